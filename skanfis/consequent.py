@@ -1,0 +1,153 @@
+r"""The THEN parts of the rules, which are linear, and the ridge regression that finds them.
+
+Conventions
+-----------
+A rule's consequent is f_r(z) = beta_r . b(z) with the basis b(z) = [1, z_1, ..., z_d] (order 1) or
+[1] (order 0). The design has one column per rule and basis function, Phi_(r, i) = w_r b_i, rules
+first; it is held transposed, shape (n_columns, n_rows), as everything that runs along rows.
+
+The local basis
+---------------
+Far from the origin the columns w_r and w_r z_j are nearly parallel. Each rule therefore has a basis
+centred and scaled where it fires, [1, (z_j - a_rj) / h_rj], with a and h the mean and the standard
+deviation of z_j weighted by w_r. Phi_local = Phi T with T block diagonal: the change costs nothing
+per row, because it is done on the Gram matrix,
+
+    Phi_local' S Phi_local = T' (Phi' S Phi) T ,
+
+and the ridge acts on the local coefficients: on the value of the rule at its centre and on its
+change over one standard deviation. T is frozen at the start of training, for the objective must be
+one and the same function throughout.
+
+Since sum_r w_r = 1, the moments behind a and h are row sums of the Gram matrix itself:
+sum_r' G[(r, i), (r', j)] = sum over rows of s w_r b_i b_j, where b_j is 1 or z_j.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+__all__ = ["LocalBasis", "RidgeFactor", "basis", "design", "rule_masses"]
+
+# A rule that fires on one spot only has no spread there; in standard deviations of the input.
+_SMALLEST_SPREAD = 0.05
+# A rule with less than this part of the data's weight has no usable moments.
+_SMALLEST_MASS = 1e-12
+
+
+def basis(Z, order):
+    """Rows [1, z_1, ..., z_d] (order 1) or [1] (order 0), shape (n_basis, n_rows)."""
+    ones = np.ones((1, Z.shape[1]))
+    return np.concatenate([ones, Z]) if order == 1 else ones
+
+
+def design(strengths, basis_rows, out=None):
+    """Phi transposed, shape (n_rules * n_basis, n_rows)."""
+    n_rules, n_rows = strengths.shape
+    n_basis = basis_rows.shape[0]
+    out = np.empty((n_rules * n_basis, n_rows)) if out is None else out
+    blocks = out.reshape(n_rules, n_basis, n_rows)
+    np.multiply(strengths[:, None, :], basis_rows[None, :, :], out=blocks)
+    return out
+
+
+def rule_masses(gram, n_rules):
+    """Part of the data's weight on which each rule fires, from the Gram matrix of the design."""
+    n_basis = gram.shape[0] // n_rules
+    return gram[::n_basis, ::n_basis].sum(axis=1)
+
+
+@dataclass(frozen=True)
+class LocalBasis:
+    """Center a and spread h of every rule's own basis, each (n_rules, n_basis - 1)."""
+
+    center: np.ndarray
+    spread: np.ndarray
+
+    @classmethod
+    def from_gram(cls, gram, n_rules):
+        """Weighted moments of the inputs under each rule, out of Phi' S Phi / sum(s)."""
+        n_basis = gram.shape[0] // n_rules
+        blocks = gram.reshape(n_rules, n_basis, n_rules, n_basis)
+        mass = blocks[:, 0, :, 0].sum(axis=1)
+        fires = mass > _SMALLEST_MASS
+        safe_mass = np.where(fires, mass, 1.0)[:, None]
+        first = blocks[:, 1:, :, 0].sum(axis=2)
+        second = np.stack([blocks[:, j, :, j].sum(axis=1) for j in range(n_basis)], axis=1)[:, 1:]
+        center = np.where(fires[:, None], first / safe_mass, 0.0)
+        variance = np.where(fires[:, None], second / safe_mass - center**2, 1.0)
+        spread = np.sqrt(np.maximum(variance, _SMALLEST_SPREAD**2))
+        return cls(center, spread)
+
+    @property
+    def n_basis(self):
+        """Functions per rule."""
+        return 1 + self.center.shape[1]
+
+    def transform_rows(self, matrix):
+        """T' M for a matrix (or vectors) with one row per column of Phi; in place."""
+        blocks = matrix.reshape(-1, self.n_basis, matrix.shape[1])
+        blocks[:, 1:] -= self.center[:, :, None] * blocks[:, :1]
+        blocks[:, 1:] /= self.spread[:, :, None]
+        return matrix
+
+    def transform_gram(self, gram):
+        """T' G T, a new array in C order."""
+        half = self.transform_rows(gram.copy())
+        return self.transform_rows(np.ascontiguousarray(half.T))
+
+    def to_local(self, coefficients):
+        """Coefficients on the local basis from those on [1, z], the inverse of to_global."""
+        blocks = coefficients.reshape(-1, self.n_basis, coefficients.shape[1]).copy()
+        blocks[:, 0] += np.einsum("rj,rjo->ro", self.center, blocks[:, 1:])
+        blocks[:, 1:] *= self.spread[:, :, None]
+        return blocks.reshape(coefficients.shape)
+
+    def to_global(self, coefficients):
+        """Coefficients on [1, z] from those on the local basis: T beta, shape (n_columns, n_out)."""
+        blocks = coefficients.reshape(-1, self.n_basis, coefficients.shape[1]).copy()
+        blocks[:, 1:] /= self.spread[:, :, None]
+        blocks[:, 0] -= np.einsum("rj,rjo->ro", self.center, blocks[:, 1:])
+        return blocks.reshape(coefficients.shape)
+
+
+class RidgeFactor:
+    r"""The Cholesky factor of G + alpha I: the one factorisation behind solution and projector.
+
+    Solving with one factorisation and projecting with another makes the reduced gradient wrong as
+    soon as two rules are alike, which is an everyday case here. Where ``alpha`` is below rounding
+    (p eps max diag G), that much is added in its stead: a singular Gram matrix then has a solution
+    too, and it is of small norm.
+    """
+
+    def __init__(self, gram, alpha):
+        diagonal = np.diagonal(gram)
+        floor = gram.shape[0] * np.finfo(float).eps * diagonal.max(initial=0.0)
+        self.alpha = max(alpha, floor, np.finfo(float).tiny)
+        shifted = gram.copy()
+        shifted.flat[:: gram.shape[0] + 1] += self.alpha
+        self._lower = self._factorise(shifted)
+
+    def _factorise(self, shifted):
+        while True:
+            lower, info = linalg.lapack.dpotrf(shifted, lower=1, clean=1)
+            if info == 0:
+                return lower
+            # Rounding has made the sum of a semi-definite matrix and the floor indefinite.
+            shifted.flat[:: shifted.shape[0] + 1] += 9.0 * self.alpha
+            self.alpha *= 10.0
+
+    def solve(self, right_side):
+        """(G + alpha I)^-1 times right_side."""
+        return linalg.cho_solve((self._lower, True), right_side, check_finite=False)
+
+    def half_solve(self, right_side):
+        """L^-1 times right_side, so that (.)' (.) is the quadratic form of the inverse."""
+        return linalg.solve_triangular(self._lower, right_side, lower=True, check_finite=False)
+
+    def effective_parameters(self):
+        """Degrees of freedom, trace of G (G + alpha I)^-1."""
+        n_columns = self._lower.shape[0]
+        inverse_factor, _ = linalg.lapack.dtrtri(self._lower, lower=1)
+        return n_columns - self.alpha * np.sum(inverse_factor**2)

@@ -1,0 +1,15 @@
+"""Warnings of skanfis. Errors are ValueError, TypeError and scikit-learn's NotFittedError."""
+
+__all__ = ["ConstantInputWarning", "OutOfBoundsWarning", "UnderdeterminedWarning"]
+
+
+class ConstantInputWarning(UserWarning):
+    """An input never changes in the training data, so that nothing can be learnt of it."""
+
+
+class OutOfBoundsWarning(UserWarning):
+    """Rows asked for lie outside the box of the training data."""
+
+
+class UnderdeterminedWarning(UserWarning):
+    """There are more consequent parameters than distinct training rows."""

@@ -1,0 +1,217 @@
+r"""The trained model, frozen and in the user's units: what solvers end in and all else reads.
+
+A first-order Takagi-Sugeno-Kang model (Jang 1993),
+
+    y(x) = sum_r w_r(x) f_r(x) ,    f_r(x) = a_r + sum_j b_rj (x_j - x0_j) ,
+
+with normalised firing strengths w and consequents about a reference point x0, the mean of the
+training data: a column that lies far from the origin (a time stamp, a raw count) so loses no
+digits. :attr:`TSKModel.consequents` gives the textbook form p0 + p1 x1 + ... + pd xd.
+
+Outside the box of the training data the model follows a declared policy. Strengths are always
+those of the nearest point in the box; they sum to one everywhere, so that no policy ever gives a
+silent zero.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .antecedent import Antecedent
+
+__all__ = ["OUT_OF_BOUNDS", "TSKModel"]
+
+OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
+
+# Bytes that the intermediate results of one block of rows may take.
+_BLOCK_BYTES = 2**21
+
+
+@dataclass(frozen=True)
+class TSKModel:
+    """A frozen Takagi-Sugeno-Kang model.
+
+    Attributes
+    ----------
+    antecedent : Antecedent
+        Rule base after training.
+    initial_antecedent : Antecedent
+        Rule base before training.
+    coefficients : ndarray of shape (n_rules, n_basis, n_outputs)
+        a_r, then b_rj where the order is 1.
+    reference : ndarray of shape (n_inputs,)
+        x0, the weighted mean of the training inputs.
+    spread : ndarray of shape (n_inputs,)
+        Weighted standard deviation of the training inputs.
+    minimum, maximum : ndarray of shape (n_inputs,)
+        The box of the training data.
+    rule_weights : ndarray of shape (n_rules,)
+        Part of the training data's weight on which each rule fires; the sum is one.
+    n_training_rows : int
+        Training rows with a positive weight.
+    input_names : tuple of str
+    out_of_bounds : {"clip", "linear", "nan", "raise"}
+    """
+
+    antecedent: Antecedent
+    initial_antecedent: Antecedent
+    coefficients: np.ndarray
+    reference: np.ndarray
+    spread: np.ndarray
+    minimum: np.ndarray
+    maximum: np.ndarray
+    rule_weights: np.ndarray
+    n_training_rows: int
+    input_names: tuple[str, ...]
+    out_of_bounds: str = "clip"
+
+    @property
+    def n_rules(self):
+        """Number of rules."""
+        return self.coefficients.shape[0]
+
+    @property
+    def n_inputs(self):
+        """Number of inputs."""
+        return self.reference.size
+
+    @property
+    def n_outputs(self):
+        """Number of outputs."""
+        return self.coefficients.shape[2]
+
+    @property
+    def order(self):
+        """Order of the consequents, 0 or 1."""
+        return int(self.coefficients.shape[1] > 1)
+
+    @property
+    def consequents(self):
+        """p0, p1 .. pd of every rule in the user's units, (n_rules, 1 + n_inputs, n_outputs)."""
+        textbook = np.zeros((self.n_rules, 1 + self.n_inputs, self.n_outputs))
+        textbook[:, : self.coefficients.shape[1]] = self.coefficients
+        textbook[:, 0] -= np.einsum("j,rjo->ro", self.reference, textbook[:, 1:])
+        return textbook
+
+    def memberships(self, trained=True):
+        """Memberships in the user's units, after training or before it.
+
+        Returns
+        -------
+        list of dict
+            One per term, with keys "input" (its name), "function" and one per parameter.
+        """
+        antecedent = self.antecedent if trained else self.initial_antecedent
+        terms = []
+        for group in antecedent.groups:
+            names = [parameter.name for parameter in group.family.parameters]
+            natural = group.family.natural(group.theta)
+            for j, values in zip(group.inputs, natural.T, strict=True):
+                numbers = dict(zip(names, map(float, values), strict=True))
+                terms.append(
+                    {"input": self.input_names[j], "function": group.family.name, **numbers}
+                )
+        return terms
+
+    def in_bounds(self, X):
+        """Whether each row lies in the box of the training data, shape (n_rows,)."""
+        return ((self.minimum <= X) & (self.maximum >= X)).all(axis=1)
+
+    def strengths(self, X):
+        """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
+        return self._by_block(X, self._strengths, self.n_rules)
+
+    def predict(self, X, inside=None):
+        """Outputs, shape (n_rows, n_outputs).
+
+        ``inside`` is what :meth:`in_bounds` gives, for a caller that has it already.
+        """
+        inside = self.in_bounds(X) if inside is None else inside
+        if inside.all():
+            return self._by_block(X, self._outputs, self.n_outputs)
+        if self.out_of_bounds == "raise":
+            raise ValueError(self.describe_out_of_bounds(X))
+        if self.out_of_bounds == "linear":
+            return self._by_block(X, self._outputs_linear, self.n_outputs)
+        outputs = self._by_block(X, self._outputs_clipped, self.n_outputs)
+        if self.out_of_bounds == "nan":
+            outputs[~inside] = np.nan
+        return outputs
+
+    def coverage(self, X):
+        r"""How well the training data cover each row, from 0 (not at all) to 1, (n_rows,).
+
+        sum_r w_r(x) min(1, N_r / P) times exp(-|delta|^2 / 2): N_r is the number of training rows,
+        in effect, on which rule r fires, P the number of its coefficients, and delta the distance
+        from the box in standard deviations of each input. Zero where only rules without data
+        speak, and falling to zero away from the box.
+        """
+        rows_per_rule = self.rule_weights * self.n_training_rows
+        supported = np.minimum(1.0, rows_per_rule / self.coefficients.shape[1])
+
+        def of_block(Z):
+            inside = self._clip(Z)
+            outside = (Z - inside) / self.spread[:, None]
+            near = np.exp(-0.5 * np.sum(outside**2, axis=0))
+            return (supported @ self.antecedent.strengths(inside) * near)[None]
+
+        return self._by_block(X, of_block, 1)[:, 0]
+
+    def describe_out_of_bounds(self, X):
+        """Say which inputs leave the box of the training data, in how many rows, and how far."""
+        parts = []
+        for j, name in enumerate(self.input_names):
+            column = X[:, j]
+            outside = (column < self.minimum[j]) | (column > self.maximum[j])
+            if outside.any():
+                parts.append(
+                    f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
+                    f"[{self.minimum[j]:.6g}, {self.maximum[j]:.6g}], "
+                    f"found [{column.min():.6g}, {column.max():.6g}])"
+                )
+        return "X lies outside the training data: " + "; ".join(parts) + "."
+
+    def with_out_of_bounds(self, policy):
+        """Return the same model with another policy."""
+        return replace(self, out_of_bounds=policy)
+
+    def _by_block(self, X, of_block, n_columns):
+        """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns)."""
+        n_rows = X.shape[0]
+        values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms
+        step = max(_BLOCK_BYTES // (8 * values_per_row), 64)
+        if n_rows <= step:
+            return of_block(np.array(X.T, dtype=float, order="C")).T
+        result = np.empty((n_rows, n_columns))
+        for start in range(0, n_rows, step):
+            Z = np.array(X[start : start + step].T, dtype=float, order="C")
+            result[start : start + step] = of_block(Z).T
+        return result
+
+    def _clip(self, Z):
+        return np.clip(Z, self.minimum[:, None], self.maximum[:, None])
+
+    def _strengths(self, Z):
+        return self.antecedent.strengths(self._clip(Z))
+
+    def _outputs(self, Z):
+        return self._combine(self.antecedent.strengths(Z), Z)
+
+    def _outputs_clipped(self, Z):
+        return self._outputs(self._clip(Z))
+
+    def _outputs_linear(self, Z):
+        """Strengths of the nearest point in the box, consequents at the row itself."""
+        return self._combine(self._strengths(Z), Z)
+
+    def _combine(self, strengths, Z):
+        if self.order == 0:
+            return self.coefficients[:, 0].T @ strengths
+        centred = Z - self.reference[:, None]
+        outputs = np.empty((self.n_outputs, Z.shape[1]))
+        for k, output in enumerate(outputs):
+            rule_outputs = self.coefficients[:, 1:, k] @ centred
+            rule_outputs += self.coefficients[:, :1, k]
+            rule_outputs *= strengths
+            rule_outputs.sum(axis=0, out=output)
+        return outputs

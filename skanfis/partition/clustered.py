@@ -1,0 +1,87 @@
+r"""Scattered rules from clusters: one rule where the data gather.
+
+Clusters are sought in standardised inputs and target together, as is the custom since genfis2
+(Chiu 1994), so that rules part where the target bends and not only where the inputs are dense. A
+rule's terms stand at the mean of its cluster; their widths are the cluster's standard deviations
+times sqrt(d), for the distance from the centre grows as sqrt(d) in d inputs and rules would
+otherwise hardly overlap.
+"""
+
+import numpy as np
+
+from ..antecedent import GridAntecedent, ScatteredAntecedent
+from ..rows import Rows
+
+__all__ = ["clustered_antecedent", "representative_rows"]
+
+# More rows than this tell a clustering nothing new.
+_MOST_ROWS = 20_000
+# Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
+_SMALLEST_WIDTH = 0.1
+# One projection of a row on these tells distinct rows apart.
+_PROJECTION_SEED = 20090101
+
+
+def _project(rows: Rows):
+    """One number per row of standardised inputs and target; the same row gives the same number."""
+    n_inputs, n_outputs = rows.X.shape[1], rows.y.shape[1]
+    factors = np.random.default_rng(_PROJECTION_SEED).standard_normal(n_inputs + n_outputs)
+    projection = np.empty(rows.n_rows)
+    for chunk in rows.chunks(_MOST_ROWS):
+        for part in chunk:
+            table = rows.table(part)
+            # Column by column, in one order: equal rows give equal numbers to the last bit.
+            projection[part] = sum(f * c for f, c in zip(factors, table.T, strict=True))
+    return projection
+
+
+def representative_rows(rows: Rows, most=_MOST_ROWS):
+    """Distinct rows of [z, y], standardised, and their weights, in an order of their own.
+
+    Beyond ``most`` rows, those at evenly spaced quantiles of the weight along a projection. Neither
+    the order of the rows nor whether one is repeated or weighted makes any difference.
+
+    Returns
+    -------
+    table : ndarray of shape (n_distinct, n_inputs + n_outputs)
+    weight : ndarray of shape (n_distinct,)
+    """
+    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+    if rows.n_rows <= most:
+        table = rows.table(slice(None))
+    else:
+        order = np.argsort(_project(rows), kind="stable")
+        upto = np.cumsum(weight[order])
+        wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
+        table = rows.table(order[np.searchsorted(upto, wanted)])
+        weight = np.ones(most)
+    distinct, group = np.unique(table, axis=0, return_inverse=True)
+    return distinct, np.bincount(group.ravel(), weights=weight)
+
+
+def clustered_antecedent(family, rows: Rows, label):
+    """A rule for every cluster that ``label(table, weight)`` finds in [z, y].
+
+    ``label`` returns one integer per row; negative ones (noise) belong to no rule. A single cluster
+    is a single rule without terms: a linear model.
+    """
+    table, weight = representative_rows(rows)
+    labels = np.asarray(label(table, weight))
+    found = np.unique(labels[labels >= 0])
+    if found.size == 0:
+        raise ValueError(
+            "partition found no cluster: every training row was labelled as noise. Give a "
+            "clusterer whose parameters fit standardised data (zero mean, unit deviation)."
+        )
+    if found.size == 1:
+        return GridAntecedent((), counts=())
+    n_inputs = rows.X.shape[1]
+    inputs = np.flatnonzero(~rows.inputs.is_constant)
+    centers, widths = np.empty((found.size, n_inputs)), np.empty((found.size, n_inputs))
+    for r, cluster in enumerate(found):
+        members, w = table[labels == cluster, :n_inputs], weight[labels == cluster]
+        centers[r] = np.average(members, axis=0, weights=w)
+        widths[r] = np.sqrt(np.average((members - centers[r]) ** 2, axis=0, weights=w))
+    widths = np.maximum(widths, _SMALLEST_WIDTH) * np.sqrt(inputs.size)
+    theta = family.from_center_and_width(centers[:, inputs], widths[:, inputs])
+    return ScatteredAntecedent.build(family, inputs, theta)

@@ -1,0 +1,123 @@
+"""How many terms and rules: what the user asked for, what fits into memory, what data can carry."""
+
+from collections.abc import Sequence
+from math import prod
+from numbers import Integral
+
+import numpy as np
+
+from ..rows import Rows
+
+__all__ = [
+    "GridSize",
+    "automatic_counts",
+    "automatic_n_rules",
+    "count_distinct_inputs",
+    "term_counts",
+]
+
+# Distinct training rows per consequent parameter below which "auto" makes a smaller model.
+ROWS_PER_PARAMETER = 10
+# Most consequent parameters that "auto" gives a grid: a pass over the data grows with the square.
+MOST_PARAMETERS = 256
+# Most scattered rules by "auto"; more than a handful of them seldom pays (docs, choosing).
+MOST_RULES = 5
+_READ_ROWS = 4096
+_PROJECTION_SEED = 19930501
+
+
+class GridSize:
+    """What a full grid amounts to, found without building any of it.
+
+    Parameters
+    ----------
+    counts : sequence of int
+        Terms per input.
+    n_basis, n_outputs : int
+        Coefficients per rule and output; outputs.
+    """
+
+    def __init__(self, counts: Sequence[int], n_basis: int, n_outputs: int = 1):
+        self.n_rules = prod(counts)
+        self.n_columns = self.n_rules * n_basis
+        side = self.n_columns + n_outputs
+        terms = sum(count for count in counts if count > 1)
+        # Gram matrix, its local form, its factor and one copy; the table of terms against rules.
+        self.n_bytes = 8 * (4 * side**2 + terms * self.n_rules)
+
+    def check_fits(self, n_mfs, limit, names):
+        """Raise ValueError where training would need more than ``limit`` bytes."""
+        if self.n_bytes <= limit:
+            return
+        smallest = 2 ** len(names)
+        hint = f"n_mfs=2 makes {smallest:,} rules, " if smallest < self.n_rules else ""
+        raise ValueError(
+            f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {self.n_rules:,} rules with "
+            f"{self.n_columns:,} consequent parameters; training it would take "
+            f"{_bytes(self.n_bytes)}, and the limit is {_bytes(limit)} "
+            "(sklearn.set_config(working_memory=...), in MiB). Use fewer terms: "
+            f"{hint}or give one number per input, 1 for an input that needs no fuzzy terms; or use "
+            "scattered rules, whose number does not grow with the inputs: partition=KMeans("
+            "n_clusters=...)."
+        )
+
+
+def _bytes(number):
+    for unit in ("bytes", "kB", "MB", "GB", "TB", "PB"):
+        if number < 1000 or unit == "PB":
+            return f"{number:,.3g} {unit}" if number < 1e6 else f"{float(number):.3g} {unit}"
+        number /= 1000
+
+
+def term_counts(n_mfs, names):
+    """``n_mfs`` as one count per input, or ValueError or TypeError that says what it must be."""
+    if isinstance(n_mfs, Integral) and not isinstance(n_mfs, bool):
+        counts = [int(n_mfs)] * len(names)
+    else:
+        if isinstance(n_mfs, str | bytes | bool) or np.ndim(n_mfs) != 1:
+            raise TypeError(
+                f"n_mfs={n_mfs!r} must be 'auto', a whole number, or one whole number per input."
+            )
+        if len(n_mfs) != len(names):
+            raise ValueError(
+                f"n_mfs={n_mfs!r} has {len(n_mfs)} entries, but X has {len(names)} columns "
+                f"({', '.join(names)}): give one number of terms per column."
+            )
+        if not all(isinstance(count, Integral) and not isinstance(count, bool) for count in n_mfs):
+            raise TypeError(f"n_mfs={n_mfs!r} must hold whole numbers only.")
+        counts = [int(count) for count in n_mfs]
+    if min(counts) < 1:
+        raise ValueError(
+            f"n_mfs={n_mfs!r} must be 1 or more everywhere; 1 means that an input has no fuzzy "
+            "terms and takes part in the consequents alone."
+        )
+    return counts
+
+
+def count_distinct_inputs(rows: Rows, enough):
+    """Number of distinct rows of X, or ``enough`` as soon as there are that many."""
+    factors = np.random.default_rng(_PROJECTION_SEED).standard_normal(rows.X.shape[1])
+    seen = np.empty(0)
+    for start in range(0, rows.n_rows, _READ_ROWS):
+        Z, _, _ = rows.read(slice(start, start + _READ_ROWS))
+        # Equal rows have equal projections to the last bit; unequal ones, all but surely not.
+        seen = np.union1d(seen, sum(f * z for f, z in zip(factors, Z, strict=True)))
+        if seen.size >= enough:
+            return enough
+    return seen.size
+
+
+def automatic_counts(is_constant, n_basis, n_distinct):
+    """The largest grid of 3, else 2, terms per input that the data can carry; None if neither."""
+    for count in (3, 2):
+        counts = [1 if constant else count for constant in is_constant]
+        n_columns = prod(counts) * n_basis
+        if n_columns <= min(MOST_PARAMETERS, n_distinct / ROWS_PER_PARAMETER):
+            return counts
+    return None
+
+
+def automatic_n_rules(n_inputs, n_basis, n_premise_parameters, n_distinct):
+    """How many scattered rules the data can carry, premises and consequents counted."""
+    per_rule = n_basis + n_premise_parameters * n_inputs
+    return int(np.clip(n_distinct // (2 * ROWS_PER_PARAMETER * per_rule), 1, MOST_RULES))

@@ -1,0 +1,138 @@
+r"""The data as the kernel sees it: standardised, transposed, one cache-sized block at a time.
+
+Inputs and target are standardised here and nowhere else, by weighted mean and standard deviation,
+so that a fit does not depend on their units. A block is read as Z (n_inputs, n_rows) and the target
+(n_outputs, n_rows), and only one block per worker exists at any time: ``X`` may be memory-mapped
+and larger than memory.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Rows", "Scale", "column_statistics"]
+
+# Rows that are read at once where no cache-sized working set asks for fewer.
+_READ_ROWS = 4096
+# Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
+# whatever the number of workers.
+_BLOCKS_PER_CHUNK = 16
+
+
+@dataclass(frozen=True)
+class Scale:
+    """z = (x - offset) / scale, per column; the range is that of the rows with weight."""
+
+    offset: np.ndarray
+    scale: np.ndarray
+    minimum: np.ndarray
+    maximum: np.ndarray
+
+    @property
+    def is_constant(self):
+        """Which columns never change."""
+        return self.minimum == self.maximum
+
+    def apply(self, columns, out):
+        """Standardise columns (n_columns, n_rows) into ``out``."""
+        np.subtract(columns, self.offset[:, None], out=out)
+        out /= self.scale[:, None]
+        return out
+
+
+def _slices(n_rows, length):
+    return [slice(start, min(start + length, n_rows)) for start in range(0, n_rows, length)]
+
+
+def column_statistics(values, sample_weight=None):
+    """The :class:`Scale` of every column of ``values`` (n_rows, n_columns), in two passes.
+
+    The variance is taken about the mean, in a second pass: columns far from the origin lose no
+    digits. A constant column has scale one.
+    """
+    parts = _slices(values.shape[0], _READ_ROWS)
+    n_columns = values.shape[1]
+    total, first = 0.0, np.zeros(n_columns)
+    minimum, maximum = np.full(n_columns, np.inf), np.full(n_columns, -np.inf)
+    # Sums are of differences from the first row, for the same reason.
+    origin = np.array(values[0], dtype=float)
+    for part in parts:
+        block = np.asarray(values[part], dtype=float)
+        weight = _weights_of(sample_weight, part, block.shape[0])
+        total += weight.sum()
+        first += weight @ (block - origin)
+        np.minimum(minimum, block.min(axis=0), out=minimum)
+        np.maximum(maximum, block.max(axis=0), out=maximum)
+    mean = origin + first / total
+    second = np.zeros(n_columns)
+    for part in parts:
+        block = np.asarray(values[part], dtype=float)
+        weight = _weights_of(sample_weight, part, block.shape[0])
+        second += weight @ (block - mean) ** 2
+    scale = np.sqrt(second / total)
+    constant = minimum == maximum
+    return Scale(
+        np.where(constant, minimum, mean),
+        np.where(constant | (scale == 0.0), 1.0, scale),
+        minimum,
+        maximum,
+    )
+
+
+def _weights_of(sample_weight, part, n_rows):
+    return np.ones(n_rows) if sample_weight is None else sample_weight[part]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, and the scales of both."""
+
+    X: np.ndarray
+    y: np.ndarray
+    sample_weight: np.ndarray | None
+    inputs: Scale
+    targets: Scale
+
+    @classmethod
+    def standardised(cls, X, y, sample_weight=None):
+        """Rows with the scales found from the data; every weight must be positive."""
+        return cls(
+            X,
+            y,
+            sample_weight,
+            column_statistics(X, sample_weight),
+            column_statistics(y, sample_weight),
+        )
+
+    @property
+    def n_rows(self):
+        return self.X.shape[0]
+
+    @property
+    def total_weight(self):
+        """Sum of the weights; the number of rows where there are none."""
+        if self.sample_weight is None:
+            return float(self.n_rows)
+        return float(np.sum(self.sample_weight))
+
+    def chunks(self, block_rows):
+        """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
+        blocks = _slices(self.n_rows, block_rows)
+        step = _BLOCKS_PER_CHUNK
+        return [blocks[start : start + step] for start in range(0, len(blocks), step)]
+
+    def table(self, part):
+        """Standardised [z, y] of some rows, (n_rows, n_inputs + n_outputs), weights left out."""
+        inputs = (self.X[part] - self.inputs.offset) / self.inputs.scale
+        return np.hstack([inputs, (self.y[part] - self.targets.offset) / self.targets.scale])
+
+    def read(self, part):
+        """Z, standardised target and square root of the weights (or None) of one block."""
+        X, y = self.X[part], self.y[part]
+        Z = self.inputs.apply(X.T, np.empty((X.shape[1], X.shape[0])))
+        target = self.targets.apply(y.T, np.empty((y.shape[1], y.shape[0])))
+        if self.sample_weight is None:
+            return Z, target, None
+        root_weight = np.sqrt(self.sample_weight[part])
+        target *= root_weight
+        return Z, target, root_weight

@@ -1,0 +1,151 @@
+r"""Variable projection: trust-region Gauss-Newton steps on the reduced problem, within a box.
+
+With g and H the gradient and Gauss-Newton matrix of the reduced cost F by the premises'
+displacements x, the step minimises the model
+
+    m(s) = g's + s'Hs / 2    over |s| <= radius ,
+
+exactly, from the eigenvalues of H, among the displacements that are free to move (a displacement at
+a bound whose gradient points outward is not); what would then leave the box is put on its edge.
+With rho the ratio of the actual decrease to the model's, the radius falls to a quarter of the step
+where rho < 1/4 and doubles where rho > 3/4 and the step ends on the region's edge; the step is
+taken where rho > 1e-4 (Nocedal and Wright 2006, algorithm 4.1 and section 4.3).
+
+A rejected step costs one pass over the data, an accepted one two (see ``objective``).
+
+``stiffness`` adds stiffness/2 |x|^2 to the cost, which draws the premises to their start. There is
+nothing to choose otherwise: displacements have no unit, so that one radius serves all problems.
+"""
+
+import numpy as np
+
+from .result import SolverResult
+
+__all__ = ["trust_region_step", "varpro"]
+
+# Displacements are in spacings and logarithms: steps beyond about a third of a spacing skip from
+# one arrangement of the terms to another, and the bad minima are met that way.
+_FIRST_RADIUS = 0.3
+_LARGEST_RADIUS = 1.0
+_SMALLEST_RADIUS = 1e-9
+_ACCEPTED_RATIO = 1e-4
+# Steps up to this much longer than the radius count as on its edge.
+_LENGTH_SLACK = 1.01
+_MOST_NEWTON_STEPS = 50
+# The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
+_GRADIENT_FACTOR = 1e-2
+
+
+def trust_region_step(gradient, hessian, radius):
+    """Minimise g's + s'Hs/2 over |s| <= radius, with H positive semi-definite up to rounding."""
+    values, vectors = np.linalg.eigh(hessian)
+    slope = vectors.T @ gradient
+    size = np.linalg.norm(slope)
+    if size == 0.0:
+        return np.zeros_like(gradient)
+    # Curvature below rounding is noise; a damping of |g| / radius alone bounds the step's length,
+    # and no smaller than what the largest curvature leaves of it can be needed.
+    values = np.maximum(values, 0.0)
+    damping = max(size / radius - values[-1], 0.0)
+    rounding = values.size * np.finfo(float).eps * max(values[-1], size / radius)
+    values += rounding
+    for _ in range(_MOST_NEWTON_STEPS):
+        step = slope / (values + damping)
+        length = np.linalg.norm(step)
+        if length <= _LENGTH_SLACK * radius:
+            break
+        # Newton on 1 / |s(damping)| = 1 / radius, which converges from this side without overshoot.
+        damping += (length / radius - 1.0) * length**2 / np.sum(step**2 / (values + damping))
+    return -vectors @ step
+
+
+class _ReducedCost:
+    """F(x) + stiffness/2 |x|^2 over displacements."""
+
+    def __init__(self, problem, premise, stiffness):
+        self.problem, self.premise, self.stiffness = problem, premise, stiffness
+
+    def evaluate(self, x, reference=None):
+        evaluation = self.problem.evaluate(self.premise.parameters(x), reference)
+        return evaluation, evaluation.cost + 0.5 * self.stiffness * (x @ x)
+
+    def linearise(self, x, evaluation):
+        raw = self.problem.linearise(evaluation)
+        gradient, hessian = self.premise.pull_back(x, raw.gradient, raw.gauss_newton)
+        return gradient + self.stiffness * x, hessian + self.stiffness * np.eye(x.size)
+
+
+def _free(x, gradient, premise):
+    """Displacements that a descent may move without leaving the box."""
+    stuck_low = (x <= premise.lower) & (gradient > 0.0)
+    stuck_high = (x >= premise.upper) & (gradient < 0.0)
+    return ~(stuck_low | stuck_high)
+
+
+def _propose(x, gradient, hessian, radius, premise, free):
+    """A step within box and region, and the decrease that the model promises."""
+    step = np.zeros_like(x)
+    step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius)
+    step = np.clip(x + step, premise.lower, premise.upper) - x
+    return step, -(gradient @ step + 0.5 * step @ hessian @ step)
+
+
+def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None):
+    """Minimise the reduced cost over the premises.
+
+    Parameters
+    ----------
+    problem : SeparableProblem
+    premise : Premise
+    max_iter : int
+        Most iterations (accepted steps).
+    tol : float
+        Stop when expected and actual relative decrease of the cost stay below ``tol`` twice.
+    stiffness : float
+        Weight of the pull of the premises to their start.
+    start : ndarray of shape (premise.size,), optional
+        Displacements to start from, inside the box; zero if not given.
+    on_iteration : callable, optional
+        Called with (n_iter, evaluation) after every accepted step.
+
+    Returns
+    -------
+    SolverResult
+    """
+    cost_of = _ReducedCost(problem, premise, stiffness)
+    x = np.zeros(premise.size) if start is None else start
+    current, cost = cost_of.evaluate(x)
+    loss_curve = [current.mean_squared_error]
+    status = "max_iter" if premise.size else "no_premise"
+    radius, settled, n_iter = _FIRST_RADIUS, 0, 0
+    while premise.size and n_iter < max_iter:
+        gradient, hessian = cost_of.linearise(x, current)
+        free = _free(x, gradient, premise)
+        if np.abs(gradient[free]).max(initial=0.0) <= _GRADIENT_FACTOR * tol * cost:
+            status = "gradient"
+            break
+        while True:
+            step, expected = _propose(x, gradient, hessian, radius, premise, free)
+            length = np.linalg.norm(step)
+            trial, trial_cost = cost_of.evaluate(x + step, current.coefficients)
+            ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
+            accepted = ratio > _ACCEPTED_RATIO
+            if not ratio >= 0.25:  # also where the trial is not finite
+                radius = 0.25 * min(length, radius)
+            elif ratio > 0.75 and length > 0.9 * radius:
+                radius = min(2.0 * radius, _LARGEST_RADIUS)
+            if accepted or radius < _SMALLEST_RADIUS:
+                break
+        if not accepted:
+            status = "step"
+            break
+        decrease = cost - trial_cost
+        x, current, cost, n_iter = x + step, trial, trial_cost, n_iter + 1
+        loss_curve.append(current.mean_squared_error)
+        if on_iteration is not None:
+            on_iteration(n_iter, current)
+        settled = settled + 1 if max(decrease, expected) <= tol * cost else 0
+        if settled == 2:
+            status = "cost"
+            break
+    return SolverResult(current, np.array(loss_curve), n_iter, status)
