@@ -1,4 +1,4 @@
-"""Data sets: a gyroscope, real (one printed table) and simulated, and the benchmarks of Jang 1993."""
+"""Data sets: gyros, real (one printed table) and simulated, and the benchmarks of Jang 1993."""
 
 from ._jang import make_jang_sinc, make_jang_three_input, make_mackey_glass
 from ._ofog_simulator import make_ofog

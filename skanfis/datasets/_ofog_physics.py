@@ -107,7 +107,7 @@ def relative_amplitude(temperature, coefficient, curvature):
 
 
 def relative_scale_factor(deviation):
-    """Scale factor relative to the nominal one, S = 1 + e, e in ppm; IEEE 952's scale factor error."""
+    """Scale factor relative to the nominal one, S = 1 + e, with e in ppm."""
     return 1.0 + _PPM * deviation
 
 

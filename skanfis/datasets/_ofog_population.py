@@ -130,7 +130,7 @@ def draw_runs(devices, n_runs, ambient_range, max_residual_heat, random_state):
     independent draws, a device of few runs could miss half of the range.
     """
     low, high = ambient_range
-    runs = []
+    runs: list[Run] = []
     for device_id, device in enumerate(devices):
         parts = random_state.permutation(n_runs) + random_state.uniform(size=n_runs)
         ambients = low + (high - low) * parts / n_runs

@@ -42,7 +42,8 @@ def make_ofog(
     another ambient temperature, while the table steps through rates of both signs. The gyro heats
     itself, and its thermometer lags behind the coil: at one indicated temperature, the error
     depends on the time since power-on too. Beside the error, which a compensation has to learn,
-    every part of it is given, so that a compensation can be judged effect by effect.
+    every part of it is given, so that a compensation can be judged effect by effect. A compensator
+    at work in a gyro has the columns time, temperature and output, and no others.
 
     The split matters. Rates are levels, held for a while and met in every run, and neighbouring
     rows are nearly equal: a random split of rows tests on what was trained on. Hold out whole runs

@@ -118,15 +118,14 @@ def load_ofog(*, return_X_y=False, as_frame=True):
     39.5906
     """
     frame = pd.DataFrame(_TABLE, columns=[*_FEATURE_NAMES, _TARGET_NAME], dtype=np.float64)
-    data, target = frame[_FEATURE_NAMES], frame[_TARGET_NAME]
-    if not as_frame:
-        frame, data, target = None, data.to_numpy(), target.to_numpy()
+    columns = frame[_FEATURE_NAMES], frame[_TARGET_NAME]
+    data, target = columns if as_frame else (column.to_numpy() for column in columns)
     if return_X_y:
         return data, target
     return Bunch(
         data=data,
         target=target,
-        frame=frame,
+        frame=frame if as_frame else None,
         feature_names=list(_FEATURE_NAMES),
         target_names=[_TARGET_NAME],
         DESCR=_DESCRIPTION,

@@ -11,6 +11,13 @@ With rho the ratio of the actual decrease to the model's, the radius falls to a 
 where rho < 1/4 and doubles where rho > 3/4 and the step ends on the region's edge; the step is
 taken where rho > 1e-4 (Nocedal and Wright 2006, algorithm 4.1 and section 4.3).
 
+To the curvature that a step sees is added what keeps rounding errors from deciding it. Normalised
+strengths do not change at all along some directions (two Gaussian terms have four parameters, their
+log ratio has three coefficients), and hardly along others: slope and curvature are both noise
+there, and so would their ratio be. The addition is a small part of the largest curvature, plus the
+curvature with which moving by one must pay: a decrease of the cost by 50 tol of itself. Two fits to
+the same data in other units so take the same path (tests/test_invariance.py).
+
 A rejected step costs one pass over the data, an accepted one two (see ``objective``).
 
 ``stiffness`` adds stiffness/2 |x|^2 to the cost, which draws the premises to their start. There is
@@ -32,23 +39,25 @@ _ACCEPTED_RATIO = 1e-4
 # Steps up to this much longer than the radius count as on its edge.
 _LENGTH_SLACK = 1.01
 _MOST_NEWTON_STEPS = 50
+# Added to every curvature: this part of the largest, and this times tol times the cost.
+_SMALLEST_CURVATURE = 1e-6
+_WORTH = 100.0
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
 _GRADIENT_FACTOR = 1e-2
 
 
-def trust_region_step(gradient, hessian, radius):
-    """Minimise g's + s'Hs/2 over |s| <= radius, with H positive semi-definite up to rounding."""
+def trust_region_step(gradient, hessian, radius, damping=0.0):
+    """Minimise g's + s'(H + damping I)s/2 over |s| <= radius (1 %), H positive semi-definite."""
     values, vectors = np.linalg.eigh(hessian)
     slope = vectors.T @ gradient
     size = np.linalg.norm(slope)
     if size == 0.0:
         return np.zeros_like(gradient)
-    # Curvature below rounding is noise; a damping of |g| / radius alone bounds the step's length,
-    # and no smaller than what the largest curvature leaves of it can be needed.
+    # A damping of |g| / radius alone bounds the step's length, and no smaller one than what the
+    # largest curvature leaves of it can be needed.
     values = np.maximum(values, 0.0)
+    values += damping + _SMALLEST_CURVATURE * max(values[-1], np.finfo(float).tiny)
     damping = max(size / radius - values[-1], 0.0)
-    rounding = values.size * np.finfo(float).eps * max(values[-1], size / radius)
-    values += rounding
     for _ in range(_MOST_NEWTON_STEPS):
         step = slope / (values + damping)
         length = np.linalg.norm(step)
@@ -82,10 +91,10 @@ def _free(x, gradient, premise):
     return ~(stuck_low | stuck_high)
 
 
-def _propose(x, gradient, hessian, radius, premise, free):
+def _propose(x, gradient, hessian, premise, free, radius, damping):
     """A step within box and region, and the decrease that the model promises."""
     step = np.zeros_like(x)
-    step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius)
+    step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius, damping)
     step = np.clip(x + step, premise.lower, premise.upper) - x
     return step, -(gradient @ step + 0.5 * step @ hessian @ step)
 
@@ -125,7 +134,7 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
             status = "gradient"
             break
         while True:
-            step, expected = _propose(x, gradient, hessian, radius, premise, free)
+            step, expected = _propose(x, gradient, hessian, premise, free, radius, _WORTH * tol * cost)
             length = np.linalg.norm(step)
             trial, trial_cost = cost_of.evaluate(x + step, current.coefficients)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf

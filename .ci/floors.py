@@ -1,0 +1,33 @@
+"""Print pip constraints that hold every dependency in pyproject.toml at its floor.
+
+Run it with the Python that the pins are for: its version has a floor too.
+"""
+
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
+
+
+def floor(requirement):
+    """Name and version of "name>=version", the one form that dependencies are written in."""
+    match = re.fullmatch(r"([\w.-]+)\s*>=\s*([\w.]+)", requirement)
+    if match is None:
+        sys.exit(f"{PYPROJECT.name}: {requirement!r} has no floor of the form name>=version")
+    return match.groups()
+
+
+def main():
+    project = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["project"]
+    (_, python_floor) = floor("python" + project["requires-python"])
+    running = ".".join(map(str, sys.version_info[:2]))
+    if running != python_floor:
+        sys.exit(f"the floors are tested on Python {python_floor}, this is {running}")
+    for requirement in project["dependencies"] + project["optional-dependencies"]["plot"]:
+        print("==".join(floor(requirement)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+# Every target makes the virtual environment that it needs, once, and again when pyproject.toml
+# changes. PYTHON=... chooses the interpreter, WORKERS=... the number of test processes.
+
+MINIMUM := $(shell sed -n 's/^requires-python *= *">= *\([0-9.]*\)"$$/\1/p' pyproject.toml)
+
+comma := ,
+# $(call check-python,RELATION): exits with success if Python stands in this relation to the minimum
+# and can make environments.
+check-python = import sys, ensurepip, venv; \
+	sys.exit(not sys.version_info[:2] $(1) ($(subst .,$(comma),$(MINIMUM))))
+# $(call find-python,RELATION,COMMANDS): the first of the commands that passes the check.
+find-python = $(shell for python in $(2); do \
+	$$python -c '$(call check-python,$(1))' 2>/dev/null && echo $$python && break; done)
+
+PYTHON ?= $(call find-python,>=,python3 python$(MINIMUM) python3.12 python3.13 python3.14 python)
+# The floors have wheels for the oldest Python only.
+FLOORS_PYTHON ?= $(call find-python,==,python$(MINIMUM) $(PYTHON) python3)
+WORKERS ?= auto
+
+DEMO := .venv
+DEV := .venv-dev
+FLOORS := .venv-floors
+DOCS := .venv-docs
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_QUIET := 1
+export MPLBACKEND := Agg
+
+# $(call make-venv,FOLDER,PYTHON,RELATION): the pip of an older Python knows no dependency groups.
+define make-venv
+	@$(or $(2),false) -c '$(call check-python,$(3))' 2>/dev/null || { echo "This needs Python $(3) $(MINIMUM)" \
+		"with the modules venv and ensurepip; $(or $(2),no command found) is not that." \
+		"Name one with PYTHON=... (for the floors FLOORS_PYTHON=...)."; exit 1; }
+	$(2) -m venv --clear $(1)
+	$(1)/bin/python -m pip install --upgrade "pip>=25.1"
+endef
+
+# One BLAS thread per test process: more would only compete for the same cores. No more processes
+# than four where their number is left open: each pays for its imports.
+pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
+
+# Runs the script argv[1] and saves the figures that it leaves open in the folder argv[2].
+define RUN_AND_SAVE
+import runpy, sys
+from pathlib import Path
+import matplotlib.pyplot as plt
+script, folder = map(Path, sys.argv[1:])
+plt.show = lambda *args, **kwargs: None
+runpy.run_path(str(script), run_name="__main__")
+folder.mkdir(exist_ok=True)
+for number in plt.get_fignums():
+    picture = folder.resolve() / f"{script.stem}_{number}.png"
+    plt.figure(number).savefig(picture, dpi=150)
+    print("Picture:", picture)
+endef
+export RUN_AND_SAVE
+
+.PHONY: help demo test lint format test-floors wheel test-wheel docs benchmarks clean
+
+help:
+	@echo "make demo         run the gyro example and save its pictures in figures/"
+	@echo "make test         all tests and docstring examples, newest dependencies"
+	@echo "make lint         style, format, types"
+	@echo "make format       put style and format right where a tool can"
+	@echo "make test-floors  all tests at the oldest dependencies that pyproject.toml allows"
+	@echo "make test-wheel   all tests against the built wheel, away from the source"
+	@echo "make wheel        sdist and wheel, in dist/"
+	@echo "make docs         the documentation, in docs/_build/html"
+	@echo "make benchmarks   all benchmarks"
+	@echo "make clean        remove environments and everything that was built"
+
+$(DEMO)/.installed: pyproject.toml
+	$(call make-venv,$(DEMO),$(PYTHON),>=)
+	$(DEMO)/bin/python -m pip install --editable ".[plot]"
+	@touch $@
+
+$(DEV)/.installed: pyproject.toml
+	$(call make-venv,$(DEV),$(PYTHON),>=)
+	$(DEV)/bin/python -m pip install --editable ".[plot]" --group dev
+	@touch $@
+
+$(FLOORS)/.installed: pyproject.toml .ci/floors.py
+	$(call make-venv,$(FLOORS),$(FLOORS_PYTHON),==)
+	$(FLOORS)/bin/python .ci/floors.py > $(FLOORS)/floors.txt
+	$(FLOORS)/bin/python -m pip install --editable ".[plot]" --group test --constraint $(FLOORS)/floors.txt
+	@touch $@
+
+$(DOCS)/.installed: pyproject.toml
+	$(call make-venv,$(DOCS),$(PYTHON),>=)
+	$(DOCS)/bin/python -m pip install --editable ".[docs]"
+	@touch $@
+
+demo: $(DEMO)/.installed
+	$(DEMO)/bin/python -c "$$RUN_AND_SAVE" examples/plot_gyro_compensation.py figures
+
+test: $(DEV)/.installed
+	$(call pytest,$(DEV))
+
+lint: $(DEV)/.installed
+	$(DEV)/bin/ruff check
+	$(DEV)/bin/ruff format --check
+	$(DEV)/bin/mypy
+
+format: $(DEV)/.installed
+	$(DEV)/bin/ruff check --fix
+	$(DEV)/bin/ruff format
+
+test-floors: $(FLOORS)/.installed
+	@echo "The floors:" $$(cat $(FLOORS)/floors.txt)
+	$(call pytest,$(FLOORS))
+
+wheel: $(DEV)/.installed
+	rm -rf dist
+	$(DEV)/bin/python -m build --outdir dist
+
+# The tests read pyproject.toml for pytest's settings and docs/api.rst for the names it lists.
+test-wheel: wheel
+	@set -e; away=$$(mktemp -d); trap 'rm -rf "$$away"' EXIT; trap 'exit 1' INT TERM; \
+	mkdir "$$away/docs"; cp -R tests pyproject.toml "$$away"; cp docs/api.rst "$$away/docs"; \
+	wheel=$$(ls "$$PWD"/dist/*.whl); \
+	$(DEV)/bin/python -m venv "$$away/venv"; cd "$$away"; \
+	venv/bin/python -m pip install --upgrade "pip>=25.1"; \
+	venv/bin/python -m pip install "$$wheel[plot]" --group test; \
+	venv/bin/python -c "import skanfis; print('Testing', skanfis.__file__)"; \
+	$(call pytest,venv) tests --pyargs skanfis
+
+docs: $(DOCS)/.installed
+	$(DOCS)/bin/python -m sphinx --fail-on-warning --keep-going docs docs/_build/html
+	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"
+
+benchmarks: $(DEV)/.installed
+	$(DEV)/bin/python -m benchmarks
+
+clean:
+	rm -rf $(DEMO) $(DEV) $(FLOORS) $(DOCS) build dist figures
+	rm -rf .mypy_cache .pytest_cache .ruff_cache
+	rm -rf docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst
+	find skanfis tests examples benchmarks docs -type d -name __pycache__ -exec rm -rf {} +

@@ -1,0 +1,36 @@
+"""Configuration of Sphinx; every option that is not set has its default."""
+
+import skanfis
+
+project = "skanfis"
+author = "The skanfis developers"
+copyright = author
+version = release = skanfis.__version__
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "numpydoc",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build"]
+templates_path = ["_templates"]
+default_role = "literal"
+
+autosummary_generate = True
+# The tables of methods come from the template of autosummary.
+numpydoc_show_class_members = False
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "auto_examples",
+    "image_scrapers": ("matplotlib",),
+    "abort_on_example_error": True,
+    "min_reported_time": 1,
+    "show_memory": False,
+}
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"skanfis {version}"
+html_theme_options = {"show_prev_next": False}

@@ -1,0 +1,189 @@
+"""Imports point one way: the layers of the package as a table, held against its source."""
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+
+import skanfis
+
+PACKAGE = Path(skanfis.__file__).parent
+
+# From the bottom to the top; each may import those before it.
+KERNEL = [
+    "exceptions",
+    "membership",
+    "antecedent",
+    "consequent",
+    "rows",
+    "objective",
+    "premise",
+    "model",
+    "solvers",
+]
+
+NUMERIC = ["numpy", "scipy"]
+LEARNING = [*NUMERIC, "sklearn", "joblib", "threadpoolctl"]
+PLOTTING = [*NUMERIC, "sklearn", "matplotlib"]
+
+# Layer (module or subpackage): the layers of skanfis that it may import, the packages that it may
+# import. PUBLIC is the package itself, to others the names that it exports.
+PUBLIC = "__init__"
+TABLE = {
+    **{layer: (KERNEL[:place], NUMERIC) for place, layer in enumerate(KERNEL)},
+    "_sklearn": ([], LEARNING),
+    "_validation": (["_sklearn"], LEARNING),
+    "cluster": (["_sklearn", "_validation"], LEARNING),
+    "partition": ([*KERNEL, "cluster"], [*NUMERIC, "sklearn"]),
+    "_anfis": ([*KERNEL, "partition", "_sklearn", "_validation"], LEARNING),
+    "regressor": ([*KERNEL, "partition", "_sklearn", "_validation", "_anfis"], LEARNING),
+    "classifier": ([*KERNEL, "partition", "_sklearn", "_validation", "_anfis"], LEARNING),
+    "inspection": (["model"], PLOTTING),
+    "export": (["model"], NUMERIC),
+    "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
+    "gyro": ([PUBLIC, "exceptions", "inspection", "datasets"], [*PLOTTING, "pandas"]),
+    PUBLIC: (["exceptions", "regressor", "classifier"], []),
+}
+ONLY_INSIDE_FUNCTIONS = {"matplotlib"}
+DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
+
+
+def violations(source, module):
+    """What ``source``, the module of this dotted name, does against the rules."""
+    layer = module.split(".")[1]
+    if layer not in TABLE:
+        return [f"{module} is in no layer: give {layer!r} a place in the table"]
+    tree = ast.parse(source)
+    lazy = {node for function in functions(tree) for node in ast.walk(function)}
+    found = []
+    for node in ast.walk(tree):
+        for name in imported_names(node, module):
+            found += forbidden_import(name, layer, is_lazy=node in lazy)
+        if is_private_sklearn(dotted(node)) and layer != DOOR_TO_PRIVATE_SKLEARN:
+            found.append(f"{dotted(node)} is private")
+        if isinstance(node, ast.Call) and dotted(node.func) == "print":
+            found.append("print")
+    return found
+
+
+def forbidden_import(name, layer, is_lazy):
+    """Reasons why ``layer`` may not import ``name``; none is as it should be."""
+    layers, packages = TABLE[layer]
+    top = name.partition(".")[0]
+    if top == "skanfis":
+        if layer_of(name) not in [layer, *layers]:
+            yield f"{name} is not below"
+    elif top not in sys.stdlib_module_names:
+        if top not in packages:
+            yield f"{top} is not for this layer"
+        if top in ONLY_INSIDE_FUNCTIONS and not is_lazy:
+            yield f"{top} outside a function"
+    if is_private_sklearn(name) and layer != DOOR_TO_PRIVATE_SKLEARN:
+        yield f"{name} is private"
+
+
+def layer_of(name):
+    """The layer that an imported name belongs to."""
+    parts = name.split(".")
+    return parts[1] if len(parts) > 1 and is_layer(parts[1]) else PUBLIC
+
+
+def is_layer(name):
+    """Whether skanfis.name is a module, not an object that the package exports."""
+    return name in TABLE or (PACKAGE / name).is_dir() or (PACKAGE / f"{name}.py").is_file()
+
+
+def imported_names(node, module):
+    """Full dotted names of what an import statement imports; ``module`` is where it stands."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        origin = [node.module] if node.module else []
+        if node.level:
+            origin = module.split(".")[: -node.level] + origin
+        return [".".join([*origin, alias.name]) for alias in node.names]
+    return []
+
+
+def is_private_sklearn(name):
+    """Whether a dotted name reaches behind an underscore of scikit-learn."""
+    top, *rest = name.split(".")
+    return top == "sklearn" and any(p.startswith("_") and not p.endswith("__") for p in rest)
+
+
+def dotted(node):
+    """The node as a dotted name; empty if it is none."""
+    if isinstance(node, ast.Name):
+        return node.id
+    if isinstance(node, ast.Attribute):
+        owner = dotted(node.value)
+        return owner and f"{owner}.{node.attr}"
+    return ""
+
+
+def functions(tree):
+    """Every function in the tree."""
+    return [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+
+
+def module_name(path):
+    """Dotted name by which relative imports count: a package ends in .__init__."""
+    return ".".join(["skanfis", *path.relative_to(PACKAGE).with_suffix("").parts])
+
+
+SOURCES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+@pytest.mark.parametrize("module", SOURCES)
+def test_module_keeps_to_its_layer(module):
+    assert violations(SOURCES[module].read_text(encoding="utf-8"), module) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("skanfis.exceptions", "from . import rows"),
+        ("skanfis.membership", "from .antecedent import Antecedent"),
+        ("skanfis.rows", "from . import objective"),
+        ("skanfis.objective", "from skanfis.solvers.varpro import varpro"),
+        ("skanfis.objective", "import skanfis.solvers"),
+        ("skanfis.solvers.varpro", "from ..partition import grid"),
+        ("skanfis.solvers.__init__", "from ..partition import grid"),
+        ("skanfis.model", "import pandas"),
+        ("skanfis.model", "def f():\n    from sklearn.base import clone"),
+        ("skanfis.partition.grid", "from .._anfis import fit"),
+        ("skanfis.datasets._jang", "from ..membership import Bell"),
+        ("skanfis.regressor", "import pandas as pd"),
+        ("skanfis.regressor", "from sklearn.utils._param_validation import Interval"),
+        ("skanfis.regressor", "from sklearn.utils import _safe_indexing"),
+        ("skanfis.regressor", "import sklearn\nsklearn.utils._safe_indexing"),
+        ("skanfis.gyro.report", "from skanfis.model import TSKModel"),
+        ("skanfis.gyro.report", "from .. import model"),
+        ("skanfis.gyro.report", "import matplotlib.pyplot as plt"),
+        ("skanfis.gyro.report", "class Report:\n    from matplotlib import pyplot"),
+        ("skanfis.inspection.surface", "print('done')"),
+        ("skanfis.somewhere", ""),
+        ("skanfis.regressor", "import somewhere"),
+    ],
+)
+def test_checker_finds(module, source):
+    assert len(violations(source, module)) == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("skanfis.membership", "import numpy as np\nfrom abc import ABC"),
+        ("skanfis.solvers.varpro", "from ..objective import Evaluation\nfrom .result import X"),
+        ("skanfis.partition.grid", "from ..antecedent import GridAntecedent"),
+        ("skanfis.regressor", "from sklearn import __version__"),
+        ("skanfis._sklearn", "from sklearn.utils._param_validation import Interval"),
+        ("skanfis.gyro.report", "from skanfis import ANFISRegressor"),
+        ("skanfis.gyro.report", "from .. import ANFISRegressor"),
+        ("skanfis.gyro.report", "def plot():\n    from matplotlib import pyplot"),
+        ("skanfis.__init__", "from .regressor import ANFISRegressor"),
+    ],
+)
+def test_checker_lets_pass(module, source):
+    assert violations(source, module) == []

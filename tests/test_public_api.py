@@ -1,0 +1,79 @@
+"""Every public name has a full docstring with an example, and a place in the documentation."""
+
+import inspect
+import re
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import skanfis
+
+PUBLIC_MODULES = ["skanfis", "skanfis.datasets"]
+API_PAGE = Path(__file__).parents[1] / "docs" / "api.rst"
+
+
+def exports(module):
+    return import_module(module).__all__
+
+
+def public_names():
+    """Dotted names of the classes and functions that the public modules export."""
+    exported = [f"{module}.{name}" for module in PUBLIC_MODULES for name in exports(module)]
+    return [name for name in exported if callable(resolve(name))]
+
+
+def resolve(dotted_name):
+    module, _, name = dotted_name.rpartition(".")
+    return getattr(import_module(module), name)
+
+
+def sections(docstring):
+    """Sections of a numpydoc docstring by title; the text before the first is the summary."""
+    parts = re.split(r"^(\S.*)\n-{3,}$", inspect.cleandoc(docstring or ""), flags=re.MULTILINE)
+    return {"Summary": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
+
+
+def described(section):
+    """Names described in a section, which stand at the start of a line: ``a, b : float``."""
+    heads = [line.partition(":")[0] for line in section.splitlines() if re.match(r"[\w*]", line)]
+    return [name.strip(" *") for head in heads for name in head.split(",")]
+
+
+def listed_on_api_page():
+    """Dotted names in the autosummary tables of the API page."""
+    module, listed = "", []
+    for line in API_PAGE.read_text(encoding="utf-8").splitlines():
+        if match := re.match(r"\.\. currentmodule:: (\S+)", line):
+            module = match[1]
+        elif match := re.fullmatch(r" +(\w+)", line):
+            listed.append(f"{module}.{match[1]}")
+    return listed
+
+
+@pytest.mark.parametrize("name", public_names())
+def test_docstring_is_complete(name):
+    public = resolve(name)
+    found = sections(public.__doc__)
+    assert re.match(r"\S.*\.$", found["Summary"].split("\n\n")[0], flags=re.DOTALL)
+    assert described(found.get("Parameters", "")) == list(inspect.signature(public).parameters)
+    assert inspect.isclass(public) or "Returns" in found
+    assert ">>> " in found["Examples"]
+
+
+def test_api_page_lists_every_public_name():
+    assert set(public_names()) <= set(listed_on_api_page())
+
+
+@pytest.mark.parametrize("name", listed_on_api_page())
+def test_what_the_api_page_lists_exists(name):
+    module, _, name = name.rpartition(".")
+    assert name in exports(module)
+
+
+def test_version_is_exported():
+    assert re.match(r"\d+\.\d+\.\d+", skanfis.__version__)
+
+
+def test_package_tells_type_checkers_that_it_is_typed():
+    assert Path(skanfis.__file__).with_name("py.typed").is_file()
