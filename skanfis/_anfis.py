@@ -73,7 +73,9 @@ def train(estimator, X, y, sample_weight, names):
         problem = SeparableProblem(
             rows, antecedent, estimator.order, alpha, _ordered_map(estimator.n_jobs)
         )
-        low, high = (_standardised(rows, edge) for edge in (rows.inputs.minimum, rows.inputs.maximum))
+        low, high = (
+            _standardised(rows, edge) for edge in (rows.inputs.minimum, rows.inputs.maximum)
+        )
         result = SOLVERS[estimator.solver](
             problem,
             Premise.of(antecedent, low, high),
@@ -126,7 +128,9 @@ def _initial_antecedent(estimator, rows, names) -> tuple[Antecedent, float]:
         GridSize(counts, n_basis, rows.y.shape[1]).check_fits(
             estimator.n_mfs, get_config()["working_memory"] * _MIB, names
         )
-        low, high = (_standardised(rows, edge) for edge in (rows.inputs.minimum, rows.inputs.maximum))
+        low, high = (
+            _standardised(rows, edge) for edge in (rows.inputs.minimum, rows.inputs.maximum)
+        )
         antecedent = grid_antecedent([family] * len(names), counts, low, high, _OVERLAP)
     elif isinstance(estimator.partition, str):
         n_premise = len(family.parameters)
@@ -209,7 +213,7 @@ def _report_constant(constant, rows, names):
     if flat:
         warnings.warn(
             f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
-            "it: it gets no fuzzy terms and no slope. Drop it, or train on data in which it varies.",
+            "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",
             ConstantInputWarning,
             stacklevel=6,
         )

@@ -28,13 +28,16 @@ def check_finite(values, what, names):
             n_bad = int(np.count_nonzero(~np.isfinite(values[:, column])))
             raise ValueError(
                 f"Input {what} contains {kind} in column {names[column]!r}, first at row "
-                f"{start + row}; {n_bad} of its {values.shape[0]} values are not finite. Drop these "
-                "rows, or impute them in a Pipeline before (sklearn.impute)."
+                f"{start + row}; {n_bad} of its {values.shape[0]} values are not finite. Drop "
+                "these rows, or impute them in a Pipeline before (sklearn.impute)."
             )
 
 
 def positive_weights(sample_weight, n_rows):
-    """Which rows have weight: a mask, or None where all have. ValueError for impossible weights."""
+    """Which rows have weight: a mask, or None where all have.
+
+    ValueError where a weight is negative, or where fewer than two rows are left.
+    """
     if np.any(sample_weight < 0):
         row = int(np.argmax(sample_weight < 0))
         raise ValueError(

@@ -19,10 +19,12 @@ derivatives then gives the sensitivity to every premise parameter.
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import groupby
+from itertools import accumulate, groupby, pairwise
 from math import prod
 
 import numpy as np
+
+from .membership import Membership
 
 __all__ = ["Antecedent", "GridAntecedent", "ScatteredAntecedent", "TermGroup"]
 
@@ -31,7 +33,7 @@ __all__ = ["Antecedent", "GridAntecedent", "ScatteredAntecedent", "TermGroup"]
 class TermGroup:
     """Consecutive terms of one family: parameters theta (n_parameters, n_terms), input of each."""
 
-    family: type
+    family: type[Membership]
     inputs: np.ndarray
     theta: np.ndarray
 
@@ -41,11 +43,18 @@ class TermGroup:
         return self.inputs.size
 
 
+def _stack(values, Z):
+    """Rows of all groups; the usual single group is not copied."""
+    if len(values) == 1:
+        return values[0]
+    return np.concatenate(values) if values else np.empty((0, Z.shape[1]))
+
+
 def _softmax_in_place(log_values):
-    """Softmax along the first axis."""
-    log_values -= log_values.max(axis=0)
+    """Softmax along the last axis but one."""
+    log_values -= np.maximum.reduce(log_values, axis=-2, keepdims=True)
     np.exp(log_values, out=log_values)
-    log_values /= log_values.sum(axis=0)
+    log_values /= np.add.reduce(log_values, axis=-2, keepdims=True)
 
 
 @dataclass(frozen=True)
@@ -99,8 +108,7 @@ class Antecedent(ABC):
 
     def log_memberships(self, Z):
         """Log mu of every term at every row, shape (n_terms, n_rows)."""
-        values = [group.family.log_value(Z[group.inputs], group.theta) for group in self.groups]
-        return values[0] if len(values) == 1 else np.concatenate(values)
+        return _stack([g.family.log_value(Z[g.inputs], g.theta) for g in self.groups], Z)
 
     def log_memberships_and_gradient(self, Z):
         """Log mu, and per group its derivatives (n_parameters, n_terms of the group, n_rows)."""
@@ -109,13 +117,20 @@ class Antecedent(ABC):
             value, gradient = group.family.log_value_and_gradient(Z[group.inputs], group.theta)
             values.append(value)
             gradients.append(gradient)
-        return (values[0] if len(values) == 1 else np.concatenate(values)), gradients
+        return _stack(values, Z), gradients
+
+    def strengths_and_shares(self, Z):
+        """Normalised firing strengths w (n_rules, n_rows), and the shares that they factor into."""
+        return self.normalise(self.log_memberships(Z))
 
     def strengths(self, Z):
         """Normalised firing strengths w, shape (n_rules, n_rows)."""
-        if not self.groups:
-            return np.ones((1, Z.shape[1]))
-        return self.normalise(self.log_memberships(Z))[0]
+        return self.strengths_and_shares(Z)[0]
+
+    @property
+    @abstractmethod
+    def share_counts(self):
+        """How many shares each factor of the strengths has: w is a product of one of each."""
 
     @abstractmethod
     def normalise(self, log_mu):
@@ -175,19 +190,28 @@ class GridAntecedent(Antecedent):
         return prod(self.counts)
 
     @property
+    def share_counts(self):
+        return self.counts
+
+    @property
     def rule_terms(self):
         return _grid_rule_terms(self.counts) if self.counts else np.empty((1, 0), dtype=int)
 
     def normalise(self, log_mu):
-        strengths, start = None, 0
-        for count in self.counts:
-            share = log_mu[start : start + count]
-            _softmax_in_place(share)
-            if strengths is None:
-                strengths = share
-            else:
-                strengths = (strengths[:, None, :] * share).reshape(-1, log_mu.shape[1])
-            start += count
+        n_rows = log_mu.shape[1]
+        if not self.counts:
+            return np.ones((1, n_rows)), log_mu
+        edges = [0, *accumulate(self.counts)]
+        shares = [log_mu[i:j] for i, j in pairwise(edges)]
+        if min(self.counts) == max(self.counts):
+            # All inputs at once: fewer calls, which is what the prediction of one row consists of.
+            _softmax_in_place(log_mu.reshape(len(shares), -1, n_rows))
+        else:
+            for share in shares:
+                _softmax_in_place(share)
+        strengths = shares[0]
+        for share in shares[1:]:
+            strengths = (strengths[:, None, :] * share).reshape(-1, n_rows)
         return strengths, log_mu
 
     def term_sensitivity(self, rule_outputs, output, shares):
@@ -215,6 +239,10 @@ class ScatteredAntecedent(Antecedent):
     @property
     def n_rules(self):
         return self.n_terms // self.n_premise_inputs
+
+    @property
+    def share_counts(self):
+        return (self.n_rules,)
 
     @property
     def rule_terms(self):

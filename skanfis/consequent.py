@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-__all__ = ["LocalBasis", "RidgeFactor", "basis", "design", "rule_masses"]
+__all__ = ["LocalBasis", "RidgeFactor", "basis", "design", "rule_masses", "rule_outputs"]
 
 # A rule that fires on one spot only has no spread there; in standard deviations of the input.
 _SMALLEST_SPREAD = 0.05
@@ -50,6 +50,13 @@ def design(strengths, basis_rows, out=None):
     blocks = out.reshape(n_rules, n_basis, n_rows)
     np.multiply(strengths[:, None, :], basis_rows[None, :, :], out=blocks)
     return out
+
+
+def rule_outputs(coefficients, strengths, basis_rows):
+    """w_r f_r (n_rules, n_rows) of one output and their sum; coefficients (n_rules, n_basis)."""
+    weighted = coefficients @ basis_rows
+    weighted *= strengths
+    return weighted, weighted.sum(axis=0)
 
 
 def rule_masses(gram, n_rules):
@@ -105,7 +112,7 @@ class LocalBasis:
         return blocks.reshape(coefficients.shape)
 
     def to_global(self, coefficients):
-        """Coefficients on [1, z] from those on the local basis: T beta, shape (n_columns, n_out)."""
+        """Coefficients on [1, z] from those on the local basis: T beta, (n_columns, n_outputs)."""
         blocks = coefficients.reshape(-1, self.n_basis, coefficients.shape[1]).copy()
         blocks[:, 1:] /= self.spread[:, :, None]
         blocks[:, 0] -= np.einsum("rj,rjo->ro", self.center, blocks[:, 1:])

@@ -23,7 +23,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-__all__ = ["Bell", "Gaussian", "MEMBERSHIPS", "Membership", "Parameter"]
+__all__ = ["MEMBERSHIPS", "Bell", "Gaussian", "Membership", "Parameter"]
 
 # Below this, (x - c)^2 / a^2 counts as zero: its logarithm stays finite, mu is exactly one.
 _SMALLEST_SQUARE = 1e-300
@@ -65,7 +65,7 @@ class Membership(ABC):
     @staticmethod
     @abstractmethod
     def start(center, spacing, overlap):
-        """Theta of terms at ``center``, ``spacing`` apart, whose neighbours cross at mu = ``overlap``."""
+        """Theta of terms at ``center``, ``spacing`` apart; neighbours cross at mu = ``overlap``."""
 
     @staticmethod
     @abstractmethod
@@ -138,7 +138,7 @@ class Gaussian(Membership):
 
 
 class Bell(Membership):
-    r"""Jang's generalised bell, mu(x) = 1 / (1 + ((x - c)^2 / a^2)^b), theta = (c, log a, log b)."""
+    r"""Jang's bell, mu(x) = 1 / (1 + ((x - c)^2 / a^2)^b), with theta = (c, log a, log b)."""
 
     name = "bell"
     parameters = (
@@ -186,4 +186,4 @@ class Bell(Membership):
         return np.stack([center, half, np.full_like(half, np.log(_FIRST_SLOPE))])
 
 
-MEMBERSHIPS = {family.name: family for family in (Gaussian, Bell)}
+MEMBERSHIPS: dict[str, type[Membership]] = {family.name: family for family in (Gaussian, Bell)}

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .antecedent import Antecedent
+from .consequent import rule_outputs
 
 __all__ = ["OUT_OF_BOUNDS", "TSKModel"]
 
@@ -122,7 +123,7 @@ class TSKModel:
         return self._by_block(X, self._strengths, self.n_rules)
 
     def predict(self, X, inside=None):
-        """Outputs, shape (n_rows, n_outputs).
+        """Outputs, shape (n_rows, n_outputs), by the policy for rows out of bounds.
 
         ``inside`` is what :meth:`in_bounds` gives, for a caller that has it already.
         """
@@ -205,13 +206,8 @@ class TSKModel:
         return self._combine(self._strengths(Z), Z)
 
     def _combine(self, strengths, Z):
-        if self.order == 0:
-            return self.coefficients[:, 0].T @ strengths
-        centred = Z - self.reference[:, None]
-        outputs = np.empty((self.n_outputs, Z.shape[1]))
-        for k, output in enumerate(outputs):
-            rule_outputs = self.coefficients[:, 1:, k] @ centred
-            rule_outputs += self.coefficients[:, :1, k]
-            rule_outputs *= strengths
-            rule_outputs.sum(axis=0, out=output)
-        return outputs
+        basis_rows = np.ones((self.coefficients.shape[1], Z.shape[1]))
+        if self.order == 1:
+            np.subtract(Z, self.reference[:, None], out=basis_rows[1:])
+        by_rule = self.coefficients.transpose(2, 0, 1)
+        return np.stack([rule_outputs(one, strengths, basis_rows)[1] for one in by_rule])

@@ -15,8 +15,8 @@ exactly, and the Schur complement of the joint Gauss-Newton matrix that of the r
 Everything is a block of one Gram matrix and adds over rows. Two passes make one iteration:
 :meth:`SeparableProblem.evaluate` accumulates Phi' S [Phi, r] and gives cost and beta, which is all
 that a rejected step needs; :meth:`SeparableProblem.linearise` accumulates D' S [D, Phi, r] at that
-very beta, so that the gradient is exact. A pass holds one block of rows per worker, whatever the
-number of rows.
+very beta, so that the gradient is exact. Phi itself is never formed (see ``gram``). A pass holds
+one block of rows per worker, whatever the number of rows.
 
 The right side is the residual of *reference* coefficients, those of the last accepted point, not y:
 the cost of a nearly exact fit would otherwise be a small difference of large numbers.
@@ -28,17 +28,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import blas
 
 from .antecedent import Antecedent
-from .consequent import LocalBasis, RidgeFactor, basis, design, rule_masses
+from .consequent import LocalBasis, RidgeFactor, basis, rule_masses, rule_outputs
+from .gram import DesignMoments
 from .rows import Rows
 
 __all__ = ["Evaluation", "Linearisation", "SeparableProblem"]
 
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
-# a call to NumPy more often; between 2^18 and 2^22, this was fastest (benchmarks/one_pass.py).
-_BLOCK_BYTES = 2**21
+# a call to NumPy more often; between 2^18 and 2^23, this was fastest (benchmarks/one_pass.py).
+_BLOCK_BYTES = 2**23
 _FEWEST_ROWS, _MOST_ROWS = 128, 4096
 
 
@@ -94,19 +94,24 @@ class SeparableProblem:
         self.n_basis = 1 + rows.X.shape[1] if order == 1 else 1
         self.n_columns = antecedent.n_rules * self.n_basis
         self.n_outputs = rows.y.shape[1]
+        self._moments = DesignMoments(antecedent.share_counts, self.n_basis)
         self._chunks = rows.chunks(self._block_rows(antecedent))
         self._weight = rows.total_weight
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
-        gram = self._gram(antecedent, no_coefficients)[: self.n_columns, : self.n_columns]
-        self.local = LocalBasis.from_gram(np.ascontiguousarray(gram), antecedent.n_rules)
+        gram, _, _ = self._first_pass(antecedent, no_coefficients)
+        self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
 
     def _block_rows(self, antecedent):
-        values_per_row = self.n_columns + antecedent.parameters.size + 4 * antecedent.n_terms
+        values_per_row = (
+            sum(self._moments.shape)
+            + antecedent.parameters.size * (1 + self.n_basis)
+            + 4 * (antecedent.n_terms + antecedent.n_rules)
+        )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
         return int(np.clip(fitting, _FEWEST_ROWS, _MOST_ROWS))
 
     def _sum_over_chunks(self, accumulate, shapes):
-        """Sum of what ``accumulate(chunk, sums)`` adds to zeroed arrays, in the chunks' order."""
+        """Sum of what ``accumulate(rows, sums)`` adds to zeroed arrays, in the chunks' order."""
 
         def of_chunk(chunk):
             sums = [np.zeros(shape, order="F") for shape in shapes]
@@ -114,105 +119,95 @@ class SeparableProblem:
                 accumulate(part, sums)
             return sums
 
-        totals = None
+        totals = [np.zeros(shape, order="F") for shape in shapes]
         for sums in self.map_ordered(of_chunk, self._chunks):
-            if totals is None:
-                totals = sums
-            else:
-                for total, one in zip(totals, sums, strict=True):
-                    total += one
+            for total, one in zip(totals, sums, strict=True):
+                total += one
         return [total / self._weight for total in totals]
 
-    def _design(self, antecedent, Z, root_weight, out=None):
-        """Weighted strengths, term log-gradient left out, and the weighted design."""
-        strengths = antecedent.strengths(Z)
-        if root_weight is not None:
-            strengths = strengths * root_weight
-        return design(strengths, basis(Z, self.order), out)
-
-    def _gram(self, antecedent, reference):
-        """[Phi, r]' S [Phi, r] / W, with r the residual of the reference coefficients."""
-        n_columns, n_all = self.n_columns, self.n_columns + self.n_outputs
+    def _first_pass(self, antecedent, reference):
+        """Phi' S Phi, Phi' S r and r' S r (per output), over W; r is the reference's residual."""
+        by_rule = reference.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
 
         def accumulate(part, sums):
-            Z, target, root_weight = self.rows.read(part)
-            stacked = np.empty((n_all, Z.shape[1]))
-            self._design(antecedent, Z, root_weight, stacked[:n_columns])
-            np.subtract(target, reference.T @ stacked[:n_columns], out=stacked[n_columns:])
-            blas.dsyrk(1.0, stacked.T, beta=1.0, c=sums[0], trans=1, lower=1, overwrite_c=1)
+            moments, slope, square = sums
+            Z, target, weight = self.rows.read(part)
+            basis_rows = basis(Z, self.order)
+            weighted_basis = basis_rows if weight is None else basis_rows * weight
+            strengths, shares = antecedent.strengths_and_shares(Z)
+            self._moments.accumulate(moments, shares, basis_rows, weighted_basis)
+            for k in range(self.n_outputs):
+                residual = target[k] - rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+                slope[:, k] += (strengths @ (weighted_basis * residual).T).ravel()
+                square[k] += weighted_basis[0] @ residual**2  # the basis begins with 1
 
-        (gram,) = self._sum_over_chunks(accumulate, [(n_all, n_all)])
-        return np.tril(gram) + np.tril(gram, -1).T
+        shapes = [self._moments.shape, reference.shape, (self.n_outputs,)]
+        moments, slope, square = self._sum_over_chunks(accumulate, shapes)
+        return self._moments.gram(moments), np.ascontiguousarray(slope), square
 
     def evaluate(self, parameters, reference=None):
         """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
-        p = self.n_columns
         if reference is None:
-            reference = np.zeros((p, self.n_outputs))
-        gram = self._gram(antecedent, reference)
-        factor = RidgeFactor(self.local.transform_gram(gram[:p, :p]), self.alpha)
+            reference = np.zeros((self.n_columns, self.n_outputs))
+        gram, slope, square = self._first_pass(antecedent, reference)
+        factor = RidgeFactor(self.local.transform_gram(gram), self.alpha)
         reference_local = self.local.to_local(reference)
-        slope = self.local.transform_rows(gram[:p, p:].copy()) - factor.alpha * reference_local
+        slope = self.local.transform_rows(slope) - factor.alpha * reference_local
         change = factor.solve(slope)
-        square = np.trace(gram[p:, p:]) + factor.alpha * np.sum(reference_local**2)
-        cost = 0.5 * (square - np.sum(slope * change))
-        local_coefficients = reference_local + change
-        penalty = factor.alpha * np.sum(local_coefficients**2)
+        at_reference = square.sum() + factor.alpha * np.sum(reference_local**2)
+        cost = 0.5 * (at_reference - np.sum(slope * change))
+        penalty = factor.alpha * np.sum((reference_local + change) ** 2)
         return Evaluation(
             antecedent,
             cost,
             reference + self.local.to_global(change),
             factor,
-            rule_masses(gram[:p, :p], antecedent.n_rules),
+            rule_masses(gram, antecedent.n_rules),
             max(2.0 * cost - penalty, 0.0),
         )
 
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
-        antecedent, coefficients = evaluation.antecedent, evaluation.coefficients
-        n_raw = antecedent.parameters.size
-        by_rule = coefficients.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
-        shapes = [(n_raw, n_raw), (n_raw, self.n_outputs)]
-        shapes += [(self.n_columns, n_raw)] * self.n_outputs
+        antecedent = evaluation.antecedent
+        n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
+        by_rule = evaluation.coefficients.reshape(n_rules, self.n_basis, self.n_outputs)
 
         def accumulate(part, sums):
             square, slope, *cross = sums
-            Z, target, root_weight = self.rows.read(part)
+            Z, target, weight = self.rows.read(part)
+            basis_rows = basis(Z, self.order)
+            weighted_basis = basis_rows if weight is None else basis_rows * weight
             log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
             strengths, shares = antecedent.normalise(log_mu)
-            if root_weight is not None:
-                strengths = strengths * root_weight
-            basis_rows = basis(Z, self.order)
-            phi = design(strengths, basis_rows)
-            sensitivity = np.empty((n_raw, Z.shape[1]))
+            n_rows = Z.shape[1]
+            sensitivity = np.empty((n_raw, n_rows))
             for k in range(self.n_outputs):
-                rule_outputs = by_rule[:, :, k] @ basis_rows
-                rule_outputs *= strengths
-                output = rule_outputs.sum(axis=0)
-                by_term = antecedent.term_sensitivity(rule_outputs, output, shares)
+                by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
+                by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
                 self._chain(gradients, by_term, sensitivity)
-                blas.dsyrk(
-                    1.0, sensitivity.T, beta=1.0, c=square, trans=1, lower=1, overwrite_c=1
-                )
-                slope[:, k] += sensitivity @ (target[k] - output)
-                blas.dgemm(
-                    1.0, phi.T, sensitivity.T, beta=1.0, c=cross[k], trans_a=1, overwrite_c=1
-                )
+                # One product for D' S Phi and, the basis beginning with 1, the weighted D itself.
+                products = sensitivity[:, None, :] * weighted_basis
+                square += products[:, 0] @ sensitivity.T
+                slope += products[:, 0] @ (target[k] - output)
+                cross[k] += products.reshape(-1, n_rows) @ strengths.T
 
-        square, slope, *cross = self._sum_over_chunks(accumulate, shapes)
-        gauss_newton = np.tril(square) + np.tril(square, -1).T
+        shapes = [(n_raw, n_raw), (n_raw,)]
+        shapes += [(n_raw * self.n_basis, n_rules)] * self.n_outputs
+        gauss_newton, slope, *cross = self._sum_over_chunks(accumulate, shapes)
         for one in cross:
-            half = evaluation.factor.half_solve(self.local.transform_rows(np.ascontiguousarray(one)))
+            by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
+            columns = np.ascontiguousarray(by_column).reshape(self.n_columns, n_raw)
+            half = evaluation.factor.half_solve(self.local.transform_rows(columns))
             gauss_newton -= half.T @ half
-        return Linearisation(-slope.sum(axis=1), gauss_newton)
+        return Linearisation(-slope, gauss_newton)
 
     @staticmethod
     def _chain(gradients, by_term, out):
         """Sensitivity to every parameter: that to log mu times its derivative, group by group."""
         row = term = 0
         for gradient in gradients:
-            n_parameters, n_terms, n_rows = gradient.shape
+            n_parameters, n_terms, _ = gradient.shape
             target = out[row : row + n_parameters * n_terms].reshape(gradient.shape)
             np.multiply(gradient, by_term[term : term + n_terms], out=target)
             row, term = row + n_parameters * n_terms, term + n_terms

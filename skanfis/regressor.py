@@ -2,6 +2,7 @@
 
 import warnings
 from numbers import Integral, Real
+from typing import ClassVar
 
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
@@ -19,9 +20,128 @@ __all__ = ["ANFISRegressor"]
 
 
 class ANFISRegressor(RegressorMixin, BaseEstimator):
-    """DOC"""
+    r"""Adaptive neuro-fuzzy inference system for regression.
 
-    _parameter_constraints = {
+    A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN
+    y = p0 + p1 temperature + p2 rate", whose outputs are averaged with the strengths at which the
+    rules fire,
+
+    .. math:: \hat y(x) = \sum_r \bar w_r(x) \, (p_{r0} + p_{r1} x_1 + \dots + p_{rd} x_d) ,
+       \qquad \bar w_r \propto \prod_j \mu_{rj}(x_j) .
+
+    Memberships and consequents are learnt together, by variable projection [2]_: the consequents
+    are the solution of a linear least-squares problem at every step, and only the memberships are
+    iterated on. Inputs and targets are standardised inside: the fit does not depend on their
+    units, and everything that comes out is in the user's units.
+
+    Parameters
+    ----------
+    n_mfs : "auto", int, or array-like of shape (n_features,), default="auto"
+        Number of membership functions (terms) per input, one number for all or one each. A number
+        makes a grid partition, with a rule for every combination of terms. 1 means that the input
+        has no fuzzy terms and takes part in the consequents alone. "auto" leaves it to
+        ``partition``.
+    partition : {"auto", "grid"} or clusterer, default="auto"
+        Where the rules come from. "grid": every combination of the terms of ``n_mfs``; with
+        ``n_mfs="auto"``, 3 or else 2 terms per input. A scikit-learn clusterer, such as
+        ``KMeans(n_clusters=5)``: one rule per cluster, with terms of its own, from clusters sought
+        in standardised inputs and targets together; ``n_mfs`` must then stay "auto". "auto": a grid
+        if the data hold ten distinct rows for each of its consequent parameters, else up to five
+        rules from k-means, as many as the data can carry.
+    mf : {"gaussian", "bell"}, default="gaussian"
+        Family of the membership functions: :math:`\exp(-(x-c)^2 / 2\sigma^2)` or Jang's
+        generalised bell :math:`1 / (1 + |(x-c)/a|^{2b})`.
+    order : {0, 1}, default=1
+        Order of the consequents: 0 is a constant per rule, 1 a linear function of all inputs.
+    solver : {"varpro"}, default="varpro"
+        How the premises are learnt. "varpro": variable projection with trust-region Gauss-Newton
+        steps.
+    alpha : "auto" or float, default="auto"
+        Ridge penalty on the consequents, zero or positive: alpha / 2 times their squared norm is
+        added to half the mean squared error of the standardised target. It acts on each rule's
+        value at its centre and on its change over one standard deviation of the inputs there.
+        "auto" is 1e-12, next to nothing, or 1e-8 where there are fewer than two distinct rows per
+        consequent parameter. Raise it (1e-6 to 1e-2) for noisy data with many rules. At zero, a
+        ridge at the level of rounding errors remains.
+    stiffness : float, default=0.0
+        Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
+        of their displacements (in spacings of terms and logarithms of widths) is added likewise.
+    max_iter : int, default=200
+        Most iterations, 1 or more.
+    tol : float, default=1e-4
+        Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
+        or when the gradient says as much. Zero or positive.
+    out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
+        What ``predict`` does with rows outside the range of the training data, input by input:
+        "clip" holds the value at the edge; "linear" holds the rules' strengths at the edge and
+        lets their consequents go on; "nan" returns NaN; "raise" raises ValueError. It is part of
+        the fitted model.
+    warn_out_of_bounds : bool, default=True
+        Whether ``predict`` warns of such rows.
+    random_state : int, RandomState instance or None, default=None
+        Seed of the clustering behind ``partition="auto"``; everything else is deterministic. None
+        stands for one fixed seed, so that the same data always give the same model. A clusterer
+        given as ``partition`` has a seed of its own.
+    n_jobs : int, default=None
+        Worker threads for the passes over the data; None is one, -1 is one per core. The result is
+        the same to the last bit for any number. It pays from some 100,000 rows on.
+
+    Attributes
+    ----------
+    model_ : skanfis.model.TSKModel
+        The frozen model, in the user's units.
+    n_rules_ : int
+        Number of rules.
+    rules_ : ndarray of shape (n_rules_, n_premise_inputs)
+        The terms of each rule: positions in ``memberships_``.
+    memberships_, initial_memberships_ : list of dict
+        Every term after training, and before: its "input", "function" and parameters ("center",
+        "width"; for a bell "slope" too), in the user's units.
+    consequents_ : ndarray of shape (n_rules_, 1 + n_features_in_[, n_outputs])
+        p0, p1, ..., pd of every rule, in the user's units.
+    n_iter_ : int
+        Iterations run; 1 where there was nothing to iterate on.
+    loss_curve_ : ndarray of shape (n_iter_ + 1,)
+        Mean squared error of the standardised target, from the start on.
+    status_ : str
+        Why the solver stopped.
+    n_features_in_ : int
+        Number of inputs.
+    feature_names_in_ : ndarray of shape (n_features_in_,)
+        Names of the inputs, where X had names that are all strings.
+
+    Warns
+    -----
+    ConvergenceWarning
+        If ``max_iter`` was reached first.
+    ConstantInputWarning
+        If an input is constant in the training data; it gets no terms and no slope.
+    UnderdeterminedWarning
+        If there are more consequent parameters than distinct training rows.
+    OutOfBoundsWarning
+        From ``predict`` and ``score``; see ``out_of_bounds``.
+
+    References
+    ----------
+    .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
+       on Systems, Man, and Cybernetics 23 (1993) 665-685.
+    .. [2] G. H. Golub and V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least
+       squares problems whose variables separate", SIAM Journal on Numerical Analysis 10 (1973)
+       413-432.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=4).fit(X, y)
+    >>> model.n_rules_
+    16
+    >>> bool(abs(model.predict(X) - y).max() < 1e-3)
+    True
+    """
+
+    _parameter_constraints: ClassVar[dict] = {
         "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
         "partition": [StrOptions({"auto", "grid"}), HasMethods(["fit", "fit_predict"])],
         "mf": [StrOptions(set(MEMBERSHIPS))],
@@ -90,6 +210,13 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         self : ANFISRegressor
+
+        Raises
+        ------
+        ValueError
+            If the data are empty, a single row, or not finite; if weights are negative or leave
+            fewer than two rows; if parameters contradict each other or the data; if the grid has
+            more rules than ``sklearn.get_config()["working_memory"]`` can hold.
         """
         X, y = validate_data(
             self,
@@ -140,29 +267,81 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             If rows lie outside the training data, unless ``warn_out_of_bounds=False``.
         """
         X = self._check_inputs(X)
-        inside = self.model_.in_bounds(X)
-        outputs = self.model_.predict(X, inside)
+        model = self.model_
+        inside = model.in_bounds(X)
+        outputs = model.predict(X, inside)
         if self.warn_out_of_bounds and not inside.all():
-            policy = self.model_.out_of_bounds
+            message = model.describe_out_of_bounds(X)
             warnings.warn(
-                f"{self.model_.describe_out_of_bounds(X)} Policy: out_of_bounds={policy!r}.",
+                f"{message} Policy: out_of_bounds={model.out_of_bounds!r}.",
                 OutOfBoundsWarning,
                 stacklevel=2,
             )
         return outputs[:, 0] if self._single_output else outputs
 
     def coverage(self, X):
-        """How well the training data cover each row, from 0 (not at all) to 1."""
+        """Tell how well the training data cover each row.
+
+        The sum over rules of strength times support, where a rule's support is the number of
+        training rows on which it fires, in effect, over the number of its coefficients, at most
+        one; times exp(-delta^2 / 2) with delta the distance from the training range in standard
+        deviations.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        coverage : ndarray of shape (n_samples,)
+            From 0, where no data speak, to 1.
+        """
         return self.model_.coverage(self._check_inputs(X))
 
     def strengths(self, X):
+        """Tell how strongly each rule fires on each row, normalised.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        strengths : ndarray of shape (n_samples, n_rules_)
+            Positive, with sum one in every row. Rows outside the training range are taken at its
+            edge.
+        """
         return self.model_.strengths(self._check_inputs(X))
 
     @property
     def n_rules_(self):
         """Number of rules."""
+        return self._fitted_model().n_rules
+
+    @property
+    def rules_(self):
+        """The terms of each rule, as positions in ``memberships_``."""
+        return self._fitted_model().antecedent.rule_terms
+
+    @property
+    def memberships_(self):
+        """Every term after training, in the user's units."""
+        return self._fitted_model().memberships()
+
+    @property
+    def initial_memberships_(self):
+        """Every term before training, in the user's units."""
+        return self._fitted_model().memberships(trained=False)
+
+    @property
+    def consequents_(self):
+        """p0, p1, ..., pd of every rule, in the user's units."""
+        consequents = self._fitted_model().consequents
+        return consequents[:, :, 0] if self._single_output else consequents
+
+    def _fitted_model(self):
         check_is_fitted(self)
-        return self.model_.n_rules
+        return self.model_
 
     def _input_names(self):
         names = getattr(self, "feature_names_in_", None)
@@ -170,8 +349,20 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
 
     def _check_inputs(self, X):
         check_is_fitted(self)
-        X = validate_data(
-            self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
-        )
+        if not self._is_plain_input(X):
+            X = validate_data(
+                self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
+            )
         check_finite(X, "X", self.model_.input_names)
         return X
+
+    def _is_plain_input(self, X):
+        """Whether X is an array in which scikit-learn's checks, half of a call, find nothing."""
+        return (
+            type(X) is np.ndarray
+            and X.dtype == np.float64
+            and X.ndim == 2
+            and X.shape[0] > 0
+            and X.shape[1] == self.n_features_in_
+            and not hasattr(self, "feature_names_in_")
+        )

@@ -10,13 +10,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Rows", "Scale", "column_statistics"]
+__all__ = ["Rows", "Scale", "column_statistics", "fingerprint"]
 
 # Rows that are read at once where no cache-sized working set asks for fewer.
 _READ_ROWS = 4096
 # Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
 # whatever the number of workers.
 _BLOCKS_PER_CHUNK = 16
+
+
+# Any fixed number would do.
+_FINGERPRINT_SEED = 20090101
+
+
+def fingerprint(columns):
+    """One number per row out of columns (n_columns, n_rows): a fixed random projection.
+
+    Equal rows have equal numbers to the last bit, because the columns are added one by one; unequal
+    rows have unequal numbers, all but surely.
+    """
+    factors = np.random.default_rng(_FINGERPRINT_SEED).standard_normal(len(columns))
+    numbers = np.zeros(columns.shape[1])
+    for factor, column in zip(factors, columns, strict=True):
+        numbers += factor * column
+    return numbers
 
 
 @dataclass(frozen=True)
@@ -127,12 +144,8 @@ class Rows:
         return np.hstack([inputs, (self.y[part] - self.targets.offset) / self.targets.scale])
 
     def read(self, part):
-        """Z, standardised target and square root of the weights (or None) of one block."""
+        """Z, standardised target, and weights or None, of one block."""
         X, y = self.X[part], self.y[part]
         Z = self.inputs.apply(X.T, np.empty((X.shape[1], X.shape[0])))
         target = self.targets.apply(y.T, np.empty((y.shape[1], y.shape[0])))
-        if self.sample_weight is None:
-            return Z, target, None
-        root_weight = np.sqrt(self.sample_weight[part])
-        target *= root_weight
-        return Z, target, root_weight
+        return Z, target, None if self.sample_weight is None else self.sample_weight[part]

@@ -16,6 +16,7 @@ KERNEL = [
     "membership",
     "antecedent",
     "consequent",
+    "gram",
     "rows",
     "objective",
     "premise",

@@ -10,7 +10,7 @@ otherwise hardly overlap.
 import numpy as np
 
 from ..antecedent import GridAntecedent, ScatteredAntecedent
-from ..rows import Rows
+from ..rows import Rows, fingerprint
 
 __all__ = ["clustered_antecedent", "representative_rows"]
 
@@ -18,27 +18,21 @@ __all__ = ["clustered_antecedent", "representative_rows"]
 _MOST_ROWS = 20_000
 # Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
 _SMALLEST_WIDTH = 0.1
-# One projection of a row on these tells distinct rows apart.
-_PROJECTION_SEED = 20090101
 
 
-def _project(rows: Rows):
-    """One number per row of standardised inputs and target; the same row gives the same number."""
-    n_inputs, n_outputs = rows.X.shape[1], rows.y.shape[1]
-    factors = np.random.default_rng(_PROJECTION_SEED).standard_normal(n_inputs + n_outputs)
-    projection = np.empty(rows.n_rows)
+def _fingerprints(rows: Rows):
+    """A number for every row of standardised inputs and target."""
+    numbers = np.empty(rows.n_rows)
     for chunk in rows.chunks(_MOST_ROWS):
         for part in chunk:
-            table = rows.table(part)
-            # Column by column, in one order: equal rows give equal numbers to the last bit.
-            projection[part] = sum(f * c for f, c in zip(factors, table.T, strict=True))
-    return projection
+            numbers[part] = fingerprint(rows.table(part).T)
+    return numbers
 
 
 def representative_rows(rows: Rows, most=_MOST_ROWS):
     """Distinct rows of [z, y], standardised, and their weights, in an order of their own.
 
-    Beyond ``most`` rows, those at evenly spaced quantiles of the weight along a projection. Neither
+    Beyond ``most`` rows, those at evenly spaced quantiles of the weight of their fingerprints. Neither
     the order of the rows nor whether one is repeated or weighted makes any difference.
 
     Returns
@@ -50,7 +44,7 @@ def representative_rows(rows: Rows, most=_MOST_ROWS):
     if rows.n_rows <= most:
         table = rows.table(slice(None))
     else:
-        order = np.argsort(_project(rows), kind="stable")
+        order = np.argsort(_fingerprints(rows), kind="stable")
         upto = np.cumsum(weight[order])
         wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
         table = rows.table(order[np.searchsorted(upto, wanted)])

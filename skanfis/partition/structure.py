@@ -6,7 +6,7 @@ from numbers import Integral
 
 import numpy as np
 
-from ..rows import Rows
+from ..rows import Rows, fingerprint
 
 __all__ = [
     "GridSize",
@@ -20,10 +20,9 @@ __all__ = [
 ROWS_PER_PARAMETER = 10
 # Most consequent parameters that "auto" gives a grid: a pass over the data grows with the square.
 MOST_PARAMETERS = 256
-# Most scattered rules by "auto"; more than a handful of them seldom pays (docs, choosing).
+# Most scattered rules by "auto".
 MOST_RULES = 5
 _READ_ROWS = 4096
-_PROJECTION_SEED = 19930501
 
 
 class GridSize:
@@ -42,8 +41,9 @@ class GridSize:
         self.n_columns = self.n_rules * n_basis
         side = self.n_columns + n_outputs
         terms = sum(count for count in counts if count > 1)
-        # Gram matrix, its local form, its factor and one copy; the table of terms against rules.
-        self.n_bytes = 8 * (4 * side**2 + terms * self.n_rules)
+        # The Gram matrix, its moments, local form and factor, and a copy of two of them; the table
+        # of terms against rules.
+        self.n_bytes = 8 * (6 * side**2 + terms * self.n_rules)
 
     def check_fits(self, n_mfs, limit, names):
         """Raise ValueError where training would need more than ``limit`` bytes."""
@@ -96,12 +96,10 @@ def term_counts(n_mfs, names):
 
 def count_distinct_inputs(rows: Rows, enough):
     """Number of distinct rows of X, or ``enough`` as soon as there are that many."""
-    factors = np.random.default_rng(_PROJECTION_SEED).standard_normal(rows.X.shape[1])
     seen = np.empty(0)
     for start in range(0, rows.n_rows, _READ_ROWS):
         Z, _, _ = rows.read(slice(start, start + _READ_ROWS))
-        # Equal rows have equal projections to the last bit; unequal ones, all but surely not.
-        seen = np.union1d(seen, sum(f * z for f, z in zip(factors, Z, strict=True)))
+        seen = np.union1d(seen, fingerprint(Z))
         if seen.size >= enough:
             return enough
     return seen.size

@@ -130,11 +130,13 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
     while premise.size and n_iter < max_iter:
         gradient, hessian = cost_of.linearise(x, current)
         free = _free(x, gradient, premise)
-        if np.abs(gradient[free]).max(initial=0.0) <= _GRADIENT_FACTOR * tol * cost:
+        steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
+        if steepest <= _GRADIENT_FACTOR * tol * cost:
             status = "gradient"
             break
         while True:
-            step, expected = _propose(x, gradient, hessian, premise, free, radius, _WORTH * tol * cost)
+            damping = _WORTH * tol * cost
+            step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
             length = np.linalg.norm(step)
             trial, trial_cost = cost_of.evaluate(x + step, current.coefficients)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
