@@ -32,8 +32,8 @@ def _fingerprints(rows: Rows):
 def representative_rows(rows: Rows, most=_MOST_ROWS):
     """Distinct rows of [z, y], standardised, and their weights, in an order of their own.
 
-    Beyond ``most`` rows, those at evenly spaced quantiles of the weight of their fingerprints. Neither
-    the order of the rows nor whether one is repeated or weighted makes any difference.
+    Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
+    Neither the order of the rows nor whether one is repeated or weighted makes any difference.
 
     Returns
     -------

@@ -137,7 +137,7 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
         while True:
             damping = _WORTH * tol * cost
             step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
-            length = np.linalg.norm(step)
+            length = float(np.linalg.norm(step))
             trial, trial_cost = cost_of.evaluate(x + step, current.coefficients)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
             accepted = ratio > _ACCEPTED_RATIO
