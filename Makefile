@@ -39,22 +39,6 @@ endef
 # than four where their number is left open: each pays for its imports.
 pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-# Runs the script argv[1] and saves the figures that it leaves open in the folder argv[2].
-define RUN_AND_SAVE
-import runpy, sys
-from pathlib import Path
-import matplotlib.pyplot as plt
-script, folder = map(Path, sys.argv[1:])
-plt.show = lambda *args, **kwargs: None
-runpy.run_path(str(script), run_name="__main__")
-folder.mkdir(exist_ok=True)
-for number in plt.get_fignums():
-    picture = folder.resolve() / f"{script.stem}_{number}.png"
-    plt.figure(number).savefig(picture, dpi=150)
-    print("Picture:", picture)
-endef
-export RUN_AND_SAVE
-
 .PHONY: help demo test lint format test-floors wheel test-wheel docs benchmarks clean
 
 help:
@@ -91,7 +75,7 @@ $(DOCS)/.installed: pyproject.toml
 	@touch $@
 
 demo: $(DEMO)/.installed
-	$(DEMO)/bin/python -c "$$RUN_AND_SAVE" examples/plot_gyro_compensation.py figures
+	$(DEMO)/bin/python examples/plot_gyro_compensation.py --output figures
 
 test: $(DEV)/.installed
 	$(call pytest,$(DEV))

@@ -19,8 +19,6 @@ from .membership import MEMBERSHIPS
 from .model import TSKModel
 from .objective import SeparableProblem
 from .partition import (
-    MOST_PARAMETERS,
-    ROWS_PER_PARAMETER,
     GridSize,
     automatic_counts,
     automatic_n_rules,
@@ -39,12 +37,15 @@ __all__ = ["Training", "train"]
 # training from there meets fewer bad minima (benchmarks/start.py).
 _OVERLAP = 0.6
 _MIB = 2**20
+# Distinct rows are counted up to here: more make no difference to any decision.
+_ENOUGH_ROWS = 20_000
+_READ_ROWS = 4096
 # alpha="auto": as small as rounding allows where the data determine the consequents well; rounding
 # errors grow by 1 / alpha along directions that the data leave open, so more where they do not.
 _ALPHA, _ALPHA_FEW_ROWS = 1e-12, 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Training:
     """A finished training."""
 
@@ -69,7 +70,7 @@ def train(estimator, X, y, sample_weight, names):
     # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many.
     with threadpool_limits(limits=1, user_api="blas"):
         rows = Rows.standardised(X, y, sample_weight)
-        antecedent, alpha = _initial_antecedent(estimator, rows, names)
+        antecedent, alpha, n_distinct = _initial_antecedent(estimator, rows, names)
         problem = SeparableProblem(
             rows, antecedent, estimator.order, alpha, _ordered_map(estimator.n_jobs)
         )
@@ -85,13 +86,13 @@ def train(estimator, X, y, sample_weight, names):
         )
     if not result.converged:
         warnings.warn(
-            f"solver={estimator.solver!r} stopped at max_iter={estimator.max_iter} before the cost "
-            f"settled to tol={estimator.tol:g}. The model is the best one found; increase max_iter "
-            "or tol.",
+            f"solver={estimator.solver!r} with {antecedent.n_rules} rules on {rows.n_rows} rows "
+            f"stopped at max_iter={estimator.max_iter} before the cost settled to "
+            f"tol={estimator.tol:g}. The model is the best one found; increase max_iter or tol.",
             ConvergenceWarning,
             stacklevel=4,
         )
-    model = _frozen(rows, antecedent, result, names, estimator.out_of_bounds)
+    model = _frozen(rows, antecedent, result, n_distinct, names, estimator.out_of_bounds)
     return Training(model, result)
 
 
@@ -113,15 +114,18 @@ def _ordered_map(n_jobs):
     return map_ordered
 
 
-def _initial_antecedent(estimator, rows, names) -> tuple[Antecedent, float]:
-    """The rule base that training starts from, in standardised units, and the ridge it needs."""
+def _initial_antecedent(estimator, rows, names) -> tuple[Antecedent, float, int]:
+    """The rule base that training starts from, in standardised units, and the ridge that it needs.
+
+    With them, the number of distinct rows of X, as far as it has been counted.
+    """
     _check_combination(estimator)
     constant = rows.inputs.is_constant
     _report_constant(constant, rows, names)
     family = MEMBERSHIPS[estimator.mf]
-    n_basis = 1 + len(names) if estimator.order == 1 else 1
-    enough = max(ROWS_PER_PARAMETER * MOST_PARAMETERS, 2 * n_basis)
-    n_distinct = count_distinct_inputs(rows, enough)
+    n_inputs = int(np.count_nonzero(~constant))
+    n_basis = 1 + n_inputs if estimator.order == 1 else 1
+    n_distinct = count_distinct_inputs(rows, _ENOUGH_ROWS)
 
     counts = _grid_counts(estimator, rows, names, n_basis, n_distinct)
     if counts is not None:
@@ -134,7 +138,6 @@ def _initial_antecedent(estimator, rows, names) -> tuple[Antecedent, float]:
         antecedent = grid_antecedent([family] * len(names), counts, low, high, _OVERLAP)
     elif isinstance(estimator.partition, str):
         n_premise = len(family.parameters)
-        n_inputs = int(np.count_nonzero(~constant))
         n_rules = automatic_n_rules(n_inputs, n_basis, n_premise, n_distinct)
         # random_state=None stands for one fixed seed: the same data give the same model.
         seed = 0 if estimator.random_state is None else check_random_state(estimator.random_state)
@@ -144,13 +147,14 @@ def _initial_antecedent(estimator, rows, names) -> tuple[Antecedent, float]:
         weighted = rows.sample_weight is not None
         antecedent = clustered_antecedent(family, rows, _labeller(estimator.partition, weighted))
     n_columns = antecedent.n_rules * n_basis
-    if enough < 2 * n_columns:
+    if n_distinct == _ENOUGH_ROWS < 2 * n_columns:
         n_distinct = count_distinct_inputs(rows, 2 * n_columns)
     if n_columns > n_distinct:
         _report_underdetermined(antecedent.n_rules, n_basis, n_distinct)
     if not isinstance(estimator.alpha, str):
-        return antecedent, estimator.alpha
-    return antecedent, _ALPHA if n_distinct >= 2 * n_columns else _ALPHA_FEW_ROWS
+        return antecedent, estimator.alpha, n_distinct
+    alpha = _ALPHA if n_distinct >= 2 * n_columns else _ALPHA_FEW_ROWS
+    return antecedent, alpha, n_distinct
 
 
 def _check_combination(estimator):
@@ -230,7 +234,18 @@ def _report_underdetermined(n_rules, n_basis, n_distinct):
     )
 
 
-def _frozen(rows, antecedent, result, names, out_of_bounds) -> TSKModel:
+def _parts_strongest(rows, antecedent):
+    """Part of the data's weight on which each rule is the strongest."""
+    parts = np.zeros(antecedent.n_rules)
+    for chunk in rows.chunks(_READ_ROWS):
+        for part in chunk:
+            Z, _, weight = rows.read(part)
+            strongest = antecedent.strengths(Z).argmax(axis=0)
+            parts += np.bincount(strongest, weights=weight, minlength=parts.size)
+    return parts / rows.total_weight
+
+
+def _frozen(rows, antecedent, result, n_distinct, names, out_of_bounds) -> TSKModel:
     """The model in the user's units."""
     evaluation = result.evaluation
     offset, scale = rows.inputs.offset, rows.inputs.scale
@@ -247,7 +262,7 @@ def _frozen(rows, antecedent, result, names, out_of_bounds) -> TSKModel:
         minimum=rows.inputs.minimum,
         maximum=rows.inputs.maximum,
         rule_weights=evaluation.masses,
-        n_training_rows=rows.n_rows,
+        rule_rows=n_distinct * _parts_strongest(rows, evaluation.antecedent),
         input_names=tuple(map(str, names)),
         out_of_bounds=out_of_bounds,
     )

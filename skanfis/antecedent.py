@@ -29,7 +29,7 @@ from .membership import Membership
 __all__ = ["Antecedent", "GridAntecedent", "ScatteredAntecedent", "TermGroup"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TermGroup:
     """Consecutive terms of one family: parameters theta (n_parameters, n_terms), input of each."""
 
@@ -57,7 +57,7 @@ def _softmax_in_place(log_values):
     log_values /= np.add.reduce(log_values, axis=-2, keepdims=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Antecedent(ABC):
     """The IF parts of a set of rules over a sequence of terms; immutable."""
 
@@ -159,7 +159,7 @@ def _grid_indicator(counts):
     return indicator
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GridAntecedent(Antecedent):
     r"""Every combination of one term per input (grid partition).
 
@@ -220,7 +220,7 @@ class GridAntecedent(Antecedent):
         return sensitivity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScatteredAntecedent(Antecedent):
     """Rules with terms of their own, one per premise input; terms are in rule-major order.
 

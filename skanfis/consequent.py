@@ -65,7 +65,7 @@ def rule_masses(gram, n_rules):
     return gram[::n_basis, ::n_basis].sum(axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LocalBasis:
     """Center a and spread h of every rule's own basis, each (n_rules, n_basis - 1)."""
 

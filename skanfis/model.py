@@ -28,7 +28,7 @@ OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 _BLOCK_BYTES = 2**21
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TSKModel:
     """A frozen Takagi-Sugeno-Kang model.
 
@@ -48,8 +48,8 @@ class TSKModel:
         The box of the training data.
     rule_weights : ndarray of shape (n_rules,)
         Part of the training data's weight on which each rule fires; the sum is one.
-    n_training_rows : int
-        Training rows with a positive weight.
+    rule_rows : ndarray of shape (n_rules,)
+        Number of distinct training rows, by their weight, on which each rule is the strongest.
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     """
@@ -62,7 +62,7 @@ class TSKModel:
     minimum: np.ndarray
     maximum: np.ndarray
     rule_weights: np.ndarray
-    n_training_rows: int
+    rule_rows: np.ndarray
     input_names: tuple[str, ...]
     out_of_bounds: str = "clip"
 
@@ -142,13 +142,12 @@ class TSKModel:
     def coverage(self, X):
         r"""How well the training data cover each row, from 0 (not at all) to 1, (n_rows,).
 
-        sum_r w_r(x) min(1, N_r / P) times exp(-|delta|^2 / 2): N_r is the number of training rows,
-        in effect, on which rule r fires, P the number of its coefficients, and delta the distance
-        from the box in standard deviations of each input. Zero where only rules without data
-        speak, and falling to zero away from the box.
+        sum_r w_r(x) min(1, N_r / P) times exp(-|delta|^2 / 2): N_r is the number of distinct
+        training rows on which rule r is the strongest, P the number of its coefficients, and delta
+        the distance from the box in standard deviations of each input. Zero where only rules
+        without data speak, and falling to zero away from the box.
         """
-        rows_per_rule = self.rule_weights * self.n_training_rows
-        supported = np.minimum(1.0, rows_per_rule / self.coefficients.shape[1])
+        supported = np.minimum(1.0, self.rule_rows / self.coefficients.shape[1])
 
         def of_block(Z):
             inside = self._clip(Z)
@@ -174,6 +173,10 @@ class TSKModel:
 
     def with_out_of_bounds(self, policy):
         """Return the same model with another policy."""
+        if policy == self.out_of_bounds:
+            return self
+        if policy not in OUT_OF_BOUNDS:
+            raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
         return replace(self, out_of_bounds=policy)
 
     def _by_block(self, X, of_block, n_columns):

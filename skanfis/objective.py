@@ -42,7 +42,7 @@ _BLOCK_BYTES = 2**23
 _FEWEST_ROWS, _MOST_ROWS = 128, 4096
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """The reduced problem at one theta."""
 
@@ -54,7 +54,7 @@ class Evaluation:
     mean_squared_error: float  # of the standardised target, weighted, summed over outputs
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Linearisation:
     """Gradient and Gauss-Newton matrix of the reduced cost, by the antecedent's parameters."""
 

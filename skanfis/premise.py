@@ -28,7 +28,7 @@ _SHIFT = 1.0
 _LOG_GAP = (-np.log(5.0), np.log(2.0))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Premise:
     """The map from displacements to the antecedent's parameters, and the box they live in."""
 
@@ -58,8 +58,9 @@ class Premise:
                     lower[run[0]], upper[run[0]] = -_SHIFT, _SHIFT
             else:
                 unit[indices] = widths
-                lower[indices] = (minimum[inputs] - raw[indices]) / widths - 1.0
-                upper[indices] = (maximum[inputs] - raw[indices]) / widths + 1.0
+                # Up to one width beyond the data, or where the term stands already.
+                lower[indices] = np.minimum((minimum[inputs] - raw[indices]) / widths - 1.0, 0.0)
+                upper[indices] = np.maximum((maximum[inputs] - raw[indices]) / widths + 1.0, 0.0)
         return cls(antecedent, lower, upper, unit, is_gap, ordered)
 
     @property

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from ._anfis import train
 from ._sklearn import HasMethods, Interval, StrOptions, check_sample_weight, fit_context
@@ -66,7 +66,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     stiffness : float, default=0.0
         Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
         of their displacements (in spacings of terms and logarithms of widths) is added likewise.
-    max_iter : int, default=200
+    max_iter : int, default=500
         Most iterations, 1 or more.
     tol : float, default=1e-4
         Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
@@ -74,8 +74,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
         What ``predict`` does with rows outside the range of the training data, input by input:
         "clip" holds the value at the edge; "linear" holds the rules' strengths at the edge and
-        lets their consequents go on; "nan" returns NaN; "raise" raises ValueError. It is part of
-        the fitted model.
+        lets their consequents go on; "nan" returns NaN; "raise" raises ValueError. It may be
+        changed by ``set_params`` after training.
     warn_out_of_bounds : bool, default=True
         Whether ``predict`` warns of such rows.
     random_state : int, RandomState instance or None, default=None
@@ -167,7 +167,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         solver="varpro",
         alpha="auto",
         stiffness=0.0,
-        max_iter=200,
+        max_iter=500,
         tol=1e-4,
         out_of_bounds="clip",
         warn_out_of_bounds=True,
@@ -218,31 +218,19 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             fewer than two rows; if parameters contradict each other or the data; if the grid has
             more rules than ``sklearn.get_config()["working_memory"]`` can hold.
         """
-        X, y = validate_data(
-            self,
-            X,
-            y,
-            dtype=(np.float64, np.float32),
-            ensure_all_finite=False,
-            ensure_min_samples=2,
-            multi_output=True,
-            y_numeric=True,
-        )
-        names = self._input_names()
-        check_finite(X, "X", names)
-        targets = y.reshape(-1, 1) if y.ndim == 1 else y
-        check_finite(targets, "y", [f"y{k}" for k in range(targets.shape[1])])
-        if sample_weight is not None:
-            sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-            keep = positive_weights(sample_weight, X.shape[0])
-            if keep is not None:
-                X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
-        training = train(self, X, targets, sample_weight, names)
+        before = dict(vars(self))
+        try:
+            X, targets, sample_weight = self._check_training_data(X, y, sample_weight)
+            training = train(self, X, targets, sample_weight, self._input_names())
+        except BaseException:
+            # What was fitted before keeps its inputs' number and names: it can go on predicting.
+            vars(self).clear()
+            vars(self).update(before)
+            raise
         self.model_ = training.model
         self.n_iter_ = max(training.result.n_iter, 1)
         self.loss_curve_ = training.result.loss_curve
         self.status_ = training.result.message
-        self._single_output = y.ndim == 1
         return self
 
     def predict(self, X):
@@ -267,7 +255,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             If rows lie outside the training data, unless ``warn_out_of_bounds=False``.
         """
         X = self._check_inputs(X)
-        model = self.model_
+        model = self.model_.with_out_of_bounds(self.out_of_bounds)
         inside = model.in_bounds(X)
         outputs = model.predict(X, inside)
         if self.warn_out_of_bounds and not inside.all():
@@ -279,13 +267,27 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             )
         return outputs[:, 0] if self._single_output else outputs
 
+    def in_bounds(self, X):
+        """Tell which rows lie in the range of the training data, input by input.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        inside : ndarray of bool of shape (n_samples,)
+        """
+        X = self._check_inputs(X)
+        return self.model_.in_bounds(X)
+
     def coverage(self, X):
         """Tell how well the training data cover each row.
 
         The sum over rules of strength times support, where a rule's support is the number of
-        training rows on which it fires, in effect, over the number of its coefficients, at most
-        one; times exp(-delta^2 / 2) with delta the distance from the training range in standard
-        deviations.
+        distinct training rows on which it is the strongest over the number of its coefficients, at
+        most one; times exp(-delta^2 / 2) with delta the distance from the training range in
+        standard deviations.
 
         Parameters
         ----------
@@ -296,7 +298,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         coverage : ndarray of shape (n_samples,)
             From 0, where no data speak, to 1.
         """
-        return self.model_.coverage(self._check_inputs(X))
+        X = self._check_inputs(X)
+        return self.model_.coverage(X)
 
     def strengths(self, X):
         """Tell how strongly each rule fires on each row, normalised.
@@ -311,7 +314,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             Positive, with sum one in every row. Rows outside the training range are taken at its
             edge.
         """
-        return self.model_.strengths(self._check_inputs(X))
+        X = self._check_inputs(X)
+        return self.model_.strengths(X)
 
     @property
     def n_rules_(self):
@@ -346,6 +350,31 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     def _input_names(self):
         names = getattr(self, "feature_names_in_", None)
         return [f"x{j}" for j in range(self.n_features_in_)] if names is None else list(names)
+
+    def _check_training_data(self, X, y, sample_weight):
+        """X, targets (n_rows, n_outputs) and weights or None, all of rows with weight."""
+        numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
+        X, y = validate_data(
+            self,
+            X,
+            y,
+            validate_separately=(
+                {**numeric, "ensure_min_samples": 2},
+                {**numeric, "ensure_2d": False},
+            ),
+        )
+        check_consistent_length(X, y)
+        self._single_output = y.ndim == 1
+        targets = y.reshape(-1, 1) if y.ndim == 1 else y
+        check_finite(X, "X", self._input_names())
+        check_finite(targets, "y", [f"y{k}" for k in range(targets.shape[1])])
+        if sample_weight is None:
+            return X, targets, None
+        sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+        keep = positive_weights(sample_weight, X.shape[0])
+        if keep is None:
+            return X, targets, sample_weight
+        return X[keep], targets[keep], sample_weight[keep]
 
     def _check_inputs(self, X):
         check_is_fitted(self)

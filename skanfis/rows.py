@@ -36,7 +36,7 @@ def fingerprint(columns):
     return numbers
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scale:
     """z = (x - offset) / scale, per column; the range is that of the rows with weight."""
 
@@ -81,13 +81,15 @@ def column_statistics(values, sample_weight=None):
         np.minimum(minimum, block.min(axis=0), out=minimum)
         np.maximum(maximum, block.max(axis=0), out=maximum)
     mean = origin + first / total
+    constant = minimum == maximum
+    # Deviations count in parts of the range: their squares neither overflow nor vanish.
+    span = np.where(constant, 1.0, maximum - minimum)
     second = np.zeros(n_columns)
     for part in parts:
         block = np.asarray(values[part], dtype=float)
         weight = _weights_of(sample_weight, part, block.shape[0])
-        second += weight @ (block - mean) ** 2
-    scale = np.sqrt(second / total)
-    constant = minimum == maximum
+        second += weight @ ((block - mean) / span) ** 2
+    scale = span * np.sqrt(second / total)
     return Scale(
         np.where(constant, minimum, mean),
         np.where(constant | (scale == 0.0), 1.0, scale),
@@ -100,7 +102,7 @@ def _weights_of(sample_weight, part, n_rows):
     return np.ones(n_rows) if sample_weight is None else sample_weight[part]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rows:
     """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, and the scales of both."""
 

@@ -27,7 +27,7 @@ def make_ofog(
     duration=3600.0,
     sampling_interval=10.0,
     max_rate=100.0,
-    n_rate_levels=11,
+    n_rate_levels=401,
     dwell_time=120.0,
     ambient_range=(-20.0, 50.0),
     max_residual_heat=0.5,
@@ -45,9 +45,10 @@ def make_ofog(
     every part of it is given, so that a compensation can be judged effect by effect. A compensator
     at work in a gyro has the columns time, temperature and output, and no others.
 
-    The split matters. Rates are levels, held for a while and met in every run, and neighbouring
-    rows are nearly equal: a random split of rows tests on what was trained on. Hold out whole runs
-    (``run`` as the groups), devices (``device``), or rate levels (``rate``).
+    The split matters. Neighbouring rows are nearly equal: a random split of rows tests on what was
+    trained on. Hold out whole runs (``run`` as the groups) or devices (``device``). With few rate
+    levels, which every run then meets, hold out levels too: a flexible model learns the list of
+    levels by heart, and an indicated rate tells which one it is.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def make_ofog(
         Largest rate of the table [deg/s], positive and below the rate at which the Sagnac phase
         of some device of the population could reach pi/2 (some 340 deg/s by default). Beyond a
         phase of 1.2 rad (271 deg/s nominally) inverting the sine is possible but magnifies noise.
-    n_rate_levels : int, default=11
+    n_rate_levels : int, default=401
         Number of equally spaced rates from ``-max_rate`` to ``max_rate``, at least 2; an odd number
         includes rest. They are visited in random order, each once before any comes again.
     dwell_time : float, default=120

@@ -3,8 +3,6 @@
 from .clustered import clustered_antecedent
 from .grid import grid_antecedent
 from .structure import (
-    MOST_PARAMETERS,
-    ROWS_PER_PARAMETER,
     GridSize,
     automatic_counts,
     automatic_n_rules,
@@ -13,8 +11,6 @@ from .structure import (
 )
 
 __all__ = [
-    "MOST_PARAMETERS",
-    "ROWS_PER_PARAMETER",
     "GridSize",
     "automatic_counts",
     "automatic_n_rules",

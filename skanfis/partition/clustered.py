@@ -30,7 +30,7 @@ def _fingerprints(rows: Rows):
 
 
 def representative_rows(rows: Rows, most=_MOST_ROWS):
-    """Distinct rows of [z, y], standardised, and their weights, in an order of their own.
+    """Distinct rows of [z, y], standardised, and their weights, in lexical order.
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
@@ -41,16 +41,18 @@ def representative_rows(rows: Rows, most=_MOST_ROWS):
     weight : ndarray of shape (n_distinct,)
     """
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
-    if rows.n_rows <= most:
-        table = rows.table(slice(None))
-    else:
-        order = np.argsort(_fingerprints(rows), kind="stable")
-        upto = np.cumsum(weight[order])
+    numbers = _fingerprints(rows)
+    order = np.argsort(numbers, kind="stable")
+    first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
+    distinct, weight = order[first], np.add.reduceat(weight[order], first)
+    if distinct.size > most:
+        upto = np.cumsum(weight)
         wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
-        table = rows.table(order[np.searchsorted(upto, wanted)])
-        weight = np.ones(most)
-    distinct, group = np.unique(table, axis=0, return_inverse=True)
-    return distinct, np.bincount(group.ravel(), weights=weight)
+        chosen, times = np.unique(np.searchsorted(upto, wanted), return_counts=True)
+        distinct, weight = distinct[chosen], times.astype(float)
+    table = rows.table(distinct)
+    order = np.lexsort(table.T[::-1])
+    return table[order], weight[order]
 
 
 def clustered_antecedent(family, rows: Rows, label):
@@ -67,10 +69,10 @@ def clustered_antecedent(family, rows: Rows, label):
             "partition found no cluster: every training row was labelled as noise. Give a "
             "clusterer whose parameters fit standardised data (zero mean, unit deviation)."
         )
-    if found.size == 1:
-        return GridAntecedent((), counts=())
     n_inputs = rows.X.shape[1]
     inputs = np.flatnonzero(~rows.inputs.is_constant)
+    if found.size == 1 or inputs.size == 0:
+        return GridAntecedent((), counts=())
     centers, widths = np.empty((found.size, n_inputs)), np.empty((found.size, n_inputs))
     for r, cluster in enumerate(found):
         members, w = table[labels == cluster, :n_inputs], weight[labels == cluster]

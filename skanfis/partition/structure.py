@@ -23,6 +23,8 @@ MOST_PARAMETERS = 256
 # Most scattered rules by "auto".
 MOST_RULES = 5
 _READ_ROWS = 4096
+# Of one term, whatever its family: what a limit on memory reckons with.
+_MOST_PREMISE_PARAMETERS = 4
 
 
 class GridSize:
@@ -41,19 +43,22 @@ class GridSize:
         self.n_columns = self.n_rules * n_basis
         side = self.n_columns + n_outputs
         terms = sum(count for count in counts if count > 1)
+        n_premise = _MOST_PREMISE_PARAMETERS * terms
         # The Gram matrix, its moments, local form and factor, and a copy of two of them; the table
-        # of terms against rules.
-        self.n_bytes = 8 * (6 * side**2 + terms * self.n_rules)
+        # of terms against rules; the same for the premises, and their products with the design.
+        self.n_bytes = 8 * (
+            6 * side**2 + terms * self.n_rules + 4 * n_premise**2 + 2 * n_premise * self.n_columns
+        )
 
     def check_fits(self, n_mfs, limit, names):
         """Raise ValueError where training would need more than ``limit`` bytes."""
         if self.n_bytes <= limit:
             return
-        smallest = 2 ** len(names)
-        hint = f"n_mfs=2 makes {smallest:,} rules, " if smallest < self.n_rules else ""
+        smallest = GridSize([2] * len(names), 1 + len(names))
+        hint = f"n_mfs=2 makes {smallest.n_rules:,} rules, " if smallest.n_bytes <= limit else ""
         raise ValueError(
-            f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {self.n_rules:,} rules with "
-            f"{self.n_columns:,} consequent parameters; training it would take "
+            f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {_count(self.n_rules)} rules "
+            f"with {_count(self.n_columns)} consequent parameters; training it would take "
             f"{_bytes(self.n_bytes)}, and the limit is {_bytes(limit)} "
             "(sklearn.set_config(working_memory=...), in MiB). Use fewer terms: "
             f"{hint}or give one number per input, 1 for an input that needs no fuzzy terms; or use "
@@ -62,11 +67,18 @@ class GridSize:
         )
 
 
+def _count(number):
+    """A count for people; beyond any hope, its order of magnitude suffices."""
+    return f"{number:,}" if number < 10**15 else "more than 10^15"
+
+
 def _bytes(number):
-    for unit in ("bytes", "kB", "MB", "GB", "TB", "PB"):
-        if number < 1000 or unit == "PB":
-            return f"{number:,.3g} {unit}" if number < 1e6 else f"{float(number):.3g} {unit}"
-        number /= 1000
+    if number >= 10**18:
+        return "more than 10^18 bytes"
+    exponent = 0
+    while number >= 1000 ** (exponent + 1):
+        exponent += 1
+    return f"{number / 1000**exponent:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB')[exponent]}"
 
 
 def term_counts(n_mfs, names):
@@ -118,4 +130,6 @@ def automatic_counts(is_constant, n_basis, n_distinct):
 def automatic_n_rules(n_inputs, n_basis, n_premise_parameters, n_distinct):
     """How many scattered rules the data can carry, premises and consequents counted."""
     per_rule = n_basis + n_premise_parameters * n_inputs
-    return int(np.clip(n_distinct // (2 * ROWS_PER_PARAMETER * per_rule), 1, MOST_RULES))
+    # A single rule is a linear model, or, with consequents of order zero, no model at all.
+    fewest = 1 if n_basis > 1 else 2
+    return int(np.clip(n_distinct // (2 * ROWS_PER_PARAMETER * per_rule), fewest, MOST_RULES))

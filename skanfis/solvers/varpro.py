@@ -92,11 +92,13 @@ def _free(x, gradient, premise):
 
 
 def _propose(x, gradient, hessian, premise, free, radius, damping):
-    """A step within box and region, and the decrease that the model promises."""
+    """A point within box and region, the step to it, and the decrease that the model promises."""
     step = np.zeros_like(x)
     step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius, damping)
-    step = np.clip(x + step, premise.lower, premise.upper) - x
-    return step, -(gradient @ step + 0.5 * step @ hessian @ step)
+    # The point and not the step is what meets an edge of the box to the last bit.
+    trial_x = np.clip(x + step, premise.lower, premise.upper)
+    step = trial_x - x
+    return trial_x, step, -(gradient @ step + 0.5 * step @ hessian @ step)
 
 
 def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None):
@@ -136,9 +138,9 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
             break
         while True:
             damping = _WORTH * tol * cost
-            step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
+            trial_x, step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
             length = float(np.linalg.norm(step))
-            trial, trial_cost = cost_of.evaluate(x + step, current.coefficients)
+            trial, trial_cost = cost_of.evaluate(trial_x, current.coefficients)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
             accepted = ratio > _ACCEPTED_RATIO
             if not ratio >= 0.25:  # also where the trial is not finite
@@ -151,7 +153,7 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
             status = "step"
             break
         decrease = cost - trial_cost
-        x, current, cost, n_iter = x + step, trial, trial_cost, n_iter + 1
+        x, current, cost, n_iter = trial_x, trial, trial_cost, n_iter + 1
         loss_curve.append(current.mean_squared_error)
         if on_iteration is not None:
             on_iteration(n_iter, current)

@@ -63,8 +63,13 @@ def test_runs_of_devices_are_numbered_without_repeats(data):
 
 
 def test_rates_are_levels_of_both_signs_in_every_run(data):
+    levels = np.linspace(-100, 100, 401)
+    few = make_ofog(n_rate_levels=11, random_state=0)
     for _, run in data.groupby("run"):
-        assert_allclose(np.unique(run["rate"]), np.linspace(-100, 100, 11), atol=1e-12)
+        assert run["rate"].min() < 0 < run["rate"].max()
+        assert np.abs(run["rate"].to_numpy()[:, None] - levels).min(axis=1).max() < 1e-9
+    for _, run in few.groupby("run"):
+        assert_allclose(np.unique(run["rate"]), levels[::40], atol=1e-12)
 
 
 def test_coefficients_are_of_the_device_and_scale_factor_depends_on_nothing_else(data):
@@ -129,6 +134,7 @@ def _one_rate_of_a_quiet_device(**coefficients):
         n_devices=1,
         n_runs=12,
         sampling_interval=5.0,
+        n_rate_levels=11,
         device_spread=0.0,
         noise=0.0,
         coefficients=without_others | coefficients,
@@ -150,6 +156,7 @@ def test_rate_of_temperature_change_makes_it_single_valued_again():
         n_devices=1,
         n_runs=12,
         sampling_interval=5.0,
+        n_rate_levels=11,
         device_spread=0.0,
         noise=0.0,
         coefficients={"bias_repeatability": 0.0, "warm_up": 0.0, "thermal_rate": 0.0},

@@ -1,0 +1,64 @@
+"""The command line: ``python -m benchmarks --help``."""
+
+import argparse
+import sys
+import warnings
+from importlib import import_module
+from pathlib import Path
+from shlex import join
+
+from .report import Results, machine, markdown
+
+ALWAYS = ("jang", "gyro", "campaign", "one_pass", "memory", "one_row", "file_size")
+ON_REQUEST = ("start", "peers")
+RESULTS = Path(__file__).with_name("RESULTS.md")
+
+
+def parse():
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Run the benchmarks.")
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help=f"which: {', '.join(ALWAYS)} (without a name, these); {', '.join(ON_REQUEST)}",
+    )
+    parser.add_argument(
+        "--campaign",
+        type=Path,
+        metavar="PATH",
+        help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
+    )
+    parser.add_argument("--details", action="store_true", help="also what explains the figures")
+    parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name}")
+    options = parser.parse_args()
+    unknown = [name for name in options.names if name not in ALWAYS + ON_REQUEST]
+    if unknown:
+        parser.error(f"no such benchmark: {', '.join(unknown)}")
+    return options
+
+
+def command(options):
+    """How to run this again; the campaign's path is nobody's business."""
+    words = ["python", "-m", "benchmarks", *options.names]
+    words += ["--campaign", "PATH"] if options.campaign else []
+    words += ["--details"] if options.details else []
+    return join(words)
+
+
+def main():
+    options = parse()
+    results = Results()
+    for name in options.names or ALWAYS:
+        print(f"{name} ...", file=sys.stderr, flush=True)
+        with warnings.catch_warnings():
+            # Rows outside the training data, iterations cut short: on purpose here.
+            warnings.simplefilter("ignore")
+            results += import_module(f".{name}", __package__).run(options)
+    text = markdown(results, [*machine(), f"command: `{command(options)}`"])
+    print(text)
+    if options.write:
+        RESULTS.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

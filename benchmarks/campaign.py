@@ -1,0 +1,65 @@
+"""A real gyro on a rate table, from a CSV that is no part of the project: --campaign PATH.
+
+The true rate lies on a grid of levels. A model judged on levels that it has seen need only remember
+them, so whole levels of the rate's size are held out.
+"""
+
+import numpy as np
+
+from skanfis import ANFISRegressor
+
+from .gyro import cubic, gaussian_process
+from .report import Measure, Results, Row, Table
+from .timing import best_of
+
+__all__ = ["run"]
+
+_LEVEL = 3.6  # deg/s
+_N_GROUPS = 5
+_GRIDS = ["auto", 2, [3, 2], [4, 2], [5, 2], [6, 2], [4, 3]]
+_WORK = "rate-table campaign, rate levels held out"
+
+
+def read(path):
+    """Counts and temperature, the true rate, and the level of each row."""
+    data = np.genfromtxt(path, delimiter=",", names=True)
+    rate = data["rate_true_deg_s"]
+    level = np.round(np.abs(rate) / _LEVEL).astype(int)
+    return np.column_stack([data["gyro_counts"], data["temp_c"]]), rate, level
+
+
+def held_out_rms(make_estimator, X, rate, level):
+    """RMS error over the interleaved groups of levels, without the top one; the last model."""
+    errors = []
+    for group in range(_N_GROUPS):
+        held_out = level % _N_GROUPS == group
+        model = make_estimator().fit(X[~held_out], rate[~held_out])
+        scored = held_out & (level < level.max())
+        errors.append(model.predict(X[scored]) - rate[scored])
+    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), model
+
+
+def run(options):
+    if options.campaign is None:
+        return Results([Row(f"{_WORK} (--campaign PATH)", [])])
+    data = read(options.campaign)
+    lines = []
+    for n_mfs in _GRIDS:
+        make = lambda n_mfs=n_mfs: ANFISRegressor(n_mfs)  # noqa: E731
+        seconds, (rms, model) = best_of(lambda make=make: held_out_rms(make, *data))
+        lines.append([f"n_mfs={n_mfs!r}", model.n_rules_, rms, seconds / _N_GROUPS])
+    _, n_rules, rms, seconds = lines[0]
+    row = Row(
+        f"{_WORK}, defaults",
+        [
+            Measure("RMS", rms, "deg/s", 0.050, 0.047),
+            Measure("rules", n_rules, "", 12),
+            Measure("CPU per fit", seconds, "s"),
+        ],
+    )
+    rivals = {"cubic polynomial": cubic, "Gaussian process": lambda: gaussian_process(n_inputs=2)}
+    for name, make in rivals.items():
+        seconds, (rms, _) = best_of(lambda make=make: held_out_rms(make, *data), rounds=1)
+        lines.append([name, "", rms, seconds / _N_GROUPS])
+    head = ["model", "rules", "RMS [deg/s]", "CPU per fit [s]"]
+    return Results([row], [Table("Rate-table campaign", head, lines)])

@@ -1,0 +1,112 @@
+"""Three problems of Jang 1993; defaults but for ``n_mfs`` and ``mf``."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_jang_sinc, make_jang_three_input, make_mackey_glass
+
+from .report import Measure, Results, Row, Table
+from .timing import best_of
+
+__all__ = ["PROBLEMS", "run"]
+
+
+def rmse(model, X, y):
+    return float(np.sqrt(np.mean((model.predict(X) - y) ** 2)))
+
+
+def percentage_error(model, X, y):
+    """Jang's average percentage error."""
+    return float(100.0 * np.mean(np.abs(model.predict(X) - y) / np.abs(y)))
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Data to train on and to check with, and what is asked of both errors."""
+
+    name: str
+    reference: str
+    mf: str
+    n_mfs: int
+    train: tuple
+    check: tuple
+    error: callable
+    names: tuple[str, str]
+    unit: str
+    bars: tuple
+    aims: tuple
+
+    def fit(self, mf=None):
+        return ANFISRegressor(n_mfs=self.n_mfs, mf=mf or self.mf).fit(*self.train)
+
+    def errors(self, model):
+        return self.error(model, *self.train), self.error(model, *self.check)
+
+    def row(self):
+        seconds, model = best_of(self.fit)
+        measures = [
+            Measure(*entry)
+            for entry in zip(
+                self.names, self.errors(model), [self.unit] * 2, self.bars, self.aims, strict=True
+            )
+        ]
+        return Row(
+            f"{self.name}, {self.mf} (Jang: {self.reference})",
+            [*measures, Measure("CPU", seconds, "s", 1.0)],
+        )
+
+
+PROBLEMS = [
+    Problem(
+        name="Jang's sinc, 16 rules",
+        reference="2.1e-3 after 250 epochs",
+        mf="gaussian",
+        n_mfs=4,
+        train=make_jang_sinc(),
+        check=make_jang_sinc(midpoints=True),
+        error=rmse,
+        names=("grid RMSE", "midpoint RMSE"),
+        unit="",
+        bars=(1e-3, None),
+        aims=(None, 0.0145),
+    ),
+    Problem(
+        name="Jang's three-input, 8 rules",
+        reference="0.043 % / 1.066 %",
+        mf="bell",
+        n_mfs=2,
+        train=make_jang_three_input(),
+        check=make_jang_three_input("check"),
+        error=percentage_error,
+        names=("train APE", "check APE"),
+        unit="%",
+        bars=(0.025, 0.6),
+        aims=(None, 0.25),
+    ),
+    Problem(
+        name="Mackey-Glass, 16 rules",
+        reference="0.0016 / 0.0015 after 500 epochs",
+        mf="bell",
+        n_mfs=2,
+        train=make_mackey_glass(),
+        check=make_mackey_glass("check"),
+        error=rmse,
+        names=("train RMSE", "check RMSE"),
+        unit="",
+        bars=(0.0011, 0.0026),
+        aims=(0.0010, 0.0022),
+    ),
+]
+
+
+def run(options):
+    lines = []
+    for problem in PROBLEMS:
+        for mf in ("gaussian", "bell"):
+            seconds, model = best_of(lambda problem=problem, mf=mf: problem.fit(mf))
+            lines.append([problem.name, mf, *problem.errors(model), model.n_iter_, seconds])
+    head = ["problem", "mf", "error, train", "error, check", "iterations", "CPU [s]"]
+    table = Table("Jang's problems with either membership", head, lines)
+    return Results([problem.row() for problem in PROBLEMS], [table])

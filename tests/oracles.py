@@ -1,0 +1,202 @@
+"""Brute force: the formulas of the papers, dense, one at a time, fast in nothing.
+
+Nothing here normalises in log space, factorises a grid, works in blocks, changes the basis on a
+Gram matrix or eliminates by a Cholesky factor: what the package does cleverly is done plainly. All
+of it is analytic in the premises, so that a derivative is the imaginary part at a complex step.
+"""
+
+from itertools import product
+
+import numpy as np
+
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.rows import Rows
+
+# With a complex step there is no difference to lose digits in: any tiny step is exact to rounding.
+STEP = 1e-30
+
+
+def complex_step(function, parameters):
+    """Derivatives of an analytic function of a vector, one along the last axis per entry."""
+    columns = []
+    for i in range(parameters.size):
+        moved = np.array(parameters, dtype=complex)
+        moved[i] += 1j * STEP
+        columns.append(np.imag(function(moved)) / STEP)
+    return np.stack(columns, axis=-1)
+
+
+def central_difference(function, parameters, step=1e-2):
+    """Derivatives by the eight-point rule of order 8, where complex numbers do not go."""
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+    columns = []
+    for i in range(parameters.size):
+        unit = np.zeros(parameters.size)
+        unit[i] = step
+        columns.append(
+            sum(
+                w * (np.asarray(function(parameters + k * unit)) - function(parameters - k * unit))
+                for k, w in weights.items()
+            )
+            / step
+        )
+    return np.stack(columns, axis=-1)
+
+
+def textbook_membership(function, x, numbers):
+    """mu(x) by name, from the numbers that a person reads in a paper."""
+    if function == "gaussian":
+        return np.exp(-(((x - numbers["center"]) / numbers["width"]) ** 2) / 2)
+    if function == "bell":
+        distance = np.abs((x - numbers["center"]) / numbers["width"])
+        return 1 / (1 + distance ** (2 * numbers["slope"]))
+    raise NotImplementedError(function)
+
+
+def rules_by_hand(antecedent):
+    """Terms of every rule as lists, from nothing but the inputs of the terms."""
+    inputs = [int(j) for group in antecedent.groups for j in group.inputs]
+    if isinstance(antecedent, GridAntecedent):
+        used = list(dict.fromkeys(inputs))
+        return list(product(*[[t for t, j in enumerate(inputs) if j == u] for u in used]))
+    n_used = len(set(inputs))
+    return [range(r * n_used, (r + 1) * n_used) for r in range(len(inputs) // n_used)]
+
+
+def memberships(antecedent, parameters, Z):
+    """mu of every term, by the families' textbook formulas."""
+    rows, start = [], 0
+    for group in antecedent.groups:
+        n_parameters, n_terms = len(group.family.parameters), group.inputs.size
+        theta = parameters[start : start + n_parameters * n_terms].reshape(n_parameters, n_terms)
+        rows += [group.family.value(Z[[j]], theta[:, [t]])[0] for t, j in enumerate(group.inputs)]
+        start += n_parameters * n_terms
+    return np.array(rows)
+
+
+def strengths(antecedent, parameters, Z):
+    """Product of the memberships of every rule, over the sum of all products."""
+    if not antecedent.groups:
+        return np.ones((1, Z.shape[1]))
+    mu = memberships(antecedent, parameters, Z)
+    products = np.array([np.prod(mu[list(rule)], axis=0) for rule in rules_by_hand(antecedent)])
+    return products / products.sum(axis=0)
+
+
+def dense_design(antecedent, parameters, Z, order):
+    """Phi, shape (n_rows, n_columns): w_r, w_r z_1, ..., w_r z_d for one rule after another."""
+    columns = []
+    for w in strengths(antecedent, parameters, Z):
+        columns.append(w)
+        if order == 1:
+            columns += [w * z for z in Z]
+    return np.array(columns).T
+
+
+class DenseProblem:
+    """F(theta) = min_beta |y - Phi beta|_S^2 / (2 W) + alpha/2 |beta_local|^2, all in one piece."""
+
+    def __init__(self, rows, antecedent, order, alpha):
+        self.antecedent, self.order, self.alpha = antecedent, order, alpha
+        self.Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
+        self.y = (rows.y - rows.targets.offset) / rows.targets.scale
+        weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+        self.weight = weight / weight.sum()
+        self.local = self._local_basis()
+
+    def _local_basis(self):
+        """T, built entry by entry from numpy's weighted moments at the start."""
+        n_basis = 1 + len(self.Z) if self.order == 1 else 1
+        firing = strengths(self.antecedent, self.antecedent.parameters, self.Z)
+        local = np.zeros((len(firing) * n_basis, len(firing) * n_basis))
+        for r, w in enumerate(firing * self.weight):
+            block = np.eye(n_basis)
+            for j in range(1, n_basis):
+                center, spread = 0.0, 1.0
+                if w.sum() > 1e-12:
+                    center = np.average(self.Z[j - 1], weights=w)
+                    spread = np.sqrt(np.average((self.Z[j - 1] - center) ** 2, weights=w))
+                block[0, j], block[j, j] = -center / max(spread, 0.05), 1 / max(spread, 0.05)
+            local[r * n_basis : (r + 1) * n_basis, r * n_basis : (r + 1) * n_basis] = block
+        return local
+
+    def design(self, parameters):
+        """Phi on [1, z]."""
+        return dense_design(self.antecedent, parameters, self.Z, self.order)
+
+    def coefficients(self, parameters):
+        """beta on [1, z], from the normal equations."""
+        phi = self.design(parameters) @ self.local
+        gram = (phi.T * self.weight) @ phi + self.alpha * np.eye(phi.shape[1])
+        return self.local @ np.linalg.solve(gram, (phi.T * self.weight) @ self.y)
+
+    def cost(self, parameters):
+        """F, analytic: squares are of complex numbers, not of their sizes."""
+        beta = self.coefficients(parameters)
+        residual = self.y - self.design(parameters) @ beta
+        local_beta = np.linalg.solve(self.local, beta)
+        return 0.5 * np.sum(self.weight[:, None] * residual**2) + 0.5 * self.alpha * np.sum(
+            local_beta**2
+        )
+
+    def gradient(self, parameters):
+        """dF / d theta."""
+        return complex_step(self.cost, parameters)
+
+    def gauss_newton(self, parameters):
+        """Schur complement of J'J, J the Jacobian of all residuals by theta and beta together.
+
+        The residuals are the weighted rows and, below them, those of the ridge.
+        """
+        beta = self.coefficients(parameters)
+        sensitivity = complex_step(lambda p: self.design(p) @ beta, parameters)
+        root = np.sqrt(self.weight)[:, None]
+        phi = np.vstack(
+            [root * (self.design(parameters) @ self.local), np.sqrt(self.alpha) * np.eye(len(beta))]
+        )
+        orthogonal, _ = np.linalg.qr(phi)
+        total = 0.0
+        for k in range(self.y.shape[1]):
+            jacobian = np.vstack([root * sensitivity[:, k], np.zeros((len(beta), parameters.size))])
+            projected = jacobian - orthogonal @ (orthogonal.T @ jacobian)
+            total = total + projected.T @ projected
+        return total
+
+
+def bumpy_rows(rng, n_rows=300, n_inputs=2, n_outputs=1, weighted=False):
+    """Rows in odd units, with a target that no small model fits exactly."""
+    X = rng.normal(size=(n_rows, n_inputs)) * 10.0 ** np.arange(n_inputs) + 3.0
+    z = (X - X.mean(axis=0)) / X.std(axis=0)
+    bumps = [
+        np.sin((1.5 + k) * z[:, 0]) * np.cos(z[:, -1]) + 0.3 * z.sum(axis=1)
+        for k in range(n_outputs)
+    ]
+    y = np.stack(bumps, axis=1) + 0.1 * rng.normal(size=(n_rows, n_outputs))
+    return Rows.standardised(X, y, rng.uniform(0.2, 3.0, n_rows) if weighted else None)
+
+
+def box(rows):
+    """Standardised minimum and maximum of the inputs."""
+    edges = np.stack([rows.inputs.minimum, rows.inputs.maximum])
+    return (edges - rows.inputs.offset) / rows.inputs.scale
+
+
+def random_grid(rng, families, counts, inputs=None):
+    """A grid whose terms are in order but otherwise anywhere."""
+    inputs = range(len(counts)) if inputs is None else inputs
+    thetas = []
+    for family, count in zip(families, counts, strict=True):
+        centers = np.linspace(-1.5, 1.5, count) + 0.2 * rng.normal(size=count)
+        theta = family.start(centers, np.full(count, 3.0 / max(count - 1, 1)), 0.6)
+        theta[1:] += 0.2 * rng.normal(size=theta[1:].shape)
+        thetas.append(theta)
+    return GridAntecedent.build(list(families), list(inputs), thetas)
+
+
+def random_scattered(rng, family, n_rules, inputs):
+    """Rules anywhere within reach of standardised data."""
+    inputs = np.asarray(inputs)
+    centers = rng.normal(size=(n_rules, inputs.size))
+    theta = family.from_center_and_width(centers, rng.uniform(0.7, 1.5, centers.shape))
+    theta[1:] += 0.2 * rng.normal(size=theta[1:].shape)
+    return ScatteredAntecedent.build(family, inputs, theta)

@@ -1,0 +1,223 @@
+"""Rules from clusters: blobs that are known, rows that stand for many, labels that mean noise."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.cluster import KMeans
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import ScatteredAntecedent
+from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.partition import clustered_antecedent
+from skanfis.partition.clustered import representative_rows
+from skanfis.rows import Rows
+
+
+def blobs(rng, n_per_blob=80, n_inputs=2):
+    """Three blobs far apart in both inputs and target, their labels, and weights."""
+    centers = 3.0 * np.array([[0, 0, 0], [3, 1, 2], [-2, 4, -3]], dtype=float)[:, : n_inputs + 1]
+    labels = rng.permutation(np.repeat(np.arange(3), n_per_blob))
+    table = centers[labels] + rng.normal(size=(labels.size, n_inputs + 1))
+    return table[:, :-1], table[:, -1:], labels, rng.uniform(0.5, 2.0, labels.size)
+
+
+def by_k_means(table, weight):
+    return KMeans(3, n_init=3, random_state=0).fit(table, sample_weight=weight).labels_
+
+
+def rule_parameters(antecedent, n_inputs):
+    """Theta as (n_parameters, n_rules, n_inputs), rules in the order of their first centre."""
+    (group,) = antecedent.groups
+    theta = group.theta.reshape(len(group.theta), -1, n_inputs)
+    return theta[:, np.argsort(theta[0, :, 0])]
+
+
+class TestRules:
+    @pytest.mark.parametrize("weighted", [False, True])
+    @pytest.mark.parametrize("n_inputs", [1, 2])
+    def test_centers_and_widths_are_weighted_moments_of_the_clusters(self, rng, weighted, n_inputs):
+        X, y, labels, weight = blobs(rng, n_inputs=n_inputs)
+        rows = Rows.standardised(X, y, weight if weighted else None)
+        theta = rule_parameters(clustered_antecedent(Gaussian, rows, by_k_means), n_inputs)
+        z = (X - rows.inputs.offset) / rows.inputs.scale
+        expected = []
+        for blob in range(3):
+            members = z[labels == blob]
+            w = weight[labels == blob] if weighted else None
+            mean = np.average(members, axis=0, weights=w)
+            deviation = np.sqrt(np.average((members - mean) ** 2, axis=0, weights=w))
+            assert (deviation > 0.1).all()  # wider than the least width
+            expected.append([mean, deviation * np.sqrt(n_inputs)])
+        expected = np.array(sorted(expected, key=lambda rule: rule[0][0])).transpose(1, 0, 2)
+        assert_allclose(theta[0], expected[0], rtol=1e-10, atol=1e-12)
+        assert_allclose(np.exp(theta[1]), expected[1], rtol=1e-10)
+
+    @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+    def test_each_rule_rules_its_own_blob(self, rng, family):
+        X, y, labels, _ = blobs(rng)
+        rows = Rows.standardised(X, y)
+        antecedent = clustered_antecedent(family, rows, by_k_means)
+        assert isinstance(antecedent, ScatteredAntecedent)
+        strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
+        # The same partition under other names.
+        assert len(set(zip(strongest.tolist(), labels.tolist(), strict=True))) == 3
+
+    def test_clusters_are_sought_in_inputs_and_target_together(self, rng):
+        rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 3)))
+        seen = []
+
+        def label(table, weight):
+            seen.append(table)
+            return np.arange(len(table)) % 2
+
+        clustered_antecedent(Gaussian, rows, label)
+        expected = rows.table(slice(None))
+        assert_array_equal(seen[0], expected[np.lexsort(expected.T[::-1])])
+
+    def test_noise_belongs_to_no_rule(self, rng):
+        # Without the far rows that are labelled -1, the rules are those of the rest.
+        X, y, _, _ = blobs(rng)
+        rows = Rows.standardised(X, y)
+        noisy = clustered_antecedent(
+            Gaussian, rows, lambda t, w: np.where(t[:, 0] > 0.5, -1, t[:, 1] > 0)
+        )
+        assert noisy.n_rules == 2
+        z, _, _ = rows.read(slice(None))
+        kept = z[:, z[0] <= 0.5]
+        means = sorted(
+            kept[0, kept[1] > 0].mean() if side else kept[0, kept[1] <= 0].mean() for side in (0, 1)
+        )
+        assert_allclose(np.sort(rule_parameters(noisy, 2)[0, :, 0]), means, rtol=1e-10)
+
+    def test_labels_may_be_any_integers(self, rng):
+        X, y, _, _ = blobs(rng)
+        rows = Rows.standardised(X, y)
+        plain = clustered_antecedent(Gaussian, rows, by_k_means)
+        odd = clustered_antecedent(Gaussian, rows, lambda t, w: 7 * by_k_means(t, w) + 3)
+        assert_array_equal(odd.parameters, plain.parameters)
+
+    def test_one_cluster_is_a_linear_model(self, rng):
+        rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
+        antecedent = clustered_antecedent(Gaussian, rows, lambda t, w: np.zeros(len(t), dtype=int))
+        assert antecedent.n_rules == 1
+        assert antecedent.parameters.size == 0
+        assert_array_equal(antecedent.strengths(np.zeros((2, 5))), 1.0)
+
+    def test_no_cluster_is_an_error_that_says_why(self, rng):
+        rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
+        with pytest.raises(ValueError, match=r"partition found no cluster: .* noise.*standardised"):
+            clustered_antecedent(Gaussian, rows, lambda t, w: np.full(len(t), -1))
+
+    def test_cluster_on_one_spot_has_a_term_of_some_width(self, rng):
+        X = np.vstack([np.full((30, 2), 5.0), rng.normal(size=(30, 2))])
+        rows = Rows.standardised(X, X[:, :1])
+        antecedent = clustered_antecedent(
+            Gaussian, rows, lambda t, w: (t[:, 0] < t[:, 0].max()).astype(int)
+        )
+        assert_allclose(
+            np.exp(rule_parameters(antecedent, 2)[1, 1]), 0.1 * np.sqrt(2.0), rtol=1e-12
+        )
+
+    def test_constant_input_gets_no_terms_and_widens_none(self, rng):
+        X, y, _, _ = blobs(rng)
+        padded = Rows.standardised(np.insert(X, 1, 7.0, axis=1), y)
+        plain = clustered_antecedent(Gaussian, Rows.standardised(X, y), by_k_means)
+        other = clustered_antecedent(Gaussian, padded, by_k_means)
+        assert_array_equal(other.groups[0].inputs, [0, 2] * 3)
+        assert_allclose(other.parameters, plain.parameters, rtol=1e-12, atol=1e-14)
+
+    @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+    def test_clusters_of_the_target_alone_leave_one_rule(self):
+        # Every input is constant: there is nothing for a premise to tell clusters apart by.
+        y = np.repeat([0.0, 1.0], 50)
+        model = ANFISRegressor(partition=KMeans(2, random_state=0)).fit(np.ones((100, 2)), y)
+        assert model.n_rules_ == 1
+        assert_allclose(model.predict(np.ones((1, 2))), 0.5)
+
+
+def many(rng, n_rows=300):
+    """Rows of whole numbers, some of them equal, with whole weights."""
+    X = rng.integers(0, 12, (n_rows, 2)).astype(float)
+    y = rng.integers(0, 3, (n_rows, 1)).astype(float)
+    return X, y, rng.integers(1, 6, n_rows)
+
+
+def standing_for(X, y, weight=None, most=10_000):
+    """Table in the user's units, and weight as part of the whole."""
+    rows = Rows.standardised(X, y, None if weight is None else weight.astype(float))
+    table, share = representative_rows(rows, most)
+    scales = np.concatenate([rows.inputs.scale, rows.targets.scale])
+    return table * scales + np.concatenate(
+        [rows.inputs.offset, rows.targets.offset]
+    ), share / share.sum()
+
+
+class TestRepresentativeRows:
+    @pytest.mark.parametrize("most", [10_000, 100])
+    def test_order_of_the_rows_does_not_matter(self, rng, most):
+        X, y, weight = many(rng)
+        turn = rng.permutation(len(X))
+        table, share = standing_for(X, y, weight, most)
+        turned, turned_share = standing_for(X[turn], y[turn], weight[turn], most)
+        assert_allclose(turned, table, atol=1e-9)
+        assert_allclose(turned_share, share, rtol=1e-9)
+
+    @pytest.mark.parametrize("most", [100_000, 100])
+    def test_weight_is_repetition(self, rng, most):
+        # Both more than ``most`` rows, or both fewer.
+        X, y, times = many(rng)
+        table, share = standing_for(X, y, times, most)
+        repeated = standing_for(
+            np.repeat(X, times, axis=0), np.repeat(y, times, axis=0), None, most
+        )
+        assert_allclose(repeated[0], table, atol=1e-9)
+        assert_allclose(repeated[1], share, rtol=1e-9)
+
+    def test_weight_is_repetition_also_where_only_the_repeated_rows_are_too_many(self, rng):
+        X, y, times = many(rng)
+        table, share = standing_for(X, y, times, 500)
+        repeated = standing_for(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0), None, 500)
+        assert times.sum() > 500 > len(X)
+        assert repeated[0].shape == table.shape
+        assert_allclose(repeated[1], share, rtol=1e-9)
+
+    def test_few_rows_stand_for_themselves(self, rng):
+        X, y, times = many(rng)
+        table, share = standing_for(X, y, times)
+        expected, group = np.unique(np.hstack([X, y]), axis=0, return_inverse=True)
+        assert_allclose(table, expected, atol=1e-9)
+        assert_allclose(share, np.bincount(group.ravel(), weights=times) / times.sum(), rtol=1e-12)
+        assert len(table) < len(X)
+
+    def test_many_rows_are_thinned_evenly(self, rng):
+        X = rng.normal(size=(5000, 2))
+        y = X.sum(axis=1, keepdims=True)
+        rows = Rows.standardised(X, y)
+        table, weight = representative_rows(rows, 500)
+        assert len(table) <= 500
+        assert weight.sum() == 500
+        every = {row.tobytes() for row in rows.table(slice(None))}
+        assert all(row.tobytes() in every for row in table)
+        # A sample of independent rows would be off by 1 / sqrt(500), 0.045.
+        assert_allclose(np.average(table, axis=0, weights=weight), 0.0, atol=0.15)
+        assert_allclose(np.average(table**2, axis=0, weights=weight), 1.0, atol=0.2)
+
+    def test_heavy_rows_stand_for_more(self, rng):
+        X = rng.normal(size=(1000, 1))
+        weight = np.where(X[:, 0] > 0.0, 9.0, 1.0)
+        rows = Rows.standardised(X, np.zeros((1000, 1)), weight)
+        table, share = representative_rows(rows, 200)
+        heavy = table[:, 0] > -rows.inputs.offset[0] / rows.inputs.scale[0]
+        assert_allclose(
+            share[heavy].sum() / share.sum(), weight[X[:, 0] > 0.0].sum() / weight.sum(), atol=0.01
+        )
+
+    def test_a_fit_by_clusters_does_not_see_the_order_of_the_rows(self, rng, monkeypatch):
+        monkeypatch.setattr(representative_rows, "__defaults__", (200,))
+        X = rng.uniform(-1.0, 1.0, (900, 2))
+        y = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2
+        turn = rng.permutation(900)
+        partition = KMeans(3, n_init=2, random_state=0)
+        one = ANFISRegressor(partition=partition, tol=0.01).fit(X, y)
+        other = ANFISRegressor(partition=partition, tol=0.01).fit(X[turn], y[turn])
+        assert_allclose(other.predict(X), one.predict(X), atol=1e-6)

@@ -1,0 +1,214 @@
+"""Rule bases against the product over every rule, divided by the sum over all rules."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.membership import Bell, Gaussian
+
+from . import oracles
+
+
+def grid(*names_and_counts, inputs=None):
+    families = {"g": Gaussian, "b": Bell}
+    names, counts = zip(*names_and_counts, strict=True)
+    return oracles.random_grid(
+        np.random.default_rng(1), [families[name] for name in names], counts, inputs
+    )
+
+
+def scattered(family, n_rules, inputs):
+    return oracles.random_scattered(np.random.default_rng(2), family, n_rules, inputs)
+
+
+# All for data with three inputs.
+ANTECEDENTS = {
+    "one input": grid(("g", 3), inputs=[1]),
+    "equal counts": grid(("g", 3), ("b", 3), ("b", 3)),
+    "mixed counts": grid(("g", 2), ("g", 4), ("g", 3)),
+    "an input without terms": grid(("b", 3), ("b", 2), inputs=[0, 2]),
+    "two families": grid(("g", 3), ("b", 2)),
+    "families that alternate": grid(("b", 2), ("g", 3), ("b", 2)),
+    "two rules": scattered(Gaussian, 2, [0, 1, 2]),
+    "one premise input": scattered(Bell, 4, [2]),
+    "scattered": scattered(Gaussian, 5, [0, 2]),
+    "scattered bells": scattered(Bell, 6, [0, 1, 2]),
+}
+ALL = pytest.mark.parametrize("antecedent", ANTECEDENTS.values(), ids=list(ANTECEDENTS))
+
+
+@pytest.fixture(name="Z")
+def standardised_inputs(rng):
+    return rng.normal(size=(3, 60))
+
+
+def no_terms():
+    return GridAntecedent((), counts=())
+
+
+@ALL
+def test_strengths_are_products_over_the_sum_of_products(antecedent, Z):
+    expected = oracles.strengths(antecedent, antecedent.parameters, Z)
+    assert_allclose(antecedent.strengths(Z), expected, rtol=1e-12, atol=1e-300)
+
+
+@ALL
+@pytest.mark.parametrize("distance", [1.0, 1e3, 1e6, 1e8])
+def test_strengths_sum_to_one_wherever_a_row_lies(antecedent, rng, distance):
+    Z = distance * rng.normal(size=(3, 200))
+    strengths = antecedent.strengths(Z)
+    assert (strengths >= 0.0).all()
+    assert_allclose(strengths.sum(axis=0), 1.0, rtol=1e-13)
+
+
+@ALL
+def test_rule_terms_are_those_by_hand(antecedent):
+    assert_array_equal(antecedent.rule_terms, [list(r) for r in oracles.rules_by_hand(antecedent)])
+    assert antecedent.n_rules == len(antecedent.rule_terms)
+    assert antecedent.n_terms == antecedent.rule_terms.max() + 1
+
+
+@ALL
+def test_log_memberships_are_those_of_every_term(antecedent, Z):
+    expected = np.log(oracles.memberships(antecedent, antecedent.parameters, Z))
+    assert_allclose(antecedent.log_memberships(Z), expected, rtol=1e-11, atol=1e-15)
+    both, _ = antecedent.log_memberships_and_gradient(Z)
+    assert_allclose(both, expected, rtol=1e-11, atol=1e-15)
+
+
+@ALL
+def test_gradient_of_log_memberships_is_laid_out_as_the_parameters(antecedent, Z):
+    _, gradients = antecedent.log_memberships_and_gradient(Z)
+    numeric = (
+        oracles.complex_step(lambda p: oracles.memberships(antecedent, p, Z), antecedent.parameters)
+        / oracles.memberships(antecedent, antecedent.parameters, Z)[:, :, None]
+    )
+    found = np.concatenate([gradient.reshape(-1, Z.shape[1]) for gradient in gradients])
+    # A parameter acts on the log mu of its own term alone: the sum over terms is that term's.
+    assert_allclose(found.T, numeric.sum(axis=0), rtol=1e-10, atol=1e-13)
+
+
+@ALL
+def test_shares_are_the_strength_that_a_term_holds_on_its_input(antecedent, Z):
+    strengths, shares = antecedent.normalise(antecedent.log_memberships(Z))
+    if isinstance(antecedent, GridAntecedent):
+        rules = antecedent.rule_terms
+        expected = [
+            strengths[(rules == t).any(axis=1)].sum(axis=0) for t in range(antecedent.n_terms)
+        ]
+        assert_allclose(shares, expected, rtol=1e-12)
+    else:
+        assert_array_equal(shares, strengths)
+
+
+@ALL
+def test_term_sensitivity_is_the_derivative_by_log_membership(antecedent, Z, rng):
+    values = rng.normal(size=(antecedent.n_rules, Z.shape[1]))
+    rules = antecedent.rule_terms
+    log_mu = antecedent.log_memberships(Z)
+
+    def output(shift):
+        """y = sum_r w_r f_r with every row's log mu shifted alike."""
+        firing = np.array(
+            [np.prod(np.exp(log_mu + shift[:, None])[rule], axis=0) for rule in rules]
+        )
+        return np.sum(firing * values, axis=0) / firing.sum(axis=0)
+
+    numeric = oracles.complex_step(output, np.zeros(antecedent.n_terms))
+    strengths, shares = antecedent.normalise(log_mu.copy())
+    by_rule = strengths * values
+    found = antecedent.term_sensitivity(by_rule, by_rule.sum(axis=0), shares)
+    assert_allclose(found.T, numeric, rtol=1e-10, atol=1e-13)
+
+
+@ALL
+def test_parameters_make_the_round_trip(antecedent, Z, rng):
+    new = antecedent.parameters + 0.1 * rng.normal(size=antecedent.parameters.size)
+    moved = antecedent.with_parameters(new)
+    assert_array_equal(moved.parameters, new)
+    assert_allclose(moved.strengths(Z), oracles.strengths(antecedent, new, Z), rtol=1e-11)
+    assert_array_equal(
+        moved.with_parameters(antecedent.parameters).strengths(Z), antecedent.strengths(Z)
+    )
+
+
+@ALL
+def test_strengths_do_not_depend_on_the_inputs_units(antecedent, Z):
+    offset, scale = np.array([20.0, -3e4, 0.5]), np.array([1e-4, 1e3, 7.0])
+    moved = antecedent.change_units(offset, scale)
+    X = offset[:, None] + scale[:, None] * Z
+    # 20 + 1e-4 z keeps eleven digits of z.
+    assert_allclose(moved.strengths(X), antecedent.strengths(Z), rtol=1e-8, atol=1e-12)
+
+
+@ALL
+def test_nothing_is_changed_in_place(antecedent, Z):
+    before, parameters = Z.copy(), antecedent.parameters.copy()
+    antecedent.strengths(Z)
+    antecedent.log_memberships_and_gradient(Z)
+    antecedent.change_units(np.ones(3), np.full(3, 2.0))
+    antecedent.with_parameters(parameters + 1.0)
+    assert_array_equal(Z, before)
+    assert_array_equal(antecedent.parameters, parameters)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_order_of_the_inputs_permutes_the_rules_of_a_grid(rng, Z, order):
+    families, counts = [Gaussian, Bell, Gaussian], [2, 3, 4]
+    thetas = [
+        family.start(np.sort(rng.normal(size=count)), rng.uniform(0.5, 2.0, count), 0.5)
+        for family, count in zip(families, counts, strict=True)
+    ]
+    straight = GridAntecedent.build(families, [0, 1, 2], thetas)
+    turned = GridAntecedent.build(
+        [families[j] for j in order], [int(j) for j in order], [thetas[j] for j in order]
+    )
+    expected = straight.strengths(Z).reshape(*counts, -1).transpose(*order, 3)
+    assert_allclose(turned.strengths(Z), expected.reshape(24, -1), rtol=1e-12)
+
+
+@pytest.mark.parametrize("family", [Gaussian, Bell])
+def test_order_of_scattered_rules_and_of_their_inputs_does_not_matter(rng, Z, family):
+    theta = family.from_center_and_width(rng.normal(size=(5, 3)), rng.uniform(0.5, 2.0, (5, 3)))
+    expected = ScatteredAntecedent.build(family, np.arange(3), theta).strengths(Z)
+    rules, inputs = rng.permutation(5), np.array([2, 0, 1])
+    turned = ScatteredAntecedent.build(family, inputs, theta[:, rules][:, :, inputs])
+    assert_allclose(turned.strengths(Z), expected[rules], rtol=1e-12)
+
+
+def test_rules_on_a_lattice_are_the_grid(Z):
+    # The scattered form of a grid: one rule per combination, each with terms of its own.
+    whole = ANTECEDENTS["mixed counts"]
+    (group,) = whole.groups
+    theta = group.theta[:, whole.rule_terms]
+    loose = ScatteredAntecedent.build(Gaussian, np.arange(3), theta)
+    assert_allclose(loose.strengths(Z), whole.strengths(Z), rtol=1e-11)
+
+
+def test_two_gaussians_of_one_width_share_by_a_logistic_curve(Z):
+    # nu_2 / nu_1 = exp((c_2 - c_1) (z - (c_1 + c_2) / 2) / sigma^2)
+    theta = np.array([[-1.0, 2.0], np.log([1.5, 1.5])])
+    strengths = GridAntecedent.build([Gaussian], [1], [theta]).strengths(Z)
+    assert_allclose(strengths[1], 1 / (1 + np.exp(-3.0 * (Z[1] - 0.5) / 2.25)), rtol=1e-12)
+
+
+def test_two_equal_rules_share_alike(Z):
+    theta = Gaussian.from_center_and_width(np.zeros((2, 3)), np.ones((2, 3)))
+    assert_array_equal(ScatteredAntecedent.build(Gaussian, np.arange(3), theta).strengths(Z), 0.5)
+
+
+def test_without_terms_one_rule_always_fires(Z):
+    antecedent = no_terms()
+    assert_array_equal(antecedent.strengths(Z), np.ones((1, 60)))
+    assert antecedent.n_rules == 1
+    assert antecedent.n_terms == 0
+    assert antecedent.rule_terms.shape == (1, 0)
+    assert antecedent.parameters.size == 0
+    for same in [
+        antecedent.with_parameters(np.empty(0)),
+        antecedent.change_units(np.ones(3), np.ones(3)),
+    ]:
+        assert_array_equal(same.strengths(Z), np.ones((1, 60)))

@@ -1,0 +1,500 @@
+"""Everything a user can get wrong: the message says where, what was found and what would do."""
+
+import re
+import time
+import tracemalloc
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy import sparse
+from sklearn import config_context
+from sklearn.cluster import DBSCAN, AgglomerativeClustering, KMeans
+from sklearn.exceptions import NotFittedError
+
+from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning, UnderdeterminedWarning
+
+NAMES = ["time", "temperature", "rate"]
+N_ROWS = 60
+KMEANS = KMeans(n_clusters=2, n_init=1, random_state=0)
+# One rule: fitted in one solve.
+QUICK = {"n_mfs": 1}
+
+
+def table(n_rows=N_ROWS):
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (n_rows, 3)) * [10.0, 1.0, 0.1] + [100.0, 0.0, 5.0]
+    return X, np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
+
+
+X, Y = table()
+FRAME = pd.DataFrame(X, columns=NAMES)
+
+
+def with_entry(array, place, value):
+    array = np.array(array, dtype=float)
+    array[place] = value
+    return array
+
+
+def refused(error, *parts):
+    """An error whose message holds all parts, in this order."""
+    return pytest.raises(error, match="(?s)" + ".*".join(re.escape(part) for part in parts))
+
+
+# ------------------------------------------------------------------------------ values of X and y
+
+
+@pytest.mark.parametrize(
+    ("value", "kind"), [(np.nan, "NaN"), (np.inf, "infinity"), (-np.inf, "infinity")]
+)
+@pytest.mark.parametrize("as_frame", [False, True])
+def test_entry_of_x_that_is_not_finite(value, kind, as_frame):
+    bad = with_entry(X, ([7, 40], [2, 2]), value)
+    name = "rate" if as_frame else "x2"
+    bad = pd.DataFrame(bad, columns=NAMES) if as_frame else bad
+    with refused(ValueError, f"Input X contains {kind}", f"{name!r}", "row 7", "2 of its 60"):
+        ANFISRegressor().fit(bad, Y)
+
+
+def test_missing_value_of_x_is_told_what_to_do_about():
+    with refused(ValueError, "Drop these rows", "impute", "Pipeline"):
+        ANFISRegressor().fit(with_entry(X, (0, 0), np.nan), Y)
+
+
+def test_missing_value_in_a_column_of_nullable_integers():
+    frame = FRAME.assign(count=pd.array([1, 2, None] * 20, dtype="Int64"))
+    with refused(ValueError, "NaN", "'count'", "row 2", "20 of its 60"):
+        ANFISRegressor().fit(frame, Y)
+
+
+@pytest.mark.parametrize(("value", "kind"), [(np.nan, "NaN"), (-np.inf, "infinity")])
+def test_entry_of_y_that_is_not_finite(value, kind):
+    with refused(ValueError, f"Input y contains {kind}", "row 3", "1 of its 60"):
+        ANFISRegressor().fit(X, with_entry(Y, 3, value))
+
+
+def test_entry_of_one_of_several_targets_that_is_not_finite():
+    targets = with_entry(np.column_stack([Y, Y]), (4, 1), np.nan)
+    with refused(ValueError, "Input y contains NaN", "'y1'", "row 4"):
+        ANFISRegressor().fit(X, targets)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("method", ["predict", "coverage", "strengths"])
+@pytest.mark.parametrize("as_frame", [False, True])
+def test_entry_that_is_not_finite_after_training(value, method, as_frame):
+    data = FRAME if as_frame else X
+    name = "temperature" if as_frame else "x1"
+    model = ANFISRegressor(**QUICK).fit(data, Y)
+    bad = with_entry(X, (5, 1), value)
+    with refused(ValueError, "Input X contains", f"{name!r}", "row 5"):
+        getattr(model, method)(pd.DataFrame(bad, columns=NAMES) if as_frame else bad)
+
+
+def test_complex_x():
+    with refused(ValueError, "Complex data not supported"):
+        ANFISRegressor().fit(X + 1j, Y)
+
+
+def test_complex_y():
+    with refused(ValueError, "Complex data not supported"):
+        ANFISRegressor().fit(X, Y + 1j)
+
+
+def test_text_in_x():
+    with refused(ValueError, "could not convert string to float", "'warm'"):
+        ANFISRegressor().fit(FRAME.assign(temperature="warm"), Y)
+
+
+def test_text_as_y():
+    with pytest.raises(ValueError, match=r"string|numeric|float"):
+        ANFISRegressor().fit(X, np.array(["low", "high"] * 30))
+
+
+@pytest.mark.parametrize("form", [sparse.csr_matrix, sparse.csr_array])
+def test_sparse_x(form):
+    with refused(TypeError, "Sparse data was passed for X", "toarray"):
+        ANFISRegressor().fit(form(X), Y)
+    with refused(TypeError, "Sparse data was passed for X", "toarray"):
+        ANFISRegressor(**QUICK).fit(X, Y).predict(form(X))
+
+
+# ----------------------------------------------------------------------------------------- shapes
+
+
+def test_no_rows():
+    with refused(ValueError, "0 sample(s)", "minimum of 2", "ANFISRegressor"):
+        ANFISRegressor().fit(X[:0], Y[:0])
+
+
+def test_one_row():
+    with refused(ValueError, "1 sample(s)", "minimum of 2", "ANFISRegressor"):
+        ANFISRegressor().fit(X[:1], Y[:1])
+
+
+def test_no_columns():
+    with refused(ValueError, "0 feature(s)", "minimum of 1", "ANFISRegressor"):
+        ANFISRegressor().fit(X[:, :0], Y)
+
+
+def test_x_of_one_dimension():
+    with refused(ValueError, "Expected 2D array, got 1D array", "reshape(-1, 1)"):
+        ANFISRegressor().fit(X[:, 0], Y)
+
+
+def test_x_of_three_dimensions():
+    with refused(ValueError, "Found array with dim 3", "ANFISRegressor"):
+        ANFISRegressor().fit(X[None], Y)
+
+
+def test_y_of_three_dimensions():
+    with refused(ValueError, "Found array with dim 3", "ANFISRegressor"):
+        ANFISRegressor().fit(X, Y[:, None, None])
+
+
+def test_no_targets():
+    with refused(ValueError, "requires y to be passed"):
+        ANFISRegressor().fit(X, None)
+
+
+def test_x_and_y_of_different_lengths():
+    with refused(ValueError, "inconsistent numbers of samples", "60", "59"):
+        ANFISRegressor().fit(X, Y[:-1])
+
+
+@pytest.mark.parametrize("method", ["predict", "coverage", "strengths"])
+def test_before_fit(method):
+    with refused(NotFittedError, "not fitted yet", "fit"):
+        getattr(ANFISRegressor(), method)(X)
+
+
+@pytest.mark.parametrize("name", ["n_rules_", "rules_", "memberships_", "consequents_"])
+def test_attribute_before_fit(name):
+    with refused(NotFittedError, "not fitted yet", "fit"):
+        getattr(ANFISRegressor(), name)
+    assert not hasattr(ANFISRegressor(), name)
+
+
+@pytest.mark.parametrize("method", ["predict", "coverage", "strengths"])
+@pytest.mark.parametrize("n_columns", [1, 2, 4])
+def test_wrong_number_of_columns_after_training(method, n_columns):
+    model = ANFISRegressor(**QUICK).fit(X, Y)
+    wide = np.column_stack([X, X])
+    with refused(ValueError, f"X has {n_columns} features", "expecting 3 features"):
+        getattr(model, method)(wide[:, :n_columns])
+
+
+def test_one_row_of_one_dimension_after_training():
+    with refused(ValueError, "Expected 2D array, got 1D array", "reshape(1, -1)"):
+        ANFISRegressor(**QUICK).fit(X, Y).predict(X[0])
+
+
+def test_no_rows_after_training():
+    with refused(ValueError, "0 sample(s)", "minimum of 1"):
+        ANFISRegressor(**QUICK).fit(X, Y).predict(X[:0])
+
+
+# ----------------------------------------------------------------------------- data without content
+
+
+def flat(column, value=4.25):
+    return with_entry(X, (slice(None), column), value)
+
+
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {}, {"partition": KMEANS}])
+def test_constant_column_gets_no_terms_and_no_slope(settings):
+    constant = pd.DataFrame(flat(1), columns=NAMES)
+    with pytest.warns(ConstantInputWarning, match=r"'temperature' \(always 4\.25\).*Drop it"):
+        model = ANFISRegressor(**settings).fit(constant, Y)
+    assert "temperature" not in [term["input"] for term in model.memberships_]
+    assert_array_equal(model.consequents_[:, 2], 0.0)
+    without = ANFISRegressor(**settings).fit(constant.drop(columns="temperature"), Y)
+    # A column of zeros more in the same least-squares problem.
+    assert_allclose(
+        model.predict(constant),
+        without.predict(constant.drop(columns="temperature")),
+        rtol=0,
+        atol=1e-8 * np.ptp(Y),
+    )
+
+
+def test_every_constant_column_is_named():
+    both = with_entry(flat(1), (slice(None), 2), -7.0)
+    with pytest.warns(ConstantInputWarning, match=r"'x1' \(always 4\.25\), 'x2' \(always -7\)"):
+        ANFISRegressor(n_mfs=2).fit(both, Y)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")  # beside the error
+def test_terms_asked_for_a_constant_column():
+    with refused(ValueError, "n_mfs=[2, 3, 2]", "3 terms on column 'x1'", "constant", "give it 1"):
+        ANFISRegressor(n_mfs=[2, 3, 2]).fit(flat(1), Y)
+
+
+def test_one_term_for_a_constant_column_is_as_it_should_be():
+    with pytest.warns(ConstantInputWarning, match="'x1'"):
+        model = ANFISRegressor(n_mfs=[2, 1, 2], max_iter=50, tol=0.01).fit(flat(1), Y)
+    assert model.n_rules_ == 4
+
+
+def test_constant_column_that_moves_later_changes_nothing():
+    with pytest.warns(ConstantInputWarning, match="'x1'"):
+        model = ANFISRegressor(n_mfs=2, tol=0.1, warn_out_of_bounds=False).fit(flat(1), Y)
+    for policy in ("clip", "linear"):
+        frozen = model.model_.with_out_of_bounds(policy)
+        assert_allclose(frozen.predict(flat(1, 99.0))[:, 0], model.predict(flat(1)), rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
+@pytest.mark.parametrize("settings", [{}, {"n_mfs": 3}, {"partition": KMEANS}])
+def test_rows_that_are_all_the_same_give_the_mean(settings):
+    same = np.tile(X[:1], (N_ROWS, 1))
+    with pytest.warns(ConstantInputWarning, match="'x0'.*'x1'.*'x2'"):
+        model = ANFISRegressor(**settings).fit(same, Y)
+    assert_allclose(model.predict(X[:1]), Y.mean(), rtol=1e-12)
+
+
+def test_few_distinct_rows_often_repeated():
+    # Three targets for each of five points: a model through the five means is the best there is.
+    few, targets = np.repeat(X[:5], 12, axis=0), np.tile(Y[:3], 20)
+    with pytest.warns(
+        UnderdeterminedWarning,
+        match=r"8 rules with 4 coefficients each are 32 .* 5 distinct .* fewer rules, or raise",
+    ):
+        model = ANFISRegressor(n_mfs=2).fit(few, targets)
+    means = targets.reshape(5, 12).mean(axis=1)
+    # The ridge of 1e-8 pulls at the means, which themselves are only 1e-2 apart in standard
+    # deviations of this target.
+    assert_allclose(model.predict(X[:5]), means, atol=1e-6 * np.ptp(targets))
+
+
+@pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"partition": KMEANS}])
+def test_constant_target_is_predicted_everywhere(settings):
+    model = ANFISRegressor(warn_out_of_bounds=False, **settings).fit(X, np.full(N_ROWS, 7.1))
+    # Strengths sum to one but for rounding.
+    assert_allclose(model.predict(2.0 * X - X.mean(axis=0)), 7.1, rtol=1e-14)
+
+
+def test_constant_target_beside_another_does_not_disturb_it():
+    settings = {"n_mfs": 2, "max_iter": 500}
+    both = ANFISRegressor(**settings).fit(X, np.column_stack([np.full(N_ROWS, -3.0), Y]))
+    alone = ANFISRegressor(**settings).fit(X, Y)
+    assert_allclose(both.predict(X)[:, 0], -3.0, rtol=1e-14)
+    assert_allclose(both.predict(X)[:, 1], alone.predict(X), rtol=0, atol=1e-9 * np.ptp(Y))
+
+
+@pytest.mark.parametrize("scale", [1e-100, 1e100])
+@pytest.mark.parametrize("column", [0, 3])
+def test_numbers_near_the_ends_of_the_range_of_floats(scale, column):
+    # Column 3 is the target.
+    factors = np.ones(4)
+    factors[column] = scale
+    settings = {"n_mfs": 2, "max_iter": 500}
+    plain = ANFISRegressor(**settings).fit(X, Y).predict(X)
+    scaled = ANFISRegressor(**settings).fit(X * factors[:3], Y * factors[3])
+    found = scaled.predict(X * factors[:3]) / factors[3]
+    assert_allclose(found, plain, rtol=0, atol=1e-6 * np.ptp(Y))
+
+
+# ------------------------------------------------------------------------------------------- n_mfs
+
+
+@pytest.mark.parametrize("n_mfs", [[2, 2], (2, 2, 2, 2), np.array([3]), []])
+def test_wrong_number_of_numbers_of_terms(n_mfs):
+    with refused(ValueError, "n_mfs=", f"{len(n_mfs)} entries", "3 columns (time, temperature, r"):
+        ANFISRegressor(n_mfs=n_mfs).fit(FRAME, Y)
+
+
+@pytest.mark.parametrize("n_mfs", [0, -1, [2, 0, 2], [2, 2, -3]])
+def test_fewer_than_one_term(n_mfs):
+    with refused(ValueError, f"n_mfs={n_mfs!r} must be 1 or more", "1 means"):
+        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+
+
+@pytest.mark.parametrize("n_mfs", [True, False, np.array(2), [[2, 2, 2]], {"time": 2}])
+def test_number_of_terms_that_is_no_number(n_mfs):
+    with refused(TypeError, "n_mfs=", "'auto', a whole number, or one whole number per input"):
+        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+
+
+@pytest.mark.parametrize(
+    "n_mfs",
+    [
+        [2, 2.5, 2],
+        ["2", 2, 2],
+        [True, 2, 2],
+        [None, 2, 2],
+        np.array([2.0, 2.0, 2.0]),
+        np.array([True, True, True]),
+    ],
+)
+def test_numbers_of_terms_that_are_not_whole(n_mfs):
+    with refused(TypeError, "n_mfs=", "whole numbers only"):
+        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+
+
+@pytest.mark.parametrize("n_mfs", ["3", "many", 2.0, 2.5, None, np.nan])
+def test_number_of_terms_of_the_wrong_type(n_mfs):
+    with refused(ValueError, "'n_mfs' parameter of ANFISRegressor", "'auto'", f"Got {n_mfs!r}"):
+        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+
+
+@pytest.mark.parametrize("n_mfs", [2, [2, 1, 2]])
+def test_terms_together_with_a_clusterer(n_mfs):
+    with refused(ValueError, f"n_mfs={n_mfs!r} asks for a grid", "KMeans", "'auto'", "'grid'"):
+        ANFISRegressor(n_mfs=n_mfs, partition=KMEANS).fit(X, Y)
+
+
+@pytest.mark.parametrize(
+    ("n_inputs", "settings", "said"),
+    [
+        # 3^10 rules, with 11 coefficients each.
+        (10, {"n_mfs": 3}, ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "20.3 TB"]),
+        (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^18 bytes"]),
+        (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^18 bytes"]),
+        (40, {"partition": "grid", "order": 0}, ["n_mfs='auto' on 40", "10^18 bytes"]),
+        (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^18 bytes"]),
+    ],
+)
+def test_more_rules_than_memory(n_inputs, settings, said):
+    rng = np.random.default_rng(0)
+    wide = rng.normal(size=(50, n_inputs))
+    tracemalloc.start()
+    start = time.perf_counter()
+    try:
+        with refused(ValueError, *said, "limit is 1.07 GB", "working_memory", "KMeans"):
+            ANFISRegressor(**settings).fit(wide, wide[:, 0])
+        seconds = time.perf_counter() - start
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    # Of a thousand and more. Half a second is for a busy machine: 20 ms otherwise.
+    assert peak < 2e6
+    assert seconds < 0.5
+
+
+def test_limit_on_memory_is_that_of_scikit_learn():
+    settings = {"n_mfs": 4, "max_iter": 1, "tol": 1e9, "stiffness": 1e9}
+    # 64 rules with 4 coefficients: a Gram matrix of 256 x 256 is half a MB, and there are several.
+    with config_context(working_memory=1), refused(ValueError, "64 rules", "256", "1.05 MB"):
+        ANFISRegressor(**settings).fit(X, Y)
+    with config_context(working_memory=4), pytest.warns(UnderdeterminedWarning):
+        assert ANFISRegressor(**settings).fit(X, Y).n_rules_ == 64
+
+
+def test_smaller_grid_is_suggested_only_where_it_fits():
+    rng = np.random.default_rng(0)
+    wide = rng.normal(size=(50, 12))
+    # 2^12 rules with 13 coefficients each would not fit either.
+    with pytest.raises(ValueError, match="Use fewer terms: ") as refusal:
+        ANFISRegressor(n_mfs=3).fit(wide, wide[:, 0])
+    assert "n_mfs=2 makes" not in str(refusal.value)
+    with refused(ValueError, "n_mfs=2 makes 256 rules"):
+        ANFISRegressor(n_mfs=7).fit(wide[:, :8], wide[:, 0])
+
+
+# -------------------------------------------------------------------------------- other parameters
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "allowed"),
+    [
+        ("mf", "triangel", "'gaussian'"),
+        ("mf", None, "'gaussian'"),
+        ("solver", "adam", "'varpro'"),
+        ("partition", "tree", "'grid'"),
+        ("partition", 3, "'fit_predict'"),
+        ("out_of_bounds", "wrap", "'clip'"),
+        ("order", 2, "[0, 1]"),
+        ("order", -1, "[0, 1]"),
+        ("alpha", -1e-9, "[0.0, inf)"),
+        ("alpha", np.nan, "[0.0, inf)"),
+        ("alpha", "large", "'auto'"),
+        ("stiffness", -0.1, "[0.0, inf)"),
+        ("tol", -1e-4, "[0.0, inf)"),
+        ("tol", np.nan, "[0.0, inf)"),
+        ("max_iter", 0, "[1, inf)"),
+        ("max_iter", 2.5, "[1, inf)"),
+        ("warn_out_of_bounds", "no", "'bool'"),
+        ("random_state", "lucky", "RandomState"),
+        ("n_jobs", 1.5, "'int'"),
+    ],
+)
+def test_parameter_of_the_wrong_type_or_range(parameter, value, allowed):
+    estimator = ANFISRegressor(**{parameter: value})
+    with pytest.raises(ValueError, match=f"'{parameter}' parameter of ANFISRegressor") as refusal:
+        estimator.fit(X, Y)
+    assert allowed in str(refusal.value)
+    assert f"Got {value!r} instead" in str(refusal.value)
+
+
+def test_no_worker_at_all():
+    with refused(ValueError, "n_jobs == 0"):
+        ANFISRegressor(n_jobs=0).fit(X, Y)
+
+
+def test_unknown_parameter():
+    with refused(ValueError, "Invalid parameter 'mfs'", "n_mfs"):
+        ANFISRegressor().set_params(mfs=3)
+
+
+def test_clusterer_that_takes_no_weights():
+    ward = AgglomerativeClustering(n_clusters=2)
+    with refused(ValueError, "AgglomerativeClustering", "no sample_weight", "KMeans", "'grid'"):
+        ANFISRegressor(partition=ward).fit(X, Y, sample_weight=np.ones(N_ROWS))
+
+
+def test_clusterer_that_finds_nothing_but_noise():
+    with refused(ValueError, "partition found no cluster", "noise", "standardised data"):
+        ANFISRegressor(partition=DBSCAN(eps=1e-9)).fit(X, Y)
+
+
+# ----------------------------------------------------------------------------------- sample_weight
+
+
+@pytest.mark.parametrize(
+    ("sample_weight", "said"),
+    [
+        (with_entry(np.ones(N_ROWS), 4, -2.0), ["Negative", "sample_weight", "-2 at row 4"]),
+        (np.zeros(N_ROWS), ["ample", "eight", "at least"]),
+        (with_entry(np.zeros(N_ROWS), 3, 1.0), ["sample_weight leaves 1 of 60 rows", "at least 2"]),
+        (with_entry(np.ones(N_ROWS), 4, np.nan), ["sample_weight contains NaN"]),
+        (with_entry(np.ones(N_ROWS), 4, np.inf), ["sample_weight contains infinity"]),
+        (np.ones(N_ROWS - 1), ["sample_weight.shape == (59,)", "(60,)"]),
+        (np.ones((N_ROWS, 2)), ["Sample weights must be 1D"]),
+    ],
+)
+def test_weights_that_cannot_be(sample_weight, said):
+    with refused(ValueError, *said):
+        ANFISRegressor().fit(X, Y, sample_weight=sample_weight)
+
+
+# --------------------------------------------------------------------------------- a second fit fails
+
+
+@pytest.mark.parametrize(
+    ("second", "targets"),
+    [
+        (FRAME, with_entry(Y, 3, np.nan)),
+        (FRAME.assign(rate=np.nan), Y),
+        (FRAME[["rate", "time", "temperature"]], with_entry(Y, 3, np.nan)),
+        (FRAME[["rate"]].assign(rate=np.nan), Y),
+        (with_entry(X[:, :2], (0, 0), np.nan), Y),
+        (FRAME.rename(columns={"time": "hour"}), Y[:-1]),
+    ],
+    ids=["y", "x", "columns in another order", "one column", "array", "other name"],
+)
+def test_fit_that_fails_leaves_the_model_as_it_was_or_none(second, targets):
+    model = ANFISRegressor(n_mfs=2, tol=0.1).fit(FRAME, Y)
+    before = model.predict(FRAME)
+    with pytest.raises(ValueError, match=r"NaN|inconsistent"):
+        model.fit(second, targets)
+    try:
+        after = model.predict(FRAME)
+    except NotFittedError:
+        return
+    assert_array_equal(after, before)
+    with pytest.raises(ValueError, match="feature names should match"):
+        model.predict(FRAME[["rate", "time", "temperature"]])

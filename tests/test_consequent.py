@@ -1,0 +1,236 @@
+"""Local basis, design and ridge factor against explicit matrices and numpy's own solvers."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.linear_model import Ridge
+
+from skanfis.consequent import LocalBasis, RidgeFactor, basis, design, rule_masses
+
+N_RULES, N_INPUTS, N_ROWS = 4, 3, 200
+
+
+@pytest.fixture(name="Z")
+def standardised_inputs(rng):
+    return rng.normal(size=(N_INPUTS, N_ROWS)) + np.array([[0.0], [2.0], [-1.0]])
+
+
+@pytest.fixture
+def strengths(rng):
+    return rng.dirichlet(np.full(N_RULES, 0.5), N_ROWS).T
+
+
+@pytest.fixture
+def weight(rng):
+    weight = rng.uniform(0.1, 2.0, N_ROWS)
+    return weight / weight.sum()
+
+
+def gram_of(strengths, Z, weight, order):
+    phi = np.array([w * b for w in strengths for b in ([1, *Z] if order else [1.0])])
+    return (phi * weight) @ phi.T
+
+
+def explicit(local):
+    """T entry by entry: columns are the functions (z_j - a_rj) / h_rj on [1, z]."""
+    n_rules, n_slopes = local.center.shape
+    n_basis = 1 + n_slopes
+    matrix = np.zeros((n_rules * n_basis, n_rules * n_basis))
+    for r in range(n_rules):
+        first = r * n_basis
+        matrix[first, first] = 1.0
+        for j in range(n_slopes):
+            matrix[first + 1 + j, first + 1 + j] = 1.0 / local.spread[r, j]
+            matrix[first, first + 1 + j] = -local.center[r, j] / local.spread[r, j]
+    return matrix
+
+
+def random_local(rng, n_slopes=N_INPUTS):
+    return LocalBasis(
+        rng.normal(size=(N_RULES, n_slopes)), rng.uniform(0.1, 2.0, (N_RULES, n_slopes))
+    )
+
+
+def positive_definite(rng, n=12, condition=1e4):
+    q, _ = np.linalg.qr(rng.normal(size=(n, n)))
+    return (q * np.geomspace(1.0, 1.0 / condition, n)) @ q.T
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_design_holds_strength_times_basis(strengths, Z, order):
+    phi = design(strengths, basis(Z, order))
+    expected = [w * b for w in strengths for b in ([np.ones(N_ROWS), *Z] if order else [1.0])]
+    assert_array_equal(phi, expected)
+    out = np.full((len(expected), N_ROWS), np.nan)
+    assert design(strengths, basis(Z, order), out) is out
+    assert_array_equal(out, phi)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_masses_are_the_weight_on_which_rules_fire(strengths, Z, weight, order):
+    masses = rule_masses(gram_of(strengths, Z, weight, order), N_RULES)
+    assert_allclose(masses, strengths @ weight, rtol=1e-12)
+    assert_allclose(masses.sum(), 1.0, rtol=1e-12)
+
+
+def test_local_basis_holds_weighted_moments(strengths, Z, weight):
+    local = LocalBasis.from_gram(gram_of(strengths, Z, weight, 1), N_RULES)
+    for r, w in enumerate(strengths * weight):
+        mean = np.average(Z, axis=1, weights=w)
+        deviation = np.sqrt(np.average((Z - mean[:, None]) ** 2, axis=1, weights=w))
+        assert_allclose(local.center[r], mean, rtol=1e-10, atol=1e-12)
+        assert_allclose(local.spread[r], deviation, rtol=1e-10)
+
+
+def test_local_basis_of_order_zero_changes_nothing(strengths, Z, weight):
+    gram = gram_of(strengths, Z, weight, 0)
+    local = LocalBasis.from_gram(gram, N_RULES)
+    assert local.n_basis == 1
+    assert_array_equal(local.transform_gram(gram), gram)
+    assert_array_equal(local.to_global(gram), gram)
+    assert_array_equal(local.to_local(gram), gram)
+
+
+def test_dead_rule_keeps_the_plain_basis(Z, weight, strengths):
+    strengths[2] = 1e-14
+    local = LocalBasis.from_gram(gram_of(strengths / strengths.sum(axis=0), Z, weight, 1), N_RULES)
+    assert_array_equal(local.center[2], 0.0)
+    assert_array_equal(local.spread[2], 1.0)
+    assert (local.spread[[0, 1, 3]] != 1.0).all()
+
+
+def test_rule_that_fires_on_one_spot_has_a_spread(Z, weight, strengths):
+    strengths[:, 0], strengths[0, 1:] = [1.0, 0.0, 0.0, 0.0], 0.0
+    local = LocalBasis.from_gram(gram_of(strengths / strengths.sum(axis=0), Z, weight, 1), N_RULES)
+    assert_allclose(local.center[0], Z[:, 0], rtol=1e-12)
+    assert_array_equal(local.spread[0], 0.05)
+
+
+def test_gram_of_the_local_design_is_found_without_the_rows(strengths, Z, weight):
+    gram = gram_of(strengths, Z, weight, 1)
+    local = LocalBasis.from_gram(gram, N_RULES)
+    rows = []
+    for r, w in enumerate(strengths):
+        rows += [w, *(w * ((Z.T - local.center[r]) / local.spread[r]).T)]
+    rows = np.array(rows)
+    assert_allclose(local.transform_gram(gram), (rows * weight) @ rows.T, rtol=1e-10, atol=1e-14)
+
+
+def test_transforms_are_the_explicit_matrix(rng):
+    local, gram = random_local(rng), positive_definite(rng, N_RULES * (1 + N_INPUTS))
+    T = explicit(local)
+    before = gram.copy()
+    assert_allclose(local.transform_gram(gram), T.T @ gram @ T, rtol=1e-11, atol=1e-13)
+    assert_array_equal(gram, before)
+    rows = rng.normal(size=(len(T), 5))
+    beta = rng.normal(size=(len(T), 2))
+    assert_allclose(local.to_global(beta), T @ beta, rtol=1e-12, atol=1e-13)
+    assert_allclose(local.to_local(beta), np.linalg.solve(T, beta), rtol=1e-11, atol=1e-12)
+    expected = T.T @ rows
+    assert local.transform_rows(rows) is rows
+    assert_allclose(rows, expected, rtol=1e-12, atol=1e-13)
+
+
+def test_local_and_global_coefficients_are_inverse(rng):
+    local, beta = random_local(rng), rng.normal(size=(N_RULES * (1 + N_INPUTS), 3))
+    before = beta.copy()
+    assert_allclose(local.to_local(local.to_global(beta)), beta, rtol=1e-13, atol=1e-13)
+    assert_allclose(local.to_global(local.to_local(beta)), beta, rtol=1e-13, atol=1e-13)
+    assert_array_equal(beta, before)
+
+
+def test_local_basis_spares_the_gram_matrix_its_condition(rng):
+    # Two narrow rules far apart: w_r and w_r z are parallel, (z - a) / h and one are not.
+    Z = np.concatenate([rng.normal(-100.0, 1.0, 500), rng.normal(100.0, 1.0, 500)])[None]
+    strengths = np.array([Z[0] < 0, Z[0] >= 0], dtype=float)
+    gram = gram_of(strengths, Z, np.full(1000, 1e-3), 1)
+    assert np.linalg.cond(gram) > 1e7
+    assert np.linalg.cond(LocalBasis.from_gram(gram, 2).transform_gram(gram)) < 1.5
+
+
+@pytest.mark.parametrize("alpha", [1e-10, 1e-3, 1.0])
+def test_ridge_solves_the_normal_equations(rng, alpha):
+    gram, right = positive_definite(rng), rng.normal(size=(12, 2))
+    before = gram.copy()
+    factor = RidgeFactor(gram, alpha)
+    assert factor.alpha == alpha
+    assert_array_equal(gram, before)
+    shifted = gram + alpha * np.eye(12)
+    assert_allclose(factor.solve(right), np.linalg.solve(shifted, right), rtol=1e-9)
+
+
+def test_solution_and_projector_come_from_one_matrix(rng):
+    gram, right = positive_definite(rng), rng.normal(size=(12, 3))
+    factor = RidgeFactor(gram, 1e-6)
+    half = factor.half_solve(right)
+    assert_allclose(half.T @ half, right.T @ factor.solve(right), rtol=1e-10)
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1e-8, 0.1, 100.0])
+def test_effective_parameters_are_the_trace_of_the_hat_matrix(rng, alpha):
+    phi = rng.normal(size=(40, 6))
+    hat = phi @ np.linalg.solve(phi.T @ phi + alpha * np.eye(6), phi.T)
+    assert_allclose(
+        RidgeFactor(phi.T @ phi, alpha).effective_parameters(), np.trace(hat), rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1e-12, 1e-4])
+def test_duplicated_rule_shares_the_coefficients_of_the_one(rng, alpha):
+    # Phi = [A, A]: ridge on both halves is ridge of half the strength on their sum.
+    A, y = rng.normal(size=(50, 4)), rng.normal(size=(50, 1))
+    gram, slope = A.T @ A / 50, A.T @ y / 50
+    factor = RidgeFactor(np.block([[gram, gram], [gram, gram]]), alpha)
+    solution = factor.solve(np.vstack([slope, slope]))
+    single = np.linalg.solve(gram + factor.alpha / 2 * np.eye(4), slope)
+    # Rounding errors along the open direction grow by 1 / alpha, but cancel in the sum.
+    assert_allclose(solution[:4] + solution[4:], single, rtol=1e-8)
+    if alpha == 1e-4:
+        assert_allclose(solution[:4], solution[4:], rtol=1e-9)
+    assert_allclose(factor.effective_parameters(), 4.0, rtol=0.01)
+
+
+def test_alpha_zero_is_replaced_by_rounding_alone(rng):
+    gram = positive_definite(rng)
+    assert 0.0 < RidgeFactor(gram, 0.0).alpha <= 12 * np.finfo(float).eps * gram.max()
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1.0, 1e12])
+def test_singular_gram_is_factorised_at_any_scale(rng, scale):
+    column = rng.normal(size=(30, 1))
+    gram = scale * (column @ column.T)
+    factor = RidgeFactor(gram, 0.0)
+    assert factor.alpha <= 1e-10 * scale * np.trace(gram / scale)
+    solution = factor.solve(gram @ np.ones((30, 1)))
+    assert_allclose(gram @ solution, gram @ np.ones((30, 1)), rtol=1e-6, atol=1e-9 * scale)
+
+
+def test_alpha_grows_with_what_rounding_needs_and_is_told():
+    # An eigenvalue of -1e-13, as a sum of many rows may leave it.
+    factor = RidgeFactor(np.diag([1.0, -1e-13]), 0.0)
+    assert 1e-13 < factor.alpha < 1e-11
+    assert_allclose(
+        factor.solve(np.array([0.0, 1.0])), [0.0, 1.0 / (factor.alpha - 1e-13)], rtol=1e-6
+    )
+
+
+def test_empty_gram_has_the_solution_zero():
+    factor = RidgeFactor(np.zeros((3, 3)), 0.0)
+    assert_array_equal(factor.solve(np.zeros((3, 1))), 0.0)
+    assert_allclose(factor.effective_parameters(), 0.0, atol=1e-12)
+
+
+def test_one_rule_is_ridge_on_standardised_inputs(rng):
+    X, alpha = rng.normal(size=(80, 3)) * [1.0, 10.0, 0.1] + 5.0, 0.2
+    y = X @ [1.0, -0.2, 3.0] + rng.normal(size=80)
+    weight = rng.uniform(0.5, 2.0, 80)
+    share = weight / weight.sum()
+    local = LocalBasis.from_gram(gram_of(np.ones((1, 80)), X.T, share, 1), 1)
+    z = (X - local.center[0]) / local.spread[0]
+    phi = np.column_stack([np.ones(80), z])
+    target = y - share @ y
+    beta = RidgeFactor((phi.T * share) @ phi, alpha).solve((phi.T * share) @ target)
+    # Ridge minimises a sum, not a mean, and spares its intercept, which is zero for a centred y.
+    ridge = Ridge(alpha=alpha * weight.sum()).fit(z, target, sample_weight=weight)
+    assert_allclose(beta[1:], ridge.coef_, rtol=1e-9)
+    assert_allclose(beta[0], ridge.intercept_, atol=1e-12)
