@@ -102,17 +102,17 @@ def test_grid_that_fits_passes_in_silence():
 
 
 def test_message_says_how_large_the_grid_is_and_what_to_do():
-    names = [f"x{j}" for j in range(10)]
-    with pytest.raises(ValueError, match="grid of 59,049 rules") as error:
-        GridSize([3] * 10, n_basis=11).check_fits(3, GIB, names)
+    names = [f"x{j}" for j in range(8)]
+    with pytest.raises(ValueError, match="grid of 6,561 rules") as error:
+        GridSize([3] * 8, n_basis=9).check_fits(3, GIB, names)
     message = str(error.value)
-    assert message.startswith("n_mfs=3 on 10 inputs makes a grid of 59,049 rules with 649,539 ")
+    assert message.startswith("n_mfs=3 on 8 inputs makes a grid of 6,561 rules with 59,049 ")
     assert "and the limit is 1.07 GB" in message
-    assert "n_mfs=2 makes 1,024 rules" in message
+    assert "n_mfs=2 makes 256 rules" in message
     assert "partition=KMeans(" in message
-    # 8 bytes for each entry of a few matrices of side 649,539
-    terabytes = float(re.search(r"it would take ([\d.]+) TB", message)[1])
-    assert 2 * 8 * 649_539**2 < terabytes * 1e12 < 20 * 8 * 649_539**2
+    # 8 bytes for each entry of a few matrices of side 59,049
+    gigabytes = float(re.search(r"it would take ([\d.]+) GB", message)[1])
+    assert 2 * 8 * 59_049**2 < gigabytes * 1e9 < 20 * 8 * 59_049**2
 
 
 def test_hint_at_two_terms_is_not_given_where_two_are_too_many():
