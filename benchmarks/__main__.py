@@ -2,11 +2,10 @@
 
 import argparse
 import sys
-import warnings
-from importlib import import_module
 from pathlib import Path
 from shlex import join
 
+from .fresh import alone, run_benchmark
 from .report import Results, machine, markdown
 
 ALWAYS = ("jang", "gyro", "campaign", "one_pass", "memory", "one_row", "file_size")
@@ -50,10 +49,7 @@ def main():
     results = Results()
     for name in options.names or ALWAYS:
         print(f"{name} ...", file=sys.stderr, flush=True)
-        with warnings.catch_warnings():
-            # Rows outside the training data, iterations cut short: on purpose here.
-            warnings.simplefilter("ignore")
-            results += import_module(f".{name}", __package__).run(options)
+        results += alone(run_benchmark, name, options)
     text = markdown(results, [*machine(), f"command: `{command(options)}`"])
     print(text)
     if options.write:

@@ -1,5 +1,6 @@
 """Three problems of Jang 1993; defaults but for ``n_mfs`` and ``mf``."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,7 @@ class Problem:
     n_mfs: int
     train: tuple
     check: tuple
-    error: callable
+    error: Callable
     names: tuple[str, str]
     unit: str
     bars: tuple
@@ -53,7 +54,7 @@ class Problem:
             )
         ]
         return Row(
-            f"{self.name}, {self.mf} (Jang: {self.reference})",
+            f"{self.name}, {self.mf} ({self.reference})",
             [*measures, Measure("CPU", seconds, "s", 1.0)],
         )
 
@@ -61,7 +62,7 @@ class Problem:
 PROBLEMS = [
     Problem(
         name="Jang's sinc, 16 rules",
-        reference="2.1e-3 after 250 epochs",
+        reference="Jang's rule: 2.1e-3 after 250 epochs",
         mf="gaussian",
         n_mfs=4,
         train=make_jang_sinc(),
@@ -74,7 +75,7 @@ PROBLEMS = [
     ),
     Problem(
         name="Jang's three-input, 8 rules",
-        reference="0.043 % / 1.066 %",
+        reference="Jang 1993: 0.043 % / 1.066 %",
         mf="bell",
         n_mfs=2,
         train=make_jang_three_input(),
@@ -87,7 +88,7 @@ PROBLEMS = [
     ),
     Problem(
         name="Mackey-Glass, 16 rules",
-        reference="0.0016 / 0.0015 after 500 epochs",
+        reference="Jang 1993: 0.0016 / 0.0015 after 500 epochs",
         mf="bell",
         n_mfs=2,
         train=make_mackey_glass(),

@@ -16,10 +16,10 @@ __all__ = ["Measure", "Results", "Row", "Table", "machine", "markdown"]
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure, and the largest that it should be: at least the bar, better the aim."""
+    """A figure (or None), and the most it should be: at least the bar, better the aim."""
 
     name: str
-    value: float
+    value: float | None
     unit: str = ""
     bar: float | None = None
     aim: float | None = None
@@ -34,6 +34,8 @@ class Measure:
         return limit is None or self.value <= limit
 
     def __str__(self):
+        if self.value is None:
+            return f"{self.name} not given"
         return f"{self.name} {self.value:.3g}{self._suffix()}"
 
     def _suffix(self):
@@ -52,7 +54,7 @@ class Row:
             self.work,
             self._joined("bar"),
             self._joined("aim"),
-            ", ".join(map(str, self.measures)) or "not given",
+            ", ".join(map(str, self.measures)),
             self._verdict(),
         ]
 
@@ -60,7 +62,7 @@ class Row:
         return ", ".join(filter(None, (measure.limit(kind) for measure in self.measures)))
 
     def _verdict(self):
-        if not self._joined("bar"):
+        if any(measure.value is None for measure in self.measures):
             return ""
         missed = {k: [m.name for m in self.measures if not m.meets(k)] for k in ("bar", "aim")}
         if missed["bar"]:

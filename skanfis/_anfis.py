@@ -1,5 +1,6 @@
 """What every ANFIS estimator shares: validate, partition, solve, and hand out the frozen model."""
 
+import inspect
 import warnings
 from dataclasses import dataclass
 
@@ -7,21 +8,18 @@ import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
 from sklearn import get_config
 from sklearn.base import clone
-from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import has_fit_parameter
 from threadpoolctl import threadpool_limits
 
-from .antecedent import Antecedent
+from ._automatic import Structure, StructureSearch
 from .exceptions import ConstantInputWarning, UnderdeterminedWarning
 from .membership import MEMBERSHIPS
 from .model import TSKModel
 from .objective import SeparableProblem
 from .partition import (
     GridSize,
-    automatic_counts,
-    automatic_n_rules,
     clustered_antecedent,
     count_distinct_inputs,
     grid_antecedent,
@@ -51,6 +49,7 @@ class Training:
 
     model: TSKModel
     result: SolverResult
+    start: Structure
 
 
 def train(estimator, X, y, sample_weight, names):
@@ -70,34 +69,51 @@ def train(estimator, X, y, sample_weight, names):
     # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many.
     with threadpool_limits(limits=1, user_api="blas"):
         rows = Rows.standardised(X, y, sample_weight)
-        antecedent, alpha, n_distinct = _initial_antecedent(estimator, rows, names)
+        n_distinct = count_distinct_inputs(rows, _ENOUGH_ROWS)
+        start = _start(estimator, rows, names, n_distinct)
         problem = SeparableProblem(
-            rows, antecedent, estimator.order, alpha, _ordered_map(estimator.n_jobs)
-        )
-        low, high = (
-            _standardised(rows, edge) for edge in (rows.inputs.minimum, rows.inputs.maximum)
+            rows, start.antecedent, estimator.order, start.alpha, _ordered_map(estimator.n_jobs)
         )
         result = SOLVERS[estimator.solver](
             problem,
-            Premise.of(antecedent, low, high),
+            Premise.of(start.antecedent, *_box(rows)),
             max_iter=estimator.max_iter,
             tol=estimator.tol,
-            stiffness=estimator.stiffness,
+            stiffness=start.stiffness,
+            **_solver_options(estimator),
         )
     if not result.converged:
         warnings.warn(
-            f"solver={estimator.solver!r} with {antecedent.n_rules} rules on {rows.n_rows} rows "
-            f"stopped at max_iter={estimator.max_iter} before the cost settled to "
-            f"tol={estimator.tol:g}. The model is the best one found; increase max_iter or tol.",
+            f"solver={estimator.solver!r} with {start.antecedent.n_rules} rules on {rows.n_rows} "
+            f"rows, max_iter={estimator.max_iter}, tol={estimator.tol:g}: {result.message} The "
+            "model is the best one found; increase max_iter or tol.",
             ConvergenceWarning,
             stacklevel=4,
         )
-    model = _frozen(rows, antecedent, result, n_distinct, names, estimator.out_of_bounds)
-    return Training(model, result)
+    model = _frozen(rows, start.antecedent, result, n_distinct, names, estimator.out_of_bounds)
+    return Training(model, result, start)
 
 
-def _standardised(rows, values):
-    return (values - rows.inputs.offset) / rows.inputs.scale
+def _solver_options(estimator):
+    """What the solver takes beyond what all take; ValueError for what it does not take."""
+    takes = inspect.signature(SOLVERS[estimator.solver]).parameters
+    options = {}
+    for name in ("step_size", "error_goal"):
+        value = getattr(estimator, name)
+        if value is not None and name not in takes:
+            raise ValueError(
+                f"{name}={value!r} means nothing to solver={estimator.solver!r}: leave it at None, "
+                "or use solver='hybrid' or 'gradient'."
+            )
+        if value is not None:
+            options[name] = value
+    return options
+
+
+def _box(rows):
+    """Lowest and highest values of the inputs, standardised."""
+    scale = rows.inputs
+    return tuple((edge - scale.offset) / scale.scale for edge in (scale.minimum, scale.maximum))
 
 
 def _ordered_map(n_jobs):
@@ -114,47 +130,36 @@ def _ordered_map(n_jobs):
     return map_ordered
 
 
-def _initial_antecedent(estimator, rows, names) -> tuple[Antecedent, float, int]:
-    """The rule base that training starts from, in standardised units, and the ridge that it needs.
-
-    With them, the number of distinct rows of X, as far as it has been counted.
-    """
+def _start(estimator, rows, names, n_distinct) -> Structure:
+    """The rule base that training starts from, in standardised units, and its regularisation."""
     _check_combination(estimator)
-    constant = rows.inputs.is_constant
-    _report_constant(constant, rows, names)
+    _report_constant(rows, names)
     family = MEMBERSHIPS[estimator.mf]
-    n_inputs = int(np.count_nonzero(~constant))
-    n_basis = 1 + n_inputs if estimator.order == 1 else 1
-    n_distinct = count_distinct_inputs(rows, _ENOUGH_ROWS)
-
-    counts = _grid_counts(estimator, rows, names, n_basis, n_distinct)
-    if counts is not None:
+    alpha = None if isinstance(estimator.alpha, str) else estimator.alpha
+    stiffness = None if isinstance(estimator.stiffness, str) else estimator.stiffness
+    if isinstance(estimator.n_mfs, str) and isinstance(estimator.partition, str):
+        # random_state=None stands for one fixed seed: the same data give the same model.
+        state = estimator.random_state
+        seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
+        search = StructureSearch(
+            rows, family, estimator.order, n_distinct, seed, alpha, stiffness, _OVERLAP
+        )
+        return search.run(grids_only=estimator.partition == "grid")
+    if isinstance(estimator.n_mfs, str):
+        weighted = rows.sample_weight is not None
+        antecedent = clustered_antecedent(family, rows, _labeller(estimator.partition, weighted))
+    else:
+        counts = _grid_counts(estimator.n_mfs, rows, names)
+        n_basis = 1 + len(names) if estimator.order == 1 else 1
         GridSize(counts, n_basis, rows.y.shape[1]).check_fits(
             estimator.n_mfs, get_config()["working_memory"] * _MIB, names
         )
-        low, high = (
-            _standardised(rows, edge) for edge in (rows.inputs.minimum, rows.inputs.maximum)
-        )
+        low, high = _box(rows)
         antecedent = grid_antecedent([family] * len(names), counts, low, high, _OVERLAP)
-    elif isinstance(estimator.partition, str):
-        n_premise = len(family.parameters)
-        n_rules = automatic_n_rules(n_inputs, n_basis, n_premise, n_distinct)
-        # random_state=None stands for one fixed seed: the same data give the same model.
-        seed = 0 if estimator.random_state is None else check_random_state(estimator.random_state)
-        clusterer = KMeans(n_clusters=n_rules, n_init=3, random_state=seed)
-        antecedent = clustered_antecedent(family, rows, _labeller(clusterer, weighted=True))
-    else:
-        weighted = rows.sample_weight is not None
-        antecedent = clustered_antecedent(family, rows, _labeller(estimator.partition, weighted))
-    n_columns = antecedent.n_rules * n_basis
-    if n_distinct == _ENOUGH_ROWS < 2 * n_columns:
-        n_distinct = count_distinct_inputs(rows, 2 * n_columns)
-    if n_columns > n_distinct:
-        _report_underdetermined(antecedent.n_rules, n_basis, n_distinct)
-    if not isinstance(estimator.alpha, str):
-        return antecedent, estimator.alpha, n_distinct
-    alpha = _ALPHA if n_distinct >= 2 * n_columns else _ALPHA_FEW_ROWS
-    return antecedent, alpha, n_distinct
+    is_poor = _report_underdetermined(antecedent.n_rules, estimator.order, rows, n_distinct)
+    if alpha is None:
+        alpha = _ALPHA_FEW_ROWS if is_poor else _ALPHA
+    return Structure(antecedent, alpha, stiffness or 0.0, [])
 
 
 def _check_combination(estimator):
@@ -167,25 +172,18 @@ def _check_combination(estimator):
     )
 
 
-def _grid_counts(estimator, rows, names, n_basis, n_distinct):
-    """Terms per input where there is to be a grid, else None."""
+def _grid_counts(n_mfs, rows, names):
+    """Terms per input; none on an input that never changes."""
     constant = rows.inputs.is_constant
-    if not isinstance(estimator.n_mfs, str):
-        counts = term_counts(estimator.n_mfs, names)
-        if np.ndim(estimator.n_mfs) == 0:
-            return [1 if flat else count for flat, count in zip(constant, counts, strict=True)]
-        for name, flat, count in zip(names, constant, counts, strict=True):
-            if flat and count > 1:
-                raise ValueError(
-                    f"n_mfs={estimator.n_mfs!r} asks for {count} terms on column {name!r}, which "
-                    "is constant in the training data: give it 1, or drop the column."
-                )
-        return counts
-    if not isinstance(estimator.partition, str):
-        return None
-    counts = automatic_counts(constant, n_basis, n_distinct)
-    if counts is None and estimator.partition == "grid":
-        return [1 if flat else 2 for flat in constant]
+    counts = term_counts(n_mfs, names)
+    if np.ndim(n_mfs) == 0:
+        return [1 if flat else count for flat, count in zip(constant, counts, strict=True)]
+    for name, flat, count in zip(names, constant, counts, strict=True):
+        if flat and count > 1:
+            raise ValueError(
+                f"n_mfs={n_mfs!r} asks for {count} terms on column {name!r}, which is constant in "
+                "the training data: give it 1, or drop the column."
+            )
     return counts
 
 
@@ -208,10 +206,11 @@ def _labeller(clusterer, weighted):
     return label
 
 
-def _report_constant(constant, rows, names):
+def _report_constant(rows, names):
+    scale = rows.inputs
     flat = [
         f"{name!r} (always {value:.6g})"
-        for name, value, is_flat in zip(names, rows.inputs.offset, constant, strict=True)
+        for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
         if is_flat
     ]
     if flat:
@@ -223,15 +222,22 @@ def _report_constant(constant, rows, names):
         )
 
 
-def _report_underdetermined(n_rules, n_basis, n_distinct):
-    warnings.warn(
-        f"{n_rules} rules with {n_basis} coefficients each are {n_rules * n_basis} consequent "
-        f"parameters for {n_distinct} distinct training rows: the model can pass through every "
-        "row and mean nothing between them. Judge it on rows held out, use fewer rules, or "
-        "raise alpha.",
-        UnderdeterminedWarning,
-        stacklevel=6,
-    )
+def _report_underdetermined(n_rules, order, rows, n_distinct):
+    """Warn of more parameters than rows; whether there are fewer than two rows for each."""
+    n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant) if order == 1 else 1
+    n_columns = n_rules * n_basis
+    if n_distinct == _ENOUGH_ROWS < 2 * n_columns:
+        n_distinct = count_distinct_inputs(rows, 2 * n_columns)
+    if n_columns > n_distinct:
+        warnings.warn(
+            f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
+            f"parameters for {n_distinct} distinct training rows: the model can pass through every "
+            "row and mean nothing between them. Judge it on rows held out, use fewer rules, or "
+            "raise alpha.",
+            UnderdeterminedWarning,
+            stacklevel=6,
+        )
+    return n_distinct < 2 * n_columns
 
 
 def _parts_strongest(rows, antecedent):

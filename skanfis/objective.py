@@ -34,22 +34,22 @@ from .consequent import LocalBasis, RidgeFactor, basis, rule_masses, rule_output
 from .gram import DesignMoments
 from .rows import Rows
 
-__all__ = ["Evaluation", "Linearisation", "SeparableProblem"]
+__all__ = ["Evaluation", "JointGradient", "Linearisation", "SeparableProblem"]
 
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
-# a call to NumPy more often; between 2^18 and 2^23, this was fastest (benchmarks/one_pass.py).
-_BLOCK_BYTES = 2**23
+# a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
+_BLOCK_BYTES = 2**22
 _FEWEST_ROWS, _MOST_ROWS = 128, 4096
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The reduced problem at one theta."""
+    """The problem at one theta, and at the coefficients solved for there or given."""
 
     antecedent: Antecedent
     cost: float
     coefficients: np.ndarray  # on [1, z], (n_columns, n_outputs)
-    factor: RidgeFactor
+    factor: RidgeFactor | None  # None where the coefficients were given, not solved for
     masses: np.ndarray  # part of the weight on which each rule fires
     mean_squared_error: float  # of the standardised target, weighted, summed over outputs
 
@@ -60,6 +60,15 @@ class Linearisation:
 
     gradient: np.ndarray
     gauss_newton: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class JointGradient:
+    """The cost at given coefficients, and its gradient by premises and coefficients together."""
+
+    evaluation: Evaluation
+    premises: np.ndarray  # by the antecedent's parameters
+    coefficients: np.ndarray  # by those on [1, z]
 
 
 class SeparableProblem:
@@ -201,6 +210,61 @@ class SeparableProblem:
             half = evaluation.factor.half_solve(self.local.transform_rows(columns))
             gauss_newton -= half.T @ half
         return Linearisation(-slope, gauss_newton)
+
+    def joint(self, parameters, coefficients):
+        """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
+        antecedent = self.antecedent.with_parameters(parameters)
+        premises, slope, square, masses = self._joint_pass(antecedent, coefficients)
+        local = self.local.to_local(coefficients)
+        cost = 0.5 * (square.sum() + self.alpha * np.sum(local**2))
+        return JointGradient(
+            Evaluation(antecedent, cost, coefficients, None, masses, float(square.sum())),
+            -premises,
+            self.alpha * self._by_global(local) - slope,
+        )
+
+    def _joint_pass(self, antecedent, coefficients):
+        """D' S r, Phi' S r, r' S r (per output) and each rule's mass, over W."""
+        by_rule = coefficients.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
+
+        def accumulate(part, sums):
+            premises, slope, square, masses = sums
+            Z, target, weight = self.rows.read(part)
+            basis_rows = basis(Z, self.order)
+            log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
+            strengths, shares = antecedent.normalise(log_mu)
+            masses += strengths.sum(axis=1) if weight is None else strengths @ weight
+            for k in range(self.n_outputs):
+                by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
+                residual = target[k] - output
+                weighted = residual if weight is None else residual * weight
+                slope[:, k] += (strengths @ (basis_rows * weighted).T).ravel()
+                square[k] += weighted @ residual
+                by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
+                by_term *= weighted
+                premises += self._chain_sum(gradients, by_term)
+
+        shapes = [(antecedent.parameters.size,), coefficients.shape]
+        shapes += [(self.n_outputs,), (antecedent.n_rules,)]
+        return self._sum_over_chunks(accumulate, shapes)
+
+    def _by_global(self, local):
+        """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""
+        blocks = local.reshape(-1, self.n_basis, self.n_outputs).copy()
+        blocks[:, 1:] *= self.local.spread[:, :, None]
+        blocks[:, 1:] += self.local.center[:, :, None] * blocks[:, :1]
+        return blocks.reshape(local.shape)
+
+    @staticmethod
+    def _chain_sum(gradients, by_term):
+        """Sum over rows of what ``_chain`` gives, without an array of every parameter's rows."""
+        parts, term = [], 0
+        for gradient in gradients:
+            n_terms = gradient.shape[1]
+            own = by_term[term : term + n_terms]
+            parts.append(np.einsum("pti,ti->pt", gradient, own).ravel())
+            term += n_terms
+        return np.concatenate(parts) if parts else np.empty(0)
 
     @staticmethod
     def _chain(gradients, by_term, out):

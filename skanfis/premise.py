@@ -75,6 +75,12 @@ class Premise:
             self._is_gap, growth, self._unit * displacement
         )
 
+    def displacement(self, parameters):
+        """The displacement at which the antecedent has these parameters."""
+        growth = np.linalg.solve(self._ordered, parameters - self.antecedent.parameters)
+        growth = growth / self._unit
+        return np.where(self._is_gap, np.log1p(np.where(self._is_gap, growth, 0.0)), growth)
+
     def pull_back(self, displacement, gradient, gauss_newton):
         """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
         per_unit = self._unit * np.where(self._is_gap, np.exp(displacement * self._is_gap), 1.0)

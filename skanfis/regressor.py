@@ -42,33 +42,44 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         has no fuzzy terms and takes part in the consequents alone. "auto" leaves it to
         ``partition``.
     partition : {"auto", "grid"} or clusterer, default="auto"
-        Where the rules come from. "grid": every combination of the terms of ``n_mfs``; with
-        ``n_mfs="auto"``, 3 or else 2 terms per input. A scikit-learn clusterer, such as
-        ``KMeans(n_clusters=5)``: one rule per cluster, with terms of its own, from clusters sought
-        in standardised inputs and targets together; ``n_mfs`` must then stay "auto". "auto": a grid
-        if the data hold ten distinct rows for each of its consequent parameters, else up to five
-        rules from k-means, as many as the data can carry.
-    mf : {"gaussian", "bell"}, default="gaussian"
-        Family of the membership functions: :math:`\exp(-(x-c)^2 / 2\sigma^2)` or Jang's
-        generalised bell :math:`1 / (1 + |(x-c)/a|^{2b})`.
+        Where the rules come from, if ``n_mfs`` is "auto". "grid": a grid grown from the data, one
+        term at a time on the input where it pays most. "auto": such a grid, or scattered rules from
+        k-means, whichever promises the smaller error on new rows; see Notes. A scikit-learn
+        clusterer, such as ``KMeans(n_clusters=5)``: one rule per cluster, with terms of its own,
+        from clusters sought in standardised inputs and targets together.
+    mf : str, default="gaussian"
+        Family of the membership functions: "gaussian", :math:`\exp(-(x-c)^2 / 2\sigma^2)`;
+        "bell", Jang's generalised bell :math:`1 / (1 + |(x-c)/a|^{2b})`; "triangular",
+        "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
+        "sigmoid_difference" or "sigmoid_product". The first two are the sturdiest between sparse
+        points.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of all inputs.
-    solver : {"varpro"}, default="varpro"
+    solver : {"varpro", "hybrid", "gradient", "lbfgs", "lse"}, default="varpro"
         How the premises are learnt. "varpro": variable projection with trust-region Gauss-Newton
-        steps.
+        steps. "hybrid": Jang's rule, least squares forward and a gradient step of his own step size
+        backward [1]_. "gradient": gradient descent on premises and consequents together, as in
+        back-propagation. "lbfgs": the same by L-BFGS-B. "lse": premises stay as they start.
+    step_size : float, default=None
+        Length of the first step of "hybrid" and "gradient", positive; None is 0.01.
+    error_goal : float, default=None
+        "hybrid" and "gradient" stop at this root mean square error, in standard deviations of the
+        target.
     alpha : "auto" or float, default="auto"
         Ridge penalty on the consequents, zero or positive: alpha / 2 times their squared norm is
         added to half the mean squared error of the standardised target. It acts on each rule's
         value at its centre and on its change over one standard deviation of the inputs there.
-        "auto" is 1e-12, next to nothing, or 1e-8 where there are fewer than two distinct rows per
-        consequent parameter. Raise it (1e-6 to 1e-2) for noisy data with many rules. At zero, a
-        ridge at the level of rounding errors remains.
-    stiffness : float, default=0.0
+        "auto" is chosen together with the structure where that is; else it is 1e-12, next to
+        nothing, or 1e-8 where there are fewer than two distinct rows per consequent parameter:
+        raise it (1e-6 to 1e-2) for noisy data with many rules. At zero, a ridge at the level of
+        rounding errors remains.
+    stiffness : "auto" or float, default="auto"
         Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
         of their displacements (in spacings of terms and logarithms of widths) is added likewise.
+        "auto" is chosen together with the structure where that is; else it is zero.
     max_iter : int, default=500
-        Most iterations, 1 or more.
-    tol : float, default=1e-4
+        Most iterations (epochs), 1 or more.
+    tol : float, default=1e-3
         Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
         or when the gradient says as much. Zero or positive.
     out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
@@ -79,9 +90,9 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     warn_out_of_bounds : bool, default=True
         Whether ``predict`` warns of such rows.
     random_state : int, RandomState instance or None, default=None
-        Seed of the clustering behind ``partition="auto"``; everything else is deterministic. None
-        stands for one fixed seed, so that the same data always give the same model. A clusterer
-        given as ``partition`` has a seed of its own.
+        Seed of the clusterings that ``partition="auto"`` tries; everything else is deterministic.
+        None stands for one fixed seed, so that the same data always give the same model. A
+        clusterer given as ``partition`` has a seed of its own.
     n_jobs : int, default=None
         Worker threads for the passes over the data; None is one, -1 is one per core. The result is
         the same to the last bit for any number. It pays from some 100,000 rows on.
@@ -95,8 +106,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     rules_ : ndarray of shape (n_rules_, n_premise_inputs)
         The terms of each rule: positions in ``memberships_``.
     memberships_, initial_memberships_ : list of dict
-        Every term after training, and before: its "input", "function" and parameters ("center",
-        "width"; for a bell "slope" too), in the user's units.
+        Every term after training, and before: its "input", "function" and parameters by name
+        ("center" and "width" of a Gaussian), in the user's units.
     consequents_ : ndarray of shape (n_rules_, 1 + n_features_in_[, n_outputs])
         p0, p1, ..., pd of every rule, in the user's units.
     n_iter_ : int
@@ -105,6 +116,12 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         Mean squared error of the standardised target, from the start on.
     status_ : str
         Why the solver stopped.
+    alpha_, stiffness_ : float
+        The values used.
+    structures_ : list of dict
+        The candidates that were compared where the structure was chosen by itself, best first:
+        "structure", "alpha", "stiffness", and "expected_error" on new rows in standard deviations
+        of the target. Empty where the structure was given.
     n_features_in_ : int
         Number of inputs.
     feature_names_in_ : ndarray of shape (n_features_in_,)
@@ -121,6 +138,15 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     OutOfBoundsWarning
         From ``predict`` and ``score``; see ``out_of_bounds``.
 
+    Notes
+    -----
+    Where the structure is chosen by itself, a few dozen small models are trained for a few
+    iterations on at most 1,000 representative rows. They are compared by Akaike's final prediction
+    error [3]_, MSE (1 + k / N) / (1 - k / n), with the effective number of parameters k, those of
+    the premises counted twice. Nothing is held out, and nothing is random. It counts rows, and
+    cannot see that the rows of one run are alike: with few runs of many rows each, choose ``n_mfs``
+    by cross-validation over the runs.
+
     References
     ----------
     .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
@@ -128,6 +154,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     .. [2] G. H. Golub and V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least
        squares problems whose variables separate", SIAM Journal on Numerical Analysis 10 (1973)
        413-432.
+    .. [3] H. Akaike, "Fitting autoregressive models for prediction", Annals of the Institute of
+       Statistical Mathematics 21 (1969) 243-247.
 
     Examples
     --------
@@ -147,8 +175,10 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         "mf": [StrOptions(set(MEMBERSHIPS))],
         "order": [Interval(Integral, 0, 1, closed="both")],
         "solver": [StrOptions(set(SOLVERS))],
+        "step_size": [Interval(Real, 0, None, closed="neither"), None],
+        "error_goal": [Interval(Real, 0, None, closed="left"), None],
         "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-        "stiffness": [Interval(Real, 0, None, closed="left")],
+        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
         "max_iter": [Interval(Integral, 1, None, closed="left")],
         "tol": [Interval(Real, 0, None, closed="left")],
         "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS))],
@@ -165,10 +195,12 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         mf="gaussian",
         order=1,
         solver="varpro",
+        step_size=None,
+        error_goal=None,
         alpha="auto",
-        stiffness=0.0,
+        stiffness="auto",
         max_iter=500,
-        tol=1e-4,
+        tol=1e-3,
         out_of_bounds="clip",
         warn_out_of_bounds=True,
         random_state=None,
@@ -179,6 +211,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         self.mf = mf
         self.order = order
         self.solver = solver
+        self.step_size = step_size
+        self.error_goal = error_goal
         self.alpha = alpha
         self.stiffness = stiffness
         self.max_iter = max_iter
@@ -218,19 +252,20 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             fewer than two rows; if parameters contradict each other or the data; if the grid has
             more rules than ``sklearn.get_config()["working_memory"]`` can hold.
         """
-        before = dict(vars(self))
+        before = self.__dict__.copy()
         try:
             X, targets, sample_weight = self._check_training_data(X, y, sample_weight)
             training = train(self, X, targets, sample_weight, self._input_names())
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
-            vars(self).clear()
-            vars(self).update(before)
+            self.__dict__ = before
             raise
         self.model_ = training.model
         self.n_iter_ = max(training.result.n_iter, 1)
         self.loss_curve_ = training.result.loss_curve
         self.status_ = training.result.message
+        self.alpha_, self.stiffness_ = training.start.alpha, training.start.stiffness
+        self.structures_ = training.start.candidates
         return self
 
     def predict(self, X):

@@ -43,6 +43,28 @@ def central_difference(function, parameters, step=1e-2):
     return np.stack(columns, axis=-1)
 
 
+def sigmoid(u):
+    """1 / (1 + e^-u)."""
+    return 1 / (1 + np.exp(-u))
+
+
+def spline(x, foot, shoulder):
+    """From zero at the foot to one at the shoulder, by two parabolas, on whichever side it lies."""
+    rise = np.clip((x - foot) / (shoulder - foot), 0, 1)
+    return np.where(rise < 0.5, 2 * rise**2, 1 - 2 * (1 - rise) ** 2)
+
+
+def corners(function, numbers):
+    """a, b, c, d of a term that has them: left foot, shoulders, right foot."""
+    if function == "s_shaped":
+        return numbers["shoulder"] - numbers["width"], numbers["shoulder"], np.inf, np.inf
+    if function == "z_shaped":
+        return -np.inf, -np.inf, numbers["shoulder"], numbers["shoulder"] + numbers["width"]
+    b = numbers["center"] - numbers.get("plateau", 0.0) / 2
+    c = numbers["center"] + numbers.get("plateau", 0.0) / 2
+    return b - numbers["left"], b, c, c + numbers["right"]
+
+
 def textbook_membership(function, x, numbers):
     """mu(x) by name, from the numbers that a person reads in a paper."""
     if function == "gaussian":
@@ -50,6 +72,27 @@ def textbook_membership(function, x, numbers):
     if function == "bell":
         distance = np.abs((x - numbers["center"]) / numbers["width"])
         return 1 / (1 + distance ** (2 * numbers["slope"]))
+    if function == "sigmoid_difference":
+        first, second = numbers["center"] - numbers["width"], numbers["center"] + numbers["width"]
+        rise, fall = (x - first) / numbers["flank"], (x - second) / numbers["flank"]
+        # To the right of the center from the other end: 1 - s(u) = s(-u) keeps its digits there.
+        right = sigmoid(-fall) - sigmoid(-rise)
+        return np.where(x < numbers["center"], sigmoid(rise) - sigmoid(fall), right)
+    if function == "sigmoid_product":
+        first, second = numbers["center"] - numbers["width"], numbers["center"] + numbers["width"]
+        return sigmoid((x - first) / numbers["left"]) * sigmoid(-(x - second) / numbers["right"])
+    a, b, c, d = corners(function, numbers)
+    if function in ("triangular", "trapezoidal"):
+        return np.clip(np.minimum((x - a) / (b - a), (d - x) / (d - c)), 0, 1)
+    if function == "two_sided_gaussian":
+        left = np.where(x < b, np.exp(-(((x - b) / numbers["left"]) ** 2) / 2), 1.0)
+        return left * np.where(x > c, np.exp(-(((x - c) / numbers["right"]) ** 2) / 2), 1.0)
+    if function == "s_shaped":
+        return spline(x, a, b)
+    if function == "z_shaped":
+        return spline(x, d, c)
+    if function == "pi_shaped":
+        return spline(x, a, b) * spline(x, d, c)
     raise NotImplementedError(function)
 
 

@@ -1,4 +1,4 @@
-"""How many terms and rules: what the user asked for, what fits into memory, what data can carry."""
+"""How many terms and rules: what the user asked for, what fits into memory, what data hold."""
 
 from collections.abc import Sequence
 from math import prod
@@ -8,20 +8,8 @@ import numpy as np
 
 from ..rows import Rows, fingerprint
 
-__all__ = [
-    "GridSize",
-    "automatic_counts",
-    "automatic_n_rules",
-    "count_distinct_inputs",
-    "term_counts",
-]
+__all__ = ["GridSize", "count_distinct_inputs", "term_counts"]
 
-# Distinct training rows per consequent parameter below which "auto" makes a smaller model.
-ROWS_PER_PARAMETER = 10
-# Most consequent parameters that "auto" gives a grid: a pass over the data grows with the square.
-MOST_PARAMETERS = 256
-# Most scattered rules by "auto".
-MOST_RULES = 5
 _READ_ROWS = 4096
 # Of one term, whatever its family: what a limit on memory reckons with.
 _MOST_PREMISE_PARAMETERS = 4
@@ -115,21 +103,3 @@ def count_distinct_inputs(rows: Rows, enough):
         if seen.size >= enough:
             return enough
     return seen.size
-
-
-def automatic_counts(is_constant, n_basis, n_distinct):
-    """The largest grid of 3, else 2, terms per input that the data can carry; None if neither."""
-    for count in (3, 2):
-        counts = [1 if constant else count for constant in is_constant]
-        n_columns = prod(counts) * n_basis
-        if n_columns <= min(MOST_PARAMETERS, n_distinct / ROWS_PER_PARAMETER):
-            return counts
-    return None
-
-
-def automatic_n_rules(n_inputs, n_basis, n_premise_parameters, n_distinct):
-    """How many scattered rules the data can carry, premises and consequents counted."""
-    per_rule = n_basis + n_premise_parameters * n_inputs
-    # A single rule is a linear model, or, with consequents of order zero, no model at all.
-    fewest = 1 if n_basis > 1 else 2
-    return int(np.clip(n_distinct // (2 * ROWS_PER_PARAMETER * per_rule), fewest, MOST_RULES))

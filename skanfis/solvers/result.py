@@ -12,7 +12,9 @@ MESSAGES = {
     "gradient": "The projected gradient is below tol: the premises are stationary.",
     "cost": "The relative decrease of the cost, expected and found, is below tol.",
     "step": "No step decreases the cost any further at this precision.",
-    "max_iter": "max_iter was reached before the cost settled.",
+    "max_iter": "max_iter was reached before the cost settled or the error met its goal.",
+    "error_goal": "The root mean square error is as small as error_goal.",
+    "epochs": "All max_iter epochs were run: this rule stops of itself at an error_goal only.",
     "no_premise": "There is nothing to iterate on: the consequents are found in one solve.",
 }
 

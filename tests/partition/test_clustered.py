@@ -52,11 +52,12 @@ class TestRules:
         assert_allclose(theta[0], expected[0], rtol=1e-10, atol=1e-12)
         assert_allclose(np.exp(theta[1]), expected[1], rtol=1e-10)
 
-    @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-    def test_each_rule_rules_its_own_blob(self, rng, family):
+    # "At least" and "at most" hold beyond the blob too.
+    @pytest.mark.parametrize("name", sorted(set(MEMBERSHIPS) - {"s_shaped", "z_shaped"}))
+    def test_each_rule_rules_its_own_blob(self, rng, name):
         X, y, labels, _ = blobs(rng)
         rows = Rows.standardised(X, y)
-        antecedent = clustered_antecedent(family, rows, by_k_means)
+        antecedent = clustered_antecedent(MEMBERSHIPS[name], rows, by_k_means)
         assert isinstance(antecedent, ScatteredAntecedent)
         strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
         # The same partition under other names.

@@ -10,8 +10,6 @@ from sklearn import config_context
 from skanfis import ANFISRegressor
 from skanfis.partition import (
     GridSize,
-    automatic_counts,
-    automatic_n_rules,
     count_distinct_inputs,
     structure,
     term_counts,
@@ -197,54 +195,3 @@ def test_counting_stops_as_soon_as_there_are_enough(rng):
     assert read == [0, 0]
     assert count_distinct_inputs(Noting(), n + 2) == n + 1
     assert read == [0, 0, 0, n, 2 * n]
-
-
-PER_PARAMETER = structure.ROWS_PER_PARAMETER
-MOST = structure.MOST_PARAMETERS
-
-
-@pytest.mark.parametrize(
-    ("is_constant", "n_basis", "n_distinct", "counts"),
-    [
-        # 9 rules of 3 parameters
-        ([False, False], 3, 27 * PER_PARAMETER, [3, 3]),
-        ([False, False], 3, 27 * PER_PARAMETER - 1, [2, 2]),
-        ([False, False], 3, 12 * PER_PARAMETER, [2, 2]),
-        ([False, False], 3, 12 * PER_PARAMETER - 1, None),
-        # a constant input gets no terms
-        ([False, True, False], 4, 36 * PER_PARAMETER, [3, 1, 3]),
-        ([True, True], 3, 3 * PER_PARAMETER, [1, 1]),
-        ([True, True], 3, 3 * PER_PARAMETER - 1, None),
-        # however many rows: 81 rules of 5 are more than MOST_PARAMETERS, 16 of 5 are not
-        ([False] * 4, 5, 10**9, [2] * 4),
-        ([False] * 5, 6, 10**9, [2] * 5),
-        ([False] * 6, 7, 10**9, None),
-        ([False] * 600, 601, 10**9, None),
-        ([False], 1, 3 * PER_PARAMETER, [3]),
-    ],
-)
-def test_automatic_counts_are_the_most_that_the_data_carry(
-    is_constant, n_basis, n_distinct, counts
-):
-    assert automatic_counts(np.array(is_constant), n_basis, n_distinct) == counts
-
-
-def test_automatic_counts_stop_exactly_at_the_most_parameters():
-    # Three inputs of 3 terms: 27 rules; 9 basis functions are 243 columns, 10 are 270.
-    assert 27 * 9 <= MOST < 27 * 10
-    assert automatic_counts([False] * 3, 9, 10**9) == [3, 3, 3]
-    assert automatic_counts([False] * 3, 10, 10**9) == [2, 2, 2]
-
-
-@pytest.mark.parametrize("n_inputs", [1, 3, 50])
-def test_automatic_n_rules_grow_with_the_rows_between_one_and_the_most(n_inputs):
-    n_basis, n_premise = 1 + n_inputs, 2
-    rows_per_rule = 2 * PER_PARAMETER * (n_basis + n_premise * n_inputs)
-    for n_rules in range(1, structure.MOST_RULES + 1):
-        enough = n_rules * rows_per_rule
-        assert automatic_n_rules(n_inputs, n_basis, n_premise, enough) == n_rules
-        assert automatic_n_rules(n_inputs, n_basis, n_premise, enough - 1) == max(n_rules - 1, 1)
-    assert automatic_n_rules(n_inputs, n_basis, n_premise, 10**9) == structure.MOST_RULES
-    assert automatic_n_rules(n_inputs, n_basis, n_premise, 0) == 1
-    # a single constant would be no model
-    assert automatic_n_rules(n_inputs, 1, n_premise, 0) == 2

@@ -526,6 +526,3 @@ class TestStatus:
         self.check(result, "no_premise")
         # y is the first column itself.
         assert_allclose(result.evaluation.coefficients[:, 0], [0.0, 1.0, 0.0], atol=1e-7)
-
-    def test_every_message_belongs_to_a_status_tested_here(self):
-        assert set(MESSAGES) == {"gradient", "cost", "step", "max_iter", "no_premise"}

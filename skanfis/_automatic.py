@@ -1,0 +1,279 @@
+r"""Structure by itself: how many terms or rules, and how stiff, chosen from the data.
+
+What is compared are short trainings of candidate models on the rows themselves; no row is held out.
+A candidate's score is Akaike's final prediction error, the mean squared error to be expected on
+new rows,
+
+    FPE = MSE (1 + k / N) / (1 - k / n) ,    k = k_consequent + 2 k_premise ,
+
+with n the rows trained on and N those that the final model will be trained on. k_consequent is the
+trace of the ridge regression's hat matrix, k_premise that of H (H + stiffness I)^-1 with H the
+Gauss-Newton matrix of the reduced cost. A premise parameter counts twice: it was not only estimated
+but sought among many local solutions, and weighed so, the score ranks models as held-out rows do
+(benchmarks/structure.py). Candidates with k beyond a third of the rows are out of the question.
+
+The search is greedy and small. Grids grow from the linear model, one term at a time, on the input
+where it pays most: inputs that need no terms get none. Scattered rules grow along a short sequence
+of numbers. The best of both is tried with stiffer and looser regularisation.
+
+Beyond a thousand rows, the candidates see representative rows only: the search then takes no
+longer, whatever the number of rows.
+"""
+
+from dataclasses import dataclass, replace
+from math import prod
+
+import numpy as np
+from sklearn.cluster import KMeans
+
+from .antecedent import Antecedent
+from .membership import Membership
+from .objective import SeparableProblem
+from .partition import clustered_antecedent, grid_antecedent, representative_rows
+from .premise import Premise
+from .rows import Rows, Scale
+from .solvers import varpro
+
+__all__ = ["Candidate", "Structure", "StructureSearch"]
+
+_MOST_ROWS = 1000
+_MOST_COLUMNS = 256
+_MOST_RULES = 36
+_MOST_TERMS = 6
+# After each round, so many inputs stay in the running for a further term.
+_MOST_GROWING = 8
+_RULE_NUMBERS = (2, 3, 5, 8, 12)
+# Pairs of alpha and stiffness from loose to stiff. The first two are for data with little noise.
+_LEVELS = ((1e-12, 0.0), (1e-8, 0.0), (1e-6, 1e-5), (1e-4, 1e-4), (1e-3, 1e-3), (1e-2, 1e-2))
+_FIRST_LEVEL = 1
+_MOST_ITERATIONS = 12
+_TOLERANCE = 1e-3
+# A larger model must promise to be better by this part ...
+_WORTHWHILE = 0.005
+# ... and by this part over the root of the rows, about the error of the score itself.
+_SCORE_ERROR = 0.3
+# Models with more effective parameters than this part of the rows are out of the question.
+_MOST_PARAMETERS = 1 / 3
+# Of the levels within this part of the best score the stiffest is taken; within three times it, the
+# next one is tried.
+_AS_GOOD = 0.01
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A structure to be tried: terms per input, or a number of scattered rules."""
+
+    counts: tuple[int, ...] | None
+    n_clusters: int | None
+    level: int
+
+    def describe(self):
+        """In words."""
+        if self.counts is not None:
+            return f"grid {list(self.counts)}"
+        return f"{self.n_clusters} scattered rules"
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What the search has found: where to start from, and how stiff to be."""
+
+    antecedent: Antecedent
+    alpha: float
+    stiffness: float
+    candidates: list[dict]  # what was tried, best first
+
+
+class StructureSearch:
+    """A search over structures for one set of rows.
+
+    Parameters
+    ----------
+    rows : Rows
+        The rows that the final model will be trained on.
+    family : type of Membership
+    order : {0, 1}
+    n_distinct : int
+        Number of distinct rows, as far as it has been counted.
+    seed : int or RandomState
+        Of the clustering.
+    alpha, stiffness : float, optional
+        Where given, not searched for.
+    overlap : float
+        Membership at which neighbouring terms of a grid cross.
+    """
+
+    def __init__(
+        self,
+        rows: Rows,
+        family: type[Membership],
+        order: int,
+        n_distinct: int,
+        seed,
+        alpha: float | None,
+        stiffness: float | None,
+        overlap: float,
+    ):
+        self.rows, self.family, self.order, self.seed = rows, family, order, seed
+        self.alpha, self.stiffness, self.overlap = alpha, stiffness, overlap
+        self.inputs = np.flatnonzero(~rows.inputs.is_constant)
+        self.sample = _sample(rows)
+        self.n_sample = min(self.sample.n_rows, n_distinct)
+        self.n_final = max(n_distinct, self.n_sample)
+        self.scores: dict[Candidate, float] = {}
+
+    def run(self, grids_only=False):
+        """The best structure found."""
+        best = self._grow_grid()
+        if not grids_only and self.inputs.size:
+            best = self._better(best, self._grow_clusters())
+        best = self._tune(best)
+        return self._structure(best)
+
+    def _grow_grid(self):
+        n_inputs = self.rows.X.shape[1]
+        best = Candidate((1,) * n_inputs, None, _FIRST_LEVEL)
+        inputs = list(self.inputs)
+        while True:
+            grown = {self._with_one_more(best, j): j for j in inputs}
+            small = sorted(filter(self._is_small, grown), key=self._score)
+            if not small or not self._is_better(small[0], best):
+                return best
+            best = small[0]
+            inputs = [grown[candidate] for candidate in small[:_MOST_GROWING]]
+
+    @staticmethod
+    def _with_one_more(candidate, j):
+        counts = list(candidate.counts)
+        counts[j] += 1
+        return replace(candidate, counts=tuple(counts))
+
+    def _is_small(self, candidate):
+        n_rules = prod(candidate.counts)
+        n_basis = 1 + self.inputs.size if self.order == 1 else 1
+        n_columns = n_rules * n_basis
+        return (
+            max(candidate.counts) <= _MOST_TERMS
+            and n_rules <= _MOST_RULES
+            and n_columns <= min(_MOST_COLUMNS, self.n_sample / 2)
+        )
+
+    def _grow_clusters(self):
+        best, failures = Candidate(None, _RULE_NUMBERS[0], _FIRST_LEVEL), 0
+        for n_clusters in _RULE_NUMBERS[1:]:
+            candidate = replace(best, n_clusters=n_clusters)
+            better = self._is_better(candidate, best)
+            best = candidate if better else best
+            failures = 0 if better else failures + 1
+            if failures == 2:
+                break
+        return best
+
+    def _tune(self, best):
+        """The stiffest regularisation that is as good as any."""
+        if self.alpha is not None and self.stiffness is not None:
+            return best
+        tried = [best]
+        for direction in (1, -1):
+            level = best.level + direction
+            while 0 <= level < len(_LEVELS):
+                candidate = replace(best, level=level)
+                if self._score(candidate) > (1.0 + 3.0 * _AS_GOOD) * self._score(best):
+                    break
+                tried.append(candidate)
+                level += direction
+        enough = (1.0 + _AS_GOOD) * min(map(self._score, tried))
+        return max((c for c in tried if self._score(c) <= enough), key=lambda c: c.level)
+
+    def _better(self, smaller, larger):
+        return larger if self._is_better(larger, smaller) else smaller
+
+    def _is_better(self, candidate, than):
+        worthwhile = max(_WORTHWHILE, _SCORE_ERROR / np.sqrt(self.n_sample))
+        return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
+
+    def _regularisation(self, candidate):
+        alpha, stiffness = _LEVELS[candidate.level]
+        return (
+            alpha if self.alpha is None else self.alpha,
+            stiffness if self.stiffness is None else self.stiffness,
+        )
+
+    def _antecedent(self, candidate, rows):
+        if candidate.counts is None:
+            clusterer = KMeans(candidate.n_clusters, n_init=3, random_state=self.seed)
+            return clustered_antecedent(
+                self.family, rows, lambda t, w: clusterer.fit(t, sample_weight=w).labels_
+            )
+        scale = self.rows.inputs
+        low, high = ((edge - scale.offset) / scale.scale for edge in (scale.minimum, scale.maximum))
+        families = [self.family] * low.size
+        return grid_antecedent(families, candidate.counts, low, high, self.overlap)
+
+    def _score(self, candidate):
+        """Root of the final prediction error; infinite where there are too few rows."""
+        if candidate not in self.scores:
+            self.scores[candidate] = self._train_and_score(candidate)
+        return self.scores[candidate]
+
+    def _train_and_score(self, candidate):
+        if candidate.n_clusters is not None and candidate.n_clusters > self.n_sample:
+            return np.inf
+        alpha, stiffness = self._regularisation(candidate)
+        antecedent = self._antecedent(candidate, self.sample)
+        problem = SeparableProblem(self.sample, antecedent, self.order, alpha)
+        premise = Premise.of(antecedent, self.sample.inputs.minimum, self.sample.inputs.maximum)
+        result = varpro(
+            problem, premise, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE, stiffness=stiffness
+        )
+        k = _effective_parameters(problem, premise, result, stiffness)
+        is_linear = antecedent.n_rules == 1
+        if k >= (1.0 if is_linear else _MOST_PARAMETERS) * self.n_sample:
+            return np.inf
+        error = result.evaluation.mean_squared_error
+        return np.sqrt(error * (1.0 + k / self.n_final) / (1.0 - k / self.n_sample))
+
+    def _structure(self, best):
+        alpha, stiffness = self._regularisation(best)
+        return Structure(self._antecedent(best, self.rows), alpha, stiffness, self._report())
+
+    def _report(self):
+        """Every candidate in words and numbers, best first."""
+        lines = []
+        for candidate in sorted(self.scores, key=self._score):
+            alpha, stiffness = self._regularisation(candidate)
+            lines.append(
+                {
+                    "structure": candidate.describe(),
+                    "alpha": alpha,
+                    "stiffness": stiffness,
+                    "expected_error": float(self.scores[candidate]),
+                }
+            )
+        return lines
+
+
+def _sample(rows):
+    """Representative rows, already in the standardised units of all rows."""
+    table, weight = representative_rows(rows, _MOST_ROWS)
+    n_inputs = rows.X.shape[1]
+    X, y = table[:, :n_inputs], table[:, n_inputs:]
+    return Rows(X, y, weight, _unit_scale(X), _unit_scale(y))
+
+
+def _unit_scale(values):
+    n_columns = values.shape[1]
+    return Scale(np.zeros(n_columns), np.ones(n_columns), values.min(axis=0), values.max(axis=0))
+
+
+def _effective_parameters(problem, premise, result, stiffness):
+    k_consequent = result.evaluation.factor.effective_parameters()
+    if premise.size == 0:
+        return k_consequent
+    raw = problem.linearise(result.evaluation)
+    x = premise.displacement(result.evaluation.antecedent.parameters)
+    _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
+    curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
+    # Directions in which nothing changes are no parameters.
+    floor = 1e-6 * curvature[-1] + np.finfo(float).tiny
+    return k_consequent + 2.0 * np.sum(curvature / (curvature + max(stiffness, floor)))

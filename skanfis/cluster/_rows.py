@@ -1,0 +1,69 @@
+"""What both clusterers do with rows: check, merge, measure by blocks, give to the nearest centre.
+
+Fitting on the sorted distinct rows, with the weight of all that are equal, makes the result the
+same to the last bit in whatever order the rows come, and whether a row is repeated or weighted.
+"""
+
+import numpy as np
+from scipy.spatial.distance import cdist
+from sklearn import get_config
+from sklearn.utils import gen_batches
+from sklearn.utils.validation import validate_data
+
+from .._sklearn import check_sample_weight
+from .._validation import check_finite
+
+__all__ = ["check_rows", "distance_blocks", "distinct_rows", "nearest", "numbers_that_fit"]
+
+# Distances in a block: a few arrays of this size stay in the cache.
+_BLOCK_SIZE = 32_768
+# Arrays of a block's size that a caller makes of its distances, these included.
+_ARRAYS_PER_BLOCK = 5
+
+
+def check_rows(estimator, X, reset=False):
+    """X as a finite array of float64, or ValueError that names the column."""
+    X = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
+    names = getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(X.shape[1])])
+    check_finite(X, "X", names)
+    return X
+
+
+def distinct_rows(X, sample_weight):
+    """Distinct rows of positive weight, in lexicographic order, and the weight of each."""
+    weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+    if np.any(weight < 0):
+        row = int(np.argmax(weight < 0))
+        raise ValueError(
+            f"Negative values in sample_weight: {weight[row]:g} at row {row}; weights must be zero "
+            "or positive."
+        )
+    keep = weight > 0
+    if not keep.any():
+        raise ValueError("Every sample_weight is zero: no row is left to cluster.")
+    rows, group = np.unique(X[keep], axis=0, return_inverse=True)
+    return rows, np.bincount(group.ravel(), weights=weight[keep])
+
+
+def numbers_that_fit():
+    """How many float64 scikit-learn's ``working_memory`` allows for temporary arrays."""
+    return int(get_config()["working_memory"] * 2**20 / 8)
+
+
+def distance_blocks(points, centers):
+    """Blocks of points, as slices, and their squared distances (n_clusters, n_rows_of_block).
+
+    From differences, not from products: where a point coincides with a centre, the distance is an
+    exact zero.
+    """
+    size = min(_BLOCK_SIZE, numbers_that_fit() // _ARRAYS_PER_BLOCK)
+    for part in gen_batches(points.shape[0], max(1, size // centers.shape[0])):
+        yield part, cdist(centers, points[part], "sqeuclidean")
+
+
+def nearest(points, centers):
+    """Which centre is nearest to each point; the first of several."""
+    labels = np.empty(points.shape[0], dtype=np.intp)
+    for part, distances in distance_blocks(points, centers):
+        distances.argmin(axis=0, out=labels[part])
+    return labels

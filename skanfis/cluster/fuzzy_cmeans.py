@@ -1,0 +1,381 @@
+r"""Fuzzy c-means by alternating optimisation.
+
+With squared distances :math:`D_{ik} = |x_i - c_k|^2`, memberships :math:`u_{ik}` of row sum one and
+weights :math:`w_i`, the objective (Bezdek 1981) is
+
+    J = Σ_i w_i Σ_k u_ik^m D_ik
+
+At fixed centres it is least for
+
+    u_ik = D_ik^(-1/(m-1)) / Σ_l D_il^(-1/(m-1)),   u = 1 (shared) where D = 0,
+
+and at fixed memberships for
+
+    c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m.
+
+Neither step can raise J. Both are taken in one pass over the rows, by blocks. Distances are taken
+relative to the nearest centre's and powers as logarithms: as m → 1 they would overflow. There, u^m
+vanishes on every row for a cluster that is nowhere the nearest; its weights are taken relative to
+its largest, block after block.
+
+**Coincident centres.** All centres at the mean of the data are a fixed point. Linearised there,
+with z = x - mean, the displacements of the centres are multiplied at each iteration by
+
+    2 m / (m - 1) F,   F = Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i w_i
+
+so that, with λ the largest eigenvalue of F, the centres fall together if m > 1 / (1 - 2 λ) (Yu,
+Cheng and Huang 2004). Data without clusters in d columns of equal variance have λ = 1/d: with m = 2
+all centres coincide from d = 5 on.
+"""
+
+import warnings
+from numbers import Integral, Real
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from scipy.spatial.distance import pdist, squareform
+from sklearn.base import (
+    BaseEstimator,
+    ClassNamePrefixFeaturesOutMixin,
+    ClusterMixin,
+    TransformerMixin,
+)
+from sklearn.cluster import kmeans_plusplus
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.utils import check_array, check_random_state
+from sklearn.utils.validation import check_is_fitted
+
+from .._sklearn import Interval, StrOptions, fit_context
+from ._rows import check_rows, distance_blocks, distinct_rows, nearest
+
+__all__ = ["FuzzyCMeans"]
+
+# Centres that differ by less than this part of their cluster's own spread are one.
+_SAME = 0.01
+# Stands for log 0 where differences are taken, for -inf - -inf is not a number.
+_LOG_ZERO = -1e300
+
+
+class Run(NamedTuple):
+    """Where a descent from one start ended."""
+
+    centers: np.ndarray
+    spread: np.ndarray
+    objective: float
+    n_iter: int
+    shift: float
+
+
+def log_memberships(distances, m):
+    """Logarithms of the memberships, from squared distances (n_clusters, n_rows)."""
+    closest = distances.min(axis=0)
+    relative = np.ones_like(distances)
+    with np.errstate(divide="ignore", over="ignore"):
+        np.divide(distances, closest, out=relative, where=distances > closest)
+    log_u = np.log(relative, out=relative)
+    log_u /= 1.0 - m
+    log_u -= np.log(np.exp(log_u).sum(axis=0))
+    return log_u
+
+
+def alternate(points, weight, centers, m):
+    """Memberships of ``centers``, and the centres that these make.
+
+    Returns
+    -------
+    centers : ndarray of shape (n_clusters, n_features)
+    spread : ndarray of shape (n_clusters,)
+        Root mean square distance from the old centres.
+    objective : float
+        J at the old centres.
+    """
+    top = np.full((centers.shape[0], 1), _LOG_ZERO)
+    mass, scatter = np.zeros_like(top), np.zeros_like(top)
+    moment = np.zeros_like(centers)
+    for part, distances in distance_blocks(points, centers):
+        log_pull = log_memberships(distances, m)
+        log_pull *= m
+        new_top = np.maximum(top, log_pull.max(axis=1, keepdims=True))
+        fade = np.exp(top - new_top)
+        pull = np.exp(log_pull - new_top)
+        pull *= weight[part]
+        mass = fade * mass + pull.sum(axis=1, keepdims=True)
+        scatter = fade * scatter + np.einsum("kn,kn->k", pull, distances)[:, np.newaxis]
+        moment = fade * moment + pull @ points[part]
+        top = new_top
+    spread = np.sqrt(scatter / mass)[:, 0]
+    return moment / mass, spread, float((np.exp(top) * scatter).sum())
+
+
+def descend(points, weight, centers, m, tol, max_iter):
+    """Alternate until no centre moves by more than ``tol``."""
+    shift, n_iter = np.inf, 0
+    while shift > tol and n_iter < max_iter:
+        old = centers
+        centers, _, _ = alternate(points, weight, old, m)
+        shift = float(np.linalg.norm(centers - old, axis=1).max())
+        n_iter += 1
+    _, spread, objective = alternate(points, weight, centers, m)
+    return Run(centers, spread, objective, n_iter, shift)
+
+
+def largest_exponent(points, weight):
+    """1 / (1 - 2 λ): above this m all centres coincide; inf if they need not for any."""
+    squares = np.einsum("ij,ij->i", points, points)
+    share = np.divide(weight, squares, out=np.zeros_like(weight), where=squares > 0)
+    largest = np.linalg.eigvalsh((share * points.T) @ points / weight.sum())[-1]
+    return 1.0 / (1.0 - 2.0 * largest) if largest < 0.5 else np.inf
+
+
+def count_distinct(centers, spread):
+    """Number of centres that do not coincide with one before them."""
+    apart = squareform(pdist(centers)) > _SAME * np.minimum.outer(spread, spread)
+    return sum(apart[k, :k].all() for k in range(centers.shape[0]))
+
+
+class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixin, BaseEstimator):
+    r"""Fuzzy c-means: clusters to which every row belongs by degrees.
+
+    Centres :math:`c_k` and memberships :math:`u_{ik}` minimise [1]_
+
+    .. math:: J = \sum_i w_i \sum_k u_{ik}^m \, \| x_i - c_k \|^2 , \qquad \sum_k u_{ik} = 1 ,
+
+    by turns: each :math:`c_k` is the mean of the data with weights :math:`w_i u_{ik}^m`, and
+
+    .. math:: u_{ik} = \left[ \sum_l \left( \frac{\| x_i - c_k \|}{\| x_i - c_l \|}
+       \right)^{2 / (m - 1)} \right]^{-1} .
+
+    As m tends to 1, this becomes k-means. Distances are Euclidean: bring the columns to one scale
+    before, for instance with a StandardScaler.
+
+    Parameters
+    ----------
+    n_clusters : int, default=3
+        Number of clusters, 1 or more.
+    m : "auto" or float, default=2.0
+        Exponent of the memberships, greater than 1: the larger, the fuzzier. From some m on, all
+        centres fall together: the theory [2]_ says where for centres near the mean, and for data
+        without distinct clusters in five columns or more it is below 2. "auto" is half the way from
+        1 to there, and not more than 2.
+    tol : float, default=1e-4
+        Stop when no centre moves by more than ``tol``, in units of the root mean square distance of
+        the data from their mean. Zero or positive.
+    max_iter : int, default=1000
+        Most iterations from one start, 1 or more.
+    n_init : int, default=3
+        Number of starts; the result is the one with the lowest objective. An array as ``init`` is
+        one start.
+    init : {"k-means++"} or array-like of shape (n_clusters, n_features), default="k-means++"
+        Centres at the start: rows drawn far from each other, or the array, in the units of the
+        data.
+    random_state : int, RandomState instance or None, default=None
+        Seed of the draws of ``init``.
+
+    Attributes
+    ----------
+    cluster_centers_ : ndarray of shape (n_clusters, n_features)
+        Centres in the units of the data.
+    inertia_ : float
+        The objective J at ``cluster_centers_``, in squared units of the data.
+    labels_ : ndarray of shape (n_samples,)
+        For each row the cluster of largest membership, which is that of the nearest centre.
+    m_ : float
+        The exponent.
+    n_iter_ : int
+        Iterations run from the best start.
+    n_features_in_ : int
+        Number of columns.
+    feature_names_in_ : ndarray of shape (n_features_in_,)
+        Names of the columns, where X had names that are all strings.
+
+    Warns
+    -----
+    ConvergenceWarning
+        If ``max_iter`` was reached first, or if centres coincide.
+
+    See Also
+    --------
+    SubtractiveClustering : Finds the number of clusters too.
+    sklearn.cluster.KMeans : Each row belongs to one cluster.
+
+    Notes
+    -----
+    An iteration takes time in proportion to n_samples times n_clusters times n_features. Beyond the
+    data, memory grows with n_samples and not with n_clusters, but for what ``transform`` returns.
+
+    References
+    ----------
+    .. [1] J. C. Bezdek, "Pattern Recognition with Fuzzy Objective Function Algorithms", Plenum
+       Press, New York, 1981.
+    .. [2] J. Yu, Q. Cheng and H. Huang, "Analysis of the weighting exponent in the FCM", IEEE
+       Transactions on Systems, Man, and Cybernetics B 34 (2004) 634-639.
+
+    Examples
+    --------
+    >>> from sklearn.datasets import make_blobs
+    >>> from skanfis.cluster import FuzzyCMeans
+    >>> X, y = make_blobs(centers=[[0, 0], [0, 8]], random_state=0)
+    >>> clustering = FuzzyCMeans(n_clusters=2, random_state=0).fit(X)
+    >>> clustering.cluster_centers_.shape
+    (2, 2)
+    >>> memberships = clustering.transform([[0, 0], [0, 4]])
+    >>> memberships.sum(axis=1).round(6).tolist()
+    [1.0, 1.0]
+    >>> bool(memberships[0].max() > 0.99)
+    True
+    """
+
+    _parameter_constraints: ClassVar[dict] = {
+        "n_clusters": [Interval(Integral, 1, None, closed="left")],
+        "m": [StrOptions({"auto"}), Interval(Real, 1, None, closed="neither")],
+        "tol": [Interval(Real, 0, None, closed="left")],
+        "max_iter": [Interval(Integral, 1, None, closed="left")],
+        "n_init": [Interval(Integral, 1, None, closed="left")],
+        "init": [StrOptions({"k-means++"}), "array-like"],
+        "random_state": ["random_state"],
+    }
+
+    def __init__(
+        self,
+        n_clusters=3,
+        *,
+        m=2.0,
+        tol=1e-4,
+        max_iter=1000,
+        n_init=3,
+        init="k-means++",
+        random_state=None,
+    ):
+        self.n_clusters = n_clusters
+        self.m = m
+        self.tol = tol
+        self.max_iter = max_iter
+        self.n_init = n_init
+        self.init = init
+        self.random_state = random_state
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X, y=None, sample_weight=None):
+        """Find the centres.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Data, with columns on one scale.
+        y : None
+            Not used; here by convention.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weights, zero or positive. A whole number counts as so many copies of the row, zero as
+            the row's absence.
+
+        Returns
+        -------
+        self : FuzzyCMeans
+
+        Raises
+        ------
+        ValueError
+            If the data are empty or not finite; if weights are negative or all zero; if there are
+            fewer distinct rows than clusters; if ``init`` is not of shape (n_clusters, n_features).
+        """
+        X = check_rows(self, X, reset=True)
+        rows, weight = distinct_rows(X, sample_weight)
+        if rows.shape[0] < self.n_clusters:
+            raise ValueError(
+                f"n_clusters={self.n_clusters} needs as many distinct rows of positive weight; "
+                f"there are {rows.shape[0]}, with n_samples={X.shape[0]}. Give fewer clusters."
+            )
+        mean = np.average(rows, axis=0, weights=weight)
+        points = rows - mean
+        scale = np.sqrt(np.average(np.einsum("ij,ij->i", points, points), weights=weight)) or 1.0
+        points /= scale
+        self.m_ = self._exponent(points, weight)
+        starts = self._starts(points, weight, mean, scale)
+        runs = [descend(points, weight, c, self.m_, self.tol, self.max_iter) for c in starts]
+        best = min(runs, key=lambda run: run.objective)
+        self._warn_of(best, points, weight)
+        self.cluster_centers_ = mean + scale * best.centers
+        self.inertia_ = scale**2 * best.objective
+        self.n_iter_ = best.n_iter
+        self.labels_ = nearest(X, self.cluster_centers_)
+        self._n_features_out = self.n_clusters
+        return self
+
+    def predict(self, X):
+        """Find the cluster of largest membership.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        labels : ndarray of shape (n_samples,)
+            Positions in ``cluster_centers_``.
+        """
+        check_is_fitted(self)
+        return nearest(check_rows(self, X), self.cluster_centers_)
+
+    def transform(self, X):
+        """Find the memberships.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        memberships : ndarray of shape (n_samples, n_clusters)
+            From 0 to 1, with sum one in every row; one where a row coincides with a centre, or
+            shared equally where it coincides with several.
+        """
+        check_is_fitted(self)
+        X = check_rows(self, X)
+        memberships = np.empty((X.shape[0], self.n_clusters))
+        for part, distances in distance_blocks(X, self.cluster_centers_):
+            np.exp(log_memberships(distances, self.m_).T, out=memberships[part])
+        return memberships
+
+    def _exponent(self, points, weight):
+        if self.m == "auto":
+            return float(min(2.0, 0.5 * (1.0 + largest_exponent(points, weight))))
+        return float(self.m)
+
+    def _starts(self, points, weight, mean, scale):
+        """Centres to start from, on the scale of ``points``."""
+        if not isinstance(self.init, str):
+            centers = check_array(self.init, dtype=np.float64, input_name="init")
+            if centers.shape != (self.n_clusters, points.shape[1]):
+                raise ValueError(
+                    f"init has shape {centers.shape}, but n_clusters={self.n_clusters} and X has "
+                    f"{points.shape[1]} columns: give an array of shape "
+                    f"{(self.n_clusters, points.shape[1])}."
+                )
+            return [(centers - mean) / scale]
+        random_state = check_random_state(self.random_state)
+        draws = [
+            kmeans_plusplus(
+                points, self.n_clusters, sample_weight=weight, random_state=random_state
+            )
+            for _ in range(self.n_init)
+        ]
+        return [centers for centers, _ in draws]
+
+    def _warn_of(self, run, points, weight):
+        if run.shift > self.tol:
+            warnings.warn(
+                f"FuzzyCMeans did not converge: in iteration max_iter={self.max_iter} a centre "
+                f"moved by {run.shift:.2g}, relative to the spread of the data, and "
+                f"tol={self.tol:g}. Raise one of them.",
+                ConvergenceWarning,
+                stacklevel=4,
+            )
+        n_distinct = count_distinct(run.centers, run.spread)
+        if n_distinct < self.n_clusters:
+            warnings.warn(
+                f"Only {n_distinct} of n_clusters={self.n_clusters} centres are distinct. Give "
+                f"fewer clusters or a smaller m than {self.m_:g} (on these data centres near the "
+                f"mean fall together from m={largest_exponent(points, weight):.3g} on).",
+                ConvergenceWarning,
+                stacklevel=4,
+            )

@@ -1,0 +1,106 @@
+r"""What a family of membership functions is: how strongly a value belongs to a linguistic term.
+
+Conventions
+-----------
+A family works on many terms at once. ``x`` has shape (n_terms, n_rows), or anything that
+broadcasts to it; ``theta`` has shape (n_parameters, n_terms), its rows in the order of
+:attr:`Membership.parameters`. Every parameter is unconstrained, so that no step of a solver can
+leave the set of valid memberships: what must be positive is held as its logarithm, and corners that
+must be in order are a point and the logarithms of distances.
+
+Each parameter has a *kind*, which says how it changes when the unit of the input changes,
+x -> offset + scale * x:
+
+* ``"location"``: a point on the input's axis, a -> offset + scale * a;
+* ``"log_width"``: the logarithm of a length on it, s -> s + log(scale);
+* ``"log_shape"``: the logarithm of a number without unit, unchanged.
+
+A family has one location, its first parameter, and at least one width. It is by the first of its
+widths that a shift of the term is measured where rules are scattered (see ``premise``).
+
+Everything is in log space, because normalised firing strengths are a softmax of log mu: it is then
+defined, and its sum is one, however far a row lies from every term. So log mu must be finite
+everywhere, also for families whose mu is zero beyond a foot (``profiles`` says how).
+"""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+__all__ = ["Membership", "Parameter"]
+
+# exp(-u^2 / 2) = 1/2 at this u.
+_HALF_HEIGHT = np.sqrt(2.0 * np.log(2.0))
+
+
+class Parameter(NamedTuple):
+    """One unconstrained parameter of a membership family."""
+
+    name: str  # its name in the user's units: "center", "width", ...
+    kind: str  # "location", "log_width" or "log_shape"
+
+
+class Membership(ABC):
+    """A family of membership functions; see the module's conventions.
+
+    To add one, write a subclass with the members below and list it in ``MEMBERSHIPS``.
+    """
+
+    name: ClassVar[str]
+    parameters: ClassVar[tuple[Parameter, ...]]
+
+    @staticmethod
+    @abstractmethod
+    def value(x, theta):
+        """mu(x) by the textbook formula: the oracle of the rest.
+
+        For real and complex ``theta``, analytic in it between the corners that the formula has, so
+        that a derivative is the imaginary part at a complex step.
+        """
+
+    @staticmethod
+    @abstractmethod
+    def log_value(x, theta):
+        """log mu(x), shape (n_terms, n_rows), finite, without overflow or underflow."""
+
+    @staticmethod
+    @abstractmethod
+    def log_value_and_gradient(x, theta):
+        """log mu(x) and its derivatives by theta, shape (n_parameters, n_terms, n_rows)."""
+
+    @staticmethod
+    @abstractmethod
+    def start(center, spacing, overlap):
+        """Theta of terms at ``center``, ``spacing`` apart; neighbours cross at mu = ``overlap``.
+
+        The arguments may have any one shape; theta has one axis more in front.
+        """
+
+    @classmethod
+    def from_center_and_width(cls, center, width):
+        """Theta of terms at ``center`` as wide at half height as a Gaussian of deviation ``width``.
+
+        The two may have any one shape; theta has one axis more in front.
+        """
+        return cls.start(center, 2.0 * _HALF_HEIGHT * width, 0.5)
+
+    @classmethod
+    def change_units(cls, theta, offset, scale):
+        """Theta after the inputs' change of unit x -> offset + scale * x (per term)."""
+        moved = np.array(theta, dtype=float)
+        for row, parameter in zip(moved, cls.parameters, strict=True):
+            if parameter.kind == "location":
+                row[:] = offset + scale * row
+            elif parameter.kind == "log_width":
+                row += np.log(scale)
+        return moved
+
+    @classmethod
+    def natural(cls, theta):
+        """Theta with every logarithm undone: what a person reads."""
+        natural = np.array(theta, dtype=float)
+        for row, parameter in zip(natural, cls.parameters, strict=True):
+            if parameter.kind != "location":
+                np.exp(row, out=row)
+        return natural

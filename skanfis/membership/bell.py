@@ -1,0 +1,55 @@
+"""The generalised bell."""
+
+import numpy as np
+
+from .base import Membership, Parameter
+
+__all__ = ["Bell"]
+
+# Below this, (x - c)^2 / a^2 counts as zero: its logarithm stays finite, mu is exactly one.
+_SMALLEST_SQUARE = 1e-300
+# b of a bell at the start of training, as in Jang's examples.
+_FIRST_SLOPE = 2.0
+
+
+class Bell(Membership):
+    r"""Jang's bell, mu(x) = 1 / (1 + ((x - c)^2 / a^2)^b), with theta = (c, log a, log b)."""
+
+    name = "bell"
+    parameters = (
+        Parameter("center", "location"),
+        Parameter("width", "log_width"),
+        Parameter("slope", "log_shape"),
+    )
+
+    @staticmethod
+    def value(x, theta):
+        center, log_width, log_slope = theta[:, :, None]
+        return 1.0 / (1.0 + ((x - center) ** 2 * np.exp(-2.0 * log_width)) ** np.exp(log_slope))
+
+    @staticmethod
+    def log_value(x, theta):
+        center, log_width, log_slope = theta[:, :, None]
+        square = ((x - center) * np.exp(-log_width)) ** 2
+        return -np.logaddexp(0.0, np.exp(log_slope) * np.log(np.maximum(square, _SMALLEST_SQUARE)))
+
+    @staticmethod
+    def log_value_and_gradient(x, theta):
+        center, log_width, log_slope = theta[:, :, None]
+        slope, inverse_width = np.exp(log_slope), np.exp(-log_width)
+        distance = (x - center) * inverse_width
+        square = np.maximum(distance**2, _SMALLEST_SQUARE)
+        exponent = slope * np.log(square)
+        log_mu = -np.logaddexp(0.0, exponent)
+        beyond = -np.expm1(log_mu)  # 1 - mu = u^b / (1 + u^b)
+        gradient = np.empty((3, *distance.shape))
+        np.multiply(beyond, 2.0 * slope, out=gradient[1])
+        np.multiply(gradient[1], distance / square * inverse_width, out=gradient[0])
+        np.multiply(beyond, -exponent, out=gradient[2])
+        return log_mu, gradient
+
+    @staticmethod
+    def start(center, spacing, overlap):
+        # 1 / (1 + ((spacing / 2) / a)^(2 b)) = overlap
+        width = 0.5 * spacing / (1.0 / overlap - 1.0) ** (0.5 / _FIRST_SLOPE)
+        return np.stack([center, np.log(width), np.full_like(width, np.log(_FIRST_SLOPE))])

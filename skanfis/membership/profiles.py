@@ -1,0 +1,133 @@
+r"""Profiles: how a flank falls from one, as a function of t, the distance in lengths of the flank.
+
+t is zero at the shoulder and below it. Straight and S-shaped flanks reach zero at their foot,
+t = 1, where log mu would be minus infinity: rows that lie on no term would have no strengths. The
+logarithm of these two therefore has a floor,
+
+    log mu = log[(1 - e) mu + e exp(-t^2 / 2)] ,    e = 1e-10 :
+
+a term of the family's shape, mixed with 1e-10 of a Gaussian of the same place and flank.
+
+* Normalised strengths are the textbook's to 1e-10 over the largest membership at the row.
+* Where all are zero, they are those of the Gaussians: the nearest term in lengths of its flank
+  wins, and strengths change over such a length, not at once.
+* Mu stays one at the shoulder; log mu falls from there on without end, as smooth as the profile.
+
+e is so small because the least ridge, 1e-12, must outweigh its square: consequents cannot then be
+bent to make use of a rule where it fires by its floor alone.
+"""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+__all__ = ["GaussianProfile", "LinearProfile", "Profile", "SplineProfile"]
+
+_FLOOR = 1e-10
+
+
+class Profile(ABC):
+    """A flank as a function of t >= 0."""
+
+    @staticmethod
+    @abstractmethod
+    def value(t):
+        """mu, for real and complex t."""
+
+    @staticmethod
+    @abstractmethod
+    def log_value(t):
+        """log mu, finite."""
+
+    @staticmethod
+    @abstractmethod
+    def log_value_and_slope(t):
+        """log mu and its derivative by t, which is zero at t = 0."""
+
+    @staticmethod
+    @abstractmethod
+    def reach(mu):
+        """The t at which the profile has come down to ``mu``, between zero and one."""
+
+
+class GaussianProfile(Profile):
+    """exp(-t^2 / 2)."""
+
+    @staticmethod
+    def value(t):
+        return np.exp(-0.5 * t**2)
+
+    @staticmethod
+    def log_value(t):
+        return -0.5 * t**2
+
+    @staticmethod
+    def log_value_and_slope(t):
+        return -0.5 * t**2, -t
+
+    @staticmethod
+    def reach(mu):
+        return np.sqrt(-2.0 * np.log(mu))
+
+
+class _ProfileWithFoot(Profile):
+    """A profile that is zero from t = 1 on, in log space with a floor under it."""
+
+    @staticmethod
+    @abstractmethod
+    def slope(t):
+        """The derivative of ``value`` by t; zero at t = 0."""
+
+    @classmethod
+    def _floored(cls, t):
+        """min(t, 1), the Gaussian there, the mixture there, and its logarithm at t."""
+        near = np.minimum(t, 1.0)
+        gaussian = np.exp(-0.5 * near**2)
+        mu = cls.value(t)
+        mixture = mu + _FLOOR * (gaussian - mu)
+        # Beyond the foot the mixture is e exp(-1/2) here, and -t^2 / 2 goes on outside.
+        return near, gaussian, mixture, np.log(mixture) - 0.5 * (t - near) * (t + near)
+
+    @classmethod
+    def log_value(cls, t):
+        return cls._floored(t)[-1]
+
+    @classmethod
+    def log_value_and_slope(cls, t):
+        near, gaussian, mixture, log_mu = cls._floored(t)
+        slope = (1.0 - _FLOOR) * cls.slope(t) - _FLOOR * near * gaussian
+        return log_mu, slope / mixture - (t - near)
+
+
+class LinearProfile(_ProfileWithFoot):
+    """1 - t."""
+
+    @staticmethod
+    def value(t):
+        return np.where(np.real(t) < 1.0, 1.0 - t, 0.0)
+
+    @staticmethod
+    def slope(t):
+        return np.where((t > 0.0) & (t < 1.0), -1.0, 0.0)
+
+    @staticmethod
+    def reach(mu):
+        return 1.0 - mu
+
+
+class SplineProfile(_ProfileWithFoot):
+    """Two parabolas that meet at one half: 1 - 2 t^2, then 2 (1 - t)^2."""
+
+    @staticmethod
+    def value(t):
+        upper = np.real(t) < 0.5
+        s = np.where(upper, t, np.where(np.real(t) < 1.0, 1.0 - t, 0.0))
+        return np.where(upper, 1.0 - 2.0 * s**2, 2.0 * s**2)
+
+    @staticmethod
+    def slope(t):
+        return -4.0 * np.minimum(t, np.maximum(1.0 - t, 0.0))
+
+    @staticmethod
+    def reach(mu):
+        return np.where(mu > 0.5, np.sqrt(0.5 * (1.0 - mu)), 1.0 - np.sqrt(0.5 * mu))

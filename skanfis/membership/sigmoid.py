@@ -1,0 +1,131 @@
+r"""Families of two sigmoids, s(u) = 1 / (1 + exp(-u)).
+
+One rises at center - width, the other falls at center + width, over lengths called flanks. With
+one length for both, u = (x - center) / flank and v = width / flank,
+
+    s(u + v) - s(u - v) = [1 - exp(-2 v)] s(u + v) s(v - u) :
+
+difference and product differ by a factor that does not depend on x. With two lengths the product
+stays a membership, which may be steeper on one side than on the other. The difference does not: it
+is negative in the tail on the less steep side. So the difference has one flank, the product two.
+
+The top, at u = 0, is below one: tanh(v / 2) for the difference, s(v)^2 for the product.
+"""
+
+import numpy as np
+
+from .base import Membership, Parameter
+
+__all__ = ["SigmoidDifference", "SigmoidProduct"]
+
+
+def _log_sigmoid(u):
+    # A quarter of the time of -logaddexp(0, -u).
+    return np.minimum(u, 0.0) - np.log1p(np.exp(-np.abs(u)))
+
+
+def _first_ratio(overlap):
+    """V at the start: about that of a bell of slope 2, and tops well above ``overlap``."""
+    return 3.0 + np.log((1.0 + overlap) / (1.0 - overlap))
+
+
+class SigmoidDifference(Membership):
+    r"""mu(x) = s((x - c + a) / h) - s((x - c - a) / h), with theta = (c, log a, log h)."""
+
+    name = "sigmoid_difference"
+    parameters = (
+        Parameter("center", "location"),
+        Parameter("width", "log_width"),
+        Parameter("flank", "log_width"),
+    )
+
+    @staticmethod
+    def value(x, theta):
+        center, log_width, log_flank = theta[:, :, None]
+        u = (x - center) * np.exp(-log_flank)
+        v = np.exp(log_width - log_flank)
+        # The difference of the two as it stands would lose its digits in the tails.
+        return (1.0 - np.exp(-2.0 * v)) / ((1.0 + np.exp(-u - v)) * (1.0 + np.exp(u - v)))
+
+    @staticmethod
+    def log_value(x, theta):
+        center, log_width, log_flank = theta[:, :, None]
+        u = (x - center) * np.exp(-log_flank)
+        v = np.exp(log_width - log_flank)
+        return np.log(-np.expm1(-2.0 * v)) + _log_sigmoid(v + u) + _log_sigmoid(v - u)
+
+    @staticmethod
+    def log_value_and_gradient(x, theta):
+        center, log_width, log_flank = theta[:, :, None]
+        inverse_flank = np.exp(-log_flank)
+        u = (x - center) * inverse_flank
+        v = np.exp(log_width - log_flank)
+        log_rise, log_fall, gain = _log_sigmoid(v + u), _log_sigmoid(v - u), -np.expm1(-2.0 * v)
+        # d log s(u) / du = 1 - s(u)
+        by_rise, by_fall = -np.expm1(log_rise), -np.expm1(log_fall)
+        by_u = by_rise - by_fall
+        by_v = by_rise + by_fall + 2.0 * (1.0 - gain) / gain
+        gradient = np.empty((3, *u.shape))
+        np.multiply(by_u, -inverse_flank, out=gradient[0])
+        np.multiply(by_v, v, out=gradient[1])
+        np.subtract(-u * by_u, gradient[1], out=gradient[2])
+        return np.log(gain) + log_rise + log_fall, gradient
+
+    @staticmethod
+    def start(center, spacing, overlap):
+        # sinh(v) / (cosh(v) + cosh(u)) = overlap at u = spacing / (2 flank)
+        v = _first_ratio(overlap)
+        flank = 0.5 * spacing / np.arccosh(np.sinh(v) / overlap - np.cosh(v))
+        return np.stack([center, np.log(v * flank), np.log(flank)])
+
+
+class SigmoidProduct(Membership):
+    r"""mu(x) = s((x - c + a) / left) s((c + a - x) / right): theta = (c, log a, log of both)."""
+
+    name = "sigmoid_product"
+    parameters = (
+        Parameter("center", "location"),
+        Parameter("width", "log_width"),
+        Parameter("left", "log_width"),
+        Parameter("right", "log_width"),
+    )
+
+    @staticmethod
+    def value(x, theta):
+        center, log_width, log_left, log_right = theta[:, :, None]
+        width = np.exp(log_width)
+        rise = (x - center + width) * np.exp(-log_left)
+        fall = (center + width - x) * np.exp(-log_right)
+        return 1.0 / ((1.0 + np.exp(-rise)) * (1.0 + np.exp(-fall)))
+
+    @staticmethod
+    def log_value(x, theta):
+        center, log_width, log_left, log_right = theta[:, :, None]
+        offset, width = x - center, np.exp(log_width)
+        rise, fall = (width + offset) * np.exp(-log_left), (width - offset) * np.exp(-log_right)
+        return _log_sigmoid(rise) + _log_sigmoid(fall)
+
+    @staticmethod
+    def log_value_and_gradient(x, theta):
+        center, log_width, log_left, log_right = theta[:, :, None]
+        offset, width = x - center, np.exp(log_width)
+        inverse_left, inverse_right = np.exp(-log_left), np.exp(-log_right)
+        rise, fall = (width + offset) * inverse_left, (width - offset) * inverse_right
+        log_rise, log_fall = _log_sigmoid(rise), _log_sigmoid(fall)
+        # d log s(u) / du = 1 - s(u)
+        by_rise, by_fall = -np.expm1(log_rise), -np.expm1(log_fall)
+        gradient = np.empty((4, *offset.shape))
+        np.multiply(by_rise, -rise, out=gradient[2])
+        np.multiply(by_fall, -fall, out=gradient[3])
+        by_rise *= inverse_left
+        by_fall *= inverse_right
+        np.subtract(by_fall, by_rise, out=gradient[0])
+        np.multiply(by_rise + by_fall, width, out=gradient[1])
+        return log_rise + log_fall, gradient
+
+    @staticmethod
+    def start(center, spacing, overlap):
+        # exp(v) / 2 / (cosh(v) + cosh(u)) = overlap at u = spacing / (2 flank)
+        v = _first_ratio(overlap)
+        flank = 0.5 * spacing / np.arccosh(0.5 * np.exp(v) / overlap - np.cosh(v))
+        return np.stack([center, np.log(v * flank), np.log(flank), np.log(flank)])

@@ -1,0 +1,110 @@
+r"""Back-propagation: steepest descent on premises and consequents together.
+
+An epoch takes one step of all parameters, natural premises n (see ``hybrid``) and consequents beta
+on [1, z], down the gradient of the cost over all rows,
+
+    (n, beta) -> (n, beta) - kappa g / |g| ,    g = (dE / dn, dE / dbeta) ,
+
+with E = 1/(2 W) |y - Phi beta|_S^2 + alpha/2 |beta|^2, the mean of (t - o)^2 / 2 (Liu et al. 2009).
+It ends when the root mean square error meets a goal; the length kappa follows Jang's rule.
+
+The consequents start as the solution of least squares, once, and are never solved for again (the
+second of the four methods in Jang 1993, section III). From there this is slow: one epoch is one
+cheap pass, but curvatures of so many parameters differ by orders of magnitude, and no single length
+of step suits all of them. It is here for comparison with what it is the ancestor of.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..objective import JointGradient
+from .hybrid import NaturalPremise, Point, descend
+from .lse import lse
+
+__all__ = ["gradient"]
+
+
+@dataclass(frozen=True, eq=False)
+class _JointPoint(Point):
+    """A point, and the gradient there, which the same pass over the data gives."""
+
+    joint: JointGradient
+
+
+class _FreeConsequents:
+    """The descent's view of the problem: premises and consequents move."""
+
+    def __init__(self, problem, premise, stiffness):
+        self.problem, self.premise, self.stiffness = problem, premise, stiffness
+        self.natural = NaturalPremise(premise)
+
+    def start(self, x):
+        return self._at(x, self.problem.evaluate(self.premise.parameters(x)).coefficients)
+
+    def _at(self, x, coefficients):
+        joint = self.problem.joint(self.premise.parameters(x), coefficients)
+        cost = joint.evaluation.cost + 0.5 * self.stiffness * (x @ x)
+        return _JointPoint(x, joint.evaluation, cost, joint)
+
+    def slope(self, point):
+        slope, steepest = self.natural.slope(point.x, point.joint.premises, self.stiffness)
+        by_coefficients = point.joint.coefficients.ravel()
+        steepest = max(steepest, np.abs(by_coefficients).max())
+        return np.concatenate([slope, by_coefficients]), steepest
+
+    def step(self, point, step):
+        coefficients = point.evaluation.coefficients
+        change = step[point.x.size :].reshape(coefficients.shape)
+        return self._at(self.natural.move(point.x, step[: point.x.size]), coefficients + change)
+
+
+def gradient(
+    problem,
+    premise,
+    *,
+    max_iter,
+    tol,
+    stiffness=0.0,
+    start=None,
+    on_iteration=None,
+    step_size=0.01,
+    error_goal=None,
+):
+    """Train by back-propagation.
+
+    Parameters
+    ----------
+    problem : SeparableProblem
+    premise : Premise
+    max_iter : int
+        Number of epochs. There is no other end than this and ``error_goal``.
+    tol : float
+        Stop where the projected gradient is zero for all that ``tol`` can tell.
+    stiffness : float
+        Weight of the pull of the premises to their start.
+    start : ndarray of shape (premise.size,), optional
+        Displacements to start from, inside the box; zero if not given.
+    on_iteration : callable, optional
+        Called with (n_iter, evaluation) after every epoch; the evaluation has no factor.
+    step_size : float
+        Length of the first step, in standardised units.
+    error_goal : float, optional
+        Stop when the root mean square error, in standard deviations of the target, is this small.
+
+    Returns
+    -------
+    SolverResult
+        The epoch of the lowest cost; the loss curve has all of them.
+    """
+    if not premise.size:
+        return lse(problem, premise, max_iter=max_iter, tol=tol, on_iteration=on_iteration)
+    return descend(
+        _FreeConsequents(problem, premise, stiffness),
+        np.zeros(premise.size) if start is None else start,
+        max_iter=max_iter,
+        tol=tol,
+        on_iteration=on_iteration,
+        step_size=step_size,
+        error_goal=error_goal,
+    )

@@ -1,0 +1,379 @@
+"""Fuzzy c-means against Bezdek's equations, and against k-means where it becomes that."""
+
+from decimal import Decimal, localcontext
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn import config_context
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.datasets import make_blobs
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.metrics import adjusted_rand_score
+
+from skanfis.cluster import FuzzyCMeans
+from skanfis.cluster.fuzzy_cmeans import alternate, largest_exponent, log_memberships
+
+ignore_convergence = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+
+
+def squared_distances(X, centers):
+    return ((X[:, None] - centers[None]) ** 2).sum(axis=2)
+
+
+def memberships(X, centers, m):
+    """u_ik = 1 / Σ_l (D_ik / D_il)^(1/(m-1)), as it stands in the book."""
+    D = squared_distances(X, centers)
+    return 1.0 / ((D[:, :, None] / D[:, None, :]) ** (1.0 / (m - 1.0))).sum(axis=2)
+
+
+def objective(X, weight, centers, m):
+    return (weight[:, None] * memberships(X, centers, m) ** m * squared_distances(X, centers)).sum()
+
+
+def reduced_objective(X, weight, centers, m):
+    """J with the memberships eliminated, Σ_i w_i (Σ_k D_ik^(-1/(m-1)))^(1-m): analytic in c."""
+    D = squared_distances(X, centers)
+    return weight @ (D ** (-1.0 / (m - 1.0))).sum(axis=1) ** (1.0 - m)
+
+
+def gradient(X, weight, centers, m):
+    """Of the reduced objective, by complex steps."""
+    slopes = np.empty_like(centers)
+    for place in np.ndindex(centers.shape):
+        step = np.zeros(centers.shape, dtype=complex)
+        step[place] = 1e-30j
+        slopes[place] = reduced_objective(X, weight, centers + step, m).imag / 1e-30
+    return slopes
+
+
+def blobs(n_rows=200, n_columns=2):
+    """Three blobs far apart, their labels, and weights."""
+    centers = np.array([[0, 0, 0], [10, 2, 0], [3, -9, 5]], dtype=float)[:, :n_columns]
+    X, y = make_blobs(n_rows, centers=centers, random_state=0)
+    return X, y, np.random.default_rng(1).uniform(0.3, 3.0, n_rows)
+
+
+class TestMemberships:
+    @pytest.mark.parametrize("m", [1.001, 1.1, 1.5, 2.0, 3.0, 40.0])
+    def test_formula_in_fifty_digits(self, rng, m):
+        D = rng.uniform(0.5, 1.5, (4, 6))
+        with localcontext() as context:
+            context.prec, context.Emin, context.Emax = 50, -(10**9), 10**9
+            exponent = 1 / (Decimal(m) - 1)
+            exact = [
+                [-sum((Decimal(d) / Decimal(e)) ** exponent for e in row).ln() for d in row]
+                for row in D.T
+            ]
+        # Of log u, which is -1 / (m - 1) times a logarithm that errs by a rounding error.
+        assert_allclose(
+            log_memberships(D.copy(), m).T,
+            np.array(exact, dtype=float),
+            rtol=1e-13,
+            atol=1e-15 / (m - 1.0),
+        )
+
+    @pytest.mark.parametrize("m", [1.0 + 1e-12, 1.01, 2.0, 1e6])
+    def test_coincident_points_and_ties_are_shared(self, m):
+        D = np.array([[0.0, 1.0], [0.0, 0.0], [4.0, 4.0], [1e-320, 1.0]]).T
+        expected = np.array([[1.0, 0.0], [0.5, 0.5], [0.5, 0.5], [1.0, 0.0]])
+        found = np.exp(log_memberships(D, m)).T
+        assert_array_equal(found[[0, 1, 2]], expected[[0, 1, 2]])
+        if m < 3:
+            assert_allclose(found[3], expected[3], atol=1e-15)
+
+    def test_transform(self):
+        X, _, weight = blobs()
+        model = FuzzyCMeans(m=1.7, random_state=0).fit(X, sample_weight=weight)
+        u = model.transform(X)
+        assert u.shape == (200, 3)
+        assert_allclose(u, memberships(X, model.cluster_centers_, 1.7), rtol=1e-10)
+        assert_allclose(u.sum(axis=1), 1.0, rtol=1e-14)
+        assert_array_equal(u.argmax(axis=1), model.labels_)
+        assert_array_equal(model.transform(model.cluster_centers_), np.eye(3))
+
+    def test_names_of_the_columns(self):
+        X, _, _ = blobs()
+        model = FuzzyCMeans(random_state=0).set_output(transform="pandas")
+        names = ["fuzzycmeans0", "fuzzycmeans1", "fuzzycmeans2"]
+        assert list(model.fit_transform(X).columns) == names
+        assert list(model.get_feature_names_out()) == names
+
+
+class TestIteration:
+    @pytest.mark.parametrize("m", [1.2, 2.0, 3.5])
+    def test_one_step_is_bezdeks(self, rng, m):
+        X, weight, centers = rng.normal(size=(60, 3)), rng.uniform(size=60), rng.normal(size=(4, 3))
+        pull = weight[:, None] * memberships(X, centers, m) ** m
+        scatter = (pull * squared_distances(X, centers)).sum(axis=0)
+        found, spread, cost = alternate(X, weight, centers, m)
+        assert_allclose(found, pull.T @ X / pull.sum(axis=0)[:, None], rtol=1e-10, atol=1e-12)
+        assert_allclose(spread, np.sqrt(scatter / pull.sum(axis=0)), rtol=1e-10)
+        assert cost == pytest.approx(scatter.sum(), rel=1e-12)
+        assert cost == pytest.approx(reduced_objective(X, weight, centers, m), rel=1e-12)
+        # Half the gradient of the reduced objective is what the step sets to zero.
+        pulled = -2 * (pull.T @ X - pull.sum(axis=0)[:, None] * centers)
+        assert_allclose(gradient(X, weight, centers, m), pulled, rtol=1e-9, atol=1e-10)
+
+    @ignore_convergence
+    @pytest.mark.parametrize("m", [1.05, 1.3, 2.0, 4.0])
+    def test_objective_never_rises(self, rng, m):
+        X, weight = rng.normal(size=(80, 3)), rng.uniform(0.2, 2.0, 80)
+        costs = []
+        for n_iter in range(1, 25):
+            model = FuzzyCMeans(4, m=m, init=X[:4], tol=0.0, max_iter=n_iter)
+            model.fit(X, sample_weight=weight)
+            assert model.n_iter_ == n_iter
+            costs.append(model.inertia_)
+        assert (np.diff(costs) <= 1e-13 * costs[0]).all()
+        assert costs[-1] < 0.999 * costs[0]
+
+    @pytest.mark.parametrize("m", [1.3, 2.0, 2.5])
+    def test_end_is_a_fixed_point_and_stationary(self, m):
+        X, _, weight = blobs()
+        model = FuzzyCMeans(m=m, tol=1e-11, random_state=0).fit(X, sample_weight=weight)
+        centers = model.cluster_centers_
+        pull = weight[:, None] * memberships(X, centers, m) ** m
+        assert_allclose(centers, pull.T @ X / pull.sum(axis=0)[:, None], rtol=1e-8, atol=1e-9)
+        assert model.inertia_ == pytest.approx(objective(X, weight, centers, m), rel=1e-11)
+        far = np.abs(gradient(X, weight, centers + 1.0, m)).max()
+        assert np.abs(gradient(X, weight, centers, m)).max() < 1e-8 * far
+
+    # At 1.02, u^m of a row far from a cluster is 10^-400 and less.
+    @pytest.mark.parametrize("m", [1.02, 2.0])
+    @pytest.mark.parametrize("mebibytes", [0, 1e-3, 0.05])
+    def test_blocks_change_nothing(self, rng, m, mebibytes):
+        X, weight = rng.normal(size=(100, 3)), rng.uniform(size=100)
+        centers = np.array([[0, 0, 0], [1, 0, 0], [30, 0, 0]], dtype=float)
+        X[:2] = centers[:2]  # no other cluster has any part in these, and they come first
+        expected = alternate(X, weight, centers, m)
+        with config_context(working_memory=mebibytes):
+            found = alternate(X, weight, centers, m)
+        for a, b in zip(found, expected, strict=True):
+            assert_allclose(a, b, rtol=1e-10, atol=1e-13)
+            assert np.isfinite(a).all()
+
+    def test_cluster_that_is_nowhere_the_nearest_moves_to_its_nearest_row(self):
+        # Its memberships are e^-5000 or so at best, but nothing against those on other rows.
+        X = np.array([[0.0], [1.0], [2.0], [3.0]])
+        centers = np.array([[0.5], [2.4], [9.0]])
+        moved, _, _ = alternate(X, np.ones(4), centers, 1.001)
+        ratio = (9.0 - X[:, 0]) ** 2 / np.minimum((X[:, 0] - 0.5) ** 2, (X[:, 0] - 2.4) ** 2)
+        assert_allclose(moved[2], X[ratio.argmin()], rtol=1e-12)
+
+    @pytest.mark.parametrize("m", [1.6, 1.95, 3.0])
+    def test_displacements_from_the_mean_grow_as_linearised(self, rng, m):
+        X, weight = rng.normal(size=(300, 4)) * [1, 1, 1, 2], rng.uniform(0.5, 1.5, 300)
+        X -= np.average(X, axis=0, weights=weight)
+        share = weight / weight.sum() / (X**2).sum(axis=1)
+        eigenvalues, vectors = np.linalg.eigh((share * X.T) @ X)
+        shift = 1e-7 * vectors[:, -1]
+        moved, _, _ = alternate(X, weight, np.array([shift, -shift]), m)
+        # Displacements of 1e-7 against rounding errors of 1e-16, and terms of third order.
+        growth = 2.0 * m / (m - 1.0) * eigenvalues[-1]
+        assert_allclose(moved, growth * np.array([shift, -shift]), atol=1e-12)
+        assert largest_exponent(X, weight) == pytest.approx(1 / (1 - 2 * eigenvalues[-1]))
+
+
+class TestClusters:
+    @pytest.mark.parametrize("m", [1.1, 2.0, "auto"])
+    @pytest.mark.parametrize("n_columns", [2, 3])
+    def test_planted_blobs_are_found(self, m, n_columns):
+        X, y, _ = blobs(300, n_columns)
+        model = FuzzyCMeans(m=m, random_state=0).fit(X)
+        assert adjusted_rand_score(y, model.labels_) == 1.0
+        for label in range(3):
+            mean = X[y == label].mean(axis=0)
+            # A hundred rows of unit deviation, and a slight pull from the other blobs.
+            assert np.linalg.norm(model.cluster_centers_ - mean, axis=1).min() < 0.3
+        assert_array_equal(model.predict(X), model.labels_)
+        assert_array_equal(clone(model).fit_predict(X), model.labels_)
+
+    def test_becomes_k_means_as_m_tends_to_one(self, rng):
+        X, weight = rng.normal(size=(300, 3)), rng.uniform(0.5, 2.0, 300)
+        hard = KMeans(4, init=X[:4], n_init=1, tol=0).fit(X, sample_weight=weight)
+        errors = []
+        for m in (1.1, 1.01, 1.001, 1.0 + 1e-9):
+            soft = FuzzyCMeans(4, m=m, init=hard.cluster_centers_, tol=1e-10)
+            soft.fit(X, sample_weight=weight)
+            errors.append(np.abs(soft.cluster_centers_ - hard.cluster_centers_).max())
+        assert errors == sorted(errors, reverse=True)
+        assert errors[-1] < 1e-9
+        assert_array_equal(soft.labels_, hard.labels_)
+        assert soft.inertia_ == pytest.approx(hard.inertia_, rel=1e-9)
+
+    def test_one_cluster_is_the_weighted_mean(self):
+        X, _, weight = blobs()
+        model = FuzzyCMeans(1).fit(X, sample_weight=weight)
+        mean = np.average(X, axis=0, weights=weight)
+        assert_allclose(model.cluster_centers_, [mean], rtol=1e-12)
+        assert model.inertia_ == pytest.approx(weight @ ((X - mean) ** 2).sum(axis=1))
+        assert_array_equal(model.transform(X), 1.0)
+
+    @pytest.mark.parametrize("m", [1.0 + 1e-12, 1.5, 2.0])
+    def test_as_many_clusters_as_distinct_rows(self, rng, m):
+        X = rng.normal(size=(5, 2))
+        model = FuzzyCMeans(5, m=m, random_state=0).fit(np.repeat(X, 3, axis=0))
+        order = np.argsort(model.predict(X))
+        assert_allclose(model.cluster_centers_, X[order], rtol=1e-14)
+        assert model.inertia_ == pytest.approx(0.0, abs=1e-25)
+
+    def test_single_point(self):
+        model = FuzzyCMeans(1).fit([[2.0, 3.0]])
+        assert_array_equal(model.cluster_centers_, [[2.0, 3.0]])
+        assert model.inertia_ == 0.0
+
+    def test_best_of_several_starts(self):
+        X, _ = make_blobs(300, centers=12, random_state=4)
+        costs = [FuzzyCMeans(12, n_init=n, random_state=0).fit(X).inertia_ for n in (1, 2, 4, 8)]
+        assert costs == sorted(costs, reverse=True)
+        assert costs[-1] < 0.99 * costs[0]
+
+    def test_starts_are_drawn_by_weight(self, rng):
+        X, weight = rng.normal(size=(50, 2)), np.r_[1e12, np.ones(49)]
+        model = FuzzyCMeans(1, n_init=10, random_state=0)
+        for centers in model._starts(X, weight, mean=0.0, scale=1.0):
+            assert_array_equal(centers, X[:1])
+
+    def test_random_state_decides(self, rng):
+        X = rng.normal(size=(100, 2))
+        first, second = (FuzzyCMeans(5, random_state=3).fit(X) for _ in range(2))
+        assert_array_equal(first.cluster_centers_, second.cluster_centers_)
+        other = FuzzyCMeans(5, random_state=4, n_init=1).fit(X)
+        assert np.abs(other.cluster_centers_ - first.cluster_centers_).max() > 0.1
+
+    def test_array_as_init_needs_no_chance(self, rng):
+        X = rng.normal(size=(100, 2))
+        first, second = (FuzzyCMeans(2, init=X[:2].tolist(), n_init=n).fit(X) for n in (1, 5))
+        assert_array_equal(first.cluster_centers_, second.cluster_centers_)
+
+
+class TestCoincidentCenters:
+    def test_noise_in_many_columns_makes_them_coincide_and_is_reported(self, rng):
+        X = rng.normal(size=(500, 8))
+        with pytest.warns(ConvergenceWarning, match=r"Only 1 of n_clusters=3 .* from m=1\.\d+ on"):
+            model = FuzzyCMeans(3, m=2.0, tol=1e-6, random_state=0).fit(X)
+        assert_allclose(model.cluster_centers_, np.tile(X.mean(axis=0), (3, 1)), atol=1e-3)
+
+    def test_exponent_auto_keeps_them_apart(self, rng):
+        X = rng.normal(size=(500, 8))
+        model = FuzzyCMeans(3, m="auto", random_state=0).fit(X)
+        assert 1.0 < model.m_ < 1.3
+        assert np.bincount(model.labels_).min() > 50
+
+    @pytest.mark.parametrize("n_columns", [1, 2])
+    def test_exponent_auto_is_two_where_nothing_speaks_against_it(self, rng, n_columns):
+        X = rng.normal(size=(200, n_columns))
+        assert FuzzyCMeans(2, m="auto", random_state=0).fit(X).m_ == 2.0
+
+    # With m < m* the mean is unstable, above it is not: seen from a start next to it.
+    @pytest.mark.parametrize(("factor", "coincide"), [(0.8, False), (1.25, True)])
+    def test_largest_exponent_parts_the_two(self, rng, factor, coincide):
+        X = rng.normal(size=(400, 4))
+        X -= X.mean(axis=0)
+        m = 1.0 + factor * (largest_exponent(X, np.ones(400)) - 1.0)
+        model = FuzzyCMeans(2, m=m, init=0.05 * X[:2], tol=1e-7, max_iter=5000)
+        if coincide:
+            with pytest.warns(ConvergenceWarning, match="Only 1 of n_clusters=2"):
+                model.fit(X)
+        else:
+            model.fit(X)
+        assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide
+
+    def test_equal_centers_at_the_start_remain_equal(self):
+        X, _, _ = blobs()
+        with pytest.warns(ConvergenceWarning, match="Only 2 of n_clusters=3"):
+            model = FuzzyCMeans(3, init=X[[0, 0, 1]]).fit(X)
+        u = model.transform(model.cluster_centers_)
+        assert_allclose(u, [[0.5, 0.5, 0], [0.5, 0.5, 0], [0, 0, 1]], atol=1e-12)
+
+
+class TestInvariance:
+    def test_order_of_rows_changes_no_bit(self, rng):
+        X, weight = rng.normal(size=(100, 3)), rng.integers(1, 4, 100)
+        order = rng.permutation(100)
+        model = FuzzyCMeans(4, m=1.5, random_state=0)
+        expected = clone(model).fit(X, sample_weight=weight)
+        found = clone(model).fit(X[order], sample_weight=weight[order])
+        assert_array_equal(found.cluster_centers_, expected.cluster_centers_)
+        assert_array_equal(found.labels_, expected.labels_[order])
+
+    def test_weights_are_repeated_rows_to_the_last_bit(self, rng):
+        X, weight = rng.normal(size=(100, 3)), rng.integers(0, 4, 100)
+        X[weight == 0] *= 1e3
+        model = FuzzyCMeans(4, m=1.5, random_state=0)
+        weighted = clone(model).fit(X, sample_weight=weight)
+        repeated = clone(model).fit(np.repeat(X, weight, axis=0))
+        assert_array_equal(weighted.cluster_centers_, repeated.cluster_centers_)
+        assert_array_equal(weighted.transform(X), repeated.transform(X))
+        assert weighted.inertia_ == repeated.inertia_
+        assert weighted.labels_.shape == (100,)
+
+    # At an offset of 1e8, the data themselves are rounded to 1e-8.
+    @pytest.mark.parametrize(
+        ("factor", "offset", "rtol"), [(1e6, 0, 1e-9), (1e-6, 0, 1e-9), (1, 1e8, 1e-6)]
+    )
+    def test_units_and_origin_change_nothing_else(self, factor, offset, rtol):
+        X, _, weight = blobs()
+        model = FuzzyCMeans(random_state=0)
+        expected = clone(model).fit(X, sample_weight=weight)
+        found = clone(model).fit(factor * X + offset, sample_weight=weight)
+        centers = (found.cluster_centers_ - offset) / factor
+        assert_allclose(centers, expected.cluster_centers_, rtol=rtol, atol=rtol)
+        assert found.inertia_ == pytest.approx(factor**2 * expected.inertia_, rel=rtol)
+        assert_array_equal(found.labels_, expected.labels_)
+        assert found.n_iter_ == expected.n_iter_
+
+    def test_common_factor_of_weights_changes_nothing_but_inertia(self):
+        X, _, weight = blobs()
+        model = FuzzyCMeans(random_state=0)
+        expected = clone(model).fit(X, sample_weight=weight)
+        found = clone(model).fit(X, sample_weight=1e-6 * weight)
+        assert_allclose(found.cluster_centers_, expected.cluster_centers_, rtol=1e-9)
+        assert found.inertia_ == pytest.approx(1e-6 * expected.inertia_)
+
+
+class TestErrors:
+    def test_not_converged(self, rng):
+        X = rng.normal(size=(50, 2))
+        with pytest.warns(ConvergenceWarning, match="in iteration max_iter=2 a centre moved by"):
+            FuzzyCMeans(4, max_iter=2, random_state=0).fit(X)
+
+    @pytest.mark.parametrize(
+        ("setting", "message"),
+        [
+            ({"n_clusters": 0}, "'n_clusters' parameter"),
+            ({"m": 1.0}, "'m' parameter"),
+            ({"m": "two"}, "'m' parameter"),
+            ({"tol": -1.0}, "'tol' parameter"),
+            ({"max_iter": 0}, "'max_iter' parameter"),
+            ({"n_init": 0}, "'n_init' parameter"),
+            ({"init": "random"}, "'init' parameter"),
+            ({"init": np.zeros((2, 2))}, r"init has shape \(2, 2\), but n_clusters=3"),
+            ({"init": np.full((3, 2), np.nan)}, "init contains NaN"),
+            ({"n_clusters": 11}, "n_clusters=11 needs as many distinct rows .* there are 10"),
+        ],
+    )
+    def test_bad_parameters(self, rng, setting, message):
+        with pytest.raises(ValueError, match=message):
+            FuzzyCMeans(**setting).fit(rng.normal(size=(10, 2)))
+
+    def test_repeated_rows_do_not_make_clusters(self):
+        with pytest.raises(ValueError, match="there are 2, with n_samples=10"):
+            FuzzyCMeans(3).fit([[0.0], [1.0]] * 5)
+
+    def test_not_finite_data_name_the_column(self, rng):
+        X = rng.normal(size=(10, 2))
+        fitted = FuzzyCMeans(2, random_state=0).fit(X)
+        X[3, 1] = np.inf
+        for method in (FuzzyCMeans(2).fit, fitted.predict, fitted.transform):
+            with pytest.raises(ValueError, match="X contains infinity in column 'x1'"):
+                method(X)
+
+    def test_bad_weights(self, rng):
+        X = rng.normal(size=(3, 2))
+        with pytest.raises(ValueError, match="Negative values in sample_weight: -2 at row 1"):
+            FuzzyCMeans(2).fit(X, sample_weight=[1, -2, 1])
+        with pytest.raises(ValueError, match=r"weight.*zero"):
+            FuzzyCMeans(2).fit(X, sample_weight=[0, 0, 0])

@@ -1,0 +1,85 @@
+"""Every family inside the training problem and the estimator."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_jang_sinc
+from skanfis.membership import MEMBERSHIPS
+from skanfis.objective import SeparableProblem
+from skanfis.premise import Premise
+from skanfis.rows import Rows
+
+from .. import oracles
+
+FAMILIES = pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+BUILD = {
+    "grid": lambda rng, family: oracles.random_grid(rng, [family] * 2, [3, 2]),
+    "scattered": lambda rng, family: oracles.random_scattered(rng, family, 4, [0, 1]),
+}
+
+
+@FAMILIES
+@pytest.mark.parametrize("kind", BUILD)
+def test_gradient_of_the_cost_by_the_displacements(family, kind):
+    rng = np.random.default_rng(3)
+    antecedent, rows = BUILD[kind](rng, family), oracles.bumpy_rows(rng, 250, weighted=True)
+    problem = SeparableProblem(rows, antecedent, 1, 1e-4)
+    premise = Premise.of(antecedent, *oracles.box(rows))
+    x = rng.uniform(0.2 * premise.lower, 0.2 * premise.upper)
+
+    def cost(displacement):
+        return problem.evaluate(premise.parameters(displacement)).cost
+
+    evaluation = problem.evaluate(premise.parameters(x))
+    raw = problem.linearise(evaluation)
+    gradient, _ = premise.pull_back(x, raw.gradient, raw.gauss_newton)
+    # So small a step that no row passes a corner on it, or only next to nothing of a row.
+    numeric = oracles.central_difference(cost, x, 1e-6)
+    assert np.abs(numeric).max() > 1e-3
+    assert_allclose(gradient, numeric, rtol=0, atol=1e-6 * np.abs(numeric).max())
+
+
+@FAMILIES
+def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
+    rng = np.random.default_rng(3)
+    antecedent = oracles.random_grid(rng, [family] * 2, [3, 3])
+    X = rng.uniform(-1.0, 1.0, (250, 2))
+    rows = Rows.standardised(X, np.sin(3.0 * X[:, :1]) * np.cos(2.0 * X[:, 1:]))
+    # Some term reaches every row by the textbook: the dense problem has no floor.
+    Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
+    mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 3, -1)
+    assert mu.max(axis=1).min() > 0.01
+    problem = SeparableProblem(rows, antecedent, 1, 1e-4)
+    dense = oracles.DenseProblem(rows, antecedent, 1, 1e-4)
+    point = antecedent.parameters
+    linearisation = problem.linearise(problem.evaluate(point))
+    for found, expected in (
+        (linearisation.gradient, dense.gradient(point)),
+        (linearisation.gauss_newton, dense.gauss_newton(point)),
+    ):
+        # The floor of families with a foot is 1e-10, next to memberships of 0.01 or more.
+        assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+@FAMILIES
+def test_every_family_learns_a_smooth_surface(family, rng):
+    def surface(X):
+        return np.sin(2.5 * X[:, 0]) * np.exp(X[:, 1]) + 0.5 * X[:, 1] ** 2
+
+    X, unseen = rng.uniform(-1.0, 1.0, (600, 2)), rng.uniform(-0.95, 0.95, (500, 2))
+    y = surface(X) + 0.1 * rng.normal(size=600)
+    model = ANFISRegressor(n_mfs=3, mf=family.name).fit(X, y)
+    error = np.sqrt(np.mean((model.predict(unseen) - surface(unseen)) ** 2))
+    # A linear model: 0.5; the noise: 0.1; 27 coefficients from 600 rows cannot do better than 0.02.
+    assert error < 0.04
+    assert {term["function"] for term in model.memberships_} == {family.name}
+
+
+@FAMILIES
+def test_every_family_improves_on_its_start_on_jangs_sinc(family):
+    X, y = make_jang_sinc()
+    model = ANFISRegressor(n_mfs=3, mf=family.name).fit(X, y)
+    assert model.loss_curve_[-1] < 0.8 * model.loss_curve_[0]
+    assert np.sqrt(np.mean((model.predict(X) - y) ** 2)) < 0.1

@@ -1,0 +1,181 @@
+"""What all estimators share: workers, clusterers, what "auto" decides, and no side effects."""
+
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import BaseEstimator, ClusterMixin
+from sklearn.cluster import KMeans
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from threadpoolctl import threadpool_info, threadpool_limits
+
+from skanfis import ANFISRegressor
+from skanfis._anfis import _labeller, _ordered_map
+from skanfis.exceptions import UnderdeterminedWarning
+
+
+def data(n_rows=120, n_inputs=2):
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
+    return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
+
+
+# ------------------------------------------------------------------------------------------ workers
+
+
+@pytest.mark.parametrize("n_jobs", [None, 1, 2, 3])
+def test_results_come_in_order_whoever_is_done_first(n_jobs):
+    def slow_at_first(k):
+        time.sleep(0.01 * (k == 0))
+        return k**2
+
+    assert list(_ordered_map(n_jobs)(slow_at_first, list(range(20)))) == [k**2 for k in range(20)]
+
+
+def test_error_of_a_worker_reaches_the_caller():
+    def fails_at_five(k):
+        if k == 5:
+            raise FloatingPointError("five")
+        return k
+
+    with pytest.raises(FloatingPointError, match="five"):
+        list(_ordered_map(2)(fails_at_five, list(range(10))))
+
+
+# --------------------------------------------------------------------------------------- clusterers
+
+
+class Remembers(ClusterMixin, BaseEstimator):
+    """Two clusters by the sign of the first column; keeps what it was given."""
+
+    seen = ()
+
+    def fit_predict(self, X, y=None):
+        type(self).seen = (*self.seen, np.array(X))
+        return (X[:, 0] > 0).astype(int)
+
+    def fit(self, X, y=None):
+        return self
+
+
+class Weighted(Remembers):
+    """The same, of weighted rows."""
+
+    def fit(self, X, y=None, sample_weight=None):
+        type(self).seen = (*self.seen, np.array(sample_weight))
+        self.labels_ = (X[:, 0] > 0).astype(int)
+        return self
+
+
+def test_clusterer_without_weights_sees_repeated_rows():
+    Remembers.seen = ()
+    table, weight = np.array([[1.0, 5.0], [-1.0, 6.0], [2.0, 7.0]]), np.array([2.0, 1.0, 3.0])
+    labels = _labeller(Remembers(), weighted=False)(table, weight)
+    assert_array_equal(labels, [1, 0, 1])
+    assert_array_equal(Remembers.seen[0], table[[0, 0, 1, 2, 2, 2]])
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_clusterer_with_weights_is_given_them(weighted):
+    Weighted.seen = ()
+    labels = _labeller(Weighted(), weighted)(np.array([[1.0], [-1.0]]), np.array([0.25, 4.0]))
+    assert_array_equal(labels, [1, 0])
+    assert_array_equal(Weighted.seen[0], [0.25, 4.0])
+
+
+def test_clusters_are_sought_in_standardised_inputs_and_target():
+    Remembers.seen = ()
+    X, y = data()
+    ANFISRegressor(partition=Remembers(), tol=0.1).fit(X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0)
+    (table,) = Remembers.seen
+    expected = StandardScaler().fit_transform(np.column_stack([X, y]))
+    order = np.lexsort(expected.T[::-1])
+    # A column of 1e-6 beside an offset of 3 has ten digits left.
+    assert_allclose(table[np.lexsort(np.round(table, 6).T[::-1])], expected[order], atol=1e-8)
+
+
+def test_clusterer_itself_is_left_as_it_was():
+    clusterer = KMeans(n_clusters=3, n_init=1, random_state=0)
+    model = ANFISRegressor(partition=clusterer, tol=0.1).fit(*data())
+    assert model.partition is clusterer
+    assert not hasattr(clusterer, "labels_")
+    assert model.n_rules_ == 3
+
+
+def test_pipeline_is_a_clusterer_too():
+    X, y = data()
+    kmeans = KMeans(n_clusters=3, n_init=1, random_state=0)
+    alone = ANFISRegressor(partition=kmeans, tol=0.1).fit(X, y)
+    # On standardised data a scaler does nothing, but for rounding.
+    scaled = ANFISRegressor(partition=make_pipeline(StandardScaler(), kmeans), tol=0.1).fit(X, y)
+    assert_allclose(scaled.predict(X), alone.predict(X), rtol=0, atol=1e-8)
+
+
+# ------------------------------------------------------------------------------ structure and ridge
+
+
+@pytest.mark.parametrize(
+    ("n_rows", "alpha"),
+    [(24, 1e-12), (23, 1e-8)],  # four rules with three coefficients, and twice as many rows
+)
+def test_automatic_ridge_depends_on_the_number_of_distinct_rows(n_rows, alpha):
+    X, y = data(n_rows)
+    X, y = np.tile(X, (3, 1)), np.tile(y, 3)
+    automatic = ANFISRegressor(n_mfs=2).fit(X, y)
+    explicit = ANFISRegressor(n_mfs=2, alpha=alpha).fit(X, y)
+    assert_array_equal(automatic.consequents_, explicit.consequents_)
+    assert automatic.memberships_ == explicit.memberships_
+
+
+@pytest.mark.parametrize("n_rows", [11, 12])
+def test_fewer_distinct_rows_than_parameters_are_reported(n_rows, recwarn):
+    X, y = data(n_rows)
+    ANFISRegressor(n_mfs=2, tol=0.5).fit(np.tile(X, (3, 1)), np.tile(y, 3))
+    caught = [w for w in recwarn if w.category is UnderdeterminedWarning]
+    assert len(caught) == (n_rows < 12)
+    for warning in caught:
+        assert "12 consequent parameters for 11 distinct training rows" in str(warning.message)
+        assert warning.filename == __file__
+
+
+# ------------------------------------------------------------------------------------- side effects
+
+
+def blas_threads():
+    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+
+@pytest.fixture
+def two_blas_threads():
+    """As on any machine; not as a context, which would keep other threads from setting limits."""
+    limits = threadpool_limits(2, user_api="blas")
+    yield blas_threads()
+    limits.restore_original_limits()
+
+
+class CountsThreads(Remembers):
+    """The same clusters; keeps how many threads the numerical libraries have meanwhile."""
+
+    def fit_predict(self, X, y=None):
+        type(self).seen = tuple(blas_threads())
+        return super().fit_predict(X)
+
+
+def test_one_thread_of_the_numerical_libraries_in_a_fit_and_then_as_many_as_before(
+    two_blas_threads,
+):
+    CountsThreads.seen = ()
+    ANFISRegressor(partition=CountsThreads(), tol=0.5).fit(*data())
+    assert set(CountsThreads.seen[:-1]) == {1}
+    assert blas_threads() == two_blas_threads
+
+
+def test_data_are_not_written_to():
+    X, y = data()
+    weight = np.linspace(0.0, 1.0, len(y))
+    before = X.copy(), y.copy(), weight.copy()
+    ANFISRegressor(n_mfs=2, tol=0.5).fit(X, y, weight).predict(X[1:] / 2)
+    for array, copy in zip((X, y, weight), before, strict=True):
+        assert_array_equal(array, copy)

@@ -1,0 +1,793 @@
+"""ANFISRegressor as a user meets it: what it learns, what it says, and the tools it works with."""
+
+import io
+import pickle
+import threading
+import warnings
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn import config_context
+from sklearn.base import clone
+from sklearn.cluster import AgglomerativeClustering, KMeans
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.inspection import partial_dependence, permutation_importance
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.metrics import get_scorer, r2_score
+from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut, cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor, objective, rows
+from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
+from skanfis.membership import MEMBERSHIPS
+from skanfis.rows import Rows
+from skanfis.solvers import SOLVERS
+
+from . import oracles
+
+NAMES = ["time", "temperature", "rate"]
+KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
+# Where two fits are compared to the last bit, a few iterations show as much as many.
+SHORT = {"n_mfs": 2, "tol": 0.01}
+
+
+def surface(n_rows=240, seed=0, noise=0.0):
+    """Seconds, degrees Celsius and degrees per second; a smooth error that depends on all three."""
+    rng = np.random.default_rng(seed)
+    X = rng.uniform([0.0, -40.0, -300.0], [1800.0, 85.0, 300.0], (n_rows, 3))
+    time, temperature, rate = X.T
+    y = np.exp(-time / 600.0) + 1e-4 * (temperature - 25.0) ** 2 + np.tanh(rate / 150.0)
+    y += 0.2 * np.sin(temperature / 30.0) * rate / 300.0
+    return X, 0.02 * y + noise * rng.normal(size=n_rows)
+
+
+X, Y = surface()
+FRAME = pd.DataFrame(X, columns=NAMES)
+
+
+def same_bits(one, other, data=X):
+    """Whether two fitted models are one and the same."""
+    assert_array_equal(one.predict(data), other.predict(data))
+    assert_array_equal(one.consequents_, other.consequents_)
+    assert one.memberships_ == other.memberships_
+    assert one.initial_memberships_ == other.initial_memberships_
+    assert_array_equal(one.loss_curve_, other.loss_curve_)
+    assert_array_equal(one.coverage(data), other.coverage(data))
+
+
+def textbook_strengths(estimator, memberships, data):
+    """Products of memberships over their sum, from nothing but the estimator's attributes."""
+    names = list(getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(data.shape[1])]))
+    mu = [
+        oracles.textbook_membership(term["function"], data[:, names.index(term["input"])], term)
+        for term in memberships
+    ]
+    mu = np.array(mu).reshape(-1, len(data))
+    products = np.array([np.prod(mu[list(rule)], axis=0) for rule in estimator.rules_])
+    return products / products.sum(axis=0)
+
+
+def textbook_predict(estimator, data):
+    """y = sum_r w_r (p_r0 + p_r1 x_1 + ... + p_rd x_d)."""
+    strengths = textbook_strengths(estimator, estimator.memberships_, data)
+    basis = np.column_stack([np.ones(len(data)), data])
+    outputs = estimator.consequents_.reshape(estimator.n_rules_, basis.shape[1], -1)
+    result = np.einsum("rn,ni,rio->no", strengths, basis, outputs)
+    return result[:, 0] if estimator.consequents_.ndim == 2 else result
+
+
+# ----------------------------------------------------------------------------------- what it learns
+
+
+def planted(data):
+    """A known TSK model: two terms per input, four rules."""
+    centers, width = np.array([[-1.2, 0.9], [-0.8, 1.1]]), 0.9
+    mu = np.exp(-((data[:, :, None] - centers) ** 2) / (2 * width**2))
+    strengths = np.einsum("ni,nj->nij", mu[:, 0], mu[:, 1]).reshape(-1, 4)
+    strengths /= strengths.sum(axis=1, keepdims=True)
+    consequents = np.array([[1, 2, -1], [-2, 0.5, 1], [3, -1, 0.3], [0, 1, 2]])
+    return (strengths * (consequents[:, 0] + data @ consequents[:, 1:].T)).sum(axis=1)
+
+
+def test_planted_model_is_found():
+    rng = np.random.default_rng(1)
+    train, check = rng.uniform(-2, 2, (400, 2)), rng.uniform(-2, 2, (400, 2))
+    model = ANFISRegressor(n_mfs=2, warn_out_of_bounds=False).fit(train, planted(train))
+    check = check[model.in_bounds(check)]
+    truth = planted(check)
+    # Found within 1e-10; the fit stops at a relative decrease of 1e-4 of a cost near zero.
+    assert_allclose(model.predict(check), truth, rtol=0, atol=1e-6 * np.ptp(truth))
+
+
+def test_planted_model_is_found_under_noise():
+    rng = np.random.default_rng(2)
+    train, check = rng.uniform(-2, 2, (2000, 2)), rng.uniform(-1.9, 1.9, (1000, 2))
+    model = ANFISRegressor(n_mfs=2).fit(train, planted(train) + 0.1 * rng.normal(size=2000))
+    error = np.sqrt(np.mean((model.predict(check) - planted(check)) ** 2))
+    # 12 + 6 free parameters: the noise leaves 0.1 (18 / 2000)^(1/2) = 0.0095 on average.
+    assert error < 0.014
+
+
+@pytest.mark.parametrize(
+    ("settings", "most"),
+    [
+        ({}, 0.02),
+        ({"n_mfs": 3}, 0.01),
+        ({"n_mfs": 2, "mf": "bell"}, 0.02),
+        ({"n_mfs": 3, "order": 0}, 0.05),
+        ({"partition": KMEANS}, 0.05),
+        ({"partition": KMEANS, "mf": "bell"}, 0.05),
+    ],
+)
+def test_surface_is_learnt_between_the_points(settings, most):
+    train, check = surface(1000), surface(500, seed=1)
+    model = ANFISRegressor(warn_out_of_bounds=False, **settings).fit(*train)
+    # Of the target's deviation; a linear model leaves 0.4.
+    assert np.sqrt(1 - model.score(*check)) < most
+
+
+@pytest.mark.parametrize("alpha", [1e-12, 1e-6, 1e-2, 1.0])
+@pytest.mark.parametrize("weighted", [False, True])
+def test_one_rule_is_ridge_regression_of_standardised_data(alpha, weighted):
+    # (1/2) mean squared error + alpha/2 |b|^2 is Ridge's |error|^2 + n alpha |b|^2, times 1/(2 n);
+    # with the target's mean gone, the intercept of the standardised problem is zero.
+    weight = np.random.default_rng(0).uniform(0.1, 3.0, len(X)) if weighted else np.ones(len(X))
+    model = ANFISRegressor(n_mfs=1, alpha=alpha).fit(X, Y, weight if weighted else None)
+    scaler = StandardScaler().fit(X, sample_weight=weight)
+    ridge = Ridge(alpha=alpha * weight.sum()).fit(scaler.transform(X), Y, sample_weight=weight)
+    expected = ridge.predict(scaler.transform(X))
+    # The ridge scales with the target: Y in place of its standardised form is the same problem.
+    assert_allclose(model.predict(X), expected, rtol=0, atol=1e-12)
+    assert model.n_rules_ == 1
+    assert model.n_iter_ == 1
+    assert model.memberships_ == []
+
+
+def test_one_rule_without_ridge_is_linear_regression():
+    model, linear = ANFISRegressor(n_mfs=1, alpha=0.0).fit(X, Y), LinearRegression().fit(X, Y)
+    assert_allclose(model.predict(X), linear.predict(X), rtol=0, atol=1e-12)
+    assert_allclose(model.consequents_[0], [linear.intercept_, *linear.coef_], rtol=1e-9)
+
+
+def test_one_constant_rule_is_the_weighted_mean():
+    weight = np.random.default_rng(0).uniform(0.1, 3.0, len(X))
+    model = ANFISRegressor(n_mfs=1, order=0).fit(X, Y, weight)
+    assert_allclose(model.predict(X), np.average(Y, weights=weight), rtol=1e-13)
+
+
+def test_input_with_one_term_is_linear_under_every_rule():
+    model = ANFISRegressor(n_mfs=[3, 1, 2]).fit(FRAME, Y)
+    assert model.n_rules_ == 6
+    assert [term["input"] for term in model.memberships_] == ["time"] * 3 + ["rate"] * 2
+    steps = np.tile([900.0, 0.0, 50.0], (5, 1))
+    steps[:, 1] = np.linspace(-30.0, 80.0, 5)
+    assert_allclose(np.diff(model.predict(pd.DataFrame(steps, columns=NAMES)), 2), 0.0, atol=1e-14)
+
+
+def test_consequents_of_order_zero_have_no_slopes():
+    model = ANFISRegressor(n_mfs=2, order=0).fit(X, Y)
+    assert_array_equal(model.consequents_[:, 1:], 0.0)
+    # An average of the rules' constants.
+    assert model.predict(X).max() <= model.consequents_[:, 0].max()
+    assert model.predict(X).min() >= model.consequents_[:, 0].min()
+
+
+def test_stiffness_holds_the_premises_where_they_start():
+    free, stiff = (ANFISRegressor(n_mfs=2, stiffness=s).fit(X, Y) for s in (0.0, 1e6))
+
+    def travel(model):
+        pairs = zip(model.memberships_, model.initial_memberships_, strict=True)
+        return max(abs(a["width"] / b["width"] - 1) for a, b in pairs)
+
+    assert travel(free) > 0.1
+    assert travel(stiff) < 1e-5
+
+
+# ------------------------------------------------------------------ attributes, in the user's units
+
+
+SETTINGS = {
+    "gaussian grid": {"n_mfs": [3, 2, 1]},
+    "bell grid": {"n_mfs": 2, "mf": "bell"},
+    "constant rules": {"n_mfs": 2, "order": 0},
+    "clusters": {"partition": KMEANS},
+    "clusters of bells": {"partition": KMEANS, "mf": "bell"},
+    "one rule": {"n_mfs": 1},
+    **{mf: {"n_mfs": [1, 2, 3], "mf": mf} for mf in sorted(MEMBERSHIPS)},
+}
+
+
+@pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_attributes_reproduce_the_predictions(settings, n_outputs):
+    scale, offset = np.array([1e-6, 1e6, 1.0]), np.array([1.0, -3e6, 1e4])
+    data = X / np.ptp(X, axis=0) * scale + offset
+    targets = Y if n_outputs == 1 else np.column_stack([Y, 1e3 + np.cos(X[:, 1] / 40.0)])
+    model = ANFISRegressor(tol=0.01, **settings).fit(data, targets)
+    # p0 + p1 x1 + ... cancels where x is far from the origin, by 10^6 spans for the first column.
+    error = np.abs(textbook_predict(model, data) - model.predict(data)) / np.ptp(targets, axis=0)
+    assert error.max() < 1e-8
+    assert_allclose(
+        model.strengths(data).T,
+        textbook_strengths(model, model.memberships_, data),
+        rtol=0,
+        atol=1e-8,
+    )
+
+
+@pytest.mark.parametrize("mf", ["gaussian", "bell"])
+def test_grid_starts_evenly_spaced_over_the_range(mf):
+    model = ANFISRegressor(n_mfs=[4, 2, 3], mf=mf, tol=0.1).fit(FRAME, Y)
+    terms = pd.DataFrame(model.initial_memberships_)
+    for name, count in zip(NAMES, [4, 2, 3], strict=True):
+        centers = terms.loc[terms["input"] == name, "center"].to_numpy()
+        even = np.linspace(FRAME[name].min(), FRAME[name].max(), count)
+        assert_allclose(centers, even, rtol=0, atol=1e-10 * np.ptp(even))
+        # Neighbours cross half-way, at one membership for all.
+        records = terms[terms["input"] == name].to_dict("records")
+        for term, x, following in zip(records, even, even[1:], strict=False):
+            middle = (x + following) / 2
+            assert_allclose(oracles.textbook_membership(mf, middle, term), 0.6, rtol=1e-9)
+
+
+def test_rules_of_a_grid_are_all_combinations():
+    model = ANFISRegressor(n_mfs=[3, 1, 2], tol=0.1).fit(X, Y)
+    assert_array_equal(model.rules_, [[0, 3], [0, 4], [1, 3], [1, 4], [2, 3], [2, 4]])
+
+
+def test_clustered_rules_start_at_the_clusters():
+    ward = AgglomerativeClustering(n_clusters=3)
+    model = ANFISRegressor(partition=ward, tol=0.1).fit(X, Y)
+    # Clusters are sought in standardised inputs and target together; the order is the clusterer's.
+    labels = ward.fit_predict(StandardScaler().fit_transform(np.column_stack([X, Y])))
+    found = np.array([term["center"] for term in model.initial_memberships_]).reshape(3, 3)
+    widths = np.array([term["width"] for term in model.initial_memberships_]).reshape(3, 3)
+    expected = [[X[labels == k].mean(axis=0), X[labels == k].std(axis=0)] for k in range(3)]
+    expected = np.array(expected)[np.argsort([m[0][0] for m in expected])]
+    order = np.argsort(found[:, 0])
+    assert_allclose(found[order], expected[:, 0], rtol=1e-9)
+    assert_allclose(widths[order], expected[:, 1] * np.sqrt(3), rtol=1e-9)
+
+
+def test_loss_curve_goes_from_the_start_to_the_end():
+    # Not so many iterations that the ridge plays a part.
+    model = ANFISRegressor(n_mfs=2, tol=0.01).fit(X, Y)
+    assert model.loss_curve_.shape == (model.n_iter_ + 1,)
+    assert (np.diff(model.loss_curve_) < 0).all()
+    strengths = textbook_strengths(model, model.initial_memberships_, X)
+    standardised = StandardScaler().fit_transform(X)
+    basis = np.column_stack([np.ones(len(X)), standardised])
+    design = np.einsum("rn,ni->nri", strengths, basis).reshape(len(X), -1)
+    residual = Y - design @ np.linalg.lstsq(design, Y, rcond=None)[0]
+    assert_allclose(model.loss_curve_[0], np.mean(residual**2) / Y.var(), rtol=1e-6)
+    end = np.mean((Y - model.predict(X)) ** 2) / Y.var()
+    assert_allclose(model.loss_curve_[-1], end, rtol=1e-6)
+
+
+def test_terms_of_an_input_stay_in_order():
+    model = ANFISRegressor(n_mfs=4, alpha=1e-6).fit(*surface(1200, noise=0.01))
+    centers = np.reshape([term["center"] for term in model.memberships_], (3, 4))
+    assert (np.diff(centers) > 0).all()
+
+
+def test_max_iter_reached_is_said():
+    with pytest.warns(ConvergenceWarning, match=r"max_iter=2, .* increase max_iter") as caught:
+        model = ANFISRegressor(n_mfs=2, max_iter=2, tol=1e-9).fit(X, Y)
+    assert model.n_iter_ == 2
+    assert "max_iter" in model.status_
+    assert caught[0].filename == __file__
+
+
+def test_score_is_the_coefficient_of_determination():
+    model = ANFISRegressor(**SHORT).fit(X, Y)
+    weight = np.linspace(0, 1, len(X))
+    expected = r2_score(Y, model.predict(X), sample_weight=weight)
+    assert_allclose(model.score(X, Y, weight), expected, rtol=1e-14)
+
+
+# ------------------------------------------------------------------------------------------ outputs
+
+
+def test_one_column_of_targets_is_the_vector_in_another_shape():
+    flat, column = (ANFISRegressor(**SHORT).fit(X, y) for y in (Y, Y[:, None]))
+    assert_array_equal(column.predict(X), flat.predict(X)[:, None])
+    assert_array_equal(column.consequents_, flat.consequents_[:, :, None])
+
+
+def test_same_target_twice():
+    alone = ANFISRegressor(n_mfs=2).fit(X, Y)
+    twice = ANFISRegressor(n_mfs=2).fit(X, np.column_stack([Y, Y]))
+    found = twice.predict(X)
+    assert_array_equal(found[:, 0], found[:, 1])
+    # Twice the cost has the same minimum, and the solver the same steps but for rounding.
+    assert_allclose(found[:, 0], alone.predict(X), rtol=0, atol=1e-7 * np.ptp(Y))
+
+
+def test_outputs_share_the_premises_and_have_their_own_consequents():
+    targets = np.column_stack([Y, -5e6 * Y + 1.0, np.cos(X[:, 1] / 40.0)])
+    model = ANFISRegressor(n_mfs=2).fit(X, targets)
+    assert len(model.memberships_) == 6
+    # The linear part is solved for each output: given the memberships, it is least squares.
+    design = np.einsum("nr,ni->nri", model.strengths(X), np.column_stack([np.ones(len(X)), X]))
+    solution = np.linalg.lstsq(design.reshape(len(X), -1), targets, rcond=None)[0]
+    expected = design.reshape(len(X), -1) @ solution
+    error = (model.predict(X) - expected) / np.ptp(targets, axis=0)
+    assert np.abs(error).max() < 1e-6
+    assert_allclose(model.predict(X)[:, 1], -5e6 * model.predict(X)[:, 0] + 1.0, rtol=1e-9)
+
+
+def test_order_of_the_outputs_does_not_matter():
+    targets = np.column_stack([Y, np.cos(X[:, 1] / 40.0)])
+    one, other = (ANFISRegressor(n_mfs=2).fit(X, t) for t in (targets, targets[:, ::-1]))
+    error = (one.predict(X) - other.predict(X)[:, ::-1]) / np.ptp(targets, axis=0)
+    assert np.abs(error).max() < 1e-7
+
+
+# -------------------------------------------------------------------------- coverage, out of bounds
+
+
+def l_shaped(n_rows=1500):
+    """The unit square without its upper right quarter."""
+    data = np.random.default_rng(0).uniform(size=(n_rows, 2))
+    data = data[(data < 0.45).any(axis=1)]
+    return data, np.sin(3 * data[:, 0]) + data[:, 1] ** 2
+
+
+def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
+    model = ANFISRegressor(n_mfs=3, stiffness=1.0).fit(*l_shaped())
+    assert model.coverage([[0.2, 0.2], [0.2, 0.8], [0.8, 0.2]]).min() > 0.95
+    axis = np.linspace(0.05, 0.95, 10)
+    square = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    coverage = model.coverage(square)
+    assert_array_equal(square[np.argmin(coverage)], [0.95, 0.95])
+    # In the corner its own rule, without data, has a share of 0.84 by either input: 0.3 are left.
+    assert coverage.min() < 0.4
+
+
+def test_coverage_decays_with_the_distance_from_the_data():
+    data, target = l_shaped()
+    model = ANFISRegressor(n_mfs=3, stiffness=1.0).fit(data, target)
+    edge = np.array([data[:, 0].max(), 0.3])
+    deviations = np.linspace(0.0, 3.0, 7)
+    beyond = edge + np.outer(deviations * data[:, 0].std(), [1.0, 0.0])
+    expected = model.coverage(edge[None]) * np.exp(-0.5 * deviations**2)
+    assert_allclose(model.coverage(beyond), expected, rtol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def trained():
+    """Trained where temperature is in [-40, 85] and rate in [-300, 300]."""
+    return ANFISRegressor(n_mfs=2, tol=0.01).fit(FRAME, Y)
+
+
+OUTSIDE = pd.DataFrame(
+    [[900.0, 20.0, 100.0], [900.0, 120.0, 100.0], [900.0, 99.5, -400.0], [-5.0, 20.0, 0.0]],
+    columns=NAMES,
+)
+
+
+def test_out_of_bounds_rows_are_reported(trained):
+    low, high = FRAME["temperature"].min(), FRAME["temperature"].max()
+    message = (
+        rf"'time' in 1 of 4 rows .*'temperature' in 2 of 4 rows "
+        rf"\(trained on \[{low:.6g}, {high:.6g}\], found \[20, 120\]\); "
+        rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='clip'"
+    )
+    with pytest.warns(OutOfBoundsWarning, match=message) as caught:
+        trained.predict(OUTSIDE)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    assert_array_equal(trained.in_bounds(OUTSIDE), [True, False, False, False])
+
+
+def test_columns_within_bounds_are_not_reported(trained):
+    with pytest.warns(OutOfBoundsWarning) as caught:
+        trained.predict(OUTSIDE[:2])
+    assert "'temperature'" in str(caught[0].message)
+    assert "'time'" not in str(caught[0].message)
+    assert "'rate'" not in str(caught[0].message)
+
+
+def test_score_reports_out_of_bounds_rows_too(trained):
+    with pytest.warns(OutOfBoundsWarning, match="'temperature'"):
+        trained.score(OUTSIDE, np.arange(4.0))
+
+
+def test_training_data_themselves_are_within_bounds(trained):
+    assert trained.in_bounds(FRAME).all()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        trained.predict(FRAME)
+
+
+def with_policy(estimator, policy):
+    return clone(estimator).set_params(out_of_bounds=policy, warn_out_of_bounds=False).fit(FRAME, Y)
+
+
+def test_switch_silences_the_report(trained):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with_policy(trained, "clip").predict(OUTSIDE)
+
+
+def test_clip_holds_the_value_at_the_edge(trained):
+    model = with_policy(trained, "clip")
+    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1)
+    assert_array_equal(model.predict(OUTSIDE), model.predict(nearest))
+    assert_allclose(model.strengths(OUTSIDE), model.strengths(nearest), rtol=1e-14)
+
+
+def test_linear_goes_on_with_the_strengths_of_the_edge(trained):
+    model = with_policy(trained, "linear")
+    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1)
+    consequents = model.consequents_[:, :1] + model.consequents_[:, 1:] @ OUTSIDE.to_numpy().T
+    expected = (model.strengths(nearest) * consequents.T).sum(axis=1)
+    assert_allclose(model.predict(OUTSIDE), expected, rtol=1e-9)
+    edge = OUTSIDE.assign(temperature=FRAME["temperature"].max(), time=900.0, rate=0.0)
+    beyond = edge.assign(temperature=edge["temperature"] + 1e-9)
+    assert_allclose(model.predict(beyond), model.predict(edge), rtol=1e-9)
+
+
+def test_nan_marks_the_rows_out_of_bounds_alone(trained):
+    model = with_policy(trained, "nan")
+    found = model.predict(OUTSIDE)
+    assert_array_equal(np.isnan(found), [False, True, True, True])
+    assert_allclose(found[0], trained.predict(OUTSIDE[:1])[0], rtol=1e-14)
+
+
+def test_raise_names_the_columns(trained):
+    model = with_policy(trained, "raise")
+    with pytest.raises(ValueError, match=r"'temperature' in 2 of 4 rows .*'rate' in 1 of 4 rows"):
+        model.predict(OUTSIDE)
+    assert_array_equal(model.predict(OUTSIDE[:1]), trained.predict(OUTSIDE[:1]))
+
+
+def test_far_away_the_prediction_is_no_silent_zero(trained):
+    far = OUTSIDE + 1e9
+    model = with_policy(trained, "clip")
+    corner = FRAME.max().to_frame().T
+    assert_allclose(model.predict(far), model.predict(corner)[0], rtol=1e-14)
+    assert_allclose(model.strengths(far).sum(axis=1), 1.0, rtol=1e-14)
+    assert_array_equal(model.coverage(far), 0.0)
+
+
+def test_strengths_are_positive_and_sum_to_one(trained):
+    strengths = trained.strengths(pd.concat([FRAME, OUTSIDE]))
+    assert (strengths > 0).all()
+    assert_allclose(strengths.sum(axis=1), 1.0, rtol=1e-14)
+
+
+# ------------------------------------------------------------------------------ the same every time
+
+
+def test_another_fit_in_between_changes_nothing():
+    other = surface(150, seed=5)
+    model = ANFISRegressor(**SHORT).fit(X, Y)
+    first = pickle.loads(pickle.dumps(model))
+    model.fit(other[0][:, :2], np.column_stack([other[1], other[1]]))
+    same_bits(model.fit(X, Y), first)
+    same_bits(clone(model).fit(X, Y), first)
+
+
+@pytest.mark.parametrize("settings", [{}, {"partition": KMEANS}, {"order": 0, "mf": "bell"}])
+def test_nothing_depends_on_chance_or_changes_the_global_seed(settings):
+    # Few rows: "auto" clusters them.
+    few, targets = X[:150], Y[:150]
+    np.random.seed(1)  # noqa: NPY002
+    one = ANFISRegressor(random_state=None, tol=0.01, **settings).fit(few, targets)
+    np.random.seed(2)  # noqa: NPY002
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    other = ANFISRegressor(random_state=None, tol=0.01, **settings).fit(few, targets)
+    assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+    assert_array_equal(one.predict(few), other.predict(few))
+    assert one.memberships_ == other.memberships_
+
+
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"partition": KMEANS, "mf": "bell"},
+        *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
+    ],
+    ids=str,
+)
+def test_number_of_workers_changes_no_bit(monkeypatch, settings):
+    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
+    monkeypatch.setattr(objective, "_FEWEST_ROWS", 16)
+    monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
+    threads, read = set(), Rows.read
+
+    def read_and_remember(self, part):
+        threads.add(threading.get_ident())
+        return read(self, part)
+
+    monkeypatch.setattr(Rows, "read", read_and_remember)
+    weight = np.random.default_rng(0).uniform(0.5, 2.0, len(X))
+    models = {}
+    for n_jobs in (None, 1, 2, -1):
+        threads.clear()
+        model = ANFISRegressor(n_jobs=n_jobs, max_iter=5, tol=0, **settings)
+        models[n_jobs] = model.fit(X, Y, weight)
+        # Else this test compares nothing.
+        assert (len(threads) > 1) == (n_jobs == 2 or (n_jobs == -1 and joblib.cpu_count() > 1))
+    for n_jobs in (1, 2, -1):
+        same_bits(models[n_jobs], models[None])
+
+
+@pytest.mark.parametrize("settings", [{"n_mfs": 3}, {"partition": KMEANS, "mf": "bell"}])
+@pytest.mark.parametrize("through", ["pickle", "joblib", "compressed"])
+def test_loaded_model_is_the_same_to_the_last_bit(settings, through, tmp_path):
+    model = ANFISRegressor(tol=0.5, **settings).fit(X, Y)
+    path = tmp_path / "model"
+    if through == "pickle":
+        path.write_bytes(pickle.dumps(model))
+        loaded = pickle.loads(path.read_bytes())
+    else:
+        joblib.dump(model, path, compress=3 * (through == "compressed"))
+        loaded = joblib.load(path)
+    same_bits(loaded, model)
+    assert loaded.get_params()["n_mfs"] == model.n_mfs
+    assert path.stat().st_size < 50_000
+    assert model.n_rules_ == (27 if "n_mfs" in settings else 4)
+
+
+# ------------------------------------------------------------------------------------ forms of data
+
+
+def test_single_precision_is_trained_in_double():
+    single, target = X.astype(np.float32), Y.astype(np.float32)
+    model = ANFISRegressor(**SHORT).fit(single, target)
+    double = ANFISRegressor(**SHORT).fit(single.astype(float), target.astype(float))
+    assert_array_equal(model.predict(single), double.predict(single.astype(float)))
+    assert model.predict(single).dtype == np.float64
+
+
+def test_whole_numbers_lists_and_order_of_memory():
+    whole = np.round(X).astype(np.int32)
+    expected = ANFISRegressor(**SHORT).fit(whole.astype(float), Y)
+    for data in (
+        whole,
+        whole.tolist(),
+        np.asfortranarray(whole, dtype=float),
+        whole.astype(object),
+    ):
+        model = ANFISRegressor(**SHORT).fit(data, Y.tolist())
+        # Sums run along the memory: equal but for rounding.
+        assert_allclose(model.predict(data), expected.predict(whole), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_memory_map_is_as_good_as_memory(tmp_path, dtype):
+    data = X.astype(dtype)
+    np.save(tmp_path / "X.npy", data)
+    np.save(tmp_path / "y.npy", Y)
+    mapped, target = (np.load(tmp_path / f"{name}.npy", mmap_mode="r") for name in "Xy")
+    model, expected = (ANFISRegressor(**SHORT).fit(*both) for both in ((mapped, target), (data, Y)))
+    same_bits(model, expected, data)
+    assert_array_equal(model.predict(mapped), expected.predict(data))
+
+
+def frames():
+    return [pytest.param("pandas"), pytest.param("polars")]
+
+
+def frame_of(library, data, names):
+    library = pytest.importorskip(library)
+    return library.DataFrame({name: data[:, j] for j, name in enumerate(names)})
+
+
+@pytest.mark.parametrize("library", frames())
+def test_data_frame_gives_names_to_the_terms(library):
+    frame = frame_of(library, X, NAMES)
+    model = ANFISRegressor(**SHORT).fit(frame, frame_of(library, Y[:, None], ["error"])["error"])
+    assert_array_equal(model.feature_names_in_, NAMES)
+    assert [term["input"] for term in model.memberships_] == [n for n in NAMES for _ in range(2)]
+    # A frame's memory runs along its columns, and so do sums.
+    expected = ANFISRegressor(**SHORT).fit(X, Y).predict(X)
+    assert_allclose(model.predict(frame), expected, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("library", frames())
+def test_columns_in_another_order_are_refused(library):
+    model = ANFISRegressor(**SHORT).fit(frame_of(library, X, NAMES), Y)
+    turned = frame_of(library, X[:, ::-1], NAMES[::-1])
+    for method in (model.predict, model.coverage, model.strengths, model.in_bounds):
+        with pytest.raises(ValueError, match="same order"):
+            method(turned)
+
+
+@pytest.mark.parametrize("library", frames())
+def test_names_pass_through_a_scaler(library):
+    frame = frame_of(library, X, NAMES)
+    pipeline = make_pipeline(StandardScaler(), ANFISRegressor(**SHORT)).set_output(
+        transform=library
+    )
+    pipeline.fit(frame, Y)
+    assert pipeline[-1].memberships_[-1]["input"] == "rate"
+    # Standardised before or not: the fit depends on no units.
+    plain = ANFISRegressor(**SHORT).fit(frame, Y).predict(frame)
+    assert_allclose(pipeline.predict(frame), plain, rtol=0, atol=1e-8 * np.ptp(Y))
+
+
+def test_frame_without_names_that_are_text_is_an_array():
+    model = ANFISRegressor(**SHORT).fit(pd.DataFrame(X), Y)
+    assert not hasattr(model, "feature_names_in_")
+    assert model.memberships_[0]["input"] == "x0"
+    assert_array_equal(model.predict(pd.DataFrame(X)), model.predict(X))
+
+
+def test_array_in_place_of_the_frame_is_warned_of(trained):
+    with pytest.warns(UserWarning, match="valid feature names"):
+        found = trained.predict(X)
+    assert_array_equal(found, trained.predict(FRAME))
+
+
+def test_one_row_at_a_time_is_as_good_as_all():
+    model = ANFISRegressor(n_mfs=3, tol=0.5).fit(*surface(1000))
+    data = surface(200)[0]
+    data = data[model.in_bounds(data)]
+    together = model.predict(data)
+    alone = np.concatenate([model.predict(row[None]) for row in data])
+    assert_allclose(alone, together, rtol=0, atol=1e-13)
+
+
+# -------------------------------------------------------------- parameters and scikit-learn's tools
+
+
+def test_parameters_are_got_and_set_as_given():
+    n_mfs = [2, 3, 2]
+    model = ANFISRegressor(n_mfs=n_mfs, alpha=1e-6)
+    assert model.get_params()["n_mfs"] is n_mfs
+    assert clone(model).get_params() == model.get_params()
+    assert model.set_params(mf="bell", n_mfs=2) is model
+    assert (model.mf, model.n_mfs, model.alpha) == ("bell", 2, 1e-6)
+
+
+@pytest.mark.parametrize(
+    "n_mfs", [2, np.int64(2), [2, 2, 2], (2, 2, 2), np.array([2, 2, 2]), pd.Series([2, 2, 2])]
+)
+def test_number_of_terms_in_any_form(n_mfs):
+    model = ANFISRegressor(n_mfs=n_mfs, tol=0.01).fit(X, Y)
+    same_bits(model, ANFISRegressor(n_mfs=2, tol=0.01).fit(X, Y))
+    assert model.n_mfs is n_mfs
+
+
+def test_changed_parameters_count_from_the_next_fit_on():
+    model = ANFISRegressor(**SHORT).fit(X, Y)
+    before = model.predict(X)
+    model.set_params(n_mfs=[3, 2, 1])
+    assert_array_equal(model.predict(X), before)
+    same_bits(model.fit(X, Y), ANFISRegressor(n_mfs=[3, 2, 1], tol=0.01).fit(X, Y))
+    assert model.n_rules_ == 6
+
+
+def test_policy_may_be_changed_after_training(trained):
+    model = pickle.loads(pickle.dumps(trained)).set_params(warn_out_of_bounds=False)
+    for policy in ("linear", "nan", "clip"):
+        found = model.set_params(out_of_bounds=policy).predict(OUTSIDE)
+        assert_array_equal(found, with_policy(trained, policy).predict(OUTSIDE))
+
+
+def test_representations_show_what_was_changed():
+    model = ANFISRegressor(n_mfs=[2, 3, 2], mf="bell")
+    assert repr(model) == "ANFISRegressor(mf='bell', n_mfs=[2, 3, 2])"
+    for estimator in (model, model.fit(X, Y)):
+        html = estimator._repr_html_()
+        assert "ANFISRegressor" in html
+        assert "bell" in html
+    assert repr(make_pipeline(model)).count("bell") == 1
+
+
+def test_pipeline_and_transformed_target():
+    inner = ANFISRegressor(**SHORT)
+    model = TransformedTargetRegressor(
+        make_pipeline(StandardScaler(), inner), func=np.log, inverse_func=np.exp
+    )
+    positive = np.exp(20 * Y)
+    model.fit(X, positive)
+    expected = np.exp(inner.fit(X, 20 * Y).predict(X))
+    # exp turns an absolute error of 1e-9 into a relative one.
+    assert_allclose(model.predict(X), expected, rtol=1e-8)
+
+
+def test_cross_val_score_scores_every_fold():
+    model = ANFISRegressor(n_mfs=2, warn_out_of_bounds=False)
+    scores = cross_val_score(model, X, Y, cv=3)
+    assert scores.shape == (3,)
+    assert scores.min() > 0.99
+
+
+def test_grid_search_over_runs_left_out():
+    # Three terms are too few on the first input, and needless on the second.
+    rng = np.random.default_rng(0)
+    data = rng.uniform(size=(400, 3))
+    target = np.sin(14.0 * data[:, 0]) + data[:, 1] + np.sin(3.0 * data[:, 2])
+    target += 0.1 * rng.normal(size=400)
+    run = np.arange(400) % 4
+    estimator = ANFISRegressor(alpha=1e-6, tol=0.01, warn_out_of_bounds=False)
+    search = GridSearchCV(
+        make_pipeline(StandardScaler(), estimator),
+        {"anfisregressor__n_mfs": [2, 3, [4, 2, 3]]},
+        cv=LeaveOneGroupOut(),
+        n_jobs=2,
+    )
+    search.fit(data, target, groups=run)
+    assert search.best_params_ == {"anfisregressor__n_mfs": [4, 2, 3]}
+    again = clone(search.best_estimator_).fit(data, target)
+    assert_array_equal(search.predict(data), again.predict(data))
+    held_out = [
+        clone(search.best_estimator_)
+        .fit(data[run != k], target[run != k])
+        .score(data[run == k], target[run == k])
+        for k in range(4)
+    ]
+    assert_allclose(search.best_score_, np.mean(held_out), rtol=1e-12)
+
+
+def test_weights_are_routed_through_pipeline_and_search():
+    weight = np.random.default_rng(0).uniform(size=len(X)) ** 4
+    noisy = Y + 0.01 * np.random.default_rng(1).normal(size=len(X))
+    with config_context(enable_metadata_routing=True):
+        inner = ANFISRegressor(warn_out_of_bounds=False, tol=0.1)
+        inner.set_fit_request(sample_weight=True).set_score_request(sample_weight=True)
+        scaler = StandardScaler().set_fit_request(sample_weight=False)
+        search = GridSearchCV(
+            make_pipeline(scaler, inner),
+            {"anfisregressor__n_mfs": [1, 2]},
+            # Without it, the search of scikit-learn 1.6 does not ask the pipeline's last step.
+            scoring=get_scorer("r2").set_score_request(sample_weight=True),
+            cv=2,
+        ).fit(X, noisy, sample_weight=weight)
+        found = search.predict(X)
+    scaled = StandardScaler().fit_transform(X)
+    best = ANFISRegressor(**search.best_estimator_[-1].get_params())
+    assert_array_equal(found, best.fit(scaled, noisy, weight).predict(scaled))
+    assert np.abs(found - best.fit(scaled, noisy).predict(scaled)).max() > 1e-3 * np.ptp(Y)
+    half = len(X) // 2
+    expected = []
+    for train, check in ((slice(half, None), slice(half)), (slice(half), slice(half, None))):
+        scaler = StandardScaler().fit(X[train])
+        best.fit(scaler.transform(X[train]), noisy[train], weight[train])
+        expected.append(best.score(scaler.transform(X[check]), noisy[check], weight[check]))
+    assert_allclose(search.best_score_, np.mean(expected), rtol=1e-12)
+
+
+def test_permutation_importance_sees_what_matters():
+    rng = np.random.default_rng(0)
+    data = rng.uniform(size=(300, 3))
+    model = ANFISRegressor(n_mfs=2, alpha=1e-6).fit(data, np.sin(4 * data[:, 0]) + 0.3 * data[:, 1])
+    # Permuted columns stay within their range: no row is out of bounds.
+    found = permutation_importance(model, data, model.predict(data), n_repeats=3, random_state=0)
+    strong, weak, none = found.importances_mean
+    assert strong > 5 * weak > 50 * abs(none)
+
+
+def test_partial_dependence_is_the_average_prediction():
+    model = ANFISRegressor(**SHORT).fit(X, Y)
+    found = partial_dependence(model, X, [1], grid_resolution=5)
+    fixed = X.copy()
+    fixed[:, 1] = found["grid_values"][0][2]
+    assert_allclose(found["average"][0, 2], model.predict(fixed).mean(), rtol=1e-12)
+
+
+def test_model_that_can_pass_through_every_row_is_warned_of():
+    with pytest.warns(UnderdeterminedWarning, match="32 consequent parameters for 20 distinct"):
+        ANFISRegressor(**SHORT).fit(X[:20], Y[:20])
+
+
+def test_saved_model_needs_no_data(tmp_path):
+    # 240 rows of training data would be 5.8 kB more.
+    model = ANFISRegressor(**SHORT).fit(X, Y)
+    many = ANFISRegressor(**SHORT).fit(*surface(4000))
+    sizes = []
+    for one in (model, many):
+        buffer = io.BytesIO()
+        joblib.dump(one, buffer)
+        sizes.append(buffer.tell())
+    assert abs(sizes[0] - sizes[1]) < 100
