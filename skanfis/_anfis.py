@@ -40,7 +40,7 @@ _ENOUGH_ROWS = 20_000
 _READ_ROWS = 4096
 # alpha="auto": as small as rounding allows where the data determine the consequents well; rounding
 # errors grow by 1 / alpha along directions that the data leave open, so more where they do not.
-_ALPHA, _ALPHA_FEW_ROWS = 1e-12, 1e-8
+_ALPHA, _ALPHA_FEW_ROWS = 1e-12, 1e-7
 
 
 @dataclass(frozen=True, eq=False)

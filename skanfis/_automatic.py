@@ -54,6 +54,8 @@ _WORTHWHILE = 0.005
 _SCORE_ERROR = 0.3
 # Models with more effective parameters than this part of the rows are out of the question.
 _MOST_PARAMETERS = 1 / 3
+# The linear model is the last resort; where it has too many, its ridge grows until it has fewer.
+_MOST_OF_LINEAR = 0.8
 # Of the levels within this part of the best score the stiffest is taken; within three times it, the
 # next one is tried.
 _AS_GOOD = 0.01
@@ -227,8 +229,8 @@ class StructureSearch:
             problem, premise, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE, stiffness=stiffness
         )
         k = _effective_parameters(problem, premise, result, stiffness)
-        is_linear = antecedent.n_rules == 1
-        if k >= (1.0 if is_linear else _MOST_PARAMETERS) * self.n_sample:
+        most = _MOST_OF_LINEAR if antecedent.n_rules == 1 else _MOST_PARAMETERS
+        if k > most * self.n_sample:
             return np.inf
         error = result.evaluation.mean_squared_error
         return np.sqrt(error * (1.0 + k / self.n_final) / (1.0 - k / self.n_sample))

@@ -70,7 +70,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         added to half the mean squared error of the standardised target. It acts on each rule's
         value at its centre and on its change over one standard deviation of the inputs there.
         "auto" is chosen together with the structure where that is; else it is 1e-12, next to
-        nothing, or 1e-8 where there are fewer than two distinct rows per consequent parameter:
+        nothing, or 1e-7 where there are fewer than two distinct rows per consequent parameter:
         raise it (1e-6 to 1e-2) for noisy data with many rules. At zero, a ridge at the level of
         rounding errors remains.
     stiffness : "auto" or float, default="auto"
