@@ -15,7 +15,7 @@ _CALLS = 1000
 
 def run(options):
     X, y, _, _ = make_surface(seed=0)
-    model, line = ANFISRegressor().fit(X, y), LinearRegression().fit(X, y)
+    model, line = ANFISRegressor(n_mfs=3).fit(X, y), LinearRegression().fit(X, y)
     row = X[:1]
     repeated = {
         "ANFIS": lambda: [model.predict(row) for _ in range(_CALLS)],

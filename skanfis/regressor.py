@@ -103,16 +103,16 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         The frozen model, in the user's units.
     n_rules_ : int
         Number of rules.
-    rules_ : ndarray of shape (n_rules_, n_premise_inputs)
+    rules_ : ndarray of shape (n_rules, n_premise_inputs)
         The terms of each rule: positions in ``memberships_``.
     memberships_, initial_memberships_ : list of dict
         Every term after training, and before: its "input", "function" and parameters by name
         ("center" and "width" of a Gaussian), in the user's units.
-    consequents_ : ndarray of shape (n_rules_, 1 + n_features_in_[, n_outputs])
+    consequents_ : ndarray of shape (n_rules, 1 + n_features[, n_outputs])
         p0, p1, ..., pd of every rule, in the user's units.
     n_iter_ : int
         Iterations run; 1 where there was nothing to iterate on.
-    loss_curve_ : ndarray of shape (n_iter_ + 1,)
+    loss_curve_ : ndarray of shape (n_iter + 1,)
         Mean squared error of the standardised target, from the start on.
     status_ : str
         Why the solver stopped.
@@ -124,7 +124,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         of the target. Empty where the structure was given.
     n_features_in_ : int
         Number of inputs.
-    feature_names_in_ : ndarray of shape (n_features_in_,)
+    feature_names_in_ : ndarray of shape (n_features,)
         Names of the inputs, where X had names that are all strings.
 
     Warns
@@ -345,7 +345,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
 
         Returns
         -------
-        strengths : ndarray of shape (n_samples, n_rules_)
+        strengths : ndarray of shape (n_samples, n_rules)
             Positive, with sum one in every row. Rows outside the training range are taken at its
             edge.
         """

@@ -136,7 +136,7 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         The nearest centre of each row, in units of ``widths_``.
     n_features_in_ : int
         Number of columns.
-    feature_names_in_ : ndarray of shape (n_features_in_,)
+    feature_names_in_ : ndarray of shape (n_features,)
         Names of the columns, where X had names that are all strings.
 
     See Also

@@ -82,7 +82,7 @@ def make_jang_three_input(subset="train"):
 
     Notes
     -----
-    Jang's figure of merit is the average percentage error, 100 mean(|y - prediction| / |y|).
+    Jang's figure of merit is the average percentage error, 100 mean(abs(y - prediction) / abs(y)).
 
     References
     ----------

@@ -92,26 +92,26 @@ def make_ofog(
         One row per sample, n_samples = duration / sampling_interval rounded down; runs one after
         another, in time's order. First the measurement:
 
-        time : since power-on [s], from 0
-        temperature : indicated by the gyro's thermometer [degC]
-        rate : true rate about the input axis, the earth's rate included [deg/s]
-        output : indicated rate without compensation [deg/s], that is the raw signal divided by the
-            nominal small-signal scale factor
-        error : output - rate [deg/s], the target of a compensation
-        run : number of the run, unique over all devices
-        device : number of the device
+        * time: since power-on [s], from 0
+        * temperature: indicated by the gyro's thermometer [degC]
+        * rate: true rate about the input axis, the earth's rate included [deg/s]
+        * output: indicated rate without compensation [deg/s], that is the raw signal divided by the
+          nominal small-signal scale factor
+        * error: output - rate [deg/s], the target of a compensation
+        * run: number of the run, unique over all devices
+        * device: number of the device
 
         then the parts of the error [deg/s], whose sum it is but for rounding:
 
-        nonlinearity : sin(K0 rate) / K0 - rate, the arcsine law at the reference temperature
-        scale_factor : deviation of the device from the nominal scale factor
-        scale_factor_temperature : what the coil's temperature changes in the indicated rate
-        bias : fixed bias of the device, and of the run
-        bias_temperature : bias by the coil's temperature
-        warm_up : bias that dies away after power-on
-        thermal_rate : bias by the coil's rate of temperature change (Shupe effect)
-        bias_instability : slow random bias
-        angle_random_walk : white noise
+        * nonlinearity: sin(K0 rate) / K0 - rate, the arcsine law at the reference temperature
+        * scale_factor: deviation of the device from the nominal scale factor
+        * scale_factor_temperature: what the coil's temperature changes in the indicated rate
+        * bias: fixed bias of the device, and of the run
+        * bias_temperature: bias by the coil's temperature
+        * warm_up: bias that dies away after power-on
+        * thermal_rate: bias by the coil's rate of temperature change (Shupe effect)
+        * bias_instability: slow random bias
+        * angle_random_walk: white noise
 
     Raises
     ------
