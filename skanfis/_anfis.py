@@ -3,6 +3,7 @@
 import inspect
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
@@ -11,7 +12,7 @@ from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import has_fit_parameter
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ._automatic import Structure, StructureSearch
 from .exceptions import ConstantInputWarning, UnderdeterminedWarning
@@ -66,8 +67,9 @@ def train(estimator, X, y, sample_weight, names):
     names : sequence of str
         Names of the inputs.
     """
-    # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many.
-    with threadpool_limits(limits=1, user_api="blas"):
+    # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many. One
+    # OpenMP thread for the small clusterings, which more would only slow down.
+    with _thread_pools().limit(limits=1):
         rows = Rows.standardised(X, y, sample_weight)
         n_distinct = count_distinct_inputs(rows, _ENOUGH_ROWS)
         start = _start(estimator, rows, names, n_distinct)
@@ -92,6 +94,12 @@ def train(estimator, X, y, sample_weight, names):
         )
     model = _frozen(rows, start.antecedent, result, n_distinct, names, estimator.out_of_bounds)
     return Training(model, result, start)
+
+
+@lru_cache(maxsize=1)
+def _thread_pools():
+    """The process's thread pools; looking for them takes as long as a small fit."""
+    return ThreadpoolController()
 
 
 def _solver_options(estimator):
