@@ -32,8 +32,8 @@ from .solvers import SOLVERS, SolverResult
 
 __all__ = ["Training", "train"]
 
-# Neighbouring terms of a grid cross at this membership at the start. Wider than the customary 0.5:
-# training from there meets fewer bad minima (benchmarks/start.py).
+# Neighbouring terms of a grid cross at this membership at the start. From the customary 0.5, Jang's
+# sinc gets stuck; elsewhere it makes little difference (benchmarks/start.py).
 _OVERLAP = 0.6
 _MIB = 2**20
 # Distinct rows are counted up to here: more make no difference to any decision.
@@ -125,7 +125,7 @@ def _box(rows):
 
 
 def _ordered_map(n_jobs):
-    """``map`` over worker threads; results in order, and no more of them held than workers."""
+    """``map`` over worker threads, with the results in order."""
     if effective_n_jobs(n_jobs) == 1:
         return map
 

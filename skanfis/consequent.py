@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-__all__ = ["LocalBasis", "RidgeFactor", "basis", "design", "rule_masses", "rule_outputs"]
+__all__ = ["LocalBasis", "RidgeFactor", "basis", "rule_masses", "rule_outputs"]
 
 # A rule that fires on one spot only has no spread there; in standard deviations of the input.
 _SMALLEST_SPREAD = 0.05
@@ -40,16 +40,6 @@ def basis(Z, order):
     """Rows [1, z_1, ..., z_d] (order 1) or [1] (order 0), shape (n_basis, n_rows)."""
     ones = np.ones((1, Z.shape[1]))
     return np.concatenate([ones, Z]) if order == 1 else ones
-
-
-def design(strengths, basis_rows, out=None):
-    """Phi transposed, shape (n_rules * n_basis, n_rows)."""
-    n_rules, n_rows = strengths.shape
-    n_basis = basis_rows.shape[0]
-    out = np.empty((n_rules * n_basis, n_rows)) if out is None else out
-    blocks = out.reshape(n_rules, n_basis, n_rows)
-    np.multiply(strengths[:, None, :], basis_rows[None, :, :], out=blocks)
-    return out
 
 
 def rule_outputs(coefficients, strengths, basis_rows):

@@ -2,9 +2,9 @@
 
 Two fits of the same data in another form see numbers that differ by rounding, 1e-16, and the ridge
 of 1e-12 lets that grow to some 1e-10 of the target's range in the consequents; the solver then
-takes the same steps, or it would end elsewhere. The largest difference found in any test below is
-2e-8. TOLERANCE asks for 1e-6, which no step left out, no other row in a cluster and no statistic
-with n - 1 for n would pass.
+takes the same steps, or it would end elsewhere. TOLERANCE asks for 1e-6, which no step left out, no
+other row in a cluster and no statistic with n - 1 for n would pass; where a test asks for less, it
+says why.
 """
 
 import warnings
@@ -293,7 +293,10 @@ def test_structure_that_is_chosen_by_itself(name):
 @pytest.mark.parametrize(
     "settings",
     [
-        *({"n_mfs": 2, "mf": mf} for mf in sorted(MEMBERSHIPS)),
+        *({"n_mfs": 2, "mf": mf} for mf in sorted(set(MEMBERSHIPS) - {"triangular"})),
+        # Two triangles have linear shares, whose products with [1, x] span 1, x and x^2 only: the
+        # Gram matrix is singular, and the least ridge leaves 4e-3 of rounding. This one does not.
+        {"n_mfs": 2, "mf": "triangular", "alpha": 1e-10},
         *({"partition": KMEANS, "mf": mf} for mf in sorted(MEMBERSHIPS)),
         *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
     ],
@@ -306,11 +309,8 @@ def test_every_family_and_solver(settings):
     plain = model.fit(X, y, weight).predict(X)
     order = np.random.default_rng(3).permutation(weight.sum())
     model.fit(np.repeat(X, weight, axis=0)[order], np.repeat(y, weight)[order])
-    # The kinks of some families make more of a difference in rounding than the contract's 1e-6.
-    kinked = settings.get("mf") in ("triangular", "trapezoidal")
-    tolerance = 1e-3 if kinked else TOLERANCE
-    assert_allclose(model.predict(X), plain, rtol=0, atol=tolerance * np.ptp(y))
+    assert_allclose(model.predict(X), plain, rtol=0, atol=TOLERANCE * np.ptp(y))
     units, offset = np.array([1e6, 1e-6, 1e6]), 1e4 * np.ptp(X, axis=0)
     found = model.fit((X + offset) * units, 1e-6 * y, weight).predict((X + offset) * units)
     # Of sixteen digits the offset leaves twelve.
-    assert_allclose(1e6 * found, plain, rtol=0, atol=max(tolerance, 1e-4) * np.ptp(y))
+    assert_allclose(1e6 * found, plain, rtol=0, atol=1e-4 * np.ptp(y))
