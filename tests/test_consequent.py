@@ -1,11 +1,11 @@
-"""Local basis, design and ridge factor against explicit matrices and numpy's own solvers."""
+"""Local basis and ridge factor against explicit matrices and numpy's own solvers."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.linear_model import Ridge
 
-from skanfis.consequent import LocalBasis, RidgeFactor, basis, design, rule_masses
+from skanfis.consequent import LocalBasis, RidgeFactor, rule_masses
 
 N_RULES, N_INPUTS, N_ROWS = 4, 3, 200
 
@@ -54,16 +54,6 @@ def random_local(rng, n_slopes=N_INPUTS):
 def positive_definite(rng, n=12, condition=1e4):
     q, _ = np.linalg.qr(rng.normal(size=(n, n)))
     return (q * np.geomspace(1.0, 1.0 / condition, n)) @ q.T
-
-
-@pytest.mark.parametrize("order", [0, 1])
-def test_design_holds_strength_times_basis(strengths, Z, order):
-    phi = design(strengths, basis(Z, order))
-    expected = [w * b for w in strengths for b in ([np.ones(N_ROWS), *Z] if order else [1.0])]
-    assert_array_equal(phi, expected)
-    out = np.full((len(expected), N_ROWS), np.nan)
-    assert design(strengths, basis(Z, order), out) is out
-    assert_array_equal(out, phi)
 
 
 @pytest.mark.parametrize("order", [0, 1])
