@@ -8,8 +8,12 @@ with normalised firing strengths w and consequents about a reference point x0, t
 training data: a column that lies far from the origin (a time stamp, a raw count) so loses no
 digits. :attr:`TSKModel.consequents` gives the textbook form p0 + p1 x1 + ... + pd xd.
 
-Outside the box of the training data the model follows a declared policy. Strengths are always
-those of the nearest point in the box; they sum to one everywhere, so that no policy ever gives a
+Outside the box of the training data the model follows a declared policy, by the nearest point c of
+the box: hold its value (clip), or go on along its tangent (linear),
+
+    y(c) + sum_j dy/dx_j(c) (x_j - c_j) .
+
+Strengths are those of the nearest point; they sum to one everywhere, so that no policy ever gives a
 silent zero.
 """
 
@@ -19,6 +23,7 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
+from .naming import default_term_names
 
 __all__ = ["OUT_OF_BOUNDS", "TSKModel"]
 
@@ -52,6 +57,10 @@ class TSKModel:
         Number of distinct training rows, by their weight, on which each rule is the strongest.
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
+    term_names : tuple of str
+        One per term, unique on its input; where not given, see ``naming``.
+    output_names : tuple of str
+        Where not given "y", or "y0", "y1", ... of several outputs.
     """
 
     antecedent: Antecedent
@@ -65,6 +74,15 @@ class TSKModel:
     rule_rows: np.ndarray
     input_names: tuple[str, ...]
     out_of_bounds: str = "clip"
+    term_names: tuple[str, ...] = ()
+    output_names: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if not self.term_names:
+            object.__setattr__(self, "term_names", default_term_names(self.antecedent))
+        if not self.output_names:
+            names = ("y",) if self.n_outputs == 1 else tuple(f"y{k}" for k in range(self.n_outputs))
+            object.__setattr__(self, "output_names", names)
 
     @property
     def n_rules(self):
@@ -100,18 +118,18 @@ class TSKModel:
         Returns
         -------
         list of dict
-            One per term, with keys "input" (its name), "function" and one per parameter.
+            One per term, with keys "input" (its name), "name", "function" and one per parameter.
         """
         antecedent = self.antecedent if trained else self.initial_antecedent
-        terms = []
+        terms: list[dict] = []
         for group in antecedent.groups:
             names = [parameter.name for parameter in group.family.parameters]
             natural = group.family.natural(group.theta)
             for j, values in zip(group.inputs, natural.T, strict=True):
                 numbers = dict(zip(names, map(float, values), strict=True))
-                terms.append(
-                    {"input": self.input_names[j], "function": group.family.name, **numbers}
-                )
+                name = self.term_names[len(terms)]
+                term = {"input": self.input_names[j], "name": name, "function": group.family.name}
+                terms.append(term | numbers)
         return terms
 
     def in_bounds(self, X):
@@ -133,11 +151,24 @@ class TSKModel:
         if self.out_of_bounds == "raise":
             raise ValueError(self.describe_out_of_bounds(X))
         if self.out_of_bounds == "linear":
-            return self._by_block(X, self._outputs_linear, self.n_outputs)
+            return self._by_block(X, self._outputs_linear, self.n_outputs, with_slopes=True)
         outputs = self._by_block(X, self._outputs_clipped, self.n_outputs)
         if self.out_of_bounds == "nan":
             outputs[~inside] = np.nan
         return outputs
+
+    def gradient(self, X):
+        """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
+
+        Rows out of the box are taken at its nearest point.
+        """
+        n_values = self.n_inputs * self.n_outputs
+
+        def of_block(Z):
+            return self._values_and_gradient(self._clip(Z))[1].reshape(n_values, -1)
+
+        by_row = self._by_block(X, of_block, n_values, with_slopes=True)
+        return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
     def coverage(self, X):
         r"""How well the training data cover each row, from 0 (not at all) to 1, (n_rows,).
@@ -179,10 +210,12 @@ class TSKModel:
             raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
         return replace(self, out_of_bounds=policy)
 
-    def _by_block(self, X, of_block, n_columns):
+    def _by_block(self, X, of_block, n_columns, with_slopes=False):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns)."""
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms
+        if with_slopes:
+            values_per_row += 2 * self.antecedent.parameters.size + self.n_inputs * self.n_outputs
         step = max(_BLOCK_BYTES // (8 * values_per_row), 64)
         if n_rows <= step:
             return of_block(np.array(X.T, dtype=float, order="C")).T
@@ -205,12 +238,40 @@ class TSKModel:
         return self._outputs(self._clip(Z))
 
     def _outputs_linear(self, Z):
-        """Strengths of the nearest point in the box, consequents at the row itself."""
-        return self._combine(self._strengths(Z), Z)
+        """Value and slope of the nearest point in the box."""
+        inside = self._clip(Z)
+        values, gradient = self._values_and_gradient(inside)
+        return values + np.einsum("ji,joi->oi", Z - inside, gradient)
 
-    def _combine(self, strengths, Z):
+    def _values_and_gradient(self, Z):
+        """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).
+
+        Memberships depend on x and their location through the difference alone: the derivative of
+        log mu by x is minus that by the location.
+        """
+        log_mu, gradients = self.antecedent.log_memberships_and_gradient(Z)
+        strengths, shares = self.antecedent.normalise(log_mu)
+        basis_rows = self._basis(Z)
+        values, slopes = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1]))
+        for k, one in enumerate(self.coefficients.transpose(2, 0, 1)):
+            by_rule, output = rule_outputs(one, strengths, basis_rows)
+            by_term = self.antecedent.term_sensitivity(by_rule, output, shares)
+            start = 0
+            for group, gradient in zip(self.antecedent.groups, gradients, strict=True):
+                own = by_term[start : start + group.n_terms]
+                np.subtract.at(slopes[:, k], group.inputs, own * gradient[0])
+                start += group.n_terms
+            slopes[: one.shape[1] - 1, k] += one[:, 1:].T @ strengths
+            values.append(output)
+        return np.stack(values), slopes
+
+    def _basis(self, Z):
         basis_rows = np.ones((self.coefficients.shape[1], Z.shape[1]))
         if self.order == 1:
             np.subtract(Z, self.reference[:, None], out=basis_rows[1:])
+        return basis_rows
+
+    def _combine(self, strengths, Z):
+        basis_rows = self._basis(Z)
         by_rule = self.coefficients.transpose(2, 0, 1)
         return np.stack([rule_outputs(one, strengths, basis_rows)[1] for one in by_rule])

@@ -84,8 +84,8 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         or when the gradient says as much. Zero or positive.
     out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
         What ``predict`` does with rows outside the range of the training data, input by input:
-        "clip" holds the value at the edge; "linear" holds the rules' strengths at the edge and
-        lets their consequents go on; "nan" returns NaN; "raise" raises ValueError. It may be
+        "clip" holds the value at the edge; "linear" goes on along the tangent there; "nan"
+        returns NaN; "raise" raises ValueError. It may be
         changed by ``set_params`` after training.
     warn_out_of_bounds : bool, default=True
         Whether ``predict`` warns of such rows.

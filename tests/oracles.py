@@ -9,7 +9,13 @@ from itertools import product
 
 import numpy as np
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.antecedent import (
+    GridAntecedent,
+    RuleTableAntecedent,
+    ScatteredAntecedent,
+    TermGroup,
+)
+from skanfis.membership import Bell, Gaussian
 from skanfis.rows import Rows
 
 # With a complex step there is no difference to lose digits in: any tiny step is exact to rounding.
@@ -102,6 +108,8 @@ def rules_by_hand(antecedent):
     if isinstance(antecedent, GridAntecedent):
         used = list(dict.fromkeys(inputs))
         return list(product(*[[t for t, j in enumerate(inputs) if j == u] for u in used]))
+    if isinstance(antecedent, RuleTableAntecedent):
+        return [[int(t) for t in rule if t >= 0] for rule in antecedent.table]
     n_used = len(set(inputs))
     return [range(r * n_used, (r + 1) * n_used) for r in range(len(inputs) // n_used)]
 
@@ -243,3 +251,15 @@ def random_scattered(rng, family, n_rules, inputs):
     theta = family.from_center_and_width(centers, rng.uniform(0.7, 1.5, centers.shape))
     theta[1:] += 0.2 * rng.normal(size=theta[1:].shape)
     return ScatteredAntecedent.build(family, inputs, theta)
+
+
+def random_table(rng, n_rules=5, families=(Gaussian, Bell, Gaussian)):
+    """Rules over shared terms on three inputs, three terms each; some look at two inputs only."""
+    groups = []
+    for j, family in enumerate(families):
+        centers = np.array([-1.0, 0.3, 1.2]) + 0.2 * rng.normal(size=3)
+        theta = family.from_center_and_width(centers, rng.uniform(0.7, 1.5, 3))
+        groups.append(TermGroup(family, np.full(3, j), theta))
+    table = rng.integers(0, 3, (n_rules, 3)) + 3 * np.arange(3)
+    table[0], table[1] = [0, 3, -1], [-1, 4, 8]
+    return RuleTableAntecedent(tuple(groups), table)

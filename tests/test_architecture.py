@@ -20,6 +20,7 @@ KERNEL = [
     "rows",
     "objective",
     "premise",
+    "naming",
     "model",
     "solvers",
 ]

@@ -27,7 +27,7 @@ def naive(frozen, X):
     if isinstance(frozen.antecedent, GridAntecedent):
         rules = list(product(*[found for found in on_input.values() if found]))
     else:
-        rules = list(zip(*[found for found in on_input.values() if found], strict=True))
+        rules = [[terms[t] for t in rule if t >= 0] for rule in frozen.antecedent.rule_terms]
     outputs = []
     for row in X:
         at = dict(zip(frozen.input_names, row, strict=True))
@@ -73,6 +73,7 @@ MODELS = {
     "order 0": build(grid(), order=0),
     "order 0, outputs": build(scattered(Bell), order=0, n_outputs=3),
     "scattered": build(scattered(), n_outputs=2),
+    "rule table": build(oracles.random_table(np.random.default_rng(1)), n_outputs=2),
     "scattered on two inputs": build(scattered(Gaussian, (0, 2))),
 }
 ALL = pytest.mark.parametrize("frozen", MODELS.values(), ids=list(MODELS))
@@ -291,17 +292,27 @@ def test_linear_is_continuous_at_the_edge(frozen, rng):
 
 
 @ALL
-def test_linear_is_affine_beyond_the_edge_with_the_slope_of_the_rules(frozen, rng):
-    frozen = frozen.with_out_of_bounds("linear")
+def test_gradient_is_that_of_the_textbook_formula(frozen, rng):
+    X, step = inside(frozen, rng, 12), 1e-6
+    found = frozen.gradient(X)
+    assert found.shape == (12, 3, frozen.n_outputs)
     for j in range(3):
-        at = inside(frozen, rng, 10)
-        at[:, j] = frozen.maximum[j]
-        slope = frozen.strengths(at) @ frozen.consequents[:, 1 + j]
-        for distance in (0.5, 3.0, 1e3):
-            beyond = at.copy()
-            beyond[:, j] += distance
-            expected = frozen.predict(at) + distance * slope
-            assert_allclose(frozen.predict(beyond), expected, rtol=1e-10, atol=1e-10)
+        ahead, behind = X.copy(), X.copy()
+        ahead[:, j] += step
+        behind[:, j] -= step
+        numeric = (naive(frozen, ahead) - naive(frozen, behind)) / (2 * step)
+        assert_allclose(found[:, j], numeric, rtol=1e-6, atol=1e-8)
+
+
+@ALL
+def test_linear_is_the_tangent_of_the_nearest_row(frozen, rng):
+    frozen = frozen.with_out_of_bounds("linear")
+    X = around(frozen, rng, 500)
+    nearest = X.clip(frozen.minimum, frozen.maximum)
+    ahead = np.einsum("ij,ijo->io", X - nearest, frozen.gradient(nearest))
+    expected = naive(frozen, nearest) + ahead
+    assert_allclose(frozen.predict(X), expected, rtol=1e-10, atol=1e-10)
+    assert_allclose(frozen.gradient(X), frozen.gradient(nearest), rtol=1e-12)
 
 
 def test_raise_names_the_columns_and_the_numbers(rng):

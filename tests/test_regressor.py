@@ -422,11 +422,12 @@ def test_clip_holds_the_value_at_the_edge(trained):
     assert_allclose(model.strengths(OUTSIDE), model.strengths(nearest), rtol=1e-14)
 
 
-def test_linear_goes_on_with_the_strengths_of_the_edge(trained):
+def test_linear_goes_on_along_the_tangent_of_the_edge(trained):
     model = with_policy(trained, "linear")
-    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1)
-    consequents = model.consequents_[:, :1] + model.consequents_[:, 1:] @ OUTSIDE.to_numpy().T
-    expected = (model.strengths(nearest) * consequents.T).sum(axis=1)
+    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1).to_numpy()
+    slope = model.model_.gradient(nearest)[:, :, 0]
+    expected = trained.model_.predict(nearest)[:, 0]
+    expected += ((OUTSIDE.to_numpy() - nearest) * slope).sum(axis=1)
     assert_allclose(model.predict(OUTSIDE), expected, rtol=1e-9)
     edge = OUTSIDE.assign(temperature=FRAME["temperature"].max(), time=900.0, rate=0.0)
     beyond = edge.assign(temperature=edge["temperature"] + 1e-9)

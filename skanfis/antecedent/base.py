@@ -11,22 +11,19 @@ log-membership of term t is needed for training, and has one form for every rule
 
     dy / d log mu_t = sum_(rules r that contain t) w_r f_r  -  nu_t y ,
 
-where nu_t is the share of the strength that rules containing t hold, among those that use t's
-input (scattered rules: the rule's strength itself). The chain rule through the family's own
+where nu_t is the share of the strength that rules containing t hold (on a grid what is left of its
+own membership when its input's are normalised; scattered rules: the rule's strength itself). The chain rule through the family's own
 derivatives then gives the sensitivity to every premise parameter.
 """
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import accumulate, groupby, pairwise
-from math import prod
 
 import numpy as np
 
-from .membership import Membership
+from ..membership import Membership
 
-__all__ = ["Antecedent", "GridAntecedent", "ScatteredAntecedent", "TermGroup"]
+__all__ = ["Antecedent", "TermGroup", "softmax_in_place"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +47,7 @@ def _stack(values, Z):
     return np.concatenate(values) if values else np.empty((0, Z.shape[1]))
 
 
-def _softmax_in_place(log_values):
+def softmax_in_place(log_values):
     """Softmax along the last axis but one."""
     log_values -= np.maximum.reduce(log_values, axis=-2, keepdims=True)
     np.exp(log_values, out=log_values)
@@ -142,116 +139,3 @@ class Antecedent(ABC):
 
         ``rule_outputs`` is w_r f_r, ``output`` its sum over rules, ``shares`` as normalise gave it.
         """
-
-
-def _grid_rule_terms(counts):
-    """The terms of every rule of a full grid, shape (n_rules, n_inputs with terms)."""
-    combinations = np.indices(counts).reshape(len(counts), -1).T
-    return combinations + np.cumsum([0, *counts[:-1]])
-
-
-@lru_cache(maxsize=16)
-def _grid_indicator(counts):
-    """1 where term t is part of rule r, shape (n_terms, n_rules)."""
-    rule_terms = _grid_rule_terms(counts)
-    indicator = np.zeros((sum(counts), rule_terms.shape[0]))
-    indicator[rule_terms.T, np.arange(rule_terms.shape[0])] = 1.0
-    return indicator
-
-
-@dataclass(frozen=True, eq=False)
-class GridAntecedent(Antecedent):
-    r"""Every combination of one term per input (grid partition).
-
-    The sum over all rules of products of memberships is the product of the sums, so that each input
-    is normalised alone and the strengths are the products of the shares,
-
-        w_(k1 .. kd) = prod_j nu_(j, kj) ,    nu_jk = mu_jk / sum_k' mu_jk' :
-
-    as many exponentials as there are terms, not as there are rules times inputs. Rules are in
-    C order: the last input's term changes fastest.
-    """
-
-    counts: tuple[int, ...] = ()
-
-    @classmethod
-    def build(cls, families, inputs, thetas):
-        """One entry of each argument per input that has terms; thetas (n_parameters, count)."""
-        groups = []
-        entries = zip(families, inputs, thetas, strict=True)
-        for family, members in groupby(entries, key=lambda entry: entry[0]):
-            _, used, theta = zip(*members, strict=True)
-            repeats = [part.shape[1] for part in theta]
-            groups.append(TermGroup(family, np.repeat(used, repeats), np.hstack(theta)))
-        return cls(tuple(groups), counts=tuple(theta.shape[1] for theta in thetas))
-
-    @property
-    def n_rules(self):
-        return prod(self.counts)
-
-    @property
-    def share_counts(self):
-        return self.counts
-
-    @property
-    def rule_terms(self):
-        return _grid_rule_terms(self.counts) if self.counts else np.empty((1, 0), dtype=int)
-
-    def normalise(self, log_mu):
-        n_rows = log_mu.shape[1]
-        if not self.counts:
-            return np.ones((1, n_rows)), log_mu
-        edges = [0, *accumulate(self.counts)]
-        shares = [log_mu[i:j] for i, j in pairwise(edges)]
-        if min(self.counts) == max(self.counts):
-            # All inputs at once: fewer calls, which is what the prediction of one row consists of.
-            _softmax_in_place(log_mu.reshape(len(shares), -1, n_rows))
-        else:
-            for share in shares:
-                _softmax_in_place(share)
-        strengths = shares[0]
-        for share in shares[1:]:
-            strengths = (strengths[:, None, :] * share).reshape(-1, n_rows)
-        return strengths, log_mu
-
-    def term_sensitivity(self, rule_outputs, output, shares):
-        sensitivity = _grid_indicator(self.counts) @ rule_outputs
-        sensitivity -= shares * output
-        return sensitivity
-
-
-@dataclass(frozen=True, eq=False)
-class ScatteredAntecedent(Antecedent):
-    """Rules with terms of their own, one per premise input; terms are in rule-major order.
-
-    w = softmax over rules of the sum over inputs of log mu.
-    """
-
-    n_premise_inputs: int = 0
-
-    @classmethod
-    def build(cls, family, inputs, theta):
-        """``inputs`` the premise inputs; theta (n_parameters, n_rules, n_premise_inputs)."""
-        n_parameters, n_rules, n_premise_inputs = theta.shape
-        group = TermGroup(family, np.tile(inputs, n_rules), theta.reshape(n_parameters, -1))
-        return cls((group,), n_premise_inputs=n_premise_inputs)
-
-    @property
-    def n_rules(self):
-        return self.n_terms // self.n_premise_inputs
-
-    @property
-    def share_counts(self):
-        return (self.n_rules,)
-
-    @property
-    def rule_terms(self):
-        return np.arange(self.n_terms).reshape(self.n_rules, self.n_premise_inputs)
-
-    def normalise(self, log_mu):
-        strengths = log_mu.reshape(self.n_rules, self.n_premise_inputs, -1).sum(axis=1)
-        _softmax_in_place(strengths)
-        return strengths, strengths
-
-    def term_sensitivity(self, rule_outputs, output, shares):
-        return np.repeat(rule_outputs - shares * output, self.n_premise_inputs, axis=0)

@@ -1,0 +1,14 @@
+"""Rule bases: the IF parts of a set of rules, over terms of any families."""
+
+from .base import Antecedent, TermGroup
+from .grid import GridAntecedent
+from .rule_table import RuleTableAntecedent
+from .scattered import ScatteredAntecedent
+
+__all__ = [
+    "Antecedent",
+    "GridAntecedent",
+    "RuleTableAntecedent",
+    "ScatteredAntecedent",
+    "TermGroup",
+]

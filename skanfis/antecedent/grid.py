@@ -1,0 +1,88 @@
+"""Grid partition: a rule for every combination of terms."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import accumulate, groupby, pairwise
+from math import prod
+
+import numpy as np
+
+from .base import Antecedent, TermGroup, softmax_in_place
+
+__all__ = ["GridAntecedent"]
+
+
+def _grid_rule_terms(counts):
+    """The terms of every rule of a full grid, shape (n_rules, n_inputs with terms)."""
+    combinations = np.indices(counts).reshape(len(counts), -1).T
+    return combinations + np.cumsum([0, *counts[:-1]])
+
+
+@lru_cache(maxsize=16)
+def _grid_indicator(counts):
+    """1 where term t is part of rule r, shape (n_terms, n_rules)."""
+    rule_terms = _grid_rule_terms(counts)
+    indicator = np.zeros((sum(counts), rule_terms.shape[0]))
+    indicator[rule_terms.T, np.arange(rule_terms.shape[0])] = 1.0
+    return indicator
+
+
+@dataclass(frozen=True, eq=False)
+class GridAntecedent(Antecedent):
+    r"""Every combination of one term per input (grid partition).
+
+    The sum over all rules of products of memberships is the product of the sums, so that each input
+    is normalised alone and the strengths are the products of the shares,
+
+        w_(k1 .. kd) = prod_j nu_(j, kj) ,    nu_jk = mu_jk / sum_k' mu_jk' :
+
+    as many exponentials as there are terms, not as there are rules times inputs. Rules are in
+    C order: the last input's term changes fastest.
+    """
+
+    counts: tuple[int, ...] = ()
+
+    @classmethod
+    def build(cls, families, inputs, thetas):
+        """One entry of each argument per input that has terms; thetas (n_parameters, count)."""
+        groups = []
+        entries = zip(families, inputs, thetas, strict=True)
+        for family, members in groupby(entries, key=lambda entry: entry[0]):
+            _, used, theta = zip(*members, strict=True)
+            repeats = [part.shape[1] for part in theta]
+            groups.append(TermGroup(family, np.repeat(used, repeats), np.hstack(theta)))
+        return cls(tuple(groups), counts=tuple(theta.shape[1] for theta in thetas))
+
+    @property
+    def n_rules(self):
+        return prod(self.counts)
+
+    @property
+    def share_counts(self):
+        return self.counts
+
+    @property
+    def rule_terms(self):
+        return _grid_rule_terms(self.counts) if self.counts else np.empty((1, 0), dtype=int)
+
+    def normalise(self, log_mu):
+        n_rows = log_mu.shape[1]
+        if not self.counts:
+            return np.ones((1, n_rows)), log_mu
+        edges = [0, *accumulate(self.counts)]
+        shares = [log_mu[i:j] for i, j in pairwise(edges)]
+        if min(self.counts) == max(self.counts):
+            # All inputs at once: fewer calls, which is what the prediction of one row consists of.
+            softmax_in_place(log_mu.reshape(len(shares), -1, n_rows))
+        else:
+            for share in shares:
+                softmax_in_place(share)
+        strengths = shares[0]
+        for share in shares[1:]:
+            strengths = (strengths[:, None, :] * share).reshape(-1, n_rows)
+        return strengths, log_mu
+
+    def term_sensitivity(self, rule_outputs, output, shares):
+        sensitivity = _grid_indicator(self.counts) @ rule_outputs
+        sensitivity -= shares * output
+        return sensitivity

@@ -1,0 +1,101 @@
+"""What terms are called: linguistic names for a grid, places for rules with terms of their own."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .antecedent import GridAntecedent
+
+__all__ = ["LINGUISTIC", "default_term_names", "given_term_names"]
+
+# Six as in the founding paper, negative large to positive large; seven with zero between them.
+LINGUISTIC = {
+    1: ("any",),
+    2: ("low", "high"),
+    3: ("low", "medium", "high"),
+    4: ("very low", "low", "high", "very high"),
+    5: ("very low", "low", "medium", "high", "very high"),
+    6: ("NL", "NM", "NS", "PS", "PM", "PL"),
+    7: ("NL", "NM", "NS", "ZE", "PS", "PM", "PL"),
+}
+_MOST_DIGITS = 17
+
+
+def default_term_names(antecedent):
+    """A name for every term, unique on its input.
+
+    Terms of a grid are in order and are called by it ("low", "medium", "high"); beyond seven they
+    are numbered. Other terms are called by where they stand ("near 21.3").
+    """
+    inputs, places = _terms(antecedent)
+    names = np.empty(inputs.size, dtype=object)
+    for j in np.unique(inputs):
+        own = np.flatnonzero(inputs == j)
+        if isinstance(antecedent, GridAntecedent):
+            numbered = [f"level {k + 1}" for k in range(own.size)]
+            names[own] = LINGUISTIC.get(own.size, numbered)
+        else:
+            names[own] = _near(places[own])
+    return tuple(names)
+
+
+def given_term_names(antecedent, input_names, term_names):
+    """The user's names, one per term; ValueError where they do not fit.
+
+    ``term_names`` is a sequence of str for every input that has so many terms, or a mapping from
+    input names to such sequences. Inputs that it does not speak of keep the default names.
+    """
+    names = list(default_term_names(antecedent))
+    inputs, _ = _terms(antecedent)
+    is_mapping = isinstance(term_names, Mapping)
+    if is_mapping and (unknown := [key for key in term_names if key not in input_names]):
+        raise ValueError(
+            f"term_names has the key {unknown[0]!r}, which is no input; the inputs are "
+            f"{', '.join(map(repr, input_names))}."
+        )
+    for j in np.unique(inputs):
+        own = np.flatnonzero(inputs == j)
+        if is_mapping and input_names[j] not in term_names:
+            continue
+        given = term_names[input_names[j]] if is_mapping else term_names
+        _check_given(given, own.size, input_names[j])
+        for t, name in zip(own, given, strict=True):
+            names[t] = name
+    return tuple(names)
+
+
+def _terms(antecedent):
+    """Input and place (first parameter, the location) of every term."""
+    if not antecedent.groups:
+        return np.empty(0, dtype=int), np.empty(0)
+    inputs = np.concatenate([group.inputs for group in antecedent.groups])
+    return inputs, np.concatenate([group.theta[0] for group in antecedent.groups])
+
+
+def _near(places):
+    """Places in as few digits as tell them apart; equal ones are numbered."""
+    for digits in range(3, _MOST_DIGITS + 1):
+        written = [f"{place:.{digits}g}" for place in places]
+        if len(set(written)) == len(set(places)):
+            break
+    counts: dict[str, int] = {}
+    names = []
+    for text in written:
+        counts[text] = counts.get(text, 0) + 1
+        names.append(f"near {text}" + (f" ({counts[text]})" if counts[text] > 1 else ""))
+    return names
+
+
+def _check_given(given, n_terms, input_name):
+    if isinstance(given, str) or not all(isinstance(name, str) and name for name in given):
+        raise TypeError(
+            f"term_names for input {input_name!r} must be a sequence of non-empty str, got "
+            f"{given!r}."
+        )
+    if len(given) != n_terms:
+        raise ValueError(
+            f"term_names has {len(given)} names for input {input_name!r}, which has {n_terms} "
+            "terms. Give one name per term, or a dict from input to names."
+        )
+    if len(set(given)) != len(given):
+        raise ValueError(f"term_names for input {input_name!r} repeats a name: {list(given)!r}.")

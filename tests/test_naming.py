@@ -1,0 +1,62 @@
+"""Names of terms."""
+
+import numpy as np
+import pytest
+
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.membership import Gaussian
+from skanfis.naming import default_term_names, given_term_names
+
+from . import oracles
+
+INPUTS = ["time", "temperature", "rate"]
+
+
+def grid(*counts):
+    return oracles.random_grid(np.random.default_rng(0), [Gaussian] * len(counts), counts)
+
+
+def scattered(centers):
+    centers = np.array(centers, dtype=float)
+    theta = Gaussian.from_center_and_width(centers, np.ones(centers.shape))
+    return ScatteredAntecedent.build(Gaussian, np.arange(centers.shape[1]), theta)
+
+
+def test_terms_of_a_grid_are_named_by_their_order():
+    assert default_term_names(grid(2, 3)) == ("low", "high", "low", "medium", "high")
+    assert default_term_names(grid(6)) == ("NL", "NM", "NS", "PS", "PM", "PL")
+    assert default_term_names(grid(9))[:2] == ("level 1", "level 2")
+
+
+def test_other_terms_are_named_by_where_they_stand():
+    found = default_term_names(scattered([[21.34, 1e9 + 1], [-3.0, 1e9 + 2]]))
+    assert found == ("near 21.3", "near 1000000001", "near -3", "near 1000000002")
+
+
+def test_terms_at_one_place_are_told_apart():
+    assert default_term_names(scattered([[1.0], [1.0]])) == ("near 1", "near 1 (2)")
+
+
+def test_without_terms_there_are_no_names():
+    assert default_term_names(GridAntecedent((), counts=())) == ()
+
+
+def test_given_names_replace_the_default():
+    mine = {"temperature": ["cold", "mild", "hot"]}
+    assert given_term_names(grid(2, 3), INPUTS, mine) == ("low", "high", "cold", "mild", "hot")
+    assert given_term_names(grid(2, 2), INPUTS, ["S", "L"]) == ("S", "L", "S", "L")
+
+
+@pytest.mark.parametrize(
+    ("names", "error", "message"),
+    [
+        ({"speed": ["a", "b"]}, ValueError, r"'speed', which is no input; .*'time'"),
+        (["a", "b", "c"], ValueError, r"3 names for input 'time', which has 2 terms"),
+        ({"time": ["a", "a"]}, ValueError, r"'time' repeats a name"),
+        ({"time": "ab"}, TypeError, r"'time' must be a sequence of non-empty str"),
+        ({"time": ["a", ""]}, TypeError, r"'time' must be a sequence of non-empty str"),
+    ],
+)
+def test_names_that_do_not_fit_are_refused(names, error, message):
+    with pytest.raises(error, match=message):
+        given_term_names(grid(2, 3), INPUTS, names)
