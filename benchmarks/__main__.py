@@ -9,7 +9,7 @@ from .fresh import alone, run_benchmark
 from .report import Results, machine, markdown
 
 ALWAYS = ("jang", "gyro", "campaign", "one_pass", "memory", "one_row", "file_size")
-ON_REQUEST = ("structure", "start", "peers")
+ON_REQUEST = ("structure", "start", "peers", "fuzz_fis")
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
 

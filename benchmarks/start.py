@@ -1,8 +1,9 @@
-"""How wide the terms of a grid start: the measurement behind ``_anfis._OVERLAP``."""
+"""How wide the terms of a grid start: the measurement behind ``training.start._OVERLAP``."""
 
 from unittest.mock import patch
 
-from skanfis import ANFISRegressor, _anfis
+from skanfis import ANFISRegressor
+from skanfis.training import start
 
 from .gyro import measure, summary
 from .jang import PROBLEMS
@@ -17,7 +18,7 @@ _SEEDS = range(10)
 def run(options):
     lines = []
     for overlap in _OVERLAPS:
-        with patch.object(_anfis, "_OVERLAP", overlap):
+        with patch.object(start, "_OVERLAP", overlap):
             lines += [[overlap, *line] for line in figures()]
     lines.sort(key=lambda line: line[1:3])
     head = ["overlap", "problem", "mf", "error, train", "error, check", "iterations"]

@@ -1,47 +1,88 @@
-"""What every ANFIS estimator shares: validate, partition, solve, and hand out the frozen model."""
+"""What every ANFIS estimator shares: from validated data to the frozen model.
+
+The order of things: rows may be held out for early stopping; the partition gives a start; the
+solver runs from it, once or from several starts; the ridge may be chosen and the rows reweighted
+between runs; rules that do nothing may be pruned; what is left is frozen in the user's units. Each
+is a module of ``training``.
+"""
 
 import inspect
-import warnings
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
-from sklearn import get_config
-from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.utils import check_random_state
-from sklearn.utils.validation import has_fit_parameter
 from threadpoolctl import ThreadpoolController
 
-from ._automatic import Structure, StructureSearch
-from .exceptions import ConstantInputWarning, UnderdeterminedWarning
-from .membership import MEMBERSHIPS
+from ._validation import warn_user
+from .antecedent import GridAntecedent
 from .model import TSKModel
-from .objective import SeparableProblem
-from .partition import (
-    GridSize,
-    clustered_antecedent,
-    count_distinct_inputs,
-    grid_antecedent,
-    term_counts,
-)
-from .premise import Premise
+from .naming import default_term_names, given_term_names
+from .partition import count_distinct_inputs, imported_antecedent
 from .rows import Rows
 from .solvers import SOLVERS, SolverResult
+from .training import (
+    ENOUGH_ROWS,
+    EarlyStopping,
+    Keeper,
+    Learned,
+    Learner,
+    Partition,
+    Printer,
+    Structure,
+    hold_out,
+    learn_from_starts,
+    learn_robustly,
+    learn_with_best_alpha,
+    redundant_rules,
+    report_constant,
+    rule_statistics,
+    watch_all,
+    without_rules,
+)
 
-__all__ = ["Training", "train"]
+__all__ = ["Training", "TrainingData", "train"]
 
-# Neighbouring terms of a grid cross at this membership at the start. From the customary 0.5, Jang's
-# sinc gets stuck; elsewhere it makes little difference (benchmarks/start.py).
-_OVERLAP = 0.6
-_MIB = 2**20
-# Distinct rows are counted up to here: more make no difference to any decision.
-_ENOUGH_ROWS = 20_000
-_READ_ROWS = 4096
-# alpha="auto": as small as rounding allows where the data determine the consequents well; rounding
-# errors grow by 1 / alpha along directions that the data leave open, so more where they do not.
-_ALPHA, _ALPHA_FEW_ROWS = 1e-12, 1e-7
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """Validated data.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_inputs)
+    y : ndarray of shape (n_rows, n_outputs)
+    sample_weight : ndarray of shape (n_rows,) or None
+        Positive.
+    groups : ndarray of shape (n_rows,) or None
+    input_names, output_names : sequence of str
+    kept : ndarray of bool of shape (n_given_rows,), optional
+        Which of the rows given have weight and are here, if not all.
+    """
+
+    X: np.ndarray
+    y: np.ndarray
+    sample_weight: np.ndarray | None
+    groups: np.ndarray | None
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    kept: np.ndarray | None = None
+
+    def part(self, indices):
+        """Some of the rows."""
+        weight = None if self.sample_weight is None else self.sample_weight[indices]
+        return self.X[indices], self.y[indices], weight
+
+    def spread_over_rows(self, values, indices):
+        """Values of some rows as values of all rows given, NaN elsewhere."""
+        every = np.full(self.X.shape[0], np.nan)
+        every[indices] = values
+        if self.kept is None:
+            return every
+        given = np.full(self.kept.size, np.nan)
+        given[self.kept] = every
+        return given
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,56 +91,275 @@ class Training:
 
     model: TSKModel
     result: SolverResult
-    start: Structure
+    structure: Structure
+    redundant_rules: list[dict]
+    pruning: dict | None = None
+    robust_weights: np.ndarray | None = None
+    validation_losses: tuple[float, ...] | None = None
 
 
-def train(estimator, X, y, sample_weight, names):
-    """Train on validated data.
+def train(estimator, data: TrainingData, partition: Partition, bridge=None) -> Training:
+    """Train an estimator.
 
     Parameters
     ----------
     estimator : object
         Where the parameters are read from.
-    X : ndarray of shape (n_rows, n_inputs)
-    y : ndarray of shape (n_rows, n_outputs)
-    sample_weight : ndarray of shape (n_rows,) or None
-        Positive.
-    names : sequence of str
-        Names of the inputs.
+    data : TrainingData
+    partition : Partition
+    bridge : CallbackBridge, optional
+        To scikit-learn's callbacks.
     """
     # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many. One
     # OpenMP thread for the small clusterings, which more would only slow down.
     with _thread_pools().limit(limits=1):
-        rows = Rows.standardised(X, y, sample_weight)
-        n_distinct = count_distinct_inputs(rows, _ENOUGH_ROWS)
-        start = _start(estimator, rows, names, n_distinct)
-        problem = SeparableProblem(
-            rows, start.antecedent, estimator.order, start.alpha, _ordered_map(estimator.n_jobs)
+        if estimator.max_iter == 0 and isinstance(partition.partition, TSKModel):
+            return _as_given(estimator, data, partition.partition)
+        return _Trainer(estimator, data, partition, bridge).train()
+
+
+def _as_given(estimator, data, model) -> Training:
+    """The imported model itself, with its error on the data."""
+    if model.n_outputs != data.y.shape[1]:
+        raise ValueError(
+            f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}: with "
+            "max_iter=0 the model is taken as it is."
         )
-        result = SOLVERS[estimator.solver](
-            problem,
-            Premise.of(start.antecedent, *_box(rows)),
-            max_iter=estimator.max_iter,
-            tol=estimator.tol,
-            stiffness=start.stiffness,
-            **_solver_options(estimator),
-        )
-    if not result.converged:
-        warnings.warn(
-            f"solver={estimator.solver!r} with {start.antecedent.n_rules} rules on {rows.n_rows} "
-            f"rows, max_iter={estimator.max_iter}, tol={estimator.tol:g}: {result.message} The "
-            "model is the best one found; increase max_iter or tol.",
-            ConvergenceWarning,
-            stacklevel=4,
-        )
-    model = _frozen(rows, start.antecedent, result, n_distinct, names, estimator.out_of_bounds)
-    return Training(model, result, start)
+    names = model.term_names
+    if estimator.term_names is not None:
+        names = given_term_names(model.antecedent, data.input_names, estimator.term_names)
+    model = replace(
+        model,
+        initial_antecedent=model.antecedent,
+        input_names=data.input_names,
+        output_names=data.output_names,
+        term_names=names,
+        out_of_bounds=estimator.out_of_bounds,
+    )
+    rows = Rows.standardised(data.X, data.y, data.sample_weight)
+    residual = (data.y - model.with_out_of_bounds("clip").predict(data.X)) / rows.targets.scale
+    loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
+    redundant = redundant_rules(rule_statistics(rows, imported_antecedent(model, rows)))
+    result = SolverResult(None, np.full(2, loss), 0, "as_given")
+    structure = Structure(model.antecedent, 0.0, 0.0)
+    return Training(model, result, structure, redundant)
 
 
 @lru_cache(maxsize=1)
 def _thread_pools():
     """The process's thread pools; looking for them takes as long as a small fit."""
     return ThreadpoolController()
+
+
+class _Trainer:
+    """One training: the data, the settings, and who watches."""
+
+    def __init__(self, estimator, data, partition, bridge):
+        self.estimator, self.data, self.partition, self.bridge = estimator, data, partition, bridge
+        self.rng = np.random.default_rng(partition.seed)
+        self.training, self.held_out = slice(None), None
+        if estimator.early_stopping:
+            every = Rows.standardised(data.X, data.y, data.sample_weight)
+            self.training, validation = hold_out(
+                every,
+                data.groups,
+                estimator.validation_fraction,
+                int(self.rng.integers(2**31 - 1)),
+            )
+        self.rows = Rows.standardised(*data.part(self.training))
+        if estimator.early_stopping:
+            X, y, weight = data.part(validation)
+            self.held_out = Rows(X, y, weight, self.rows.inputs, self.rows.targets)
+        self.n_distinct = count_distinct_inputs(self.rows, ENOUGH_ROWS)
+        self.learner = Learner(
+            "lse" if estimator.max_iter == 0 else estimator.solver,
+            estimator.order,
+            partition.consequent_inputs,
+            estimator.max_iter,
+            estimator.tol,
+            _solver_options(estimator),
+            _ordered_map(estimator.n_jobs if estimator.n_init == 1 else 1),
+        )
+        self.keeper = Keeper() if estimator.on_interrupt == "stop" else None
+        self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
+
+    def train(self) -> Training:
+        report_constant(self.rows, self.data.input_names)
+        weights = None
+        try:
+            if self.estimator.loss == "huber":
+                learned, weights = learn_robustly(
+                    self._learn,
+                    self._start,
+                    self.rows,
+                    self.estimator.epsilon,
+                )
+            else:
+                learned = self._learn(self.rows, self._start(self.rows), None)
+            learned, redundant, pruning = self._prune(learned)
+            structure, result = learned.structure, learned.result
+            losses = learned.validation_losses if self.held_out is not None else None
+        except KeyboardInterrupt:
+            if self.keeper is None or self.keeper.best is None:
+                raise
+            structure, result = self.keeper.end()
+            redundant, pruning, losses = self._redundant(result), None, None
+        self._report(structure, result)
+        model = self.freeze(structure, result.evaluation)
+        if weights is not None:
+            weights = self.data.spread_over_rows(weights, self.training)
+        return Training(model, result, structure, redundant, pruning, weights, losses)
+
+    def freeze(self, structure, evaluation) -> TSKModel:
+        """The model in the user's units."""
+        rows, antecedent = self.rows, structure.antecedent
+        offset, scale = rows.inputs.offset, rows.inputs.scale
+        n_rules, n_outputs = antecedent.n_rules, rows.y.shape[1]
+        solved = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
+        solved[:, 0] += rows.targets.offset
+        coefficients = solved
+        if self.estimator.order == 1:
+            inputs = self.partition.consequent_inputs
+            coefficients = np.zeros((n_rules, 1 + offset.size, n_outputs))
+            coefficients[:, 0] = solved[:, 0]
+            coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
+        trained = evaluation.antecedent.change_units(offset, scale)
+        strongest = rule_statistics(rows, evaluation.antecedent).strongest
+        return TSKModel(
+            antecedent=trained,
+            initial_antecedent=antecedent.change_units(offset, scale),
+            coefficients=coefficients,
+            reference=offset,
+            spread=scale,
+            minimum=rows.inputs.minimum,
+            maximum=rows.inputs.maximum,
+            rule_weights=evaluation.masses,
+            rule_rows=self.n_distinct * strongest,
+            input_names=self.data.input_names,
+            out_of_bounds=self.estimator.out_of_bounds,
+            term_names=structure.term_names,
+            output_names=self.data.output_names,
+        )
+
+    def _start(self, rows):
+        structure = self.partition.structure(rows, self.n_distinct)
+        if self.estimator.term_names is not None:
+            antecedent = structure.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
+            structure = replace(
+                structure,
+                term_names=given_term_names(
+                    antecedent, self.data.input_names, self.estimator.term_names
+                ),
+            )
+        if self.printer is not None:
+            candidates = structure.candidates
+            found = f"{len(candidates)} candidates compared, " if candidates else ""
+            self.printer.note(
+                f"{found}{structure.antecedent.n_rules} rules, alpha {structure.alpha:g}, "
+                f"stiffness {structure.stiffness:g}"
+            )
+        return structure
+
+    def _learn(self, rows, structure, displacement):
+        """Train on some rows, from several starts unless there is a displacement already."""
+        learner = self.learner
+        several = displacement is None and self.estimator.n_init > 1
+
+        def from_starts(structure, displacement):
+            run = partial(self._run, learner, rows, structure)
+            if displacement is not None or not several:
+                return run(displacement, is_alone=True)
+            return learn_from_starts(
+                partial(run, is_alone=False),
+                learner.premise(rows, structure),
+                self.estimator.n_init,
+                self.rng,
+                self.estimator.n_jobs,
+                self._tell_of_start,
+            )
+
+        if self.estimator.alpha == "gcv":
+            return learn_with_best_alpha(from_starts, structure, displacement, self.n_distinct)
+        return from_starts(structure, displacement)
+
+    def _run(self, learner, rows, structure, displacement, is_alone) -> Learned:
+        """One run of the solver, watched."""
+        stopper = None
+        if self.held_out is not None:
+            stopper = EarlyStopping(
+                self.held_out,
+                self.partition.consequent_inputs,
+                self.estimator.n_iter_no_change,
+                self.estimator.tol,
+            )
+        keep = None if self.keeper is None else self.keeper.of(structure)
+        printer = self.printer if is_alone else None
+        bridge = None
+        if self.bridge is not None and is_alone:
+
+            def bridge(n_iter, evaluation):
+                return self.bridge.task("iteration", self, structure, evaluation)
+
+        watch = watch_all(stopper, keep, printer, bridge)
+        learned = learner.run(rows, structure, displacement, watch)
+        if stopper is None:
+            return learned
+        return replace(
+            learned,
+            result=stopper.restored(learned.result),
+            validation_losses=tuple(stopper.losses),
+        )
+
+    def _tell_of_start(self, learned):
+        result = learned.result
+        if self.printer is not None:
+            loss = result.evaluation.mean_squared_error
+            self.printer.note(f"a start: loss {loss:.6g} after {result.n_iter} iterations")
+        if self.bridge is None:
+            return False
+        return self.bridge.task("start", self, learned.structure, result.evaluation)
+
+    def _redundant(self, result):
+        return redundant_rules(rule_statistics(self.rows, result.evaluation.antecedent))
+
+    def _prune(self, learned):
+        """The redundant rules, and the training without them where that is asked for."""
+        redundant = self._redundant(learned.result)
+        if not (self.estimator.prune and redundant):
+            return learned, redundant, None
+        rules = [entry["rule"] for entry in redundant]
+        trained = learned.result.evaluation.antecedent
+        left, terms = without_rules(trained, rules)
+        names = learned.structure.term_names
+        if not names and isinstance(trained, GridAntecedent):
+            names = default_term_names(trained)
+        structure = replace(
+            learned.structure,
+            antecedent=left,
+            term_names=tuple(names[t] for t in terms) if names else (),
+        )
+        rows = learned.problem.rows
+        as_it_is = np.zeros(self.learner.premise(rows, structure).size)
+        again = self._learn(rows, structure, as_it_is)
+        pruning = {
+            "rules": redundant,
+            "loss_before": learned.result.evaluation.mean_squared_error,
+            "loss_after": again.result.evaluation.mean_squared_error,
+        }
+        initial, _ = without_rules(learned.structure.antecedent, rules)
+        again = replace(again, structure=replace(again.structure, antecedent=initial))
+        return again, redundant, pruning
+
+    def _report(self, structure, result):
+        estimator = self.estimator
+        if result.converged or estimator.max_iter == 0:
+            return
+        warn_user(
+            f"solver={estimator.solver!r} with {structure.antecedent.n_rules} rules on "
+            f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}, tol={estimator.tol:g}: "
+            f"{result.message} The model is the best one found; increase max_iter or tol.",
+            ConvergenceWarning,
+        )
 
 
 def _solver_options(estimator):
@@ -115,13 +375,7 @@ def _solver_options(estimator):
             )
         if value is not None:
             options[name] = value
-    return options
-
-
-def _box(rows):
-    """Lowest and highest values of the inputs, standardised."""
-    scale = rows.inputs
-    return tuple((edge - scale.offset) / scale.scale for edge in (scale.minimum, scale.maximum))
+    return {} if estimator.max_iter == 0 else options
 
 
 def _ordered_map(n_jobs):
@@ -136,147 +390,3 @@ def _ordered_map(n_jobs):
         return parallel(delayed(function)(item) for item in items)
 
     return map_ordered
-
-
-def _start(estimator, rows, names, n_distinct) -> Structure:
-    """The rule base that training starts from, in standardised units, and its regularisation."""
-    _check_combination(estimator)
-    _report_constant(rows, names)
-    family = MEMBERSHIPS[estimator.mf]
-    alpha = None if isinstance(estimator.alpha, str) else estimator.alpha
-    stiffness = None if isinstance(estimator.stiffness, str) else estimator.stiffness
-    if isinstance(estimator.n_mfs, str) and isinstance(estimator.partition, str):
-        # random_state=None stands for one fixed seed: the same data give the same model.
-        state = estimator.random_state
-        seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
-        search = StructureSearch(
-            rows, family, estimator.order, n_distinct, seed, alpha, stiffness, _OVERLAP
-        )
-        return search.run(grids_only=estimator.partition == "grid")
-    if isinstance(estimator.n_mfs, str):
-        weighted = rows.sample_weight is not None
-        antecedent = clustered_antecedent(family, rows, _labeller(estimator.partition, weighted))
-    else:
-        counts = _grid_counts(estimator.n_mfs, rows, names)
-        n_basis = 1 + len(names) if estimator.order == 1 else 1
-        GridSize(counts, n_basis, rows.y.shape[1]).check_fits(
-            estimator.n_mfs, get_config()["working_memory"] * _MIB, names
-        )
-        low, high = _box(rows)
-        antecedent = grid_antecedent([family] * len(names), counts, low, high, _OVERLAP)
-    is_poor = _report_underdetermined(antecedent.n_rules, estimator.order, rows, n_distinct)
-    if alpha is None:
-        alpha = _ALPHA_FEW_ROWS if is_poor else _ALPHA
-    return Structure(antecedent, alpha, stiffness or 0.0, [])
-
-
-def _check_combination(estimator):
-    """Raise ValueError where two parameters contradict each other."""
-    if isinstance(estimator.n_mfs, str) or isinstance(estimator.partition, str):
-        return
-    raise ValueError(
-        f"n_mfs={estimator.n_mfs!r} asks for a grid, partition={estimator.partition!r} for "
-        "scattered rules: leave n_mfs at 'auto', or use partition='grid'."
-    )
-
-
-def _grid_counts(n_mfs, rows, names):
-    """Terms per input; none on an input that never changes."""
-    constant = rows.inputs.is_constant
-    counts = term_counts(n_mfs, names)
-    if np.ndim(n_mfs) == 0:
-        return [1 if flat else count for flat, count in zip(constant, counts, strict=True)]
-    for name, flat, count in zip(names, constant, counts, strict=True):
-        if flat and count > 1:
-            raise ValueError(
-                f"n_mfs={n_mfs!r} asks for {count} terms on column {name!r}, which is constant in "
-                "the training data: give it 1, or drop the column."
-            )
-    return counts
-
-
-def _labeller(clusterer, weighted):
-    """Labels of weighted rows by a scikit-learn clusterer; ValueError if it takes no weights."""
-
-    def label(table, weight):
-        if has_fit_parameter(clusterer, "sample_weight"):
-            return clone(clusterer).fit(table, sample_weight=weight).labels_
-        if weighted:
-            raise ValueError(
-                f"partition={clusterer!r} takes no sample_weight, but fit was given one: use a "
-                "clusterer that does, such as KMeans, or partition='grid'."
-            )
-        repeated = np.repeat(np.arange(weight.size), weight.astype(int))
-        labels = np.empty(weight.size, dtype=int)
-        labels[repeated] = clone(clusterer).fit_predict(table[repeated])
-        return labels
-
-    return label
-
-
-def _report_constant(rows, names):
-    scale = rows.inputs
-    flat = [
-        f"{name!r} (always {value:.6g})"
-        for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
-        if is_flat
-    ]
-    if flat:
-        warnings.warn(
-            f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
-            "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",
-            ConstantInputWarning,
-            stacklevel=6,
-        )
-
-
-def _report_underdetermined(n_rules, order, rows, n_distinct):
-    """Warn of more parameters than rows; whether there are fewer than two rows for each."""
-    n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant) if order == 1 else 1
-    n_columns = n_rules * n_basis
-    if n_distinct == _ENOUGH_ROWS < 2 * n_columns:
-        n_distinct = count_distinct_inputs(rows, 2 * n_columns)
-    if n_columns > n_distinct:
-        warnings.warn(
-            f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
-            f"parameters for {n_distinct} distinct training rows: the model can pass through every "
-            "row and mean nothing between them. Judge it on rows held out, use fewer rules, or "
-            "raise alpha.",
-            UnderdeterminedWarning,
-            stacklevel=6,
-        )
-    return n_distinct < 2 * n_columns
-
-
-def _parts_strongest(rows, antecedent):
-    """Part of the data's weight on which each rule is the strongest."""
-    parts = np.zeros(antecedent.n_rules)
-    for chunk in rows.chunks(_READ_ROWS):
-        for part in chunk:
-            Z, _, weight = rows.read(part)
-            strongest = antecedent.strengths(Z).argmax(axis=0)
-            parts += np.bincount(strongest, weights=weight, minlength=parts.size)
-    return parts / rows.total_weight
-
-
-def _frozen(rows, antecedent, result, n_distinct, names, out_of_bounds) -> TSKModel:
-    """The model in the user's units."""
-    evaluation = result.evaluation
-    offset, scale = rows.inputs.offset, rows.inputs.scale
-    n_rules, n_outputs = antecedent.n_rules, rows.y.shape[1]
-    coefficients = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
-    coefficients[:, 1:] /= scale[:, None][: coefficients.shape[1] - 1]
-    coefficients[:, 0] += rows.targets.offset
-    return TSKModel(
-        antecedent=evaluation.antecedent.change_units(offset, scale),
-        initial_antecedent=antecedent.change_units(offset, scale),
-        coefficients=coefficients,
-        reference=offset,
-        spread=scale,
-        minimum=rows.inputs.minimum,
-        maximum=rows.inputs.maximum,
-        rule_weights=evaluation.masses,
-        rule_rows=n_distinct * _parts_strongest(rows, evaluation.antecedent),
-        input_names=tuple(map(str, names)),
-        out_of_bounds=out_of_bounds,
-    )

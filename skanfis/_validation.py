@@ -1,9 +1,13 @@
 """Checks on data that scikit-learn's own do not make, or not with the column's name."""
 
+import sys
+import warnings
+from numbers import Integral
+
 import numpy as np
 from sklearn import get_config
 
-__all__ = ["check_finite", "positive_weights"]
+__all__ = ["check_finite", "feature_indices", "positive_weights", "warn_user"]
 
 _READ_ROWS = 65_536
 
@@ -33,6 +37,42 @@ def check_finite(values, what, names):
             )
 
 
+def feature_indices(given, names, parameter):
+    """Columns that a parameter names, in order: all of None, or by name, position or mask.
+
+    ValueError where it names none, one twice, or one that is not there.
+    """
+    if given is None:
+        return np.arange(len(names))
+    entries = np.atleast_1d(np.asarray(given, dtype=object)).tolist()
+    if entries and all(isinstance(entry, bool | np.bool_) for entry in entries):
+        if len(entries) != len(names):
+            raise ValueError(
+                f"{parameter} is a mask of {len(entries)} entries, but X has {len(names)} columns."
+            )
+        found = list(np.flatnonzero(entries))
+    else:
+        found = [_feature_index(entry, names, parameter) for entry in entries]
+    if not found:
+        raise ValueError(
+            f"{parameter}={given!r} names no column: leave it at None for all of them."
+        )
+    if len(set(found)) < len(found):
+        raise ValueError(f"{parameter}={given!r} names a column twice.")
+    return np.sort(found)
+
+
+def _feature_index(entry, names, parameter):
+    if isinstance(entry, str) and entry in names:
+        return list(names).index(entry)
+    if isinstance(entry, Integral) and -len(names) <= int(entry) < len(names):
+        return int(entry) % len(names)
+    raise ValueError(
+        f"{parameter} names {entry!r}, which is no column of X; its columns are "
+        f"{', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}."
+    )
+
+
 def positive_weights(sample_weight, n_rows):
     """Which rows have weight: a mask, or None where all have.
 
@@ -52,3 +92,14 @@ def positive_weights(sample_weight, n_rows):
             "are needed."
         )
     return None if n_kept == n_rows else keep
+
+
+def warn_user(message, category):
+    """Warn at the line that called this package, or scikit-learn, whatever lies between."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and frame.f_globals["__name__"].partition(".")[0] in (
+        "skanfis",
+        "sklearn",
+    ):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)

@@ -36,10 +36,9 @@ _SMALLEST_SPREAD = 0.05
 _SMALLEST_MASS = 1e-12
 
 
-def basis(Z, order):
-    """Rows [1, z_1, ..., z_d] (order 1) or [1] (order 0), shape (n_basis, n_rows)."""
-    ones = np.ones((1, Z.shape[1]))
-    return np.concatenate([ones, Z]) if order == 1 else ones
+def basis(Z):
+    """Rows [1, z_1, ..., z_d], shape (1 + n_inputs, n_rows); [1] of no inputs."""
+    return np.concatenate([np.ones((1, Z.shape[1])), Z])
 
 
 def rule_outputs(coefficients, strengths, basis_rows):
@@ -134,6 +133,12 @@ class RidgeFactor:
             # Rounding has made the sum of a semi-definite matrix and the floor indefinite.
             shifted.flat[:: shifted.shape[0] + 1] += 9.0 * self.alpha
             self.alpha *= 10.0
+
+    def gram(self):
+        """G, put together again."""
+        gram = self._lower @ self._lower.T
+        gram.flat[:: gram.shape[0] + 1] -= self.alpha
+        return gram
 
     def solve(self, right_side):
         """(G + alpha I)^-1 times right_side."""

@@ -1,6 +1,11 @@
 """Warnings of skanfis. Errors are ValueError, TypeError and scikit-learn's NotFittedError."""
 
-__all__ = ["ConstantInputWarning", "OutOfBoundsWarning", "UnderdeterminedWarning"]
+__all__ = [
+    "ConstantInputWarning",
+    "OutOfBoundsWarning",
+    "SplitLeakWarning",
+    "UnderdeterminedWarning",
+]
 
 
 class ConstantInputWarning(UserWarning):
@@ -9,6 +14,10 @@ class ConstantInputWarning(UserWarning):
 
 class OutOfBoundsWarning(UserWarning):
     """Rows asked for lie outside the box of the training data."""
+
+
+class SplitLeakWarning(UserWarning):
+    """A split tests on rate levels or runs that it was trained on."""
 
 
 class UnderdeterminedWarning(UserWarning):

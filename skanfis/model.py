@@ -33,7 +33,7 @@ OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 _BLOCK_BYTES = 2**21
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TSKModel:
     """A frozen Takagi-Sugeno-Kang model.
 
@@ -83,6 +83,10 @@ class TSKModel:
         if not self.output_names:
             names = ("y",) if self.n_outputs == 1 else tuple(f"y{k}" for k in range(self.n_outputs))
             object.__setattr__(self, "output_names", names)
+
+    def __repr__(self):
+        inputs, outputs = ", ".join(self.input_names), ", ".join(self.output_names)
+        return f"TSKModel({self.n_rules} rules, {inputs} -> {outputs})"
 
     @property
     def n_rules(self):

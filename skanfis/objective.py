@@ -95,6 +95,8 @@ class SeparableProblem:
         Ridge on the local coefficients, relative to the mean over rows.
     map_ordered : callable
         ``map``, or what stands in for it to spread chunks over workers; results in order.
+    consequent_inputs : ndarray of int, optional
+        The inputs that the consequents are linear in, if not all are.
     """
 
     def __init__(
@@ -104,13 +106,18 @@ class SeparableProblem:
         order: int,
         alpha: float,
         map_ordered: Callable[[Callable, Iterable], Iterable] = map,
+        consequent_inputs: np.ndarray | None = None,
     ):
         self.rows = rows
         self.antecedent = antecedent
         self.order = order
         self.alpha = alpha
         self.map_ordered = map_ordered
-        self.n_basis = 1 + rows.X.shape[1] if order == 1 else 1
+        every_input = np.arange(rows.X.shape[1])
+        given = every_input if consequent_inputs is None else consequent_inputs
+        self.consequent_inputs = given if order == 1 else every_input[:0]
+        self._takes_every_input = self.consequent_inputs.size == every_input.size
+        self.n_basis = 1 + self.consequent_inputs.size
         self.n_columns = antecedent.n_rules * self.n_basis
         self.n_outputs = rows.y.shape[1]
         self._moments = DesignMoments(antecedent.share_counts, self.n_basis)
@@ -129,6 +136,10 @@ class SeparableProblem:
         )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
         return int(np.clip(fitting, _FEWEST_ROWS, _MOST_ROWS))
+
+    def _basis(self, Z):
+        """Basis functions of the consequents at a block of rows."""
+        return basis(Z if self._takes_every_input else Z[self.consequent_inputs])
 
     def _sum_over_chunks(self, accumulate, shapes):
         """Sum of what ``accumulate(rows, sums)`` adds to zeroed arrays, in the chunks' order."""
@@ -152,7 +163,7 @@ class SeparableProblem:
         def accumulate(part, sums):
             moments, slope, square = sums
             Z, target, weight = self.rows.read(part)
-            basis_rows = basis(Z, self.order)
+            basis_rows = self._basis(Z)
             weighted_basis = basis_rows if weight is None else basis_rows * weight
             strengths, shares = antecedent.strengths_and_shares(Z)
             self._moments.accumulate(moments, shares, basis_rows, weighted_basis)
@@ -196,7 +207,7 @@ class SeparableProblem:
         def accumulate(part, sums):
             square, slope, *cross = sums
             Z, target, weight = self.rows.read(part)
-            basis_rows = basis(Z, self.order)
+            basis_rows = self._basis(Z)
             weighted_basis = basis_rows if weight is None else basis_rows * weight
             log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
             strengths, shares = antecedent.normalise(log_mu)
@@ -234,6 +245,26 @@ class SeparableProblem:
             self.alpha * self._by_global(local) - slope,
         )
 
+    def residuals(self, evaluation):
+        """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
+        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
+        for chunk in self._chunks:
+            for part in chunk:
+                Z, target, weight = self.rows.read(part)
+                strengths = evaluation.antecedent.strengths(Z)
+                basis_rows = self._basis(Z)
+                for k in range(self.n_outputs):
+                    target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+                yield part, target, weight
+
+    def leverage(self, evaluation, part):
+        """h_i = phi_i' (Phi' S Phi + alpha W I)^-1 phi_i of some rows, shape (n_rows,)."""
+        Z, _, _ = self.rows.read(part)
+        strengths = evaluation.antecedent.strengths(Z)
+        design = (strengths[:, None, :] * self._basis(Z)).reshape(self.n_columns, -1)
+        half = evaluation.factor.half_solve(self.local.transform_rows(design))
+        return np.sum(half**2, axis=0) / self._weight
+
     def _joint_pass(self, antecedent, coefficients):
         """D' S r, Phi' S r, r' S r (per output) and each rule's mass, over W."""
         by_rule = coefficients.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
@@ -241,7 +272,7 @@ class SeparableProblem:
         def accumulate(part, sums):
             premises, slope, square, masses = sums
             Z, target, weight = self.rows.read(part)
-            basis_rows = basis(Z, self.order)
+            basis_rows = self._basis(Z)
             log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
             strengths, shares = antecedent.normalise(log_mu)
             masses += strengths.sum(axis=1) if weight is None else strengths @ weight

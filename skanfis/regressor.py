@@ -6,20 +6,30 @@ from typing import ClassVar
 
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils import check_random_state, column_or_1d
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
-from ._anfis import train
-from ._sklearn import HasMethods, Interval, StrOptions, check_sample_weight, fit_context
-from ._validation import check_finite, positive_weights
+from ._anfis import TrainingData, train
+from ._sklearn import (
+    CallbackSupportMixin,
+    HasMethods,
+    Interval,
+    StrOptions,
+    check_sample_weight,
+    fit_context,
+)
+from ._validation import check_finite, feature_indices, positive_weights
 from .exceptions import OutOfBoundsWarning
-from .membership import MEMBERSHIPS
-from .model import OUT_OF_BOUNDS
+from .membership import MEMBERSHIPS, membership_families
+from .model import OUT_OF_BOUNDS, TSKModel
+from .partition import check_inputs
 from .solvers import SOLVERS
+from .training import CallbackBridge, Partition
 
 __all__ = ["ANFISRegressor"]
 
 
-class ANFISRegressor(RegressorMixin, BaseEstimator):
+class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     r"""Adaptive neuro-fuzzy inference system for regression.
 
     A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN
@@ -41,20 +51,43 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         makes a grid partition, with a rule for every combination of terms. 1 means that the input
         has no fuzzy terms and takes part in the consequents alone. "auto" leaves it to
         ``partition``.
-    partition : {"auto", "grid"} or clusterer, default="auto"
+    partition : {"auto", "grid", "subtractive", "fcm"}, clusterer or model, default="auto"
         Where the rules come from, if ``n_mfs`` is "auto". "grid": a grid grown from the data, one
         term at a time on the input where it pays most. "auto": such a grid, or scattered rules from
-        k-means, whichever promises the smaller error on new rows; see Notes. A scikit-learn
-        clusterer, such as ``KMeans(n_clusters=5)``: one rule per cluster, with terms of its own,
-        from clusters sought in standardised inputs and targets together.
-    mf : str, default="gaussian"
-        Family of the membership functions: "gaussian", :math:`\exp(-(x-c)^2 / 2\sigma^2)`;
-        "bell", Jang's generalised bell :math:`1 / (1 + |(x-c)/a|^{2b})`; "triangular",
-        "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
-        "sigmoid_difference" or "sigmoid_product". The first two are the sturdiest between sparse
-        points.
+        k-means, whichever promises the smaller error on new rows; see Notes. "subtractive": a rule
+        per cluster of :class:`~skanfis.cluster.SubtractiveClustering`, of radius 0.5 in one input
+        and target and growing with the root of their number. "fcm": a rule per cluster of
+        :class:`~skanfis.cluster.FuzzyCMeans`, as many as promise the smallest error. Any
+        scikit-learn clusterer, such as ``KMeans(n_clusters=5)``: a rule per cluster. Scattered
+        rules have terms of their own; clusters are sought in standardised inputs and targets
+        together, as is the custom since Chiu's subtractive clustering. A fitted ANFISRegressor, or
+        a model such as its ``model_`` or what a file was read into: training starts from its rules
+        and memberships, in the units of X. With ``solver="lse"`` only the consequents are then
+        learnt, with ``max_iter=0`` nothing is.
+    mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
+        Family of the membership functions, one for all inputs or one each: "gaussian",
+        :math:`\exp(-(x-c)^2 / 2\sigma^2)`; "bell", Jang's generalised bell
+        :math:`1 / (1 + |(x-c)/a|^{2b})`; "triangular", "trapezoidal", "two_sided_gaussian",
+        "pi_shaped", "s_shaped", "z_shaped", "sigmoid_difference" or "sigmoid_product"; or a class
+        of one's own. The first two are the sturdiest between sparse points. Not looked at where
+        ``partition`` is a model, which brings its own.
+    term_names : sequence of str or dict, default=None
+        Names of the terms, for every input alike or by input ``{"temperature": ["cold", "hot"]}``,
+        in ascending order on a grid, rule by rule otherwise. None: "low" to "high", NL to PL
+        (negative large to positive large) where there are six or seven, "near 21.3" for scattered
+        rules.
+    premise_features, consequent_features : array-like of str, int or bool, default=None
+        Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
+        None is all. With rules on temperature and consequents in rate alone, say, the scale factor
+        is scheduled by temperature. What ``n_mfs`` gives terms to must be among the former.
     order : {0, 1}, default=1
-        Order of the consequents: 0 is a constant per rule, 1 a linear function of all inputs.
+        Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
+    loss : {"squared_error", "huber"}, default="squared_error"
+        What is minimised. "huber" counts rows whose residual is beyond ``epsilon`` standard
+        deviations by its size and not its square: outliers in the target then do little.
+    epsilon : float, default=1.35
+        Where Huber's loss turns, in robust standard deviations of the residual; positive. The
+        smaller, the more robust; 1.35 loses 5 % of the efficiency where there are no outliers.
     solver : {"varpro", "hybrid", "gradient", "lbfgs", "lse"}, default="varpro"
         How the premises are learnt. "varpro": variable projection with trust-region Gauss-Newton
         steps. "hybrid": Jang's rule, least squares forward and a gradient step of his own step size
@@ -65,37 +98,61 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     error_goal : float, default=None
         "hybrid" and "gradient" stop at this root mean square error, in standard deviations of the
         target.
-    alpha : "auto" or float, default="auto"
+    alpha : {"auto", "gcv"} or float, default="auto"
         Ridge penalty on the consequents, zero or positive: alpha / 2 times their squared norm is
         added to half the mean squared error of the standardised target. It acts on each rule's
         value at its centre and on its change over one standard deviation of the inputs there.
         "auto" is chosen together with the structure where that is; else it is 1e-12, next to
-        nothing, or 1e-7 where there are fewer than two distinct rows per consequent parameter:
-        raise it (1e-6 to 1e-2) for noisy data with many rules. At zero, a ridge at the level of
-        rounding errors remains.
+        nothing, or 1e-7 where there are fewer than two distinct rows per consequent parameter, or
+        1e-4 where there is less than one: raise it (1e-6 to 1e-2) for noisy data with many rules.
+        "gcv": of the powers of ten from there on, the one of the smallest generalised
+        cross-validation of the linear part, whatever the structure. At zero, a ridge at the level
+        of rounding errors remains.
     stiffness : "auto" or float, default="auto"
         Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
         of their displacements (in spacings of terms and logarithms of widths) is added likewise.
         "auto" is chosen together with the structure where that is; else it is zero.
+    n_init : int, default=1
+        Number of starts, 1 or more: the partition's own, and others displaced from it at random.
+        The model of the smallest leave-one-out error of the linear part is kept.
     max_iter : int, default=500
-        Most iterations (epochs), 1 or more.
+        Most iterations (epochs). With 0, premises stay as they start.
     tol : float, default=1e-3
         Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
         or when the gradient says as much. Zero or positive.
+    early_stopping : bool, default=False
+        Whether to hold out rows, stop when the error on them falls no more, and keep the parameters
+        of its minimum. With ``groups`` given to ``fit``, whole groups are held out.
+    validation_fraction : float, default=0.1
+        Part of the rows, or of the groups, that early stopping holds out; between 0 and 1.
+    n_iter_no_change : int, default=10
+        Early stopping ends after so many iterations in which the error on the rows held out has not
+        fallen by ``tol``, relatively.
+    warm_start : bool, default=False
+        Whether a further ``fit`` starts from the rules of the one before.
+    prune : bool, default=False
+        Whether to drop the rules that never fire or repeat another one, and train again without
+        them. They are reported in ``redundant_rules_`` in any case.
     out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
         What ``predict`` does with rows outside the range of the training data, input by input:
         "clip" holds the value at the edge; "linear" goes on along the tangent there; "nan"
-        returns NaN; "raise" raises ValueError. It may be
-        changed by ``set_params`` after training.
+        returns NaN; "raise" raises ValueError. It may be changed by ``set_params`` after training.
     warn_out_of_bounds : bool, default=True
         Whether ``predict`` warns of such rows.
+    on_interrupt : {"raise", "stop"}, default="raise"
+        What Ctrl-C does during ``fit``: "raise" leaves the estimator as it was before; "stop" keeps
+        the best model so far, if there has been an iteration.
+    verbose : bool, default=False
+        Whether to write a line per iteration. scikit-learn's callbacks (``set_callbacks``) work
+        from scikit-learn 1.9 on.
     random_state : int, RandomState instance or None, default=None
-        Seed of the clusterings that ``partition="auto"`` tries; everything else is deterministic.
-        None stands for one fixed seed, so that the same data always give the same model. A
-        clusterer given as ``partition`` has a seed of its own.
+        Seed of everything random: the clusterings of "auto" and "fcm", the starts of ``n_init``,
+        the rows that early stopping holds out. None stands for one fixed seed, so that the same
+        data always give the same model. A clusterer given as ``partition`` has a seed of its own.
     n_jobs : int, default=None
-        Worker threads for the passes over the data; None is one, -1 is one per core. The result is
-        the same to the last bit for any number. It pays from some 100,000 rows on.
+        Worker threads for the starts of ``n_init``, or else for the passes over the data; None is
+        one, -1 is one per core. The result is the same to the last bit for any number. For a single
+        start it pays from some 100,000 rows on.
 
     Attributes
     ----------
@@ -106,14 +163,14 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
     rules_ : ndarray of shape (n_rules, n_premise_inputs)
         The terms of each rule: positions in ``memberships_``.
     memberships_, initial_memberships_ : list of dict
-        Every term after training, and before: its "input", "function" and parameters by name
-        ("center" and "width" of a Gaussian), in the user's units.
+        Every term after training, and before: its "input", "name", "function" and parameters by
+        name ("center" and "width" of a Gaussian), in the user's units.
     consequents_ : ndarray of shape (n_rules, 1 + n_features[, n_outputs])
         p0, p1, ..., pd of every rule, in the user's units.
     n_iter_ : int
-        Iterations run; 1 where there was nothing to iterate on.
+        Iterations run, of the last run of the solver; 1 where there was nothing to iterate on.
     loss_curve_ : ndarray of shape (n_iter + 1,)
-        Mean squared error of the standardised target, from the start on.
+        Mean squared error of the standardised target, from the start on, in the last run.
     status_ : str
         Why the solver stopped.
     alpha_, stiffness_ : float
@@ -122,6 +179,18 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         The candidates that were compared where the structure was chosen by itself, best first:
         "structure", "alpha", "stiffness", and "expected_error" on new rows in standard deviations
         of the target. Empty where the structure was given.
+    redundant_rules_ : list of dict
+        Rules that do nothing: "rule", its number; "reason", "never fires" (nowhere in the
+        training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
+        rows); "weight", its part of the data's weight.
+    pruning_ : dict or None
+        With ``prune``, if there were redundant rules: "rules", those dropped by their numbers
+        before; "loss_before" and "loss_after", as in ``loss_curve_``.
+    validation_loss_curve_ : ndarray of shape (n_iter,) or None
+        With ``early_stopping``: as ``loss_curve_``, of the rows held out, from the first iteration.
+    robust_weights_ : ndarray of shape (n_samples,) or None
+        With ``loss="huber"``: the weight that was left to each row, 1 for those near the model;
+        NaN for rows that had no part in the training.
     n_features_in_ : int
         Number of inputs.
     feature_names_in_ : ndarray of shape (n_features,)
@@ -171,18 +240,35 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
 
     _parameter_constraints: ClassVar[dict] = {
         "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
-        "partition": [StrOptions({"auto", "grid"}), HasMethods(["fit", "fit_predict"])],
-        "mf": [StrOptions(set(MEMBERSHIPS))],
+        "partition": [
+            StrOptions({"auto", "grid", "subtractive", "fcm"}),
+            HasMethods(["fit", "fit_predict"]),
+            HasMethods(["predict", "strengths"]),
+        ],
+        "mf": [StrOptions(set(MEMBERSHIPS)), type, list, tuple, np.ndarray],
+        "term_names": [list, tuple, np.ndarray, dict, None],
+        "premise_features": ["array-like", str, Integral, None],
+        "consequent_features": ["array-like", str, Integral, None],
         "order": [Interval(Integral, 0, 1, closed="both")],
+        "loss": [StrOptions({"squared_error", "huber"})],
+        "epsilon": [Interval(Real, 0, None, closed="neither")],
         "solver": [StrOptions(set(SOLVERS))],
         "step_size": [Interval(Real, 0, None, closed="neither"), None],
         "error_goal": [Interval(Real, 0, None, closed="left"), None],
-        "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+        "alpha": [StrOptions({"auto", "gcv"}), Interval(Real, 0, None, closed="left")],
         "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-        "max_iter": [Interval(Integral, 1, None, closed="left")],
+        "n_init": [Interval(Integral, 1, None, closed="left")],
+        "max_iter": [Interval(Integral, 0, None, closed="left")],
         "tol": [Interval(Real, 0, None, closed="left")],
+        "early_stopping": ["boolean"],
+        "validation_fraction": [Interval(Real, 0, 1, closed="neither")],
+        "n_iter_no_change": [Interval(Integral, 1, None, closed="left")],
+        "warm_start": ["boolean"],
+        "prune": ["boolean"],
         "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS))],
         "warn_out_of_bounds": ["boolean"],
+        "on_interrupt": [StrOptions({"raise", "stop"})],
+        "verbose": ["verbose"],
         "random_state": ["random_state"],
         "n_jobs": [Integral, None],
     }
@@ -193,32 +279,58 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         *,
         partition="auto",
         mf="gaussian",
+        term_names=None,
+        premise_features=None,
+        consequent_features=None,
         order=1,
+        loss="squared_error",
+        epsilon=1.35,
         solver="varpro",
         step_size=None,
         error_goal=None,
         alpha="auto",
         stiffness="auto",
+        n_init=1,
         max_iter=500,
         tol=1e-3,
+        early_stopping=False,
+        validation_fraction=0.1,
+        n_iter_no_change=10,
+        warm_start=False,
+        prune=False,
         out_of_bounds="clip",
         warn_out_of_bounds=True,
+        on_interrupt="raise",
+        verbose=False,
         random_state=None,
         n_jobs=None,
     ):
         self.n_mfs = n_mfs
         self.partition = partition
         self.mf = mf
+        self.term_names = term_names
+        self.premise_features = premise_features
+        self.consequent_features = consequent_features
         self.order = order
+        self.loss = loss
+        self.epsilon = epsilon
         self.solver = solver
         self.step_size = step_size
         self.error_goal = error_goal
         self.alpha = alpha
         self.stiffness = stiffness
+        self.n_init = n_init
         self.max_iter = max_iter
         self.tol = tol
+        self.early_stopping = early_stopping
+        self.validation_fraction = validation_fraction
+        self.n_iter_no_change = n_iter_no_change
+        self.warm_start = warm_start
+        self.prune = prune
         self.out_of_bounds = out_of_bounds
         self.warn_out_of_bounds = warn_out_of_bounds
+        self.on_interrupt = on_interrupt
+        self.verbose = verbose
         self.random_state = random_state
         self.n_jobs = n_jobs
 
@@ -228,7 +340,7 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         return tags
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y, sample_weight=None):
+    def fit(self, X, y, sample_weight=None, groups=None):
         """Train the model.
 
         Parameters
@@ -240,6 +352,9 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         sample_weight : array-like of shape (n_samples,), default=None
             Weights, zero or positive. A whole number counts as so many copies of the row, zero as
             the row's absence, in initialisation and scaling too.
+        groups : array-like of shape (n_samples,), default=None
+            The run, device or level that each row belongs to: ``early_stopping`` holds out whole
+            groups. Not looked at without it.
 
         Returns
         -------
@@ -252,10 +367,17 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             fewer than two rows; if parameters contradict each other or the data; if the grid has
             more rules than ``sklearn.get_config()["working_memory"]`` can hold.
         """
+        context = None
+        if hasattr(self, "_skl_callbacks"):
+            is_single_run = self.n_init == 1 and self.loss != "huber" and self.alpha != "gcv"
+            most = self.max_iter if is_single_run and not self.prune else None
+            context = self._init_callback_context(max_subtasks=most)
         before = self.__dict__.copy()
         try:
-            X, targets, sample_weight = self._check_training_data(X, y, sample_weight)
-            training = train(self, X, targets, sample_weight, self._input_names())
+            data = self._check_training_data(X, y, sample_weight, groups)
+            partition = self._partition(data.input_names)
+            bridge = None if context is None else self._bridge(context, data)
+            training = train(self, data, partition, bridge)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
             self.__dict__ = before
@@ -264,8 +386,16 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         self.n_iter_ = max(training.result.n_iter, 1)
         self.loss_curve_ = training.result.loss_curve
         self.status_ = training.result.message
-        self.alpha_, self.stiffness_ = training.start.alpha, training.start.stiffness
-        self.structures_ = training.start.candidates
+        self.alpha_, self.stiffness_ = training.structure.alpha, training.structure.stiffness
+        self.structures_ = training.structure.candidates
+        self.redundant_rules_ = training.redundant_rules
+        self.pruning_ = training.pruning
+        self.robust_weights_ = training.robust_weights
+        losses = training.validation_losses
+        self.validation_loss_curve_ = None if losses is None else np.array(losses)
+        self._start_parameters = self._those_of_the_start()
+        if bridge is not None:
+            bridge.end(self.model_)
         return self
 
     def predict(self, X):
@@ -386,9 +516,88 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
         names = getattr(self, "feature_names_in_", None)
         return [f"x{j}" for j in range(self.n_features_in_)] if names is None else list(names)
 
-    def _check_training_data(self, X, y, sample_weight):
-        """X, targets (n_rows, n_outputs) and weights or None, all of rows with weight."""
+    def _partition(self, names):
+        """What training starts from, with all names of columns and families resolved."""
+        start, n_mfs = self._imported(names), self.n_mfs
+        alpha, stiffness = self.alpha, self.stiffness
+        if self.warm_start and hasattr(self, "_start_parameters"):
+            changed = [
+                name
+                for name, value in self._those_of_the_start().items()
+                if value != self._start_parameters[name]
+            ]
+            if changed:
+                raise ValueError(
+                    f"warm_start=True goes on from the rules of the fit before, but {changed[0]} "
+                    "has been changed since: set warm_start=False to start anew."
+                )
+            start, n_mfs = self.model_, "auto"
+            check_inputs(start, names, "warm_start=True")
+            alpha = self.alpha_ if alpha == "auto" else alpha
+            stiffness = self.stiffness_ if stiffness == "auto" else stiffness
+        if self.order == 0 and self.consequent_features is not None:
+            raise ValueError(
+                f"consequent_features={self.consequent_features!r} means nothing with order=0, "
+                "whose consequents are constants: leave it at None."
+            )
+        consequent = feature_indices(self.consequent_features, names, "consequent_features")
+        # random_state=None stands for one fixed seed: the same data give the same model.
+        state = self.random_state
+        seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
+        return Partition(
+            n_mfs=n_mfs,
+            partition=start,
+            families=membership_families(self.mf, names),
+            order=self.order,
+            premise_inputs=feature_indices(self.premise_features, names, "premise_features"),
+            consequent_inputs=consequent if self.order == 1 else consequent[:0],
+            alpha=alpha,
+            stiffness=stiffness,
+            seed=seed,
+            names=names,
+        )
+
+    def _those_of_the_start(self):
+        """The parameters that a start depends on, in a form that can be compared."""
+        names = ("n_mfs", "partition", "mf", "premise_features")
+        values = {name: getattr(self, name) for name in names}
+        # Models are themselves alone; all else says in words what it is.
+        return {k: id(v) if hasattr(v, "strengths") else repr(v) for k, v in values.items()}
+
+    def _imported(self, names):
+        """``partition``, with the model in place of the estimator that holds it."""
+        given = self.partition
+        if isinstance(given, str) or hasattr(given, "fit_predict"):
+            return given
+        model = getattr(given, "model_", given)
+        if not isinstance(model, TSKModel):
+            raise ValueError(
+                f"partition={given!r} has no rules: it has not been fitted, or was cloned, which "
+                "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
+            )
+        check_inputs(model, names, "partition")
+        return model
+
+    def _bridge(self, context, data):
+        """To scikit-learn's callbacks."""
+
+        def attributes(*state):
+            model = state[0] if len(state) == 1 else state[0].freeze(*state[1:])
+            return {"model_": model}
+
+        targets = data.y[:, 0] if self._single_output else data.y
+        weight = data.sample_weight
+        metadata = None if weight is None else {"sample_weight": weight}
+        bridge = CallbackBridge(
+            self, context, {"X": data.X, "y": targets, "metadata": metadata}, attributes
+        )
+        bridge.begin()
+        return bridge
+
+    def _check_training_data(self, X, y, sample_weight, groups):
+        """The data, of all rows with weight."""
         numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
+        output_names = _target_names(y)
         X, y = validate_data(
             self,
             X,
@@ -398,18 +607,24 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
                 {**numeric, "ensure_2d": False},
             ),
         )
-        check_consistent_length(X, y)
+        check_consistent_length(X, y, groups)
         self._single_output = y.ndim == 1
         targets = y.reshape(-1, 1) if y.ndim == 1 else y
+        if output_names is None or len(output_names) != targets.shape[1]:
+            n_outputs = targets.shape[1]
+            output_names = ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
         check_finite(X, "X", self._input_names())
-        check_finite(targets, "y", [f"y{k}" for k in range(targets.shape[1])])
-        if sample_weight is None:
-            return X, targets, None
-        sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-        keep = positive_weights(sample_weight, X.shape[0])
-        if keep is None:
-            return X, targets, sample_weight
-        return X[keep], targets[keep], sample_weight[keep]
+        check_finite(targets, "y", output_names)
+        groups = None if groups is None else column_or_1d(groups)
+        keep = None
+        if sample_weight is not None:
+            sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+            keep = positive_weights(sample_weight, X.shape[0])
+        if keep is not None:
+            X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
+            groups = None if groups is None else groups[keep]
+        names = tuple(map(str, self._input_names()))
+        return TrainingData(X, targets, sample_weight, groups, names, output_names, keep)
 
     def _check_inputs(self, X):
         check_is_fitted(self)
@@ -430,3 +645,12 @@ class ANFISRegressor(RegressorMixin, BaseEstimator):
             and X.shape[1] == self.n_features_in_
             and not hasattr(self, "feature_names_in_")
         )
+
+
+def _target_names(y):
+    """Names of a Series or of a frame's columns, if all are str."""
+    names = getattr(y, "columns", None)
+    if names is None:
+        names = [getattr(y, "name", None)]
+    names = list(names)
+    return tuple(names) if all(isinstance(name, str) and name for name in names) else None

@@ -50,6 +50,11 @@ class Scale:
         """Which columns never change."""
         return self.minimum == self.maximum
 
+    @property
+    def box(self):
+        """Lowest and highest values, standardised."""
+        return (self.minimum - self.offset) / self.scale, (self.maximum - self.offset) / self.scale
+
     def apply(self, columns, out):
         """Standardise columns (n_columns, n_rows) into ``out``."""
         np.subtract(columns, self.offset[:, None], out=out)

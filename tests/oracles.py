@@ -134,21 +134,22 @@ def strengths(antecedent, parameters, Z):
     return products / products.sum(axis=0)
 
 
-def dense_design(antecedent, parameters, Z, order):
+def dense_design(antecedent, parameters, Z, order, inputs=None):
     """Phi, shape (n_rows, n_columns): w_r, w_r z_1, ..., w_r z_d for one rule after another."""
     columns = []
     for w in strengths(antecedent, parameters, Z):
         columns.append(w)
         if order == 1:
-            columns += [w * z for z in Z]
+            columns += [w * z for z in (Z if inputs is None else Z[inputs])]
     return np.array(columns).T
 
 
 class DenseProblem:
     """F(theta) = min_beta |y - Phi beta|_S^2 / (2 W) + alpha/2 |beta_local|^2, all in one piece."""
 
-    def __init__(self, rows, antecedent, order, alpha):
+    def __init__(self, rows, antecedent, order, alpha, consequent_inputs=None):
         self.antecedent, self.order, self.alpha = antecedent, order, alpha
+        self.inputs = consequent_inputs
         self.Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
         self.y = (rows.y - rows.targets.offset) / rows.targets.scale
         weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
@@ -157,7 +158,9 @@ class DenseProblem:
 
     def _local_basis(self):
         """T, built entry by entry from numpy's weighted moments at the start."""
-        n_basis = 1 + len(self.Z) if self.order == 1 else 1
+        slopes = self.Z[: len(self.Z) * self.order]
+        slopes = slopes if self.inputs is None else slopes[self.inputs]
+        n_basis = 1 + len(slopes)
         firing = strengths(self.antecedent, self.antecedent.parameters, self.Z)
         local = np.zeros((len(firing) * n_basis, len(firing) * n_basis))
         for r, w in enumerate(firing * self.weight):
@@ -165,15 +168,15 @@ class DenseProblem:
             for j in range(1, n_basis):
                 center, spread = 0.0, 1.0
                 if w.sum() > 1e-12:
-                    center = np.average(self.Z[j - 1], weights=w)
-                    spread = np.sqrt(np.average((self.Z[j - 1] - center) ** 2, weights=w))
+                    center = np.average(slopes[j - 1], weights=w)
+                    spread = np.sqrt(np.average((slopes[j - 1] - center) ** 2, weights=w))
                 block[0, j], block[j, j] = -center / max(spread, 0.05), 1 / max(spread, 0.05)
             local[r * n_basis : (r + 1) * n_basis, r * n_basis : (r + 1) * n_basis] = block
         return local
 
     def design(self, parameters):
         """Phi on [1, z]."""
-        return dense_design(self.antecedent, parameters, self.Z, self.order)
+        return dense_design(self.antecedent, parameters, self.Z, self.order, self.inputs)
 
     def coefficients(self, parameters):
         """beta on [1, z], from the normal equations."""
@@ -253,13 +256,13 @@ def random_scattered(rng, family, n_rules, inputs):
     return ScatteredAntecedent.build(family, inputs, theta)
 
 
-def random_table(rng, n_rules=5, families=(Gaussian, Bell, Gaussian)):
-    """Rules over shared terms on three inputs, three terms each; some look at two inputs only."""
+def random_table(rng, n_rules=5, inputs=3):
+    """Rules over shared terms, three per input; the first two rules look at fewer inputs."""
     groups = []
-    for j, family in enumerate(families):
+    for j, family in zip(range(inputs), (Gaussian, Bell, Gaussian), strict=False):
         centers = np.array([-1.0, 0.3, 1.2]) + 0.2 * rng.normal(size=3)
         theta = family.from_center_and_width(centers, rng.uniform(0.7, 1.5, 3))
         groups.append(TermGroup(family, np.full(3, j), theta))
-    table = rng.integers(0, 3, (n_rules, 3)) + 3 * np.arange(3)
-    table[0], table[1] = [0, 3, -1], [-1, 4, 8]
+    table = rng.integers(0, 3, (n_rules, inputs)) + 3 * np.arange(inputs)
+    table[0, -1] = table[1, 0] = -1
     return RuleTableAntecedent(tuple(groups), table)

@@ -12,8 +12,9 @@ from sklearn.preprocessing import StandardScaler
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from skanfis import ANFISRegressor
-from skanfis._anfis import _labeller, _ordered_map
+from skanfis._anfis import _ordered_map
 from skanfis.exceptions import UnderdeterminedWarning
+from skanfis.training.start import _labeller
 
 
 def data(n_rows=120, n_inputs=2):

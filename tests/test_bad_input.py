@@ -273,7 +273,7 @@ def test_two_rows_are_enough(settings, order):
     model = ANFISRegressor(order=order, **settings).fit(X[:2], Y[:2])
     if order == 1 or model.n_rules_ > 1:
         # A line through two points has no degree of freedom left: by itself it gets a stiff ridge.
-        tolerance = 1e-6 if settings else 0.02
+        tolerance = 1e-3 if settings else 0.02
         assert_allclose(model.predict(X[:2]), Y[:2], atol=tolerance * np.ptp(Y[:2]))
     else:
         assert_allclose(model.predict(X[:2]), Y[:2].mean(), rtol=1e-12)
@@ -437,8 +437,8 @@ def test_smaller_grid_is_suggested_only_where_it_fits():
         ("stiffness", -0.1, "[0.0, inf)"),
         ("tol", -1e-4, "[0.0, inf)"),
         ("tol", np.nan, "[0.0, inf)"),
-        ("max_iter", 0, "[1, inf)"),
-        ("max_iter", 2.5, "[1, inf)"),
+        ("max_iter", -1, "[0, inf)"),
+        ("max_iter", 2.5, "[0, inf)"),
         ("warn_out_of_bounds", "no", "'bool'"),
         ("random_state", "lucky", "RandomState"),
         ("n_jobs", 1.5, "'int'"),

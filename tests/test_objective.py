@@ -46,7 +46,15 @@ def duplicated_rule(rng):
 
 
 CASES = {
-    # antecedent from rng, order, outputs, weighted
+    # antecedent from rng, order, outputs, weighted, and the consequents' inputs if not all
+    "consequents in one input": (
+        lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]),
+        1,
+        2,
+        True,
+        [1],
+    ),
+    "rules listed one by one": (lambda g: oracles.random_table(g, inputs=2), 1, 1, True),
     "grid of gaussians": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]), 1, 1, False),
     "grid of bells": (lambda g: oracles.random_grid(g, [Bell] * 2, [2, 3]), 1, 1, True),
     "grid of both": (lambda g: oracles.random_grid(g, [Bell, Gaussian], [3, 2]), 1, 2, True),
@@ -69,15 +77,18 @@ class Case:
     def __init__(self, antecedent, order, rows, alpha=ALPHA, **settings):
         self.rows, self.order, self.alpha = rows, order, alpha
         self.problem = SeparableProblem(rows, antecedent, order, alpha, **settings)
-        self.dense = oracles.DenseProblem(rows, antecedent, order, alpha)
+        consequent_inputs = settings.get("consequent_inputs")
+        self.dense = oracles.DenseProblem(rows, antecedent, order, alpha, consequent_inputs)
         g = np.random.default_rng(5)
         self.point = antecedent.parameters + 0.2 * g.normal(size=antecedent.parameters.size)
 
     @classmethod
     def named(cls, name):
         g = np.random.default_rng(3)
-        build, order, n_outputs, weighted = CASES[name]
-        return cls(build(g), order, oracles.bumpy_rows(g, 250, 2, n_outputs, weighted))
+        build, order, n_outputs, weighted, *inputs = CASES[name]
+        settings = {"consequent_inputs": np.array(inputs[0])} if inputs else {}
+        rows = oracles.bumpy_rows(g, 250, 2, n_outputs, weighted)
+        return cls(build(g), order, rows, **settings)
 
     def at_point(self):
         evaluation = self.problem.evaluate(self.point)
@@ -204,7 +215,12 @@ def test_dead_rule_has_no_gradient():
 def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     whole = arrays(*case.at_point())
     many_small_chunks(monkeypatch)
-    split = Case(case.problem.antecedent, case.order, case.rows)
+    split = Case(
+        case.problem.antecedent,
+        case.order,
+        case.rows,
+        consequent_inputs=case.problem.consequent_inputs,
+    )
     assert len(split.problem._chunks) > 10
     for one, other in zip(arrays(*split.at_point()), whole, strict=True):
         assert_all_close(one, other, 1e-9)
@@ -331,3 +347,14 @@ def test_constant_input_changes_nothing(rng):
     assert_array_equal(coefficients[:, 3], 0.0)
     assert_all_close(coefficients[:, :3].reshape(-1, 1), first.coefficients, 1e-10)
     assert_all_close(two.linearise(second).gradient, one.linearise(first).gradient, 1e-10)
+
+
+def test_residuals_are_those_of_the_dense_design(case):
+    evaluation = case.problem.evaluate(case.point)
+    expected = case.dense.y - case.dense.design(case.point) @ evaluation.coefficients
+    found = np.empty_like(expected)
+    for part, residual, weight in case.problem.residuals(evaluation):
+        found[part] = residual.T
+        if weight is not None:
+            assert_array_equal(weight, case.rows.sample_weight[part])
+    assert_allclose(found, expected, atol=1e-10)

@@ -9,7 +9,7 @@ import pytest
 
 import skanfis
 
-PUBLIC_MODULES = ["skanfis", "skanfis.cluster", "skanfis.datasets"]
+PUBLIC_MODULES = ["skanfis", "skanfis.cluster", "skanfis.datasets", "skanfis.gyro"]
 API_PAGE = Path(__file__).parents[1] / "docs" / "api.rst"
 
 

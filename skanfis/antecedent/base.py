@@ -11,9 +11,10 @@ log-membership of term t is needed for training, and has one form for every rule
 
     dy / d log mu_t = sum_(rules r that contain t) w_r f_r  -  nu_t y ,
 
-where nu_t is the share of the strength that rules containing t hold (on a grid what is left of its
-own membership when its input's are normalised; scattered rules: the rule's strength itself). The chain rule through the family's own
-derivatives then gives the sensitivity to every premise parameter.
+where nu_t is the share of the strength that rules containing t hold (on a grid, what is left of
+its own membership when its input's are normalised; scattered rules: the rule's strength itself).
+The chain rule through the family's own derivatives then gives the sensitivity to every premise
+parameter.
 """
 
 from abc import ABC, abstractmethod

@@ -8,13 +8,13 @@ The model, after the gyro model of IEEE 952 with the sine of an open-loop interf
 
 .. math::
 
-    y = S \, a(T) \, \frac{\sin\left[K(T) \, (\Omega + b)\right]}{K_0} + n
+    y = S \, w(t) \, a(T) \, \frac{\sin\left[K(T) \, (\Omega + b)\right]}{K_0} + n
 
 with the true rate :math:`\Omega`, the bias :math:`b` (a sum of several), the Sagnac factor
 :math:`K_0` at the reference temperature and :math:`K(T)` at the coil's temperature, the relative
-amplitude :math:`a(T)`, the scale factor S of the device relative to the nominal one, and white
-noise n. Since the small-signal scale factor is amplitude times :math:`K_0`, y is the raw signal
-divided by the nominal small-signal scale factor.
+amplitude :math:`a(T)`, the scale factor S of the device relative to the nominal one, its warm-up
+w(t), and the noise n, white and of quantisation. Since the small-signal scale factor is amplitude
+times :math:`K_0`, y is the raw signal divided by the nominal small-signal scale factor.
 
 References
 ----------
@@ -32,22 +32,27 @@ __all__ = [
     "angle_random_walk_deviation",
     "bias_gain",
     "bias_instability",
+    "change_of_rate_by_output",
     "coil_temperature_rate",
     "first_order_lag",
     "fixed_bias",
     "open_loop_response",
+    "quantised",
+    "rate_random_walk",
     "relative_amplitude",
     "relative_sagnac_factor",
     "relative_scale_factor",
     "temperature_bias",
     "thermal_rate_bias",
     "warm_up_bias",
+    "warm_up_scale_factor",
 ]
 
 REFERENCE_TEMPERATURE = 25.0  # degC, where the factory calibrates the scale factor
 _DEGREES_PER_HOUR = 1.0 / 3600.0  # in deg/s
 _PPM = 1e-6
 _SECONDS_PER_MINUTE = 60.0
+_ARC_SECOND = 1.0 / 3600.0  # in deg
 
 # The Allan deviation of a first-order Gauss-Markov process of standard deviation sigma has its
 # maximum, 0.437 sqrt(2) sigma, at 1.89 correlation times; that of flicker noise B is flat, 0.664 B
@@ -88,6 +93,16 @@ def bias_gain(rate, bias, sagnac_factor, relative_factor, amplitude):
     return amplitude * relative_factor * np.cos(phase) * np.sinc(half_phase / np.pi)
 
 
+def change_of_rate_by_output(rate, sagnac_factor, relative_factor, amplitude):
+    """Change of the rate per unit of the indicated rate, 1 / f'(rate); f: the response above.
+
+    What noise of the output is worth at the input: f is flatter at large rates, where the same
+    noise stands for more of the rate.
+    """
+    factor = sagnac_factor * relative_factor
+    return 1.0 / (amplitude * relative_factor * np.cos(factor * np.deg2rad(rate)))
+
+
 def relative_sagnac_factor(temperature, coefficient):
     """K(T) / K0 = 1 + c (T - T0), c in ppm/degC.
 
@@ -109,6 +124,14 @@ def relative_amplitude(temperature, coefficient, curvature):
 def relative_scale_factor(deviation):
     """Scale factor relative to the nominal one, S = 1 + e, with e in ppm."""
     return 1.0 + _PPM * deviation
+
+
+def warm_up_scale_factor(time, deviation, time_constant):
+    """Scale factor while warming up, relative to the warm one: 1 + e exp(-t / tau_w), e in ppm.
+
+    The source's power and its mean wavelength settle after power-on.
+    """
+    return 1.0 + _PPM * deviation * np.exp(-time / time_constant)
 
 
 def fixed_bias(bias):
@@ -169,6 +192,36 @@ def angle_random_walk_deviation(coefficient, sampling_interval):
     random walk in deg/sqrt(h), that is N / 60 in deg/sqrt(s) (IEEE 952).
     """
     return coefficient / 60.0 / np.sqrt(sampling_interval)
+
+
+def rate_random_walk(standard_normal, coefficient, sampling_interval):
+    """Bias that walks at random from zero at power-on [deg/s].
+
+    b(k+1) = b(k) + K sqrt(h) w(k); K is the rate random walk in deg/h/sqrt(h), that is K / 216000
+    in deg/s/sqrt(s). Its Allan deviation is K sqrt(tau / 3) (IEEE 952).
+
+    Parameters
+    ----------
+    standard_normal : ndarray of shape (n_samples,)
+        Independent standard normal numbers w; the last one would only act on the sample to come.
+    coefficient, sampling_interval : float
+        K [deg/h/sqrt(h)], h [s].
+    """
+    step = coefficient * _DEGREES_PER_HOUR / 60.0 * np.sqrt(sampling_interval)
+    return step * np.concatenate([[0.0], np.cumsum(standard_normal[:-1])])
+
+
+def quantised(rate, coefficient, sampling_interval):
+    """The rate as read from a counter of angle increments [deg/s].
+
+    The integral of the rate is rounded to whole increments q = sqrt(12) Q, and a sample is what
+    was added to it during one interval. The error of the angle is uniform, of standard deviation
+    Q [arcsec], so that the Allan deviation is sqrt(3) Q / tau (IEEE 952). Zero is no quantisation.
+    """
+    if coefficient == 0:
+        return rate
+    increment = np.sqrt(12.0) * coefficient * _ARC_SECOND / sampling_interval
+    return increment * np.diff(np.rint(np.cumsum(rate) / increment), prepend=0.0)
 
 
 def bias_instability(standard_normal, coefficient, correlation_time, sampling_interval):

@@ -9,14 +9,19 @@ from ._ofog_physics import REFERENCE_TEMPERATURE
 from ._validation import check_real
 
 __all__ = [
+    "RATE_ORDERS",
     "Device",
+    "RateTable",
     "Run",
     "check_phase",
     "draw_devices",
-    "draw_rate",
     "draw_runs",
     "nominal_device",
+    "with_noise",
 ]
+
+
+RATE_ORDERS = ("random", "sweep")
 
 
 def _coefficient(nominal, *, relative=0.0, absolute=0.0, bounds=(None, None), positive=False):
@@ -42,6 +47,7 @@ class Device:
     distribution that :func:`draw_devices` draws from. Units stand beside each coefficient.
     """
 
+    amplitude: float = _coefficient(6.29e6, **_POSITIVE)  # counts
     sagnac_factor: float = _coefficient(0.2536, relative=0.02, **_POSITIVE)  # rad/(rad/s)
     # Bounds: they keep amplitude and Sagnac factor positive at every temperature allowed.
     sagnac_temperature: float = _coefficient(-370.0, relative=0.1, bounds=(-2e3, 2e3))  # ppm/degC
@@ -53,29 +59,48 @@ class Device:
     bias_temperature: float = _coefficient(0.5, relative=0.5)  # deg/h/degC
     bias_temperature_curvature: float = _coefficient(0.01, relative=0.5)  # deg/h/degC^2
     warm_up: float = _coefficient(30.0, relative=0.5)  # deg/h
+    warm_up_scale_factor: float = _coefficient(200.0, relative=0.5, bounds=(-1e5, 1e5))  # ppm
     warm_up_time: float = _coefficient(180.0, relative=0.2, **_POSITIVE)  # s
     self_heating: float = _coefficient(15.0, relative=0.2, bounds=(0.0, 50.0))  # degC
     thermal_time: float = _coefficient(1200.0, relative=0.2, **_POSITIVE)  # s
     thermometer_lag: float = _coefficient(180.0, relative=0.2, **_NOT_NEGATIVE)  # s
-    thermal_rate: float = _coefficient(5.0, relative=0.5)  # deg/h/(degC/min)
+    bias_temperature_rate: float = _coefficient(5.0, relative=0.5)  # deg/h/(degC/min)
     angle_random_walk: float = _coefficient(0.05, relative=0.2, **_NOT_NEGATIVE)  # deg/sqrt(h)
     bias_instability: float = _coefficient(0.5, relative=0.2, **_NOT_NEGATIVE)  # deg/h
     correlation_time: float = _coefficient(300.0, relative=0.2, **_POSITIVE)  # s
+    rate_random_walk: float = _coefficient(0.3, relative=0.2, **_NOT_NEGATIVE)  # deg/h/sqrt(h)
+    quantisation: float = _coefficient(0.5, **_NOT_NEGATIVE)  # arcsec
+    thermometer_noise: float = _coefficient(0.0, relative=0.2, **_NOT_NEGATIVE)  # degC
+
+
+# What the factor on the noise multiplies.
+_RANDOM = (
+    "bias_repeatability",
+    "angle_random_walk",
+    "bias_instability",
+    "rate_random_walk",
+    "quantisation",
+    "thermometer_noise",
+)
+
+
+_NOMINAL = Device()
 
 
 @dataclass(frozen=True)
 class Run:
-    """One thermal run: one device, from power-on to power-off."""
+    """One thermal run: one device in the chamber, powered up once or several times."""
 
     device: Device
     device_id: int
-    ambient: float  # degC
-    residual_heat: float  # part of the self-heating still in the coil at power-on
-    bias: float  # deg/h, of this power-on alone
+    ambient: float  # degC, at the start
+    rising: bool  # which way the chamber goes first, if its temperature changes
+    residual_heat: float  # part of the self-heating still in the coil at the first power-on
+    biases: tuple[float, ...]  # deg/h, one per power-up
 
 
-def nominal_device(coefficients):
-    """The nominal device with some coefficients replaced.
+def nominal_device(coefficients, base=_NOMINAL):
+    """The nominal device ``base`` with some coefficients replaced.
 
     Raises
     ------
@@ -83,7 +108,7 @@ def nominal_device(coefficients):
         If ``coefficients`` is no mapping, or a name or value in it is not allowed.
     """
     if coefficients is None:
-        return Device()
+        return base
     if not isinstance(coefficients, Mapping):
         kind = type(coefficients).__qualname__
         raise TypeError(f"coefficients must be a dict of names to numbers, not {kind}.")
@@ -92,7 +117,7 @@ def nominal_device(coefficients):
     if unknown:
         raise ValueError(f"coefficients has unknown names {unknown}; known are {list(known)}.")
     checked = {name: _check_coefficient(value, known[name]) for name, value in coefficients.items()}
-    return Device(**checked)
+    return replace(base, **checked)
 
 
 def _check_coefficient(value, entry):
@@ -123,7 +148,12 @@ def _with_offsets(nominal, offsets):
     return replace(nominal, **moved)
 
 
-def draw_runs(devices, n_runs, ambient_range, max_residual_heat, random_state):
+def with_noise(device, factor):
+    """The device with its random errors multiplied by a factor."""
+    return replace(device, **{name: factor * getattr(device, name) for name in _RANDOM})
+
+
+def draw_runs(devices, n_runs, n_power_ups, ambient_range, max_residual_heat, random_state):
     """Runs of every device, each device's ambient temperatures spread over the whole range.
 
     The range is cut into ``n_runs`` equal parts, and each holds one run, in random order: with
@@ -134,26 +164,59 @@ def draw_runs(devices, n_runs, ambient_range, max_residual_heat, random_state):
     for device_id, device in enumerate(devices):
         parts = random_state.permutation(n_runs) + random_state.uniform(size=n_runs)
         ambients = low + (high - low) * parts / n_runs
-        residual_heats = random_state.uniform(0.0, max_residual_heat, size=n_runs)
-        biases = device.bias_repeatability * random_state.standard_normal(n_runs)
-        drawn = zip(ambients, residual_heats, biases, strict=True)
-        runs.extend(Run(device, device_id, *map(float, values)) for values in drawn)
+        rising = random_state.randint(2, size=n_runs)
+        heats = random_state.uniform(0.0, max_residual_heat, size=n_runs)
+        biases = device.bias_repeatability * random_state.standard_normal((n_runs, n_power_ups))
+        for ambient, up, heat, each in zip(ambients, rising, heats, biases, strict=True):
+            start = (float(ambient), bool(up), float(heat))
+            runs.append(Run(device, device_id, *start, tuple(map(float, each))))
     return runs
 
 
-def draw_rate(n_samples, dwell_samples, levels, random_state):
-    """True rate: every level once in random order, for one dwell each, and again until the end."""
-    n_dwells = -(-n_samples // dwell_samples)
+@dataclass(frozen=True)
+class RateTable:
+    """How the table turns during a power-up."""
+
+    levels: np.ndarray | None  # deg/s, ascending; None: every dwell has a rate of its own
+    largest_rate: float  # deg/s
+    dwell_samples: int
+    order: str
+
+    def draw(self, n_samples, random_state):
+        """True rate of each sample of one power-up [deg/s].
+
+        Each level comes once before any comes again. Without levels there is one rate in each of
+        as many equal parts of the range as there are dwells.
+        """
+        n_dwells = -(-n_samples // self.dwell_samples)
+        if self.levels is None:
+            rates = _rates_of_their_own(n_dwells, self.largest_rate, self.order, random_state)
+        else:
+            rates = _rates_by_turns(n_dwells, self.levels, self.order, random_state)
+        return np.repeat(rates, self.dwell_samples)[:n_samples]
+
+
+def _rates_of_their_own(n_dwells, largest_rate, order, random_state):
+    parts = np.arange(n_dwells) + random_state.uniform(size=n_dwells)
+    rates = largest_rate * (2.0 * parts / n_dwells - 1.0)
+    if order == "sweep":
+        return np.concatenate([rates[::2], rates[1::2][::-1]])
+    return random_state.permutation(rates)
+
+
+def _rates_by_turns(n_dwells, levels, order, random_state):
+    if order == "sweep":
+        return np.resize(np.concatenate([levels, levels[-2:0:-1]]), n_dwells)
     n_passes = -(-n_dwells // levels.size)
-    order = np.concatenate([random_state.permutation(levels) for _ in range(n_passes)])
-    return np.repeat(order[:n_dwells], dwell_samples)[:n_samples]
+    passes = [random_state.permutation(levels) for _ in range(n_passes)]
+    return np.concatenate(passes)[:n_dwells]
 
 
-def check_phase(nominal, spread, max_rate, ambient_range):
+def check_phase(nominal, spread, max_rate, ambient_range, name):
     """Refuse rates at which some device of the population would leave the sine's rising branch.
 
     Beyond a Sagnac phase of pi / 2 two rates give one output: the arcsine, and with it every
-    compensation from the output alone, is not defined.
+    compensation from the output alone, is not defined. ``name`` is of the parameter to blame.
     """
     bounds = [
         abs(getattr(nominal, entry.name)) + spread * _tolerance(nominal, entry)
@@ -167,6 +230,6 @@ def check_phase(nominal, spread, max_rate, ambient_range):
     limit = 90.0 / largest_factor
     if max_rate >= limit:
         raise ValueError(
-            f"max_rate == {max_rate}, must be < {limit:.4g} deg/s: from there on the Sagnac phase "
+            f"{name} == {max_rate}, must be < {limit:.4g} deg/s: from there on the Sagnac phase "
             "reaches pi / 2 in some device of this population, and the arcsine is not defined."
         )

@@ -1,18 +1,24 @@
 """A seeded simulator of thermal runs of open-loop fiber-optic gyros on a rate table."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from sklearn.utils import check_random_state
 
+from ._ofog_chamber import PROFILES, Schedule, thermal_history
 from ._ofog_population import (
+    RATE_ORDERS,
+    RateTable,
     check_phase,
     draw_devices,
-    draw_rate,
     draw_runs,
     nominal_device,
+    with_noise,
 )
-from ._ofog_run import simulate_run
-from ._validation import check_count, check_real
+from ._ofog_presets import PRESETS
+from ._ofog_run import simulate_power_up
+from ._validation import check_choice, check_count, check_real
 
 __all__ = ["make_ofog"]
 
@@ -22,14 +28,21 @@ _COLDEST, _HOTTEST = -60.0, 100.0  # degC
 
 def make_ofog(
     *,
+    preset="open_loop",
+    profile="constant",
     n_devices=3,
     n_runs=8,
-    duration=3600.0,
-    sampling_interval=10.0,
-    max_rate=100.0,
-    n_rate_levels=401,
-    dwell_time=120.0,
-    ambient_range=(-20.0, 50.0),
+    n_power_ups=1,
+    off_time=600.0,
+    duration=None,
+    sampling_interval=None,
+    max_rate=None,
+    n_rate_levels=None,
+    rates=None,
+    rate_order="random",
+    dwell_time=None,
+    ambient_range=None,
+    n_soaks=5,
     max_residual_heat=0.5,
     noise=1.0,
     device_spread=1.0,
@@ -38,85 +51,139 @@ def make_ofog(
 ):
     r"""Simulate thermal runs of open-loop fiber-optic gyros on a rate table (regression).
 
-    Every device is drawn from a population and runs ``n_runs`` times, each time from power-on, at
-    another ambient temperature, while the table steps through rates of both signs. The gyro heats
-    itself, and its thermometer lags behind the coil: at one indicated temperature, the error
-    depends on the time since power-on too. Beside the error, which a compensation has to learn,
-    every part of it is given, so that a compensation can be judged effect by effect. A compensator
-    at work in a gyro has the columns time, temperature and output, and no others.
+    Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the
+    table steps through rates of both signs. The gyro heats itself, and its thermometer lags behind
+    the coil: at one indicated temperature, the error depends on the time since power-on and on the
+    rate of the temperature too. Beside the error, which a compensation has to learn, every part of
+    it is given, so that a compensation can be judged effect by effect. A compensator at work in a
+    gyro has the columns time, temperature and output (or counts), and no others.
 
     The split matters. Neighbouring rows are nearly equal: a random split of rows tests on what was
-    trained on. Hold out whole runs (``run`` as the groups) or devices (``device``). With few rate
-    levels, which every run then meets, hold out levels too: a flexible model learns the list of
-    levels by heart, and an indicated rate tells which one it is.
+    trained on. Hold out whole runs (``run`` as the groups) or devices (``device``). With the rate
+    levels of a table (``n_rate_levels``), which every run then meets, hold out levels too: a
+    flexible model learns the list of levels by heart, and an indicated rate tells which one it is.
 
     Parameters
     ----------
+    preset : {"open_loop", "linearised", "paper"}, default="open_loop"
+        Where to start from: the nominal gyro and the conditions of the test.
+
+        * "open_loop": after a small gyro measured on a rate table, counts = A sin(K rate) with
+          A = 6.29e6 and K = 0.2536 rad/(rad/s), its scale factor changing by -410 ppm/degC
+        * "linearised": the same with what an internal linearisation leaves of the sine, 1000 ppm
+          RMS of full scale up to 375 deg/s, and of the scale factor's temperature, -50 ppm/degC
+        * "paper": the conditions of the founding paper's Table 1 (see :func:`load_ofog`): 19 rows,
+          one each 20 s, at 38.69 deg/s and some 20.5 to 21.3 degC; here as many runs as asked for
+    profile : {"constant", "soaks", "ramps"}, default="constant"
+        Temperature of the chamber during a run.
+
+        * "constant": another one for each run: power-ups at different temperatures
+        * "soaks": ``n_soaks`` temperatures in turn, up and down the ambient range
+        * "ramps": up and down the ambient range at constant speed
+
+        The way up and down takes ``duration``. Each run begins somewhere else on it.
     n_devices : int, default=3
         Number of gyros, at least 1.
     n_runs : int, default=8
         Number of runs per device, at least 1. The ambient range is cut into as many equal parts,
-        and each device has one run in each part.
-    duration : float, default=3600
-        Length of each run [s], at least ``sampling_interval``.
-    sampling_interval : float, default=10
+        and in each part one run of each device begins.
+    n_power_ups : int, default=1
+        Number of power-ups in each run, at least 1, ``off_time`` apart: the later ones begin as
+        warm as the earlier ones left the gyro.
+    off_time : float, default=600
+        Time without power between two power-ups of a run [s], not negative, rounded to a multiple
+        of ``sampling_interval``.
+    duration : float, default=None
+        Length of each power-up [s], at least ``sampling_interval``. Default: 3600; "paper" 380.
+    sampling_interval : float, default=None
         Time between rows [s], positive; a row is the mean over the interval that follows its time.
-    max_rate : float, default=100
+        Default: 10; "paper" 20.
+    max_rate : float, default=None
         Largest rate of the table [deg/s], positive and below the rate at which the Sagnac phase
-        of some device of the population could reach pi/2 (some 340 deg/s by default). Beyond a
-        phase of 1.2 rad (271 deg/s nominally) inverting the sine is possible but magnifies noise.
-    n_rate_levels : int, default=401
+        of some device of the population could reach pi/2 (some 340 deg/s for "open_loop"). Beyond
+        a phase of 1.2 rad (271 deg/s nominally) inverting the sine is possible but magnifies
+        noise. Default: 100; "linearised" 375.
+    n_rate_levels : int, default=None
         Number of equally spaced rates from ``-max_rate`` to ``max_rate``, at least 2; an odd number
-        includes rest. They are visited in random order, each once before any comes again.
-    dwell_time : float, default=120
+        includes rest. Default: every dwell has a rate of its own, one in each of as many equal
+        parts of the range as a power-up has dwells, so that no two runs share a level.
+    rates : array-like of shape (n_rates,), default=None
+        The rates of the table themselves [deg/s], in place of ``max_rate`` and ``n_rate_levels``;
+        ``rates=[0]`` is a gyro at rest. "paper": 38.69.
+    rate_order : {"random", "sweep"}, default="random"
+        Order of the rates: at random, each once before any comes again; or up from the lowest to
+        the highest and down again.
+    dwell_time : float, default=None
         Time at each rate [s], at least ``sampling_interval``, rounded to a multiple of it.
-    ambient_range : tuple of two floats, default=(-20, 50)
-        Lowest and highest ambient temperature over the runs [degC], within -60 and 100; constant
-        within a run.
+        Default: 120.
+    ambient_range : tuple of two floats, default=None
+        Lowest and highest temperature of the chamber [degC], within -60 and 100. Default: -20 and
+        50; "paper" 20.4 and 20.8.
+    n_soaks : int, default=5
+        Number of temperatures of the profile "soaks", at least 2.
     max_residual_heat : float, default=0.5
-        In [0, 1]. A run starts with a part of the self-heating, uniform between 0 (cold start) and
-        this, still in the coil: a warm start after a short break.
+        In [0, 1]. A run starts with a part of the self-heating, uniform between 0 and this, still
+        in the coil: a warm start after a short break. 0: cold starts only.
     noise : float, default=1.0
-        Factor on the random errors, angle random walk and bias instability, not negative.
+        Factor on all that is random within a device, not negative: bias repeatability, bias
+        instability, rate and angle random walk, quantisation, noise of the thermometer.
     device_spread : float, default=1.0
         Factor in [0, 1] on the tolerances of the population; 0 makes all devices nominal.
     coefficients : dict of str to float, default=None
-        Nominal values in place of those in the table below. Zero turns an effect off.
+        Nominal values in place of the preset's; names and units in the table below. Zero turns an
+        effect off.
     random_state : int, RandomState instance or None, default=None
         Seed; an int makes the result reproducible. Changing ``noise``, ``coefficients`` or
         ``device_spread`` leaves all that is drawn as it was, up to its size.
 
     Returns
     -------
-    data : DataFrame of shape (n_devices * n_runs * n_samples, 16)
+    data : DataFrame of shape (n_devices * n_runs * n_power_ups * n_samples, 26)
         One row per sample, n_samples = duration / sampling_interval rounded down; runs one after
         another, in time's order. First the measurement:
 
         * time: since power-on [s], from 0
         * temperature: indicated by the gyro's thermometer [degC]
+        * temperature_rate: derivative of what the thermometer indicates [degC/s], without noise
+        * ambient: temperature of the chamber [degC]
         * rate: true rate about the input axis, the earth's rate included [deg/s]
-        * output: indicated rate without compensation [deg/s], that is the raw signal divided by the
+        * counts: raw output [counts]
+        * output: indicated rate without compensation [deg/s], that is the raw output divided by the
           nominal small-signal scale factor
         * error: output - rate [deg/s], the target of a compensation
+        * noise: what no compensation can foresee [deg/s], referred to the input: the random biases,
+          and the noise of the output times what it stands for at this rate. Its RMS is the noise
+          floor of a compensated rate
         * run: number of the run, unique over all devices
+        * power_up: number of the power-up, unique over all runs
         * device: number of the device
 
         then the parts of the error [deg/s], whose sum it is but for rounding:
 
         * nonlinearity: sin(K0 rate) / K0 - rate, the arcsine law at the reference temperature
         * scale_factor: deviation of the device from the nominal scale factor
-        * scale_factor_temperature: what the coil's temperature changes in the indicated rate
-        * bias: fixed bias of the device, and of the run
+        * wavelength: what the coil's temperature changes by way of the wavelength, K(T)
+        * amplitude: what it changes by way of the amplitude, a(T)
+        * warm_up_scale_factor: scale factor that dies away after power-on
+        * bias: fixed bias of the device
         * bias_temperature: bias by the coil's temperature
         * warm_up: bias that dies away after power-on
-        * thermal_rate: bias by the coil's rate of temperature change (Shupe effect)
+        * bias_temperature_rate: bias by the coil's rate of temperature change (Shupe effect)
+        * bias_repeatability: bias of the power-up
         * bias_instability: slow random bias
+        * rate_random_walk: bias that walks away from power-on
         * angle_random_walk: white noise
+        * quantisation: of the angle that is counted
 
     Raises
     ------
     TypeError, ValueError
-        If a parameter is of the wrong type or out of its range.
+        If a parameter is of the wrong type or out of its range, or ``rates`` is given together with
+        ``max_rate`` or ``n_rate_levels``.
+
+    See Also
+    --------
+    load_ofog : The founding paper's Table 1, as printed.
 
     Notes
     -----
@@ -124,40 +191,54 @@ def make_ofog(
 
     .. math::
 
-        y = S \, a(T) \, \frac{\sin\left[K(T) \, (\Omega + b)\right]}{K_0} + n
+        y = S \, w(t) \, a(T) \, \frac{\sin\left[K(T) \, (\Omega + b)\right]}{K_0} + n
 
-    with the coil's temperature :math:`T`, S = 1 + scale_factor, and the bias :math:`b` a sum of
-    five; each part's share of the error is the part of b times [y(b) - y(0)] / b.
+    with the coil's temperature :math:`T`, S = 1 + scale_factor, its warm-up w, and the bias
+    :math:`b` a sum of seven; each part's share of the error is the part of b times
+    [y(b) - y(0)] / b. Temperature coefficients count from 25 degC. Counts are
+    :math:`A K_0 y` with the nominal amplitude A.
+
     The coil follows :math:`\tau_{th} \, \dot T = T_{ambient} + \Delta T_{self} - T`, and the
-    thermometer the coil with a lag :math:`\tau_s \, \dot T_s = T - T_s`, both starting equal.
-    Temperature coefficients count from 25 degC.
+    thermometer the coil with a lag :math:`\tau_s \, \dot T_s = T - T_s`, both starting equal;
+    without power there is no self-heating. From :math:`T_s` and its rate, the coil's temperature
+    :math:`T = T_s + \tau_s \, \dot T_s` is known.
 
-    Coefficients of the population: nominal value, and tolerance, the half width of a uniform
-    distribution. The Sagnac factor and the sum of its and the amplitude's temperature coefficients
-    (-410 ppm/degC) are like those of a small gyro measured on a rate table; the rest are typical of
-    tactical-grade gyros, and no measurement of one device.
+    The random errors have the Allan deviations of IEEE 952 over the averaging time :math:`\tau`:
+    :math:`N / \sqrt{\tau}` (angle random walk), a maximum of 0.664 B (bias instability, a
+    first-order Gauss-Markov process), :math:`K \sqrt{\tau / 3}` (rate random walk) and
+    :math:`\sqrt{3} Q / \tau` (quantisation).
+
+    Coefficients of the population "open_loop": nominal value, and tolerance, the half width of a
+    uniform distribution. Amplitude, Sagnac factor and the sum of its and the amplitude's
+    temperature coefficients (-410 ppm/degC) are like those of a small gyro measured on a rate
+    table; the rest are typical of tactical-grade gyros, and no measurement of one device.
 
     ========================== ======= =========== ==================== ==============
     Name                       Nominal Tolerance   Unit                 Part of
     ========================== ======= =========== ==================== ==============
+    amplitude                  6.29e6  none        counts               A
     sagnac_factor              0.2536  2 %         rad/(rad/s)          K0
     sagnac_temperature         -370    10 %        ppm/degC             K(T)
     amplitude_temperature      -40     50 %        ppm/degC             a(T)
     amplitude_curvature        -0.5    50 %        ppm/degC^2           a(T)
     scale_factor               0       500 ppm     ppm                  S
     bias                       0       10 deg/h    deg/h                b
-    bias_repeatability         1       none        deg/h, std of runs   b
+    bias_repeatability         1       none        deg/h, std           b
     bias_temperature           0.5     50 %        deg/h/degC           b
     bias_temperature_curvature 0.01    50 %        deg/h/degC^2         b
     warm_up                    30      50 %        deg/h                b
-    warm_up_time               180     20 %        s                    b
+    warm_up_scale_factor       200     50 %        ppm                  w
+    warm_up_time               180     20 %        s                    b, w
     self_heating               15      20 %        degC                 T
     thermal_time               1200    20 %        s                    T
     thermometer_lag            180     20 %        s                    T_s
-    thermal_rate               5       50 %        deg/h/(degC/min)     b
+    bias_temperature_rate      5       50 %        deg/h/(degC/min)     b
     angle_random_walk          0.05    20 %        deg/sqrt(h)          n
     bias_instability           0.5     20 %        deg/h                b
     correlation_time           300     20 %        s                    b
+    rate_random_walk           0.3     20 %        deg/h/sqrt(h)        b
+    quantisation               0.5     none        arcsec               n
+    thermometer_noise          0       20 %        degC, std            T_s
     ========================== ======= =========== ==================== ==============
 
     References
@@ -172,40 +253,119 @@ def make_ofog(
 
     Examples
     --------
+    Cold starts at twelve temperatures, of one gyro:
+
     >>> from skanfis.datasets import make_ofog
-    >>> data = make_ofog(n_devices=2, n_runs=3, random_state=0)
+    >>> data = make_ofog(n_devices=1, n_runs=12, max_residual_heat=0, random_state=0)
     >>> data.shape
-    (2160, 16)
+    (4320, 26)
     >>> parts = data.loc[:, "nonlinearity":]
     >>> bool((parts.sum(axis=1) - data["error"]).abs().max() < 1e-12)
     True
+
+    Three power-ups at each of four temperatures; a day of slow ramps; an hour at rest:
+
+    >>> power_ups = make_ofog(n_runs=4, n_power_ups=3, off_time=900, random_state=0)
+    >>> day = make_ofog(profile="ramps", duration=86_400, sampling_interval=60, random_state=0)
+    >>> at_rest = make_ofog(rates=[0], sampling_interval=0.1, n_runs=1, random_state=0)
     """
-    nominal = nominal_device(coefficients)
+    check_choice(preset, "preset", tuple(PRESETS))
+    nominal = nominal_device(coefficients, PRESETS[preset].device)
     n_devices = check_count(n_devices, "n_devices", min_val=1)
     n_runs = check_count(n_runs, "n_runs", min_val=1)
-    ambient_range = _check_ambient_range(ambient_range)
+    n_power_ups = check_count(n_power_ups, "n_power_ups", min_val=1)
     max_residual_heat = check_real(max_residual_heat, "max_residual_heat", min_val=0, max_val=1)
     noise = check_real(noise, "noise", min_val=0)
     device_spread = check_real(device_spread, "device_spread", min_val=0, max_val=1)
-    sampling_interval = check_real(
-        sampling_interval, "sampling_interval", min_val=0, include_boundaries="neither"
+    given = {
+        "duration": duration,
+        "sampling_interval": sampling_interval,
+        "max_rate": max_rate,
+        "n_rate_levels": n_rate_levels,
+        "rates": rates,
+        "dwell_time": dwell_time,
+        "ambient_range": ambient_range,
+    }
+    conditions = _conditions(PRESETS[preset].conditions, given)
+    schedule = _schedule(conditions, profile, n_power_ups, off_time, n_soaks)
+    table = _rate_table(conditions, rate_order)
+    check_phase(
+        nominal,
+        device_spread,
+        table.largest_rate,
+        schedule.ambient_range,
+        name="max_rate" if conditions.rates is None else "largest of abs(rates)",
     )
-    time = _sample_times(duration, sampling_interval)
-    dwell_samples = _dwell_samples(dwell_time, sampling_interval)
-    levels = _rate_levels(max_rate, n_rate_levels)
-    check_phase(nominal, device_spread, levels[-1], ambient_range)
 
     random_state = check_random_state(random_state)
-    devices = draw_devices(nominal, n_devices, device_spread, random_state)
-    runs = draw_runs(devices, n_runs, ambient_range, max_residual_heat, random_state)
-    simulated = []
-    for number, run in enumerate(runs):
-        rate = draw_rate(time.size, dwell_samples, levels, random_state)
-        normals = noise * random_state.standard_normal((2, time.size))
-        columns = simulate_run(run, time, rate, normals, sampling_interval)
-        simulated.append(_label(columns, number, run.device_id))
-    names = simulated[0]
-    return pd.DataFrame({name: np.concatenate([run[name] for run in simulated]) for name in names})
+    drawn = draw_devices(nominal, n_devices, device_spread, random_state)
+    devices = [with_noise(device, noise) for device in drawn]
+    runs = draw_runs(
+        devices, n_runs, n_power_ups, schedule.ambient_range, max_residual_heat, random_state
+    )
+    power_ups = [
+        columns
+        for number, run in enumerate(runs)
+        for columns in _power_ups(number, run, schedule, table, random_state)
+    ]
+    # Each piece goes as soon as it is joined, so that the table is in memory once.
+    names = list(power_ups[0])
+    data = {name: np.concatenate([each.pop(name) for each in power_ups]) for name in names}
+    counts_per_rate = nominal.amplitude * np.deg2rad(nominal.sagnac_factor)
+    data["counts"] = counts_per_rate * data["output"]
+    return pd.DataFrame(data, copy=False)
+
+
+def _power_ups(number, run, schedule, table, random_state):
+    """Yield the columns of each power-up of a run; the counts are still to be filled in."""
+    for place, temperatures in enumerate(thermal_history(run, schedule)):
+        rate = table.draw(schedule.n_samples, random_state)
+        normals = random_state.standard_normal((4, rate.size))
+        measurement, parts = simulate_power_up(
+            run.device,
+            run.biases[place],
+            schedule.time,
+            rate,
+            temperatures,
+            normals,
+            schedule.sampling_interval,
+        )
+        labels = {
+            "run": number,
+            "power_up": number * schedule.n_power_ups + place,
+            "device": run.device_id,
+        }
+        columns = measurement | {name: np.full(rate.size, label) for name, label in labels.items()}
+        yield columns | parts
+
+
+def _conditions(usual, given):
+    """The usual conditions but for what the caller gave; None is not given."""
+    given = {name: value for name, value in given.items() if value is not None}
+    levels = {"max_rate", "n_rate_levels"} & set(given)
+    if levels and "rates" in given:
+        raise ValueError(f"rates is given together with {sorted(levels)}; it takes their place.")
+    if levels:
+        given["rates"] = None
+    return replace(usual, **given)
+
+
+def _schedule(conditions, profile, n_power_ups, off_time, n_soaks):
+    """The clock and the chamber's program, checked."""
+    interval = check_real(
+        conditions.sampling_interval, "sampling_interval", min_val=0, include_boundaries="neither"
+    )
+    duration = check_real(conditions.duration, "duration", min_val=interval)
+    return Schedule(
+        # 0.3 / 0.1 is 2.9999999999999996, and three samples are meant.
+        n_samples=int(duration / interval * (1.0 + 1e-12)),
+        sampling_interval=interval,
+        n_power_ups=n_power_ups,
+        n_off=round(check_real(off_time, "off_time", min_val=0) / interval),
+        profile=check_choice(profile, "profile", PROFILES),
+        ambient_range=_check_ambient_range(conditions.ambient_range),
+        n_soaks=check_count(n_soaks, "n_soaks", min_val=2),
+    )
 
 
 def _check_ambient_range(ambient_range):
@@ -219,27 +379,30 @@ def _check_ambient_range(ambient_range):
     return low, high
 
 
-def _sample_times(duration, sampling_interval):
-    duration = check_real(duration, "duration", min_val=sampling_interval)
-    # 0.3 / 0.1 is 2.9999999999999996, and three samples are meant.
-    return sampling_interval * np.arange(int(duration / sampling_interval * (1.0 + 1e-12)))
+def _rate_table(conditions, order):
+    """The rates of the table, checked."""
+    interval = conditions.sampling_interval
+    dwell_time = check_real(conditions.dwell_time, "dwell_time", min_val=interval)
+    check_choice(order, "rate_order", RATE_ORDERS)
+    if conditions.rates is None:
+        levels, largest = _equally_spaced(conditions.max_rate, conditions.n_rate_levels)
+    else:
+        levels = _check_rates(conditions.rates)
+        largest = float(np.abs(levels).max())
+    return RateTable(levels, largest, round(dwell_time / interval), order)
 
 
-def _dwell_samples(dwell_time, sampling_interval):
-    dwell_time = check_real(dwell_time, "dwell_time", min_val=sampling_interval)
-    return round(dwell_time / sampling_interval)
-
-
-def _rate_levels(max_rate, n_rate_levels):
+def _equally_spaced(max_rate, n_rate_levels):
+    """Levels of the table, None where there are none, and the largest rate."""
     max_rate = check_real(max_rate, "max_rate", min_val=0, include_boundaries="neither")
-    return np.linspace(-max_rate, max_rate, check_count(n_rate_levels, "n_rate_levels", min_val=2))
+    if n_rate_levels is None:
+        return None, max_rate
+    n_rate_levels = check_count(n_rate_levels, "n_rate_levels", min_val=2)
+    return np.linspace(-max_rate, max_rate, n_rate_levels), max_rate
 
 
-def _label(columns, number, device_id):
-    """The columns of a run with its and its device's number after the measurement."""
-    names = list(columns)
-    n_samples = columns["time"].size
-    labelled = {name: columns[name] for name in names[:5]}
-    labelled["run"] = np.full(n_samples, number)
-    labelled["device"] = np.full(n_samples, device_id)
-    return labelled | {name: columns[name] for name in names[5:]}
+def _check_rates(rates):
+    levels = np.unique(np.asarray(rates, dtype=float))
+    if np.ndim(rates) != 1 or levels.size == 0 or not np.all(np.isfinite(levels)):
+        raise ValueError(f"rates must be a list of finite rates in deg/s; got {rates!r}.")
+    return levels

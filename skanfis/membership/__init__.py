@@ -20,6 +20,7 @@ __all__ = [
     "Triangular",
     "TwoSidedGaussian",
     "ZShaped",
+    "membership_families",
 ]
 
 # By the name that a user gives.
@@ -38,3 +39,25 @@ MEMBERSHIPS: dict[str, type[Membership]] = {
         SigmoidProduct,
     )
 }
+
+
+def membership_families(mf, input_names) -> list[type[Membership]]:
+    """One family per input, from a name, a class, or a sequence of these."""
+    given = [mf] * len(input_names) if isinstance(mf, str | type) else list(mf)
+    if len(given) != len(input_names):
+        raise ValueError(
+            f"mf={mf!r} has {len(given)} entries, but X has {len(input_names)} columns "
+            f"({', '.join(input_names)}): give one family for all inputs, or one for each."
+        )
+    families = []
+    for entry in given:
+        if isinstance(entry, type) and issubclass(entry, Membership):
+            families.append(entry)
+        elif isinstance(entry, str) and entry in MEMBERSHIPS:
+            families.append(MEMBERSHIPS[entry])
+        else:
+            raise ValueError(
+                f"mf holds {entry!r}: it must be one of {', '.join(map(repr, MEMBERSHIPS))}, or a "
+                "subclass of skanfis.membership.Membership."
+            )
+    return families

@@ -9,7 +9,7 @@ otherwise hardly overlap.
 
 import numpy as np
 
-from ..antecedent import GridAntecedent, ScatteredAntecedent
+from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ..rows import Rows, fingerprint
 
 __all__ = ["clustered_antecedent", "representative_rows"]
@@ -55,22 +55,28 @@ def representative_rows(rows: Rows, most=_MOST_ROWS):
     return table[order], weight[order]
 
 
-def clustered_antecedent(family, rows: Rows, label):
+def clustered_antecedent(families, rows: Rows, label, premise_inputs):
     """A rule for every cluster that ``label(table, weight)`` finds in [z, y].
+
+    z are the ``premise_inputs`` alone, in whose terms the rules are; ``families`` has one entry per
+    input of the rows.
 
     ``label`` returns one integer per row; negative ones (noise) belong to no rule. A single cluster
     is a single rule without terms: a linear model.
     """
     table, weight = representative_rows(rows)
-    labels = np.asarray(label(table, weight))
+    n_inputs = rows.X.shape[1]
+    inputs = premise_inputs[~rows.inputs.is_constant[premise_inputs]]
+    seen = table
+    if premise_inputs.size < n_inputs:
+        seen = np.hstack([table[:, premise_inputs], table[:, n_inputs:]])
+    labels = np.asarray(label(seen, weight))
     found = np.unique(labels[labels >= 0])
     if found.size == 0:
         raise ValueError(
             "partition found no cluster: every training row was labelled as noise. Give a "
             "clusterer whose parameters fit standardised data (zero mean, unit deviation)."
         )
-    n_inputs = rows.X.shape[1]
-    inputs = np.flatnonzero(~rows.inputs.is_constant)
     if found.size == 1 or inputs.size == 0:
         return GridAntecedent((), counts=())
     centers, widths = np.empty((found.size, n_inputs)), np.empty((found.size, n_inputs))
@@ -79,5 +85,17 @@ def clustered_antecedent(family, rows: Rows, label):
         centers[r] = np.average(members, axis=0, weights=w)
         widths[r] = np.sqrt(np.average((members - centers[r]) ** 2, axis=0, weights=w))
     widths = np.maximum(widths, _SMALLEST_WIDTH) * np.sqrt(inputs.size)
-    theta = family.from_center_and_width(centers[:, inputs], widths[:, inputs])
-    return ScatteredAntecedent.build(family, inputs, theta)
+    if len({families[j] for j in inputs}) == 1:
+        family = families[inputs[0]]
+        theta = family.from_center_and_width(centers[:, inputs], widths[:, inputs])
+        return ScatteredAntecedent.build(family, inputs, theta)
+    groups = tuple(
+        TermGroup(
+            families[j],
+            np.full(found.size, j),
+            families[j].from_center_and_width(centers[:, j], widths[:, j]),
+        )
+        for j in inputs
+    )
+    first = found.size * np.arange(inputs.size)
+    return RuleTableAntecedent(groups, np.arange(found.size)[:, None] + first)

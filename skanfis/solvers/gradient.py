@@ -86,7 +86,8 @@ def gradient(
     start : ndarray of shape (premise.size,), optional
         Displacements to start from, inside the box; zero if not given.
     on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every epoch; the evaluation has no factor.
+        Called with (n_iter, evaluation) after every epoch; what is true ends the training. The
+        evaluation has no factor.
     step_size : float
         Length of the first step, in standardised units.
     error_goal : float, optional

@@ -177,8 +177,9 @@ def descend(view, x, *, max_iter, tol, on_iteration, step_size, error_goal):
         length.follow(point.cost)
         best = point if point.cost < best.cost else best
         loss_curve.append(point.evaluation.mean_squared_error)
-        if on_iteration is not None:
-            on_iteration(n_iter, point.evaluation)
+        if on_iteration is not None and on_iteration(n_iter, point.evaluation):
+            status = "stopped"
+            break
     return SolverResult(best.evaluation, np.array(loss_curve), n_iter, status)
 
 
@@ -216,7 +217,7 @@ def hybrid(
     start : ndarray of shape (premise.size,), optional
         Displacements to start from, inside the box; zero if not given.
     on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every epoch.
+        Called with (n_iter, evaluation) after every epoch; what is true ends the training.
     step_size : float
         Length of the first step, in standard deviations of the inputs and units of the slope.
     error_goal : float, optional

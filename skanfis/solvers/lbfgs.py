@@ -84,6 +84,7 @@ class _Progress:
         self.cost_of, self.tol, self.on_iteration = cost_of, tol, on_iteration
         self.point, self.loss_curve = first, [first.evaluation.mean_squared_error]
         self._costs = deque([first.cost], maxlen=_WINDOW + 1)
+        self._is_stopped = False
 
     @property
     def n_iter(self):
@@ -91,6 +92,8 @@ class _Progress:
 
     def status(self):
         """Why this is the end; None if it is not."""
+        if self._is_stopped:
+            return "stopped"
         variables, gradient = self.point.variables, self.point.gradient
         inside = np.clip(variables - gradient, self.cost_of.lower, self.cost_of.upper)
         if np.abs(variables - inside).max() <= _GRADIENT_FACTOR * self.tol * self.point.cost:
@@ -106,7 +109,7 @@ class _Progress:
         self.loss_curve.append(self.point.evaluation.mean_squared_error)
         self._costs.append(self.point.cost)
         if self.on_iteration is not None:
-            self.on_iteration(self.n_iter, self.point.evaluation)
+            self._is_stopped = bool(self.on_iteration(self.n_iter, self.point.evaluation))
         if self.status() is not None:
             raise StopIteration
 
@@ -127,7 +130,8 @@ def lbfgs(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iter
     start : ndarray of shape (premise.size,), optional
         Displacements to start from, inside the box; zero if not given.
     on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every iteration; the evaluation has no factor.
+        Called with (n_iter, evaluation) after every iteration; what is true ends the training. The
+        evaluation has no factor.
 
     Returns
     -------

@@ -117,7 +117,7 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
     start : ndarray of shape (premise.size,), optional
         Displacements to start from, inside the box; zero if not given.
     on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every accepted step.
+        Called with (n_iter, evaluation) after every accepted step; what is true ends the training.
 
     Returns
     -------
@@ -155,8 +155,9 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
         decrease = cost - trial_cost
         x, current, cost, n_iter = trial_x, trial, trial_cost, n_iter + 1
         loss_curve.append(current.mean_squared_error)
-        if on_iteration is not None:
-            on_iteration(n_iter, current)
+        if on_iteration is not None and on_iteration(n_iter, current):
+            status = "stopped"
+            break
         settled = settled + 1 if max(decrease, expected) <= tol * cost else 0
         if settled == 2:
             status = "cost"

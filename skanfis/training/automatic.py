@@ -20,21 +20,26 @@ Beyond a thousand rows, the candidates see representative rows only: the search 
 longer, whatever the number of rows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
 from sklearn.cluster import KMeans
 
-from .antecedent import Antecedent
-from .membership import Membership
-from .objective import SeparableProblem
-from .partition import clustered_antecedent, grid_antecedent, representative_rows
-from .premise import Premise
-from .rows import Rows, Scale
-from .solvers import varpro
+from ..cluster import FuzzyCMeans
+from ..membership import Membership
+from ..objective import SeparableProblem
+from ..partition import clustered_antecedent, grid_antecedent, representative_rows
+from ..premise import Premise
+from ..rows import Rows, Scale
+from ..solvers import varpro
+from .structure import Structure
 
-__all__ = ["Candidate", "Structure", "StructureSearch"]
+__all__ = ["SEARCHED", "Candidate", "StructureSearch"]
+
+# The partitions whose size the data decide on: which candidates each of them has.
+SEARCHED = ("auto", "grid", "fcm")
 
 _MOST_ROWS = 1000
 _MOST_COLUMNS = 256
@@ -68,22 +73,15 @@ class Candidate:
     counts: tuple[int, ...] | None
     n_clusters: int | None
     level: int
+    is_fuzzy: bool = False  # clusters of fuzzy c-means, not of k-means
 
     def describe(self):
         """In words."""
         if self.counts is not None:
             return f"grid {list(self.counts)}"
+        if self.is_fuzzy:
+            return f"{self.n_clusters} fuzzy clusters"
         return f"{self.n_clusters} scattered rules"
-
-
-@dataclass(frozen=True, eq=False)
-class Structure:
-    """What the search has found: where to start from, and how stiff to be."""
-
-    antecedent: Antecedent
-    alpha: float
-    stiffness: float
-    candidates: list[dict]  # what was tried, best first
 
 
 class StructureSearch:
@@ -93,8 +91,11 @@ class StructureSearch:
     ----------
     rows : Rows
         The rows that the final model will be trained on.
-    family : type of Membership
+    families : sequence of type of Membership
+        One per input.
     order : {0, 1}
+    premise_inputs, consequent_inputs : ndarray of int
+        The inputs that may have terms, and those that the consequents are linear in.
     n_distinct : int
         Number of distinct rows, as far as it has been counted.
     seed : int or RandomState
@@ -108,33 +109,37 @@ class StructureSearch:
     def __init__(
         self,
         rows: Rows,
-        family: type[Membership],
+        families: Sequence[type[Membership]],
         order: int,
+        premise_inputs: np.ndarray,
+        consequent_inputs: np.ndarray,
         n_distinct: int,
         seed,
         alpha: float | None,
         stiffness: float | None,
         overlap: float,
     ):
-        self.rows, self.family, self.order, self.seed = rows, family, order, seed
+        self.rows, self.families, self.order, self.seed = rows, families, order, seed
+        self.consequent_inputs = consequent_inputs
         self.alpha, self.stiffness, self.overlap = alpha, stiffness, overlap
-        self.inputs = np.flatnonzero(~rows.inputs.is_constant)
+        is_constant = rows.inputs.is_constant
+        self.inputs = premise_inputs[~is_constant[premise_inputs]]
+        self.n_basis = 1 + np.count_nonzero(~is_constant[consequent_inputs])
         self.sample = _sample(rows)
         self.n_sample = min(self.sample.n_rows, n_distinct)
         self.n_final = max(n_distinct, self.n_sample)
         self.scores: dict[Candidate, float] = {}
 
-    def run(self, grids_only=False):
-        """The best structure found."""
-        best = self._grow_grid()
-        if not grids_only and self.inputs.size:
-            best = self._better(best, self._grow_clusters())
+    def run(self, partition):
+        """The best structure found; ``partition`` is one of ``SEARCHED``."""
+        linear = Candidate((1,) * self.rows.X.shape[1], None, _FIRST_LEVEL)
+        best = linear if partition == "fcm" else self._grow_grid(linear)
+        if partition != "grid" and self.inputs.size:
+            best = self._better(best, self._grow_clusters(is_fuzzy=partition == "fcm"))
         best = self._tune(best)
         return self._structure(best)
 
-    def _grow_grid(self):
-        n_inputs = self.rows.X.shape[1]
-        best = Candidate((1,) * n_inputs, None, _FIRST_LEVEL)
+    def _grow_grid(self, best):
         inputs = list(self.inputs)
         while True:
             grown = {self._with_one_more(best, j): j for j in inputs}
@@ -152,16 +157,15 @@ class StructureSearch:
 
     def _is_small(self, candidate):
         n_rules = prod(candidate.counts)
-        n_basis = 1 + self.inputs.size if self.order == 1 else 1
-        n_columns = n_rules * n_basis
+        n_columns = n_rules * self.n_basis
         return (
             max(candidate.counts) <= _MOST_TERMS
             and n_rules <= _MOST_RULES
             and n_columns <= min(_MOST_COLUMNS, self.n_sample / 2)
         )
 
-    def _grow_clusters(self):
-        best, failures = Candidate(None, _RULE_NUMBERS[0], _FIRST_LEVEL), 0
+    def _grow_clusters(self, is_fuzzy):
+        best, failures = Candidate(None, _RULE_NUMBERS[0], _FIRST_LEVEL, is_fuzzy), 0
         for n_clusters in _RULE_NUMBERS[1:]:
             candidate = replace(best, n_clusters=n_clusters)
             better = self._is_better(candidate, best)
@@ -203,14 +207,18 @@ class StructureSearch:
 
     def _antecedent(self, candidate, rows):
         if candidate.counts is None:
-            clusterer = KMeans(candidate.n_clusters, n_init=3, random_state=self.seed)
+            if candidate.is_fuzzy:
+                clusterer = FuzzyCMeans(candidate.n_clusters, m="auto", random_state=self.seed)
+            else:
+                clusterer = KMeans(candidate.n_clusters, n_init=3, random_state=self.seed)
             return clustered_antecedent(
-                self.family, rows, lambda t, w: clusterer.fit(t, sample_weight=w).labels_
+                self.families,
+                rows,
+                lambda t, w: clusterer.fit(t, sample_weight=w).labels_,
+                self.inputs,
             )
-        scale = self.rows.inputs
-        low, high = ((edge - scale.offset) / scale.scale for edge in (scale.minimum, scale.maximum))
-        families = [self.family] * low.size
-        return grid_antecedent(families, candidate.counts, low, high, self.overlap)
+        low, high = self.rows.inputs.box
+        return grid_antecedent(self.families, candidate.counts, low, high, self.overlap)
 
     def _score(self, candidate):
         """Root of the final prediction error; infinite where there are too few rows."""
@@ -223,7 +231,9 @@ class StructureSearch:
             return np.inf
         alpha, stiffness = self._regularisation(candidate)
         antecedent = self._antecedent(candidate, self.sample)
-        problem = SeparableProblem(self.sample, antecedent, self.order, alpha)
+        problem = SeparableProblem(
+            self.sample, antecedent, self.order, alpha, consequent_inputs=self.consequent_inputs
+        )
         premise = Premise.of(antecedent, self.sample.inputs.minimum, self.sample.inputs.maximum)
         result = varpro(
             problem, premise, max_iter=_MOST_ITERATIONS, tol=_TOLERANCE, stiffness=stiffness

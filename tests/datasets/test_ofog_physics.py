@@ -40,6 +40,14 @@ def test_bias_gain_is_the_secant_of_the_response(bias):
         assert_allclose(gain, 0.98 * 1.01 * np.cos(0.2536 * 0.98 * np.deg2rad(rate)), rtol=1e-13)
 
 
+def test_noise_at_the_output_is_worth_the_inverse_slope_at_the_input():
+    rate, step = np.linspace(-200, 200, 9), 1e-4
+    optics = (0.2536, 0.98, 1.01)
+    ends = [physics.open_loop_response(rate + d, *optics) for d in (-step, step)]
+    slope = (ends[1] - ends[0]) / (2 * step)
+    assert_allclose(physics.change_of_rate_by_output(rate, *optics), 1 / slope, rtol=1e-8)
+
+
 def test_temperature_effects_vanish_at_the_reference_and_have_their_units():
     at = physics.REFERENCE_TEMPERATURE
     assert physics.relative_sagnac_factor(at, -370) == 1.0
@@ -56,6 +64,8 @@ def test_biases_have_the_units_of_data_sheets():
     assert_allclose(physics.thermal_rate_bias(1 / 60, 5.0) * 3600, 5.0)
     assert_allclose(physics.warm_up_bias(np.array([0.0, 180.0]), 30, 180) * 3600, [30, 30 / np.e])
     assert_allclose(physics.relative_scale_factor(500.0), 1.0005)
+    warm_up = physics.warm_up_scale_factor(np.array([0.0, 180.0]), 200.0, 180.0)
+    assert_allclose(warm_up - 1, [200e-6, 200e-6 / np.e], rtol=1e-9)
 
 
 def test_lag_of_a_step_is_the_exponential_whatever_the_interval():
@@ -128,3 +138,61 @@ def test_bias_instability_is_stationary_and_correlated_over_its_time():
     deviations = noise.std(axis=0)
     assert_allclose(deviations, deviations.mean(), rtol=0.06)
     assert_allclose(np.corrcoef(noise[:, 0], noise[:, 10])[0, 1], np.exp(-1), atol=0.05)
+
+
+def allan_deviation(rate, n_mean):
+    """Overlapping Allan deviation of samples of a rate, over the mean of ``n_mean`` of them."""
+    angle = np.concatenate([[0.0], np.cumsum(rate)])
+    means = (angle[n_mean:] - angle[:-n_mean]) / n_mean
+    return np.sqrt(0.5 * np.mean((means[n_mean:] - means[:-n_mean]) ** 2))
+
+
+def slope_of_allan_deviation(rate, n_means):
+    deviations = [allan_deviation(rate, n_mean) for n_mean in n_means]
+    return np.polyfit(np.log(n_means), np.log(deviations), 1)[0]
+
+
+def test_allan_deviation_of_the_angle_random_walk_falls_with_the_root_of_time(rng):
+    interval = 0.5
+    deviation = physics.angle_random_walk_deviation(0.03, interval)
+    noise = deviation * rng.standard_normal(1_000_000)
+    assert_allclose(slope_of_allan_deviation(noise, [1, 4, 16, 64]), -0.5, atol=0.01)
+    # N is read off at 1 s; N in deg/sqrt(h) is N / 60 in deg/sqrt(s).
+    assert_allclose(allan_deviation(noise, 2), 0.03 / 60, rtol=0.01)
+
+
+def test_allan_deviation_of_the_rate_random_walk_grows_with_the_root_of_time(rng):
+    # The mean over an ensemble: one walk of any length tells its Allan deviation badly.
+    interval, K = 10.0, 0.4
+    walks = [physics.rate_random_walk(rng.standard_normal(2000), K, interval) for _ in range(300)]
+    assert all(walk[0] == 0 for walk in walks)
+    tau = interval * np.array([16, 32, 64])
+    measured = [
+        3600 * np.sqrt(np.mean([allan_deviation(walk, n) ** 2 for walk in walks]))
+        for n in (16, 32, 64)
+    ]
+    # K is in deg/h/sqrt(h): its deviation reads K at tau = 3 h.
+    assert_allclose(measured, K * np.sqrt(tau / 3600 / 3), rtol=0.03)
+    spread = 3600 * np.std([walk[-1] for walk in walks])
+    assert_allclose(spread, K * np.sqrt(1999 * interval / 3600), rtol=0.1)
+
+
+def test_allan_deviation_of_the_quantisation_falls_with_time(rng):
+    interval, Q = 0.01, 0.8  # s, arcsec
+    # Enough white noise to make the angle forget where the last step was.
+    rate = 3.0 + 2.0 * rng.standard_normal(400_000)
+    noise = physics.quantised(rate, Q, interval) - rate
+    assert_allclose(slope_of_allan_deviation(noise, [1, 4, 16, 64]), -1.0, atol=0.02)
+    for n_mean in (1, 16):
+        expected = np.sqrt(3) * Q / 3600 / (n_mean * interval)
+        assert_allclose(allan_deviation(noise, n_mean), expected, rtol=0.02)
+
+
+def test_quantised_rate_counts_whole_increments_and_loses_no_angle(rng):
+    rate = rng.normal(size=5000)
+    read = physics.quantised(rate, 5.0, 0.1)
+    increment = np.sqrt(12) * 5.0 / 3600
+    counted = read * 0.1 / increment
+    assert_allclose(counted, np.rint(counted), atol=1e-9)
+    assert np.abs(np.cumsum(read - rate) * 0.1).max() <= increment / 2 + 1e-12
+    assert physics.quantised(rate, 0.0, 0.1) is rate

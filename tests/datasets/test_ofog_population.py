@@ -8,11 +8,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets._ofog_population import (
     Device,
+    RateTable,
     check_phase,
     draw_devices,
-    draw_rate,
     draw_runs,
     nominal_device,
+    with_noise,
 )
 
 
@@ -72,7 +73,7 @@ def test_refuses_coefficients_without_meaning(coefficients, error, message):
 
 
 def test_each_part_of_the_ambient_range_holds_one_run_of_each_device(random_state):
-    runs = draw_runs([Device()] * 3, 7, (-20.0, 50.0), 0.5, random_state)
+    runs = draw_runs([Device()] * 3, 7, 1, (-20.0, 50.0), 0.5, random_state)
     for device_id in range(3):
         ambients = [run.ambient for run in runs if run.device_id == device_id]
         assert sorted((np.array(ambients) + 20) // 10) == list(range(7))
@@ -80,16 +81,21 @@ def test_each_part_of_the_ambient_range_holds_one_run_of_each_device(random_stat
 
 
 def test_runs_differ_in_residual_heat_and_bias(random_state):
-    runs = draw_runs([Device(bias_repeatability=4.0)] * 500, 4, (20.0, 20.0), 0.5, random_state)
+    devices = [Device(bias_repeatability=4.0)] * 500
+    runs = draw_runs(devices, 4, 2, (20.0, 20.0), 0.5, random_state)
     heats = np.array([run.residual_heat for run in runs])
     assert_allclose([heats.min(), heats.mean(), heats.max()], [0, 0.25, 0.5], atol=0.01)
-    assert_allclose(np.std([run.bias for run in runs]), 4.0, rtol=0.05)
+    # Every power-up of a run has a bias of its own.
+    biases = np.array([run.biases for run in runs])
+    assert_allclose(biases.std(axis=0), 4.0, rtol=0.05)
+    assert abs(np.corrcoef(biases.T)[0, 1]) < 0.05
+    assert_allclose(np.mean([run.rising for run in runs]), 0.5, atol=0.05)
     assert {run.ambient for run in runs} == {20.0}
 
 
 def test_every_rate_is_held_once_before_any_comes_again(random_state):
     levels = np.linspace(-100, 100, 5)
-    rate = draw_rate(4 * 13 - 1, 4, levels, random_state)
+    rate = RateTable(levels, 100.0, 4, "random").draw(4 * 13 - 1, random_state)
     assert rate.size == 51
     dwells = [rate[start : start + 4] for start in range(0, 51, 4)]
     assert all(np.ptp(dwell) == 0 for dwell in dwells)
@@ -98,17 +104,55 @@ def test_every_rate_is_held_once_before_any_comes_again(random_state):
     assert not np.array_equal(order[:5], order[5:10])
 
 
+def test_rates_in_a_sweep_go_up_and_down_again(random_state):
+    levels = np.array([-10.0, 0.0, 10.0])
+    rate = RateTable(levels, 10.0, 2, "sweep").draw(17, random_state)
+    assert_array_equal(rate[::2], [-10, 0, 10, 0, -10, 0, 10, 0, -10])
+    assert_array_equal(rate[1::2], rate[:-1:2])
+    free = RateTable(None, 10.0, 1, "sweep").draw(100, random_state)
+    steps = np.diff(free)
+    assert (steps[:49] > 0).all()
+    assert (steps[50:] < 0).all()
+
+
+def test_one_rate_is_held_for_ever(random_state):
+    for order in ("random", "sweep"):
+        rate = RateTable(np.array([38.69]), 38.69, 3, order).draw(100, random_state)
+        assert_array_equal(rate, 38.69)
+
+
+def test_rates_without_levels_fill_the_range_and_never_come_again(random_state):
+    rate = RateTable(None, 100.0, 12, "random").draw(12 * 40, random_state)
+    dwells = rate[::12]
+    assert_array_equal(np.repeat(dwells, 12), rate)
+    assert np.unique(dwells).size == 40
+    assert sorted((dwells + 100) // 5) == list(range(40))
+    assert not np.array_equal(dwells, np.sort(dwells))
+
+
+def test_factor_on_the_noise_leaves_what_is_systematic_alone():
+    device = Device(thermometer_noise=0.1)
+    silent, louder = with_noise(device, 0.0), with_noise(device, 3.0)
+    assert silent.angle_random_walk == silent.quantisation == silent.bias_repeatability == 0
+    assert silent.bias_instability == silent.rate_random_walk == silent.thermometer_noise == 0
+    assert (louder.angle_random_walk, louder.thermometer_noise) == pytest.approx((0.15, 0.3))
+    assert with_noise(silent, 1.0) == silent
+    changed = {e.name for e in fields(Device) if getattr(silent, e.name) != getattr(device, e.name)}
+    assert "correlation_time" not in changed
+    assert len(changed) == 6
+
+
 def test_phase_is_refused_exactly_where_a_device_reaches_a_quarter_turn():
     device = Device(sagnac_temperature=0.0)
     limit = 90.0 / 0.2536
-    check_phase(device, 0.0, np.nextafter(limit, 0) - 1e-9, (-20.0, 50.0))
+    check_phase(device, 0.0, np.nextafter(limit, 0) - 1e-9, (-20.0, 50.0), "max_rate")
     with pytest.raises(ValueError, match=r"must be < 354\.9 deg/s: .*arcsine is not defined"):
-        check_phase(device, 0.0, limit, (-20.0, 50.0))
+        check_phase(device, 0.0, limit, (-20.0, 50.0), "max_rate")
 
 
 def test_phase_limit_holds_for_the_whole_population(random_state):
     with pytest.raises(ValueError, match=r"must be < 341\.7 deg/s"):
-        check_phase(Device(), 1.0, 400.0, (-20.0, 50.0))
+        check_phase(Device(), 1.0, 400.0, (-20.0, 50.0), "max_rate")
     largest = 0.0
     for device in draw_devices(Device(), 2000, 1.0, random_state):
         for coil in (-20.0, 50.0 + device.self_heating):

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import ScatteredAntecedent
-from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.antecedent import RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.partition import clustered_antecedent
 from skanfis.partition.clustered import representative_rows
 from skanfis.rows import Rows
@@ -25,6 +25,12 @@ def by_k_means(table, weight):
     return KMeans(3, n_init=3, random_state=0).fit(table, sample_weight=weight).labels_
 
 
+def rules_of(family, rows, label):
+    """All inputs in the premises, all of one family."""
+    n_inputs = rows.X.shape[1]
+    return clustered_antecedent([family] * n_inputs, rows, label, np.arange(n_inputs))
+
+
 def rule_parameters(antecedent, n_inputs):
     """Theta as (n_parameters, n_rules, n_inputs), rules in the order of their first centre."""
     (group,) = antecedent.groups
@@ -33,12 +39,40 @@ def rule_parameters(antecedent, n_inputs):
 
 
 class TestRules:
+    def test_families_may_differ_from_input_to_input(self, rng):
+        X, y, *_ = blobs(rng)
+        rows = Rows.standardised(X, y)
+        mixed = clustered_antecedent([Gaussian, Bell], rows, by_k_means, np.arange(2))
+        by_input = [group.theta for group in mixed.groups]
+        for j, family in enumerate([Gaussian, Bell]):
+            alone = rules_of(family, rows, by_k_means).groups[0].theta
+            assert_allclose(by_input[j], alone.reshape(len(alone), -1, 2)[:, :, j])
+        plain = rules_of(Gaussian, rows, by_k_means)
+        same = RuleTableAntecedent(
+            tuple(
+                TermGroup(Gaussian, np.full(3, j), plain.groups[0].theta[:, j::2]) for j in range(2)
+            ),
+            mixed.table,
+        )
+        Z = rng.normal(size=(2, 50))
+        assert_allclose(same.strengths(Z), plain.strengths(Z), rtol=1e-12)
+
+    def test_clusters_are_sought_in_the_premise_inputs_alone(self, rng):
+        X, y, *_ = blobs(rng)
+        noise = 100.0 * rng.normal(size=(len(X), 1))
+        rows = Rows.standardised(np.hstack([noise, X]), y)
+        found = clustered_antecedent([Gaussian] * 3, rows, by_k_means, np.array([1, 2]))
+        expected = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
+        assert set(found.groups[0].inputs) == {1, 2}
+        for one, other in zip(rule_parameters(found, 2), rule_parameters(expected, 2), strict=True):
+            assert_allclose(one, other)
+
     @pytest.mark.parametrize("weighted", [False, True])
     @pytest.mark.parametrize("n_inputs", [1, 2])
     def test_centers_and_widths_are_weighted_moments_of_the_clusters(self, rng, weighted, n_inputs):
         X, y, labels, weight = blobs(rng, n_inputs=n_inputs)
         rows = Rows.standardised(X, y, weight if weighted else None)
-        theta = rule_parameters(clustered_antecedent(Gaussian, rows, by_k_means), n_inputs)
+        theta = rule_parameters(rules_of(Gaussian, rows, by_k_means), n_inputs)
         z = (X - rows.inputs.offset) / rows.inputs.scale
         expected = []
         for blob in range(3):
@@ -57,7 +91,7 @@ class TestRules:
     def test_each_rule_rules_its_own_blob(self, rng, name):
         X, y, labels, _ = blobs(rng)
         rows = Rows.standardised(X, y)
-        antecedent = clustered_antecedent(MEMBERSHIPS[name], rows, by_k_means)
+        antecedent = rules_of(MEMBERSHIPS[name], rows, by_k_means)
         assert isinstance(antecedent, ScatteredAntecedent)
         strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
         # The same partition under other names.
@@ -71,7 +105,7 @@ class TestRules:
             seen.append(table)
             return np.arange(len(table)) % 2
 
-        clustered_antecedent(Gaussian, rows, label)
+        rules_of(Gaussian, rows, label)
         expected = rows.table(slice(None))
         assert_array_equal(seen[0], expected[np.lexsort(expected.T[::-1])])
 
@@ -79,9 +113,7 @@ class TestRules:
         # Without the far rows that are labelled -1, the rules are those of the rest.
         X, y, _, _ = blobs(rng)
         rows = Rows.standardised(X, y)
-        noisy = clustered_antecedent(
-            Gaussian, rows, lambda t, w: np.where(t[:, 0] > 0.5, -1, t[:, 1] > 0)
-        )
+        noisy = rules_of(Gaussian, rows, lambda t, w: np.where(t[:, 0] > 0.5, -1, t[:, 1] > 0))
         assert noisy.n_rules == 2
         z, _, _ = rows.read(slice(None))
         kept = z[:, z[0] <= 0.5]
@@ -93,13 +125,13 @@ class TestRules:
     def test_labels_may_be_any_integers(self, rng):
         X, y, _, _ = blobs(rng)
         rows = Rows.standardised(X, y)
-        plain = clustered_antecedent(Gaussian, rows, by_k_means)
-        odd = clustered_antecedent(Gaussian, rows, lambda t, w: 7 * by_k_means(t, w) + 3)
+        plain = rules_of(Gaussian, rows, by_k_means)
+        odd = rules_of(Gaussian, rows, lambda t, w: 7 * by_k_means(t, w) + 3)
         assert_array_equal(odd.parameters, plain.parameters)
 
     def test_one_cluster_is_a_linear_model(self, rng):
         rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
-        antecedent = clustered_antecedent(Gaussian, rows, lambda t, w: np.zeros(len(t), dtype=int))
+        antecedent = rules_of(Gaussian, rows, lambda t, w: np.zeros(len(t), dtype=int))
         assert antecedent.n_rules == 1
         assert antecedent.parameters.size == 0
         assert_array_equal(antecedent.strengths(np.zeros((2, 5))), 1.0)
@@ -107,14 +139,12 @@ class TestRules:
     def test_no_cluster_is_an_error_that_says_why(self, rng):
         rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
         with pytest.raises(ValueError, match=r"partition found no cluster: .* noise.*standardised"):
-            clustered_antecedent(Gaussian, rows, lambda t, w: np.full(len(t), -1))
+            rules_of(Gaussian, rows, lambda t, w: np.full(len(t), -1))
 
     def test_cluster_on_one_spot_has_a_term_of_some_width(self, rng):
         X = np.vstack([np.full((30, 2), 5.0), rng.normal(size=(30, 2))])
         rows = Rows.standardised(X, X[:, :1])
-        antecedent = clustered_antecedent(
-            Gaussian, rows, lambda t, w: (t[:, 0] < t[:, 0].max()).astype(int)
-        )
+        antecedent = rules_of(Gaussian, rows, lambda t, w: (t[:, 0] < t[:, 0].max()).astype(int))
         assert_allclose(
             np.exp(rule_parameters(antecedent, 2)[1, 1]), 0.1 * np.sqrt(2.0), rtol=1e-12
         )
@@ -122,8 +152,8 @@ class TestRules:
     def test_constant_input_gets_no_terms_and_widens_none(self, rng):
         X, y, _, _ = blobs(rng)
         padded = Rows.standardised(np.insert(X, 1, 7.0, axis=1), y)
-        plain = clustered_antecedent(Gaussian, Rows.standardised(X, y), by_k_means)
-        other = clustered_antecedent(Gaussian, padded, by_k_means)
+        plain = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
+        other = rules_of(Gaussian, padded, by_k_means)
         assert_array_equal(other.groups[0].inputs, [0, 2] * 3)
         assert_allclose(other.parameters, plain.parameters, rtol=1e-12, atol=1e-14)
 

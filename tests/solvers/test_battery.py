@@ -251,5 +251,22 @@ def test_workers_do_not_matter(name, monkeypatch):
 
 
 def test_every_message_belongs_to_a_status_tested():
-    tested = {"gradient", "cost", "step", "max_iter", "no_premise", "error_goal", "epochs"}
-    assert set(MESSAGES) == tested
+    by_solvers = {"gradient", "cost", "step", "max_iter", "no_premise", "error_goal", "epochs"}
+    from_outside = {"stopped", "interrupted", "as_given"}
+    assert set(MESSAGES) == by_solvers | from_outside
+
+
+@every_iterative_solver
+def test_what_watches_can_end_the_training(name):
+    rows, premise = noisy()
+    seen = []
+
+    def watch(n_iter, evaluation):
+        seen.append((n_iter, evaluation.mean_squared_error))
+        return n_iter == 3
+
+    result = solve(name, rows, premise, on_iteration=watch)
+    assert result.status == "stopped"
+    assert result.converged
+    assert [n for n, _ in seen] == [1, 2, 3]
+    assert_array_equal(result.loss_curve[1:], [loss for _, loss in seen])

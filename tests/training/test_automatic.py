@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor, _automatic
+from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
+from skanfis.training import automatic
 
 QUIET = {"warn_out_of_bounds": False}
 
@@ -121,20 +122,20 @@ def test_many_rows_are_represented_by_few(rng, monkeypatch):
     X = inputs(rng, 1500)
     y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(1500)
     seen = []
-    trained = _automatic.SeparableProblem
+    trained = automatic.SeparableProblem
     monkeypatch.setattr(
-        _automatic,
+        automatic,
         "SeparableProblem",
-        lambda rows, *args: seen.append(rows.n_rows) or trained(rows, *args),
+        lambda rows, *args, **kwargs: seen.append(rows.n_rows) or trained(rows, *args, **kwargs),
     )
     ANFISRegressor().fit(X, y)
-    assert set(seen) == {_automatic._MOST_ROWS}
+    assert set(seen) == {automatic._MOST_ROWS}
 
 
 def test_wide_data_keep_the_best_inputs_only(rng, monkeypatch):
     X = inputs(rng, 300, 12)
     y = np.sin(3.0 * X[:, 7]) + np.abs(X[:, 2]) + 0.05 * rng.standard_normal(300)
-    monkeypatch.setattr(_automatic, "_MOST_GROWING", 3)
+    monkeypatch.setattr(automatic, "_MOST_GROWING", 3)
     model = ANFISRegressor(partition="grid", alpha=1e-6, stiffness=1e-5).fit(X, y)
     counts = terms_per_input(model, 12)
     assert [j for j, count in enumerate(counts) if count > 1] == [2, 7]

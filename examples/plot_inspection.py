@@ -1,0 +1,119 @@
+"""
+Reading a model
+===============
+
+What has the model learnt, from how much data, and why does it say what it says here? This page asks
+a model of a gyro's error, behind a scaler as models usually are: rules, tables, explanations and
+pictures all speak of seconds and degrees. :doc:`/inspection` has the reference.
+"""
+
+import matplotlib.pyplot as plt
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_ofog
+from skanfis.export import explain, export_text, rules_table
+from skanfis.inspection import (
+    LossCurveDisplay,
+    MembershipDisplay,
+    ResponseSurfaceDisplay,
+    RuleActivationDisplay,
+    RuleContributionDisplay,
+)
+
+# %%
+# The model
+# ---------
+#
+# A simulated gyro, switched on at twelve temperatures and turned at many rates. Some ``stiffness``
+# keeps the terms near the places where they start, evenly over the range: it costs little here, and
+# "low" and "high" mean what they say.
+
+data = make_ofog(n_devices=1, n_runs=12, random_state=0)
+X, error = data[["temperature", "rate"]], data["error"]
+model = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[2, 4], stiffness=1e-3))
+model.fit(X, error)
+print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X)).std():.3f} °/s")
+
+# %%
+# Rules as text
+# -------------
+#
+# The weightiest first, to three digits. Consequents are told by the distance from round numbers near
+# the mean, so that their constants are values which the model takes there.
+
+print(export_text(model, precision=3, max_rules=4, output_names=["error"]))
+
+# %%
+# As a table
+# ----------
+#
+# "weight" is the part of the data on which a rule fires, "rows" the number of rows on which it is
+# the strongest.
+
+rules_table(model, about="mean").round(3)
+
+# %%
+# Why this prediction?
+# --------------------
+#
+# For one row: the rules that fired, and what each contributed. Contributions add up to the
+# prediction.
+
+row = X.iloc[[2000]]
+explanation = explain(model, row, min_strength=0.02)
+print(row.round(2).to_string(index=False))
+print(f"prediction {model.predict(row)[0]:.4f}, sum {explanation['contribution'].sum():.4f}")
+explanation.drop(columns=["row", "output"]).round(4)
+
+# %%
+# Memberships
+# -----------
+#
+# Before and after training, over the histogram of the data: how far training has moved the terms,
+# and whether there are data under each.
+
+MembershipDisplay.from_estimator(model, X)
+
+# %%
+# Which rules have data?
+# ----------------------
+#
+# The gyro warms fast only for a while after power-on. A full grid over temperature and its rate of
+# change has rules for which there are no data. They are hatched; what they say is extrapolation.
+
+warming = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], stiffness=0.1))
+warming.fit(data[["temperature", "temperature_rate", "rate"]], error)
+RuleActivationDisplay.from_estimator(warming)
+
+# %%
+# Response
+# --------
+#
+# The prediction over two inputs. It is pale where the training data do not cover it.
+
+ResponseSurfaceDisplay.from_estimator(model, X.iloc[::5])
+
+# %%
+# Contributions
+# -------------
+#
+# Along one input, the others held: how the rules hand over to each other, and what each adds to or
+# takes from the mean of the curve.
+
+RuleContributionDisplay.from_estimator(model, "rate", held={"temperature": 40.0})
+
+# %%
+# Training
+# --------
+#
+# The training error by iteration, of three solvers from the same start.
+
+figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
+for solver in ("varpro", "hybrid", "lbfgs"):
+    model.set_params(anfisregressor__solver=solver, anfisregressor__stiffness="auto")
+    LossCurveDisplay.from_estimator(model.fit(X, error), ax=ax)
+ax.set_xscale("symlog")
+
+plt.show()

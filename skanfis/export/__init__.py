@@ -1,0 +1,27 @@
+"""Carrying a trained model away: rules as text and as tables, other formats, other languages."""
+
+from .c import CCode, CCost, export_c
+from .fis import export_fis, read_fis, write_fis
+from .model_json import export_json, read_json, write_json
+from .onnx import register_onnx_converter
+from .table import explain, memberships_table, rules_table
+from .text import export_text
+from .trusted import TRUSTED_TYPES
+
+__all__ = [
+    "TRUSTED_TYPES",
+    "CCode",
+    "CCost",
+    "explain",
+    "export_c",
+    "export_fis",
+    "export_json",
+    "export_text",
+    "memberships_table",
+    "read_fis",
+    "read_json",
+    "register_onnx_converter",
+    "rules_table",
+    "write_fis",
+    "write_json",
+]

@@ -1,0 +1,27 @@
+"""How large a model a file may describe: known before memory is asked for."""
+
+__all__ = ["LARGEST_NUMBER", "MOST_NUMBERS", "check_size", "read_bytes"]
+
+# A rule base holds rules x terms, its consequents rules x (1 + inputs) x outputs: 160 MB.
+MOST_NUMBERS = 20_000_000
+# Squares of numbers up to this size, and of their ratios, are finite.
+LARGEST_NUMBER = 1e50
+
+
+def check_size(n_rules, n_terms, n_inputs, n_outputs):
+    """Raise ValueError where the model would be larger than this reader takes."""
+    needed = n_rules * (n_terms + (1 + n_inputs) * n_outputs)
+    if needed > MOST_NUMBERS:
+        raise ValueError(
+            f"{n_rules} rules over {n_terms} terms, {n_inputs} inputs and {n_outputs} outputs are "
+            f"{needed:,} numbers; at most {MOST_NUMBERS:,} are read."
+        )
+
+
+def read_bytes(path, most_bytes):
+    """The file's bytes; ValueError, without reading on, where there are more than so many."""
+    with open(path, "rb") as file:
+        data = file.read(most_bytes + 1)
+    if len(data) > most_bytes:
+        raise ValueError(f"{path} is larger than {most_bytes:,} bytes, the most that is read.")
+    return data

@@ -1,0 +1,109 @@
+"""What text, tables and pictures have in common: how a model's rules are told and chosen."""
+
+from dataclasses import replace
+from numbers import Integral, Real
+
+import numpy as np
+
+__all__ = [
+    "SORT_BY",
+    "check_choice",
+    "check_count",
+    "choose_rules",
+    "conditions",
+    "consequents_about",
+    "premise_text",
+    "renamed",
+    "round_reference",
+]
+
+SORT_BY = ("weight", "rows", "rule")
+
+
+def conditions(model):
+    """For every rule the positions (input, term) that it looks at."""
+    inputs = np.concatenate(
+        [group.inputs for group in model.antecedent.groups] or [np.empty(0, int)]
+    )
+    return [
+        [(int(inputs[t]), int(t)) for t in rule if t >= 0] for rule in model.antecedent.rule_terms
+    ]
+
+
+def premise_text(model, rule_conditions, conjunction=" AND "):
+    """Say "temperature is low AND rate is high"; "anything" of a rule that asks nothing."""
+    if not rule_conditions:
+        return "anything"
+    return conjunction.join(
+        f"{model.input_names[j]} is {model.term_names[t]}" for j, t in rule_conditions
+    )
+
+
+def choose_rules(model, sort_by, max_rules, min_weight):
+    """Positions of the rules to tell, in the order to tell them."""
+    check_choice("sort_by", sort_by, SORT_BY)
+    if max_rules is not None:
+        check_count("max_rules", max_rules, 1)
+    if not isinstance(min_weight, Real) or not 0.0 <= min_weight <= 1.0:
+        raise ValueError(
+            f"min_weight={min_weight!r} must be a number from 0 to 1: a part of the weight of the "
+            "training data."
+        )
+    # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
+    rank = {
+        "weight": np.round(model.rule_weights, 9),
+        "rows": model.rule_rows,
+        "rule": np.zeros(model.n_rules),
+    }
+    order = np.argsort(-rank[sort_by], kind="stable")
+    return order[~(model.rule_weights[order] < min_weight)][:max_rules]
+
+
+def consequents_about(model, reference):
+    """Coefficients (n_rules, 1 + n_inputs, n_outputs) of 1 and of the inputs less a reference."""
+    moved = np.zeros((model.n_rules, 1 + model.n_inputs, model.n_outputs))
+    moved[:, : model.coefficients.shape[1]] = model.coefficients
+    moved[:, 0] += np.einsum("j,rjo->ro", reference - model.reference, moved[:, 1:])
+    return moved
+
+
+def round_reference(model):
+    """The inputs' means, rounded to the leading digit of their spreads."""
+    digits = [int(np.floor(np.log10(spread))) for spread in model.spread]
+    return np.array([round(float(x), -d) for x, d in zip(model.reference, digits, strict=True)])
+
+
+def renamed(model, feature_names, output_names):
+    """The model with other names of inputs and outputs, where given."""
+    if feature_names is not None:
+        names = _check_names("feature_names", feature_names, model.n_inputs, "inputs")
+        model = replace(model, input_names=names)
+    if output_names is not None:
+        names = _check_names("output_names", output_names, model.n_outputs, "outputs")
+        model = replace(model, output_names=names)
+    return model
+
+
+def _check_names(parameter, names, count, what):
+    names = tuple(names) if not isinstance(names, str) else names
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
+    if len(names) != count:
+        raise ValueError(f"{parameter} has {len(names)} names; the model has {count} {what}.")
+    if len(set(names)) != len(names):
+        raise ValueError(f"{parameter} repeats a name: {list(names)!r}.")
+    return names
+
+
+def check_choice(parameter, value, choices):
+    """Raise ValueError if ``value`` is not one of ``choices``."""
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{parameter}={value!r} must be one of {', '.join(map(repr, choices))}.")
+
+
+def check_count(parameter, value, smallest, largest=None):
+    """Raise ValueError if ``value`` is not a whole number within its limits."""
+    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not is_whole or value < smallest or (largest is not None and value > largest):
+        limits = f"from {smallest} to {largest}" if largest else f"of {smallest} or more"
+        raise ValueError(f"{parameter}={value!r} must be a whole number {limits}.")

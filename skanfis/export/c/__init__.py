@@ -1,0 +1,152 @@
+"""A trained model as one C function over constant tables."""
+
+from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
+
+from .._fold import fold
+from .._numbers import Numbers
+from ._cost import CCost, cost
+from ._dialect import DTYPES, STANDARDS, Dialect
+from ._header import BITS, header
+from ._self_test import known_answers, self_test
+from ._source import Source
+from ._text import check_file_name, check_name
+
+__all__ = ["CCode", "CCost", "export_c"]
+
+
+@dataclass(frozen=True)
+class CCode:
+    """A header and a source file, and what the function in them costs.
+
+    Parameters
+    ----------
+    name : str
+        What all identifiers start with.
+    header, source : str
+        The text of the two files, in ASCII.
+    cost : CCost
+        Arithmetic per evaluation, and memory.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_c
+    >>> code = export_c(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()), name="sinc")
+    >>> '#include "sinc.h"' in code.source
+    True
+    """
+
+    name: str
+    header: str
+    source: str
+    cost: CCost
+
+
+def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1):
+    """Write a trained model as C: one header and one source file.
+
+    The function ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row
+    of raw inputs and returns a status. It uses constant tables and the functions ``exp`` and
+    ``log`` alone: no heap, no state, no recursion, loops of fixed length. Scalers of a pipeline are
+    folded in.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        An ANFIS estimator, or a Pipeline of scalers that ends in one, a TransformedTargetRegressor
+        or a search over these. What it does with rows outside the training data is what the
+        function does: see Notes.
+    path : str or path-like, default=None
+        Where to write, without a suffix: "out/gyro" makes out/gyro.h and out/gyro.c. None writes
+        nothing.
+    name : str, default=None
+        What all identifiers start with, at most 16 letters, digits and underscores. None takes the
+        last part of ``path``.
+    dtype : {"double", "float"}, default="double"
+        Type of inputs, outputs, tables and arithmetic.
+    std : {"c99", "c89"}, default="c99"
+        The oldest standard that a compiler must know. "c89" is for compilers of old signal
+        processors; it does without ``expf``.
+    min_coverage : float or None, default=0.1
+        Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
+        leaves that out of status and code. It is left out too where the rules have never seen data,
+        as those read from a .fis file.
+
+    Returns
+    -------
+    code : CCode
+        The text of both files, and the cost of an evaluation.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is none of the above, if ``estimator`` has a step that cannot be folded in,
+        or if the model's numbers go beyond what "float" holds.
+
+    Notes
+    -----
+    The status is a sum of bits: ``NAME_OUT_OF_RANGE`` (1), ``NAME_NOT_FINITE`` (2),
+    ``NAME_UNCOVERED`` (4), ``NAME_NO_OUTPUT`` (8); zero says that all is well. A row outside the
+    range of the training data is answered by ``out_of_bounds`` of the estimator. "clip" and
+    "linear" give an answer. "raise" leaves y as it is, so that a controller which keeps y holds its
+    last value. "nan" writes NaN, or in C89, which has none, leaves y as it is. A row that is not
+    finite gets no answer under any policy.
+
+    With the macro ``NAME_SELF_TEST`` defined, ``int NAME_self_test(void)`` compares the function
+    with what Python predicts, and returns zero if all is well; with ``NAME_SELF_TEST_MAIN`` too,
+    the file is a program that exits with zero then.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_c
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> code = export_c(model, name="sinc", dtype="float", std="c89")
+    >>> "int sinc_predict(const float x[SINC_N_INPUTS], float y[SINC_N_OUTPUTS]);" in code.header
+    True
+    >>> code.cost.exponentials, code.cost.multiply_adds
+    (8, 104)
+    """
+    _check_choice("dtype", dtype, DTYPES)
+    _check_choice("std", std, STANDARDS)
+    if min_coverage is not None and not (
+        isinstance(min_coverage, Real) and 0.0 < min_coverage <= 1.0
+    ):
+        raise ValueError(
+            f"min_coverage={min_coverage!r} must be a number above 0 and at most 1, or None."
+        )
+    if name is None and path is None:
+        raise ValueError("name=None takes the name from path, and path is None too: give either.")
+    stem = check_file_name(Path(path).name) if path is not None else None
+    name = check_name(stem if name is None else name)
+    stem = stem or name
+
+    model = fold(estimator)
+    if not model.rule_rows.any():
+        # Rules that come from elsewhere: no data to be near to or far from.
+        min_coverage = None
+    dialect = Dialect(name, dtype, std)
+    numbers = Numbers.of(model, dialect.dtype)
+    body = Source(numbers, dialect, model.out_of_bounds, min_coverage)
+    answers = known_answers(model, numbers, min_coverage, BITS)
+    price = cost(numbers, body)
+    code = CCode(
+        name,
+        header(model, numbers, dialect, price, min_coverage),
+        body.text(f"{stem}.h") + self_test(answers, dialect),
+        price,
+    )
+    if path is not None:
+        folder = Path(path).parent
+        (folder / f"{stem}.h").write_text(code.header, encoding="ascii", newline="\n")
+        (folder / f"{stem}.c").write_text(code.source, encoding="ascii", newline="\n")
+    return code
+
+
+def _check_choice(parameter, value, choices):
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{parameter}={value!r} must be one of {', '.join(choices)}.")

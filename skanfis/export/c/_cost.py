@@ -1,0 +1,100 @@
+"""What a C function costs: arithmetic per evaluation, memory."""
+
+from dataclasses import dataclass
+
+from ._families import BODIES
+from ._source import index_type
+
+__all__ = ["CCost", "cost"]
+
+# What C promises at least, and what there is nearly everywhere.
+_INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
+
+
+@dataclass(frozen=True)
+class CCost:
+    """What one evaluation inside the box takes, and the memory of the function.
+
+    Parameters
+    ----------
+    exponentials : int
+        Calls of ``exp``, at most.
+    logarithms : int
+        Calls of ``log``, at most; zero for Gaussians.
+    multiply_adds : int
+        Multiplications, most of them with an addition to follow.
+    divisions : int
+    table_bytes : int
+        Constant tables, which may lie in read-only memory.
+    stack_bytes : int
+        Arrays on the stack.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_c
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> export_c(model, name="sinc").cost.exponentials  # 2 inputs of 4 terms, not 16 rules
+    8
+    """
+
+    exponentials: int
+    logarithms: int
+    multiply_adds: int
+    divisions: int
+    table_bytes: int
+    stack_bytes: int
+
+
+def cost(numbers, code):
+    """CCost of ``code``, a Source over ``numbers``, for a row in the box."""
+    n_rules, n_outputs, n_basis = numbers.coefficients.shape
+    exponentials = logarithms = multiply_adds = 0
+    for terms in numbers.terms:
+        n_terms, family = len(terms.constants), BODIES[terms.family]
+        exponentials += n_terms * family.exponentials
+        logarithms += n_terms * family.logarithms
+        multiply_adds += n_terms * family.multiplications
+    if numbers.counts is None:
+        n_shares, divisions = n_rules, 1
+    else:
+        n_shares, divisions = numbers.n_terms, len(numbers.counts)
+        products, n_products = 1, 0
+        for k, count in enumerate(numbers.counts):
+            products *= count
+            n_products += products if k else 0
+        multiply_adds += n_products
+    exponentials += n_shares
+    multiply_adds += n_shares + n_rules * n_outputs * n_basis
+    multiply_adds += n_rules * code.weighs_support
+    return CCost(
+        exponentials, logarithms, multiply_adds, divisions, table_bytes(numbers, code), stack(code)
+    )
+
+
+def table_bytes(numbers, code):
+    """Of all constant tables, with the widths of types that nearly every machine has."""
+    real = [numbers.low, numbers.high, numbers.offset, numbers.coefficients]
+    real += [numbers.reference] if code.has_slopes else []
+    real += [terms.constants for terms in numbers.terms]
+    real += [numbers.inverse_spread] if code.measures_distance else []
+    real += [numbers.support] if code.weighs_support else []
+    positions = [numbers.term_inputs] if numbers.n_terms else []
+    positions += [] if numbers.rule_terms is None else [numbers.rule_terms]
+    positions += [numbers.slope_inputs] if code.selects_slopes else []
+    return sum(table.nbytes for table in real) + sum(
+        table.size * _INDEX_BYTES[index_type(table)] for table in positions
+    )
+
+
+def stack(code):
+    """Of the arrays of the main function, and of the one that it may call."""
+    numbers = code.numbers
+    n_values = numbers.n_inputs * (1 + code.has_slopes) + numbers.n_outputs
+    n_values += code.n_logarithms if code.has_shares else 0
+    n_values += 0 if code.is_grid else numbers.n_rules
+    if code.is_linear:
+        n_values += numbers.n_inputs + numbers.n_outputs
+        n_values += numbers.n_terms if code.is_grid else code.n_logarithms + numbers.n_rules
+    return n_values * numbers.dtype.itemsize

@@ -1,0 +1,83 @@
+"""The .h file: what a caller must know."""
+
+import textwrap
+
+from ._text import comment
+
+__all__ = ["BITS", "header"]
+
+BITS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
+
+_POLICIES = {
+    "clip": "is answered as the nearest row in the box",
+    "linear": "is answered by value and slope at the nearest row in the box",
+    "raise": "gets no output: y stays as it is",
+    "nan": "gets no output: y becomes NaN, or stays as it is where C has no NaN",
+}
+
+_CODE = """/*
+ * A Takagi-Sugeno-Kang fuzzy model written by skanfis; generated, not to be edited.
+ *
+$facts
+ *
+ * Constant tables, no heap, no state: safe to call from several threads and from interrupts.
+ * Compile without -ffast-math, which takes away the check of the inputs.
+ */
+#ifndef $NAME_H
+#define $NAME_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define $NAME_N_INPUTS $n_inputs
+#define $NAME_N_OUTPUTS $n_outputs
+
+/* The status is the sum of these. */
+#define $NAME_IN_RANGE 0
+#define $NAME_OUT_OF_RANGE 1 /* an input lies outside the range of the training data */
+#define $NAME_NOT_FINITE 2 /* an input is infinite or not a number */
+#define $NAME_UNCOVERED 4 /* hardly any training data lie near the inputs */
+#define $NAME_NO_OUTPUT 8 /* y holds no answer */
+
+/* Evaluates the model at x, writes y, returns the status. */
+int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS]);
+
+#ifdef $NAME_SELF_TEST
+/* Returns 0, or else the number of the first test row that fails, counted from 1. */
+int $name_self_test(void);
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* $NAME_H */
+"""
+
+
+def header(model, numbers, dialect, cost, min_coverage):
+    """The header, whose first comment says what the model is and what it costs."""
+    lines = [
+        f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
+        f"Per evaluation in range: {cost.exponentials} exponentials, {cost.logarithms} logarithms, "
+        f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions.",
+        f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack.",
+        "",
+        "Inputs x, and their range in the training data:",
+    ]
+    box = zip(model.input_names, numbers.low, numbers.high, strict=True)
+    lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
+    lines += ["Outputs y:"]
+    lines += [f"  [{k}] {comment(name)}" for k, name in enumerate(model.output_names)]
+    policy = f"A row outside this range {_POLICIES[model.out_of_bounds]}."
+    lines += ["", policy, "A row that is not finite gets no output either way."]
+    if min_coverage is not None:
+        lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
+    facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
+    return dialect.write(
+        _CODE,
+        facts="\n".join(f" * {line}".rstrip() for line in facts),
+        n_inputs=model.n_inputs,
+        n_outputs=model.n_outputs,
+    )

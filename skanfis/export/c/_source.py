@@ -1,0 +1,512 @@
+"""The .c file: constant tables, and the functions that read them.
+
+The order of work is that of ``skanfis.model``: hold the inputs in the box, log memberships,
+strengths by a softmax that subtracts the largest, consequents weighed by the strengths. A grid
+normalises each input alone and multiplies the shares in nested loops, so that it takes one
+exponential per term, not per rule and input. The continuation "linear" is worked out only for rows
+outside the box: it is the derivative along the way back to the box, carried forward through the
+same loops.
+"""
+
+import re
+
+import numpy as np
+
+from ._families import BODIES, HELPERS
+from ._text import literals
+
+__all__ = ["Source", "index_type"]
+
+# C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
+_MOST_LOOPS = 12
+
+_NORMALISE = """
+/* Turns n logarithms into shares that add up to one. */
+static void $name_normalise($real *l, $int n)
+{
+    $int i;
+    $real top = l[0], sum = 0.0R;
+    for (i = 1; i < n; ++i) {
+        if (l[i] > top) {
+            top = l[i];
+        }
+    }
+    for (i = 0; i < n; ++i) {
+        l[i] = $EXP(l[i] - top);
+        sum += l[i];
+    }
+    sum = 1.0R / sum;
+    for (i = 0; i < n; ++i) {
+        l[i] *= sum;
+    }
+}
+"""
+
+_CENTRE = """
+/* Subtracts from n derivatives their mean by the n shares. */
+static void $name_centre($real *s, const $real *share, $int n)
+{
+    $int i;
+    $real mean = 0.0R;
+    for (i = 0; i < n; ++i) {
+        mean += share[i] * s[i];
+    }
+    for (i = 0; i < n; ++i) {
+        s[i] -= mean;
+    }
+}
+"""
+
+_REJECT_UNTOUCHED = """
+/* No outputs: y stays as it is. */
+#define $NAME_REJECT(y, status) ((status) | $NAME_NO_OUTPUT)
+"""
+
+_REJECT_NAN = """
+/* No outputs: y becomes NaN where there is such a thing, else it stays as it is. */
+static int $name_reject($real *y, int status)
+{
+#ifdef NAN
+    int o;
+    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+        y[o] = ($real)NAN;
+    }
+#else
+    (void)y;
+#endif
+    return status | $NAME_NO_OUTPUT;
+}
+#define $NAME_REJECT(y, status) $name_reject(y, status)
+"""
+
+_INPUTS = """
+    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+        /* Not (a and b): NaN fails every comparison. */
+        if (!(x[i] >= -$MAX && x[i] <= $MAX)) {
+            return $NAME_REJECT(y, $NAME_NOT_FINITE);
+        }
+        c[i] = x[i];
+        if (c[i] < $name_low[i]) {
+            c[i] = $name_low[i];
+            status = $NAME_OUT_OF_RANGE;
+        } else if (c[i] > $name_high[i]) {
+            c[i] = $name_high[i];
+            status = $NAME_OUT_OF_RANGE;
+        }
+"""
+
+
+def index_type(values):
+    """The smallest unsigned type that holds these positions whatever the width of a char is."""
+    largest = max(map(int, np.ravel(values)), default=0)
+    limits = [(255, "unsigned char"), (65535, "unsigned short")]
+    return next((kind for limit, kind in limits if largest <= limit), "unsigned long")
+
+
+def _words(terms):
+    """What stands for the distances and constants of terms in their family's templates."""
+    n, n_columns = terms.n_locations, terms.constants.shape[1]
+    rest = [f" - p[{n + k}]" if terms.is_in_two else "" for k in range(n)]
+    first = n * (1 + terms.is_in_two)
+    distances = {f"d{k}": f"(x - p[{k}]{rest[k]})" for k in range(n)}
+    return distances | {f"p{k - first}": f"p[{k}]" for k in range(first, n_columns)}
+
+
+def _at(array, start):
+    return f"{array} + {start}" if start else array
+
+
+class Source:
+    """The functions and tables of a .c file, without its self-test.
+
+    ``policy`` is what to do with rows outside the box, ``min_coverage`` the coverage below which a
+    row is uncovered, or None.
+    """
+
+    def __init__(self, numbers, dialect, policy, min_coverage):
+        is_constant = not numbers.n_terms and not numbers.slope_inputs.size
+        # The tangent of a constant is the constant.
+        self.policy = "clip" if is_constant and policy == "linear" else policy
+        self.numbers, self.min_coverage = numbers, min_coverage
+        self.dialect = dialect
+        # int has 16 bits at least.
+        self.int = "long" if max(numbers.n_rules, numbers.n_terms) > 32767 else "int"
+        n_loops = len(numbers.counts or ())
+        if dialect.std == "c89" and n_loops > _MOST_LOOPS:
+            raise ValueError(
+                f"std='c89' has {_MOST_LOOPS} loops in one another at most, and the grid has "
+                f"terms on {n_loops} inputs. Export as 'c99', or put terms on fewer inputs."
+            )
+
+    def write(self, template, **words):
+        return self.dialect.write(template, int=self.int, **words)
+
+    @property
+    def is_linear(self):
+        return self.policy == "linear"
+
+    @property
+    def measures_distance(self):
+        """Whether rows outside the box get an answer, whose coverage falls with the distance."""
+        return self.min_coverage is not None and self.policy in ("clip", "linear")
+
+    @property
+    def weighs_support(self):
+        """Whether coverage differs from rule to rule."""
+        return self.min_coverage is not None and self.numbers.support is not None
+
+    @property
+    def judges_coverage(self):
+        """Whether any row that gets an answer can be uncovered."""
+        return self.measures_distance or self.weighs_support
+
+    def text(self, include):
+        """All of it; ``include`` is the name of the header."""
+        parts = [
+            f'#include "{include}"\n\n#include <float.h>\n#include <math.h>\n',
+            self.macros() + "\n",
+            self.tables(),
+            *self.families(),
+            self.functions(),
+        ]
+        return "\n".join(parts)
+
+    def macros(self):
+        """EXP and LOG, where the functions below take them."""
+        body = "".join([*self.families(), self.functions()])
+        lines = self.dialect.functions().splitlines()
+        return "\n".join(line for line in lines if f"{line.split()[1].split('(')[0]}(" in body)
+
+    def table(self, kind, name, values):
+        shape = "".join(f"[{n}]" for n in values.shape)
+        return self.write(f"static const {kind} $name_{name}{shape} =\n{literals(values)};\n")
+
+    def tables(self):
+        numbers, real = self.numbers, self.dialect.real
+        tables = [self.table(real, "low", numbers.low), self.table(real, "high", numbers.high)]
+        if self.has_slopes:
+            tables.append(self.table(real, "reference", numbers.reference))
+        if self.measures_distance:
+            tables.append(self.table(real, "inverse_spread", numbers.inverse_spread))
+        for k, terms in enumerate(numbers.terms):
+            tables.append(self.table(real, f"terms{k}", terms.constants))
+        if numbers.n_terms:
+            tables.append(self.index_table("term_input", numbers.term_inputs))
+        if numbers.rule_terms is not None:
+            tables.append(self.index_table("rule_terms", numbers.rule_terms))
+        if self.selects_slopes:
+            tables.append(self.index_table("slope_input", numbers.slope_inputs))
+        if self.weighs_support:
+            tables.append(self.table(real, "support", numbers.support))
+        tables.append(self.table(real, "offset", numbers.offset))
+        tables.append("/* Of each rule and output: a value, then a slope per input. */")
+        tables.append(self.table(real, "consequents", numbers.coefficients))
+        return "\n".join(tables)
+
+    def index_table(self, name, values):
+        return self.table(index_type(values), name, values)
+
+    @property
+    def selects_slopes(self):
+        """Whether only some of the inputs take part in the consequents."""
+        return 0 < self.numbers.slope_inputs.size < self.numbers.n_inputs
+
+    def families(self):
+        """Functions of the families in use, after those that they call."""
+        used = {terms.family.name: terms for terms in self.numbers.terms}
+        functions = []
+        for label, terms in used.items():
+            bodies = {"": BODIES[terms.family].value}
+            if self.is_linear:
+                bodies["_slope"] = BODIES[terms.family].slope
+            for suffix, body in bodies.items():
+                what = "Derivative of the logarithm" if suffix else "Logarithm"
+                head = f"/* {what} of a membership: {label}. */\n"
+                head += f"static $real $name_{label}{suffix}($real x, const $real *p)\n"
+                functions.append(self.write(f"{head}{{{body}}}\n", **_words(terms)))
+        calls = "".join(functions)
+        helpers = [
+            self.write(code).lstrip()
+            for name, code in HELPERS.items()
+            if re.search(rf"\b{self.dialect.name}_{name}\(", calls)
+        ]
+        return helpers + functions
+
+    def functions(self):
+        parts = []
+        if self.has_shares:
+            parts.append(self.write(_NORMALISE).lstrip())
+            if self.is_linear:
+                parts.append(self.write(_CENTRE).lstrip())
+        if self.is_linear:
+            parts.append(self.tangent())
+        has_nan = self.policy == "nan" and self.dialect.std == "c99"
+        parts.append(self.write(_REJECT_NAN if has_nan else _REJECT_UNTOUCHED).lstrip())
+        parts.append(self.predict())
+        return "\n".join(parts)
+
+    # The main function.
+
+    def predict(self):
+        numbers = self.numbers
+        lines = [
+            "int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
+            "{",
+            "    /* Inputs in the box. */",
+            f"    $real c[{numbers.n_inputs}], sum[{numbers.n_outputs}];",
+        ]
+        if self.has_slopes:
+            lines.append(f"    $real z[{numbers.n_inputs}];")
+        if self.has_shares:
+            lines.append(f"    $real l[{self.n_logarithms}];")
+        if not self.is_grid:
+            lines.append(f"    $real w[{numbers.n_rules}];")
+        if self.is_linear:
+            lines.append(f"    $real e[{numbers.n_inputs}];")
+        if self.judges_coverage:
+            lines.append(f"    $real covered = {'0.0R' if self.weighs_support else '1.0R'};")
+        lines += [
+            "    int status = $NAME_IN_RANGE;",
+            f"    $int {', '.join(self.loop_variables(tangent=False))};",
+            "",
+            _INPUTS.strip("\n"),
+        ]
+        if self.has_slopes:
+            lines.append("        z[i] = c[i] - $name_reference[i];")
+        if self.is_linear:
+            lines.append("        e[i] = x[i] - c[i];")
+        lines.append("    }")
+        if self.policy in ("nan", "raise"):
+            lines += [
+                "    if (status != $NAME_IN_RANGE) {",
+                "        return $NAME_REJECT(y, status);",
+                "    }",
+            ]
+        lines += [*self.strengths("l", "w", ""), ""]
+        lines += [
+            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
+            "        sum[o] = 0.0R;",
+            "    }",
+        ]
+        lines += self.over_rules(self.add_rule, tangent=False)
+        if self.is_linear:
+            values = [*self.places, "e", *self.shares]
+            lines += [
+                "    if (status != $NAME_IN_RANGE) {",
+                f"        $name_tangent({', '.join([*values, 'sum'])});",
+                "    }",
+            ]
+        lines += self.judge_coverage()
+        # Last, so that y may be x.
+        lines += [
+            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
+            "        y[o] = $name_offset[o] + sum[o];",
+            "    }",
+            "    return status;",
+            "}",
+        ]
+        return self.write("\n".join(lines) + "\n")
+
+    @property
+    def is_grid(self):
+        """Whether strengths are products of shares, or one."""
+        return self.numbers.counts is not None
+
+    @property
+    def has_shares(self):
+        """Whether there is anything to normalise."""
+        return self.numbers.n_terms > 0 or not self.is_grid
+
+    @property
+    def places(self):
+        """Names of where the row lies: what memberships take, what consequents take."""
+        return ["c"] * self.has_shares + ["z"] * self.has_slopes
+
+    @property
+    def shares(self):
+        """Names of what the strengths are made of."""
+        if not self.has_shares:
+            return []
+        return ["l"] if self.is_grid else ["w"]
+
+    @property
+    def n_logarithms(self):
+        """Logarithms that are kept: of terms, and the zero of "none"."""
+        return self.numbers.n_terms + (self.numbers.rule_terms is not None)
+
+    def loop_variables(self, tangent):
+        n_loops = len(self.numbers.counts or ())
+        names = ["r", "o", *(f"i{k}" for k in range(n_loops))]
+        if not tangent or self.numbers.n_terms:
+            names.insert(0, "i")
+        if self.has_slopes:
+            names.append("j")
+        if self.numbers.terms and not self.is_grid:
+            names.append("k")
+        return names
+
+    @property
+    def has_slopes(self):
+        return self.numbers.slope_inputs.size > 0
+
+    def strengths(self, logarithms, rules, slope):
+        """Terms, then shares (of a grid, in place) or strengths; or their derivatives."""
+        numbers = self.numbers
+        lines = []
+        for k, terms in enumerate(numbers.terms):
+            position = f"{terms.start} + i" if terms.start else "i"
+            of_input = f"$name_term_input[{position}]"
+            value = f"$name_{terms.family.name}{slope}(c[{of_input}], $name_terms{k}[i])"
+            value += f" * e[{of_input}]" if slope else ""
+            lines += [
+                f"    for (i = 0; i < {len(terms.constants)}; ++i) {{",
+                f"        {logarithms}[{position}] = {value};",
+                "    }",
+            ]
+        if self.is_grid:
+            for start, count in zip(numbers.block_starts, numbers.counts, strict=True):
+                lines += self.finish(_at(logarithms, start), _at("l", start), count, slope)
+            return lines
+        if numbers.rule_terms is not None:
+            lines.append(f"    {logarithms}[{numbers.n_terms}] = 0.0R;")
+            term = "$name_rule_terms[r][k]"
+        else:
+            term = f"r * {numbers.terms_per_rule} + k"
+        lines += [
+            f"    for (r = 0; r < {numbers.n_rules}; ++r) {{",
+            f"        {rules}[r] = 0.0R;",
+            f"        for (k = 0; k < {numbers.terms_per_rule}; ++k) {{",
+            f"            {rules}[r] += {logarithms}[{term}];",
+            "        }",
+            "    }",
+        ]
+        return lines + self.finish(rules, "w", numbers.n_rules, slope)
+
+    def finish(self, values, shares, count, slope):
+        if slope:
+            return [f"    $name_centre({values}, {shares}, {count});"]
+        return [f"    $name_normalise({values}, {count});"]
+
+    def over_rules(self, body, tangent):
+        """A loop over all rules around ``body(strength, change)``, in C order for a grid."""
+        numbers = self.numbers
+        if not self.is_grid:
+            change = "s[r]" if tangent else ""
+            inner = [f"        {line}" for line in body("w[r]", change)]
+            return [f"    for (r = 0; r < {numbers.n_rules}; ++r) {{", *inner, "    }"]
+        if not numbers.counts:
+            change = "0.0R" if tangent else ""
+            return ["    r = 0;", *(f"    {line}" for line in body("1.0R", change))]
+        lines, depth = ["    r = 0;"], 4
+        for k, (start, count) in enumerate(zip(numbers.block_starts, numbers.counts, strict=True)):
+            pad = " " * depth
+            place = f"{start} + i{k}" if start else f"i{k}"
+            product = f"w{k - 1} * l[{place}]" if k else f"l[{place}]"
+            lines.append(f"{pad}for (i{k} = 0; i{k} < {count}; ++i{k}) {{")
+            lines.append(f"{pad}    const $real w{k} = {product};")
+            if tangent:
+                total = f"s{k - 1} + s[{place}]" if k else f"s[{place}]"
+                lines.append(f"{pad}    const $real s{k} = {total};")
+            depth += 4
+        last = len(numbers.counts) - 1
+        lines += [" " * depth + line for line in body(f"w{last}", f"s{last}" if tangent else "")]
+        lines.append(" " * depth + "++r;")
+        for _ in numbers.counts:
+            depth -= 4
+            lines.append(" " * depth + "}")
+        return lines
+
+    def slope_loop(self, statement, pad):
+        """``statement`` for every slope j of a consequent, on input @."""
+        if not self.has_slopes:
+            return []
+        at = "$name_slope_input[j]" if self.selects_slopes else "j"
+        return [
+            f"{pad}for (j = 0; j < {self.numbers.slope_inputs.size}; ++j) {{",
+            f"{pad}    {statement.replace('@', at)}",
+            f"{pad}}}",
+        ]
+
+    def add_rule(self, strength, change):
+        lines = []
+        if self.weighs_support:
+            lines.append(f"covered += {strength} * $name_support[r];")
+        return [
+            *lines,
+            "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
+            "    $real f = $name_consequents[r][o][0];",
+            *self.slope_loop("f += $name_consequents[r][o][1 + j] * z[@];", "    "),
+            f"    sum[o] += {strength} * f;",
+            "}",
+        ]
+
+    def judge_coverage(self):
+        if not self.judges_coverage:
+            return []
+        lines = []
+        if self.measures_distance:
+            lines += [
+                "    if (status != $NAME_IN_RANGE) {",
+                "        $real distance = 0.0R;",
+                "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
+                "            const $real d = (x[i] - c[i]) * $name_inverse_spread[i];",
+                "            distance += d * d;",
+                "        }",
+                "        covered *= $EXP(-0.5R * distance);",
+                "    }",
+            ]
+        return [
+            *lines,
+            f"    if (covered < {self.dialect.number(self.min_coverage)}) {{",
+            "        status |= $NAME_UNCOVERED;",
+            "    }",
+        ]
+
+    # The continuation of "linear".
+
+    def tangent(self):
+        """Add to ``sum`` its derivative along e, the way from the box to the input."""
+        numbers = self.numbers
+        arguments = [f"const $real *{name}" for name in (*self.places, "e", *self.shares)]
+        lines = [
+            "/* Adds to every sum its derivative by the inputs times e, the way out of the box. */",
+            f"static void $name_tangent({', '.join(arguments)},",
+            "    $real *sum)",
+            "{",
+        ]
+        # Of a grid: change of the logarithm of each share; else of terms, and of each strength.
+        if self.is_grid and numbers.n_terms:
+            lines.append(f"    $real s[{numbers.n_terms}];")
+        if not self.is_grid:
+            lines.append(f"    $real t[{self.n_logarithms}], s[{numbers.n_rules}];")
+        lines.append(f"    $real change[{numbers.n_outputs}];")
+        lines.append(f"    $int {', '.join(self.loop_variables(tangent=True))};")
+        names = ("s", "") if self.is_grid else ("t", "s")
+        lines += ["", *self.strengths(*names, "_slope")]
+        lines += [
+            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
+            "        change[o] = 0.0R;",
+            "    }",
+        ]
+        lines += self.over_rules(self.add_rule_change, tangent=True)
+        lines += [
+            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
+            "        sum[o] += change[o];",
+            "    }",
+            "}",
+        ]
+        return self.write("\n".join(lines) + "\n")
+
+    def add_rule_change(self, strength, change):
+        along = "f += $name_consequents[r][o][1 + j] * z[@];"
+        ahead = "change_of_f += $name_consequents[r][o][1 + j] * e[@];"
+        return [
+            "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
+            "    $real f = $name_consequents[r][o][0];",
+            *(["    $real change_of_f = 0.0R;"] if self.has_slopes else []),
+            *self.slope_loop(along, "    "),
+            *self.slope_loop(ahead, "    "),
+            f"    change[o] += {strength} * ({change} * f"
+            + (" + change_of_f);" if self.has_slopes else ");"),
+            "}",
+        ]

@@ -1,0 +1,368 @@
+"""From a .fis file to a frozen model: strictly, and nothing but data."""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import groupby
+from math import prod
+
+import numpy as np
+
+from ...antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from ...model import TSKModel
+from .._limits import check_size, read_bytes
+from .functions import theta_of
+from .syntax import sections_of, shown, text_of
+
+__all__ = ["parse_fis", "read_fis"]
+
+_MOST_BYTES = 2**22
+_MOST_VARIABLES = 1000
+_MOST_TERMS = 10_000
+_MOST_RULES = 100_000
+
+
+def read_fis(path, *, input_names=None):
+    r"""Read a Sugeno system from a .fis file of MATLAB, Octave or fuzzylite.
+
+    The file is data: it is parsed strictly, and no part of it is ever run. What it may hold:
+
+    * Sugeno systems with product as AND, weighted average, constant or linear consequents, and one
+      or more outputs;
+    * the membership functions gaussmf, gbellmf, trimf, trapmf, gauss2mf, pimf, smf, zmf, dsigmf
+      with one slope, and psigmf;
+    * rules of weight 1 that are joined by AND and may leave inputs out (0).
+
+    Everything else is refused: Mamdani systems, OR, NOT, hedges, rule weights, other functions. At
+    most 4 MiB are read, and at most 20 million numbers held.
+
+    Parameters
+    ----------
+    path : str or path-like
+    input_names : sequence of str, default=None
+        Names for the inputs in place of the file's: those of a table's columns.
+
+    Returns
+    -------
+    model : skanfis.model.TSKModel
+        The box of the model is the Range of the inputs; outside it the edge is held
+        (``out_of_bounds="clip"``), where other programs compute on or refuse. A full grid becomes a
+        ``GridAntecedent`` with its rules in C order, rules with terms of their own a
+        ``ScatteredAntecedent``, all else a ``RuleTableAntecedent``. Of the training data the file
+        knows nothing: ``coverage`` is zero everywhere.
+
+    Raises
+    ------
+    ValueError
+        With the line, if the file is malformed or holds what is not supported; if
+        ``input_names`` are not one per input, and different.
+    OSError
+        If the file cannot be opened.
+
+    Notes
+    -----
+    Membership functions that no rule uses are left out. Where no rule fires, programs give zero,
+    NaN, or the middle of the output's Range; here the nearest rule speaks.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import read_fis, write_fis
+    >>> X, y = make_jang_sinc()
+    >>> estimator = ANFISRegressor(n_mfs=4).fit(X, y)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_fis(estimator, Path(folder) / "sinc.fis")
+    ...     model = read_fis(Path(folder) / "sinc.fis")
+    >>> model.n_rules
+    16
+    >>> bool(abs(model.predict(X)[:, 0] - estimator.predict(X)).max() < 1e-9)
+    True
+    """
+    try:
+        model = parse_fis(text_of(read_bytes(path, _MOST_BYTES)))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    return model if input_names is None else _renamed(model, input_names)
+
+
+def _renamed(model, names):
+    names = tuple(map(str, names))
+    if len(set(names)) != model.n_inputs or len(names) != model.n_inputs:
+        raise ValueError(
+            f"input_names={list(names)!r} must be {model.n_inputs} different names, one for each "
+            f"of {', '.join(model.input_names)}."
+        )
+    return replace(model, input_names=names)
+
+
+def parse_fis(text):
+    """The model that the text of a .fis file describes; ValueError with the line."""
+    sections = sections_of(text)
+    if "System" not in sections:
+        raise ValueError("line 1: the file has no [System].")
+    n_inputs, n_outputs, n_rules, and_method = _read_system(sections["System"])
+    inputs = [_variable(sections, "Input", j + 1, theta_of) for j in range(n_inputs)]
+    outputs = [
+        _variable(sections, "Output", k + 1, _consequent(n_inputs)) for k in range(n_outputs)
+    ]
+    rules = _rules(sections, inputs, outputs, n_rules, and_method)
+    for name, section in sections.items():
+        if name not in ("System", "Rules"):
+            raise ValueError(f"line {section.line}: [{name}] is not among those that are counted.")
+    return _model(inputs, outputs, *rules)
+
+
+@dataclass(frozen=True)
+class _Variable:
+    """An input or output: its name, its range, its membership functions and their names."""
+
+    name: str
+    low: float
+    high: float
+    names: list
+    terms: list
+
+
+def _read_system(section):
+    """Numbers of inputs, outputs and rules, and the entry of the AND method."""
+    section.take("Name").name()
+    _expect(section, "Type", ["sugeno"], "only Sugeno systems are supported")
+    section.entries.pop("Version", None)
+    n_inputs = section.take("NumInputs").whole(1, _MOST_VARIABLES)
+    n_outputs = section.take("NumOutputs").whole(1, _MOST_VARIABLES)
+    n_rules = section.take("NumRules").whole(1, _MOST_RULES)
+    and_method = section.take("AndMethod")
+    and_method.name()
+    # These three have no part in a Sugeno system of rules joined by AND.
+    for key in ("OrMethod", "ImpMethod", "AggMethod"):
+        section.take(key).name()
+    _expect(section, "DefuzzMethod", ["wtaver"], "only the weighted average is supported")
+    section.check_empty()
+    return n_inputs, n_outputs, n_rules, and_method
+
+
+def _expect(section, key, allowed, reason):
+    entry = section.take(key)
+    found = entry.name()
+    if found not in allowed:
+        raise entry.error(f"{key}={shown(found)}: {reason} ({' or '.join(map(repr, allowed))}).")
+
+
+def _variable(sections, kind, number, read_term):
+    """An input or output with its membership functions, each as ``read_term`` takes it."""
+    section = sections.pop(f"{kind}{number}", None)
+    if section is None:
+        line = sections["System"].line
+        raise ValueError(f"line {line}: [System] counts [{kind}{number}], which is not there.")
+    name = section.take("Name").name()
+    low, high = section.take("Range").interval()
+    # Written by some versions of fuzzylite.
+    section.entries.pop("Enabled", None)
+    names, terms = [], []
+    for k in range(section.take("NumMFs").whole(0, _MOST_TERMS)):
+        entry = section.take(f"MF{k + 1}")
+        term_name, function, parameters = entry.membership()
+        try:
+            terms.append(read_term(function, parameters, low, high))
+        except ValueError as error:
+            raise entry.error(error) from None
+        names.append(term_name)
+    section.check_empty()
+    return _Variable(name, low, high, names, terms)
+
+
+def _consequent(n_inputs):
+    """A reader of consequents: p0, p1 .. pd, and whether they are linear."""
+
+    def read(function, parameters, low, high):
+        lengths = {"constant": 1, "linear": n_inputs + 1}
+        if function not in lengths:
+            raise ValueError(
+                f"the consequent {shown(function)} is not supported; constant, linear are."
+            )
+        if len(parameters) != lengths[function]:
+            raise ValueError(
+                f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
+            )
+        return [parameters[-1], *(parameters[:-1] or [0.0] * n_inputs)], function == "linear"
+
+    return read
+
+
+def _rules(sections, inputs, outputs, n_rules, and_method):
+    """Antecedents (n_rules, n_inputs) and consequents (n_rules, n_outputs), numbers from 1."""
+    section = sections.get("Rules")
+    if section is None or len(section.rules) != n_rules:
+        found = 0 if section is None else len(section.rules)
+        line = sections["System"].line if section is None else section.line
+        raise ValueError(f"line {line}: [System] counts {n_rules} rules, [Rules] has {found}.")
+    n_terms = sum(len(variable.terms) for variable in inputs)
+    try:
+        check_size(n_rules, n_terms, len(inputs), len(outputs))
+    except ValueError as error:
+        raise ValueError(f"line {section.line}: {error}") from None
+    antecedents = np.zeros((n_rules, len(inputs)), dtype=int)
+    consequents = np.zeros((n_rules, len(outputs)), dtype=int)
+    for r, entry in enumerate(section.rules):
+        antecedents[r], consequents[r] = _rule(entry, inputs, outputs, and_method)
+    return antecedents, consequents
+
+
+def _rule(entry, inputs, outputs, and_method):
+    antecedent, consequent, weight, connection = entry.rule()
+    _check_terms(entry, antecedent, inputs, "input", lowest=0)
+    _check_terms(entry, consequent, outputs, "output", lowest=1)
+    if weight != 1.0:
+        raise entry.error(f"the rule has weight {weight:g}; only weight 1 is supported.")
+    if np.count_nonzero(antecedent) > 1:
+        if connection == 2:
+            raise entry.error("the rule joins its terms by OR (2); only AND (1) is supported.")
+        if and_method.name() != "prod":
+            raise and_method.error(
+                f"AndMethod={shown(and_method.name())}: only the product ('prod') is supported."
+            )
+    return antecedent, consequent
+
+
+def _check_terms(entry, numbers, variables, kind, lowest):
+    """One number for every variable, each from ``lowest`` to the number of its terms."""
+    if len(numbers) != len(variables):
+        raise entry.error(
+            f"the rule has {len(numbers)} numbers for {len(variables)} {kind}s, it must have one "
+            "for each."
+        )
+    for number, variable in zip(numbers, variables, strict=True):
+        if number < 0:
+            raise entry.error(
+                f"{number} for {kind} {shown(variable.name)}: NOT, a negative number, is not "
+                "supported."
+            )
+        if not lowest <= number <= len(variable.terms):
+            raise entry.error(
+                f"{number} for {kind} {shown(variable.name)}, which has {len(variable.terms)} "
+                f"membership functions; it must be from {lowest} to that."
+            )
+
+
+def _model(inputs, outputs, antecedents, consequents):
+    rows = _grid_rows(inputs, antecedents)
+    if rows is not None:
+        antecedents, consequents = antecedents[rows], consequents[rows]
+        antecedent, term_names = _grid(inputs, antecedents)
+    elif _is_scattered(inputs, antecedents):
+        antecedent, term_names = _scattered(inputs, antecedents)
+    else:
+        antecedent, term_names = _table(inputs, antecedents)
+    coefficients = np.stack(
+        [
+            np.array([numbers for numbers, _ in output.terms])[numbers_of - 1]
+            for output, numbers_of in zip(outputs, consequents.T, strict=True)
+        ],
+        axis=2,
+    )
+    is_linear = any(linear for output in outputs for _, linear in output.terms)
+    n_rules = len(antecedents)
+    low = np.array([variable.low for variable in inputs])
+    high = np.array([variable.high for variable in inputs])
+    return TSKModel(
+        antecedent=antecedent,
+        initial_antecedent=antecedent,
+        coefficients=coefficients if is_linear else coefficients[:, :1].copy(),
+        # About another point the file's own p0 would be rounded.
+        reference=np.zeros(len(inputs)),
+        # That of rows spread evenly over the Range.
+        spread=(high - low) / np.sqrt(12.0),
+        minimum=low,
+        maximum=high,
+        rule_weights=np.full(n_rules, 1.0 / n_rules),
+        rule_rows=np.zeros(n_rules),
+        input_names=_distinct(variable.name for variable in inputs),
+        term_names=term_names,
+        output_names=_distinct(variable.name for variable in outputs),
+    )
+
+
+def _grid_rows(inputs, antecedents):
+    """Where the rules of a full grid stand, in C order; None where they are no grid.
+
+    A grid has at least two terms of one family, in order, on every input that it looks at.
+    """
+    premises = np.flatnonzero(antecedents.any(axis=0))
+    used = [np.unique(antecedents[:, j]) for j in premises]
+    n_combinations = prod(own.size for own in used)
+    if n_combinations != len(antecedents) or not all(
+        own.size > 1 and own[0] > 0 and _is_ordered([inputs[j].terms[k - 1] for k in own])
+        for j, own in zip(premises, used, strict=True)
+    ):
+        return None
+    rows = np.lexsort(antecedents.T[::-1])
+    distinct = np.any(np.diff(antecedents[rows], axis=0), axis=1)
+    return rows if distinct.all() else None
+
+
+def _is_ordered(terms):
+    """Whether terms are of one family and each stands above the one before."""
+    families, thetas = zip(*terms, strict=True)
+    return len(set(families)) == 1 and bool(np.all(np.diff([theta[0] for theta in thetas]) > 0.0))
+
+
+def _is_scattered(inputs, antecedents):
+    """Whether all rules look at the same inputs, by terms of their own and of one family."""
+    premises = np.flatnonzero(antecedents.any(axis=0))
+    families = {inputs[j].terms[k - 1][0] for j in premises for k in antecedents[:, j] if k > 0}
+    n_rules = len(antecedents)
+    return len(families) == 1 and all(
+        antecedents[:, j].min() > 0 and np.unique(antecedents[:, j]).size == n_rules
+        for j in premises
+    )
+
+
+def _grid(inputs, antecedents):
+    places = [(j, k) for j, column in enumerate(antecedents.T) for k in np.unique(column) if k > 0]
+    counts = tuple(Counter(j for j, _ in places).values())
+    return GridAntecedent(_groups(inputs, places), counts=counts), _names(inputs, places)
+
+
+def _scattered(inputs, antecedents):
+    premises = np.flatnonzero(antecedents.any(axis=0))
+    places = [(j, rule[j]) for rule in antecedents for j in premises]
+    groups = _groups(inputs, places)
+    return ScatteredAntecedent(groups, n_premise_inputs=premises.size), _names(inputs, places)
+
+
+def _table(inputs, antecedents):
+    places = [(j, k) for j, column in enumerate(antecedents.T) for k in np.unique(column) if k > 0]
+    table = np.full(antecedents.shape, -1)
+    for t, (j, k) in enumerate(places):
+        table[antecedents[:, j] == k, j] = t
+    return RuleTableAntecedent(_groups(inputs, places), table), _names(inputs, places)
+
+
+def _groups(inputs, places):
+    """The terms at these places, pairs of input and number, in runs of one family."""
+    terms = [(j, *inputs[j].terms[k - 1]) for j, k in places]
+    groups = []
+    for family, members in groupby(terms, key=lambda term: term[1]):
+        numbers, _, thetas = zip(*members, strict=True)
+        groups.append(TermGroup(family, np.array(numbers), np.stack(thetas, axis=1)))
+    return tuple(groups)
+
+
+def _names(inputs, places):
+    names = [_distinct(variable.names) for variable in inputs]
+    return tuple(names[j][k - 1] for j, k in places)
+
+
+def _distinct(names):
+    """The names; one that was there before gets a number."""
+    taken: dict[str, int] = {}
+    distinct = []
+    for name in names:
+        while name in taken:
+            taken[name] += 1
+            name = f"{name} ({taken[name]})"
+        taken[name] = 1
+        distinct.append(name)
+    return tuple(distinct)

@@ -1,0 +1,283 @@
+"""From a trained model to a .fis file."""
+
+import re
+import unicodedata
+from pathlib import Path
+
+import numpy as np
+
+from ..._validation import warn_user
+from .._fold import fold
+from .functions import function_of
+
+__all__ = ["export_fis", "write_fis"]
+
+_NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_]+")
+_MINUS = re.compile(r"(?<!\S)-(?=[0-9.])")
+# What fuzzylite takes for words of a rule.
+_WORDS = {
+    "if",
+    "is",
+    "then",
+    "with",
+    "and",
+    "or",
+    "not",
+    "any",
+    "very",
+    "seldom",
+    "somewhat",
+    "extremely",
+}
+# Points of the box at which the rules of the file are tried.
+_N_POINTS = 1000
+
+
+def export_fis(estimator):
+    r"""Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
+
+    The system is Sugeno's, with product as AND and weighted average. Its membership functions are
+    those of the model under MATLAB's names, its consequents are constant or linear in the raw
+    inputs; numbers have all their digits. A scaler in front of the estimator is folded in.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        An :class:`~skanfis.ANFISRegressor`, or a Pipeline of scalers and one (a
+        TransformedTargetRegressor with a scaler likewise).
+
+    Returns
+    -------
+    text : str
+        ASCII. Names of inputs, outputs and terms become letters, digits and underscores, different
+        from each other; a comment gives the names that changed.
+
+    Raises
+    ------
+    ValueError
+        If a step in front cannot be folded, or if a membership has no function in the format.
+    TypeError
+        If ``estimator`` is no such estimator.
+
+    Warns
+    -----
+    UserWarning
+        If there are places in the box of the training data at which no rule of the file fires.
+
+    Notes
+    -----
+    The file holds the model within the box of the training data, which is the Range of its inputs.
+    What lies outside, the format cannot say: MATLAB and fuzzylite compute on, Octave refuses. Clamp
+    the inputs to the Range to have ``out_of_bounds="clip"``.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_fis
+    >>> X, y = make_jang_sinc()
+    >>> text = export_fis(ANFISRegressor(n_mfs=2).fit(X, y))
+    >>> print(text[text.index("[Rules]") :])
+    [Rules]
+    1 1, 1 (1) : 1
+    1 2, 2 (1) : 1
+    2 1, 3 (1) : 1
+    2 2, 4 (1) : 1
+    <BLANKLINE>
+    """
+    model = fold(estimator)
+    _warn_of_gaps(model)
+    inputs, names_of_terms, terms, rules = _premises(model)
+    input_names = _identifiers(model.input_names, "input")
+    output_names = _identifiers(model.output_names, "output")
+    system = {
+        "Name": "'skanfis'",
+        "Type": "'sugeno'",
+        "Version": "2.0",
+        "NumInputs": model.n_inputs,
+        "NumOutputs": model.n_outputs,
+        "NumRules": model.n_rules,
+        "AndMethod": "'prod'",
+        "OrMethod": "'probor'",
+        "ImpMethod": "'prod'",
+        "AggMethod": "'sum'",
+        "DefuzzMethod": "'wtaver'",
+    }
+    lines = [*_comments(model, input_names, output_names), "[System]"]
+    lines += [f"{key}={value}" for key, value in system.items()]
+    for j, name in enumerate(input_names):
+        own = np.flatnonzero(inputs == j)
+        names = _identifiers([names_of_terms[t] for t in own], "term")
+        interval = _wide(model.minimum[j], model.maximum[j], 0.0)
+        lines += _variable(f"Input{j + 1}", name, interval, names, [terms[t] for t in own])
+    names = [f"rule{r + 1}" for r in range(model.n_rules)]
+    for k, name in enumerate(output_names):
+        interval, consequents = _consequents(model, k)
+        lines += _variable(f"Output{k + 1}", name, interval, names, consequents)
+    return "\n".join([*lines, "", "[Rules]", *_rules(rules, model.n_outputs), ""])
+
+
+def write_fis(estimator, path):
+    """Write a trained model to a .fis file, as :func:`export_fis` gives it.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+    path : str or path-like
+        Of the file, which is replaced where it exists; Octave wants it to end in ".fis".
+
+    Returns
+    -------
+    None
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`export_fis`.
+    OSError
+        If the file cannot be written.
+
+    Warns
+    -----
+    UserWarning
+        As :func:`export_fis`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import write_fis
+    >>> X, y = make_jang_sinc()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_fis(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.fis")
+    """
+    Path(path).write_text(export_fis(estimator), encoding="ascii", newline="\n")
+
+
+def _premises(model):
+    """Per term its input, name, and function with parameters; the rules (n_rules, n_inputs).
+
+    A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
+    """
+    groups = model.antecedent.groups
+    inputs = np.concatenate([np.empty(0, dtype=int), *(group.inputs for group in groups)])
+    terms = [
+        function_of(group.family, natural)
+        for group in groups
+        for natural in group.family.natural(group.theta).T
+    ]
+    number = np.zeros_like(inputs)
+    for j in range(model.n_inputs):
+        own = np.flatnonzero(inputs == j)
+        number[own] = np.arange(own.size) + 1
+    rule_terms = model.antecedent.rule_terms
+    rules = np.zeros((model.n_rules, model.n_inputs), dtype=int)
+    which, place = np.nonzero(rule_terms >= 0)
+    term = rule_terms[which, place]
+    rules[which, inputs[term]] = number[term]
+    names, always = list(model.term_names), ~rules.any(axis=1)
+    if always.any():
+        # Readers want every rule to have a condition: a term that is 1 on the whole Range.
+        rules[always, 0] = 1 + np.count_nonzero(inputs == 0)
+        inputs, names = np.append(inputs, 0), [*names, "any value"]
+        low, high = model.minimum[0], model.maximum[0]
+        margin = 1.0 + abs(low) + abs(high)
+        terms.append(("trapmf", [low - margin, low, high, high + margin]))
+    return inputs, names, terms, rules
+
+
+def _consequents(model, k):
+    """An interval that holds output k within the box, and its functions with parameters."""
+    textbook = model.consequents[:, :, k]
+    if not model.order:
+        by_rule = [("constant", own[:1]) for own in textbook]
+    else:
+        by_rule = [("linear", [*own[1:], own[0]]) for own in textbook]
+    # A linear function on a box: its value at the middle, and the half-widths times its slopes.
+    half = 0.5 * (model.maximum - model.minimum)
+    middle = textbook[:, 0] + textbook[:, 1:] @ (model.minimum + half)
+    reach = np.abs(textbook[:, 1:]) @ half
+    return _wide((middle - reach).min(), (middle + reach).max(), 1.0), by_rule
+
+
+def _wide(low, high, least):
+    """The interval, wider than nothing: MATLAB wants low < high."""
+    return [low, high if high > low else max(low + least, np.nextafter(low, np.inf))]
+
+
+def _variable(section, name, interval, names, functions):
+    """The lines of an input or output."""
+    lines = ["", f"[{section}]", f"Name='{name}'", f"Range={_numbers(interval)}"]
+    lines.append(f"NumMFs={len(functions)}")
+    for k, (term, (function, parameters)) in enumerate(zip(names, functions, strict=True)):
+        lines.append(f"MF{k + 1}='{term}':'{function}',{_numbers(parameters)}")
+    return lines
+
+
+def _rules(rules, n_outputs):
+    for r, terms in enumerate(rules):
+        consequents = " ".join([str(r + 1)] * n_outputs)
+        yield f"{' '.join(map(str, terms))}, {consequents} (1) : 1"
+
+
+def _numbers(values):
+    """As few digits as give the same double back, 17 at most."""
+    return f"[{' '.join(repr(float(value)) for value in values)}]"
+
+
+def _comments(model, input_names, output_names):
+    yield f"% Sugeno system of {model.n_rules} rules, written by skanfis."
+    yield "% It holds within the Range of its inputs: clamp them to it."
+    if model.out_of_bounds != "clip":
+        yield f"% In skanfis, beyond it: out_of_bounds={model.out_of_bounds!r}."
+    for kind, names, given in (
+        ("Input", input_names, model.input_names),
+        ("Output", output_names, model.output_names),
+    ):
+        for k, (name, original) in enumerate(zip(names, given, strict=True)):
+            if name != original:
+                yield f"% {kind}{k + 1} is {original!a}."
+
+
+def _identifiers(names, fallback):
+    """Names of letters, digits and underscores, different from each other."""
+    taken: set[str] = set()
+    identifiers = []
+    for k, name in enumerate(names):
+        plain = unicodedata.normalize("NFKD", _MINUS.sub("minus ", name))
+        base = _NOT_IN_A_NAME.sub("_", plain.encode("ascii", "ignore").decode()).strip("_")
+        if not base or base[0].isdigit() or base in _WORDS:
+            base = f"{fallback}{k + 1}" if not base else f"{fallback}_{base}"
+        identifier, count = base, 1
+        while identifier in taken:
+            count += 1
+            identifier = f"{base}_{count}"
+        taken.add(identifier)
+        identifiers.append(identifier)
+    return identifiers
+
+
+def _warn_of_gaps(model):
+    """Warn where the textbook's strengths, which the file has, are zero for all rules.
+
+    In skanfis the nearest rule speaks there: its memberships have a floor.
+    """
+    rng = np.random.default_rng(0)
+    Z = rng.uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs)).T
+    groups = model.antecedent.groups
+    by_group = [group.family.value(Z[group.inputs], group.theta) for group in groups]
+    # One more, for the inputs that a rule does not look at (-1).
+    mu = np.concatenate([*by_group, np.ones((1, _N_POINTS))])
+    fires = np.zeros(_N_POINTS, dtype=bool)
+    for rule in model.antecedent.rule_terms:
+        fires |= np.prod(mu[rule], axis=0) > 0.0
+    if not fires.all():
+        warn_user(
+            f"At {np.mean(~fires):.1%} of {_N_POINTS} points within the training range no rule of "
+            "the .fis file fires: other programs give NaN, zero or the middle of the output's "
+            "Range there, skanfis what the nearest rule says. A membership without a foot (mf = "
+            "'gaussian', 'bell', 'two_sided_gaussian') or fewer, wider terms leave no such gaps.",
+            UserWarning,
+        )

@@ -1,0 +1,466 @@
+"""A model as JSON: to be read by people, kept in version control, and loaded without pickle.
+
+::
+
+    {
+        "format": "skanfis-model",
+        "version": 1,
+        "inputs": [{"name": "x0", "minimum": ..., "maximum": ..., "reference": ..., "spread": ...}],
+        "outputs": ["y"],
+        "out_of_bounds": "clip",
+        "rule_base": "grid",
+        "terms": [
+            {
+                "name": "low",
+                "input": 0,
+                "function": "gaussian",
+                "center": ...,
+                "log_width": ...,
+                "before_training": {"center": ..., "log_width": ...},
+            }
+        ],
+        "rules": [{"terms": [0, 3], "weight": ..., "rows": ..., "consequents": [[...]]}],
+    }
+
+Numbers are written so that the same double comes back; widths stay the logarithms that the model
+holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
+terms are positions in "terms", -1 for an input that it does not look at.
+"""
+
+import json
+from itertools import groupby
+from math import prod
+from pathlib import Path
+
+import numpy as np
+
+from ..antecedent import (
+    Antecedent,
+    GridAntecedent,
+    RuleTableAntecedent,
+    ScatteredAntecedent,
+    TermGroup,
+)
+from ..membership import MEMBERSHIPS
+from ..model import OUT_OF_BOUNDS, TSKModel
+from ._fold import fold
+from ._limits import LARGEST_NUMBER, check_size, read_bytes
+
+__all__ = ["export_json", "read_json", "write_json"]
+
+_FORMAT = "skanfis-model"
+_VERSION = 1
+_MOST_BYTES = 2**24
+_KINDS: dict[type[Antecedent], str] = {
+    GridAntecedent: "grid",
+    ScatteredAntecedent: "scattered",
+    RuleTableAntecedent: "table",
+}
+_FILE = ["format", "version", "inputs", "outputs", "out_of_bounds", "rule_base", "terms", "rules"]
+_INPUT = ["name", "minimum", "maximum", "reference", "spread"]
+_LARGEST_LOG = float(np.log(LARGEST_NUMBER))
+_SHOWN = 60
+
+
+def export_json(estimator):
+    """Give a trained model as JSON text, exact to the last bit.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        An :class:`~skanfis.ANFISRegressor`, or a Pipeline of scalers and one, which is folded into
+        one model of the raw inputs.
+
+    Returns
+    -------
+    text : str
+        A JSON object, versioned, one line per input, term and rule.
+
+    Raises
+    ------
+    ValueError
+        If a step in front cannot be folded, or if a membership is not one of skanfis' own.
+    TypeError
+        If ``estimator`` is no such estimator.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_json
+    >>> X, y = make_jang_sinc()
+    >>> text = export_json(ANFISRegressor(n_mfs=2).fit(X, y))
+    >>> text.splitlines()[:3]
+    ['{', '  "format": "skanfis-model",', '  "version": 1,']
+    """
+    model = fold(estimator)
+    box = (model.minimum, model.maximum, model.reference, model.spread)
+    inputs = [
+        {"name": name, "minimum": low, "maximum": high, "reference": reference, "spread": spread}
+        for name, low, high, reference, spread in zip(
+            model.input_names, *(values.tolist() for values in box), strict=True
+        )
+    ]
+    before = _terms(model.initial_antecedent)
+    terms = [
+        {"name": name, **term, "before_training": {key: start[key] for key in list(start)[2:]}}
+        for name, term, start in zip(
+            model.term_names, _terms(model.antecedent), before, strict=True
+        )
+    ]
+    rules = [
+        {"terms": own, "weight": weight, "rows": rows, "consequents": consequents}
+        for own, weight, rows, consequents in zip(
+            model.antecedent.rule_terms.tolist(),
+            model.rule_weights.tolist(),
+            model.rule_rows.tolist(),
+            model.coefficients.transpose(0, 2, 1).tolist(),
+            strict=True,
+        )
+    ]
+    return _laid_out(
+        {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "inputs": inputs,
+            "outputs": list(model.output_names),
+            "out_of_bounds": model.out_of_bounds,
+            "rule_base": _KINDS[type(model.antecedent)],
+            "terms": terms,
+            "rules": rules,
+        }
+    )
+
+
+def write_json(estimator, path):
+    """Write a trained model to a JSON file, as :func:`export_json` gives it.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+    path : str or path-like
+        Of the file, which is replaced where it exists.
+
+    Returns
+    -------
+    None
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`export_json`.
+    OSError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import write_json
+    >>> X, y = make_jang_sinc()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_json(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.json")
+    """
+    Path(path).write_text(export_json(estimator), encoding="utf-8", newline="\n")
+
+
+def read_json(path):
+    """Read a model that :func:`write_json` has written; no pickle, nothing is ever run.
+
+    Parameters
+    ----------
+    path : str or path-like
+
+    Returns
+    -------
+    model : skanfis.model.TSKModel
+        It predicts what the model written does, to the last bit. Give it to ``ANFISRegressor`` as
+        ``partition`` to train on.
+
+    Raises
+    ------
+    ValueError
+        If the file is not such a model, in any respect; if it is of a later version, which is
+        named; if it has more than 16 MiB, or the model more than 20 million numbers.
+    OSError
+        If the file cannot be opened.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import read_json, write_json
+    >>> X, y = make_jang_sinc()
+    >>> estimator = ANFISRegressor(n_mfs=2).fit(X, y)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_json(estimator, Path(folder) / "sinc.json")
+    ...     model = read_json(Path(folder) / "sinc.json")
+    >>> bool((model.predict(X)[:, 0] == estimator.predict(X)).all())
+    True
+    """
+    data = read_bytes(path, _MOST_BYTES)
+    try:
+        return parse_json(data.decode("utf-8"))
+    except RecursionError:
+        raise ValueError(f"{path}: nested too deeply to be a model.") from None
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def parse_json(text):
+    """The model that a JSON text describes; ValueError where it is none."""
+    document = json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition)
+    _check_version(document)
+    _, _, inputs, outputs, policy, kind, terms, rules = _members(document, _FILE, "the file")
+    input_names, box = _inputs(_list(inputs, "inputs"))
+    outputs = [_text(name, "outputs") for name in _list(outputs, "outputs")]
+    if policy not in OUT_OF_BOUNDS:
+        raise ValueError(f"out_of_bounds is {_shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
+    n_rules = len(_list(rules, "rules"))
+    check_size(n_rules, len(_list(terms, "terms", 0)), len(inputs), len(outputs))
+    groups, initial_groups, term_names = _read_terms(terms, len(inputs))
+    table, weights, rows, coefficients = _rules(rules, len(terms), len(inputs), len(outputs))
+    return TSKModel(
+        antecedent=_rule_base(kind, groups, table),
+        initial_antecedent=_rule_base(kind, initial_groups, table),
+        coefficients=coefficients,
+        reference=box[2],
+        spread=box[3],
+        minimum=box[0],
+        maximum=box[1],
+        rule_weights=weights,
+        rule_rows=rows,
+        input_names=input_names,
+        out_of_bounds=policy,
+        term_names=term_names,
+        output_names=tuple(outputs),
+    )
+
+
+def _terms(antecedent):
+    """Every term's input, function and theta by name."""
+    terms = []
+    for group in antecedent.groups:
+        if group.family not in MEMBERSHIPS.values():
+            raise ValueError(f"the membership {group.family.name!r} is not one of skanfis' own.")
+        keys = [_key(parameter) for parameter in group.family.parameters]
+        for j, theta in zip(group.inputs.tolist(), group.theta.T.tolist(), strict=True):
+            numbers = dict(zip(keys, theta, strict=True))
+            terms.append({"input": j, "function": group.family.name, **numbers})
+    return terms
+
+
+def _key(parameter):
+    return parameter.name if parameter.kind == "location" else f"log_{parameter.name}"
+
+
+def _laid_out(document):
+    """JSON text with one item of every list per line."""
+    entries = []
+    for key, value in document.items():
+        if isinstance(value, list):
+            items = [f"\n    {_written(item)}" for item in value]
+            entries.append(f'  "{key}": [{",".join(items)}\n  ]')
+        else:
+            entries.append(f'  "{key}": {_written(value)}')
+    return "{\n" + ",\n".join(entries) + "\n}\n"
+
+
+def _written(value):
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _refuse(constant):
+    raise ValueError(f"{constant} is not a number of JSON; every number must be finite.")
+
+
+def _without_repetition(pairs):
+    members: dict = {}
+    for key, value in pairs:
+        if key in members:
+            raise ValueError(f"the key {_shown(key)} stands twice in one object.")
+        members[key] = value
+    return members
+
+
+def _check_version(document):
+    if not isinstance(document, dict) or document.get("format") != _FORMAT:
+        raise ValueError(f'not a model of skanfis: it has no "format": "{_FORMAT}".')
+    version = document.get("version")
+    if type(version) is not int or version < 1:
+        raise ValueError(f'"version" is {_shown(version)}, not a whole number from 1 on.')
+    if version > _VERSION:
+        raise ValueError(
+            f"the file is of version {_shown(version)}, this skanfis reads version {_VERSION}: "
+            "upgrade skanfis to read it."
+        )
+
+
+def _inputs(inputs):
+    """Names, and minimum, maximum, reference, spread as rows."""
+    names, box = [], []
+    for j, item in enumerate(inputs):
+        where = f"inputs[{j}]"
+        name, *numbers = _members(item, _INPUT, where)
+        low, high, reference, spread = (_number(number, where) for number in numbers)
+        if low > high or spread < 0.0:
+            raise ValueError(f"{where}: minimum is above maximum, or spread is negative.")
+        names.append(_text(name, where))
+        box.append([low, high, reference, spread])
+    return tuple(names), np.array(box).T.copy()
+
+
+def _read_terms(terms, n_inputs):
+    """Groups of terms after training, before it, and the terms' names."""
+    names, after, before = [], [], []
+    for t, item in enumerate(terms):
+        where = f"terms[{t}]"
+        function = item.get("function") if isinstance(item, dict) else None
+        family = MEMBERSHIPS.get(function) if isinstance(function, str) else None
+        if family is None:
+            raise ValueError(f'{where} has no "function" among {", ".join(MEMBERSHIPS)}.')
+        keys = [_key(parameter) for parameter in family.parameters]
+        name, j, _, start, *theta = _members(
+            item, ["name", "input", "function", "before_training", *keys], where
+        )
+        j = _whole(j, 0, n_inputs - 1, f'"input" of {where}')
+        names.append(_text(name, where))
+        after.append((j, family, _theta(family, theta, where)))
+        start = _members(start, keys, f'"before_training" of {where}')
+        before.append((j, family, _theta(family, start, where)))
+    return _groups(after), _groups(before), tuple(names)
+
+
+def _theta(family, theta, where):
+    numbers = []
+    for parameter, value in zip(family.parameters, theta, strict=True):
+        largest = LARGEST_NUMBER if parameter.kind == "location" else _LARGEST_LOG
+        numbers.append(_number(value, where, largest))
+    return numbers
+
+
+def _groups(terms):
+    """Consecutive terms of one family together."""
+    groups = []
+    for family, members in groupby(terms, key=lambda term: term[1]):
+        inputs, _, theta = zip(*members, strict=True)
+        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
+    return tuple(groups)
+
+
+def _rules(rules, n_terms, n_inputs, n_outputs):
+    """Table of terms, weights, rows and coefficients."""
+    table, weights, rows, consequents = [], [], [], []
+    for r, item in enumerate(rules):
+        where = f"rules[{r}]"
+        own, weight, n_rows, by_output = _members(
+            item, ["terms", "weight", "rows", "consequents"], where
+        )
+        table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
+        weights.append(_number(weight, where))
+        rows.append(_number(n_rows, where))
+        if weights[-1] < 0.0 or rows[-1] < 0.0:
+            raise ValueError(f'"weight" and "rows" of {where} must not be negative.')
+        by_output = [
+            [_number(number, where) for number in _list(one, where)]
+            for one in _list(by_output, where)
+        ]
+        n_basis = len(by_output[0])
+        if len(by_output) != n_outputs or n_basis not in (1, 1 + n_inputs):
+            raise ValueError(
+                f'"consequents" of {where} must be one list per output, of 1 or {1 + n_inputs} '
+                "numbers."
+            )
+        consequents.append(by_output)
+        if [len(one) for one in by_output] != [len(consequents[0][0])] * n_outputs or len(
+            table[-1]
+        ) != len(table[0]):
+            raise ValueError(f"{where} has other numbers of terms or coefficients than rules[0].")
+    shape = (len(rules), len(table[0]))
+    coefficients = np.array(consequents).transpose(0, 2, 1).copy()
+    return (
+        np.array(table, dtype=int).reshape(shape),
+        np.array(weights),
+        np.array(rows),
+        coefficients,
+    )
+
+
+def _rule_base(kind, groups, table):
+    """The rule base of a kind with these terms; ValueError where its rules are not the table's."""
+    inputs = np.concatenate([group.inputs for group in groups]) if groups else np.empty(0, int)
+    antecedent: Antecedent
+    if kind == "grid":
+        counts = tuple(len(list(run)) for _, run in groupby(inputs))
+        antecedent = GridAntecedent(groups, counts=counts)
+        fits = prod(counts) == len(table) and len(counts) == np.unique(inputs).size
+    elif kind == "scattered":
+        antecedent = ScatteredAntecedent(groups, n_premise_inputs=table.shape[1])
+        fits = 0 < table.size == inputs.size
+    elif kind == "table":
+        antecedent, fits = RuleTableAntecedent(groups, table), True
+    else:
+        raise ValueError(f'"rule_base" is {_shown(kind)}, not {", ".join(_KINDS.values())}.')
+    if not fits or not np.array_equal(antecedent.rule_terms, table):
+        raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
+    _check_columns(inputs, table)
+    return antecedent
+
+
+def _check_columns(inputs, table):
+    """Each place in a rule is one input's, and no input has two."""
+    seen = []
+    for column in table.T:
+        own = np.unique(inputs[column[column >= 0]])
+        if own.size > 1:
+            raise ValueError("the terms at one place of the rules are of different inputs.")
+        seen += own.tolist()
+    if len(set(seen)) != len(seen):
+        raise ValueError("rules have two terms of one input.")
+
+
+def _members(item, keys, where):
+    """The values of exactly these keys."""
+    if not isinstance(item, dict):
+        raise ValueError(f"{where} is {_shown(item)}, not an object.")
+    if missing := [key for key in keys if key not in item]:
+        raise ValueError(f"{where} has no {_shown(missing[0])}.")
+    if unknown := [key for key in item if key not in keys]:
+        raise ValueError(f"{where} has the unknown key {_shown(unknown[0])}.")
+    return [item[key] for key in keys]
+
+
+def _list(value, where, least=1):
+    if not isinstance(value, list) or len(value) < least:
+        raise ValueError(f"{where}: {_shown(value)} is not a list of {least} or more.")
+    return value
+
+
+def _text(value, where):
+    if not isinstance(value, str):
+        raise ValueError(f"{where}: {_shown(value)} is not a name in quotes.")
+    return value
+
+
+def _number(value, where, largest=LARGEST_NUMBER):
+    if type(value) not in (int, float) or not abs(value) <= largest:
+        raise ValueError(f"{where}: {_shown(value)} is not a number of size up to {largest:g}.")
+    return float(value)
+
+
+def _whole(value, lowest, highest, where):
+    if type(value) is not int or not lowest <= value <= highest:
+        raise ValueError(
+            f"{where}: {_shown(value)} is not a whole number from {lowest} to {highest}."
+        )
+    return value
+
+
+def _shown(value):
+    """The value, shortened and safe to print."""
+    text = ascii(value)
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."

@@ -1,0 +1,353 @@
+r"""ONNX: a converter that skl2onnx takes up for estimators and the pipelines they end.
+
+The graph does what the model does, in the same order: inputs held in the box, log memberships,
+strengths by a softmax (of a grid: one per input, then their products), consequents weighed by the
+strengths. The continuation "linear" carries the derivative along the way out of the box through the
+same operations.
+"""
+
+import numpy as np
+
+from ..membership import MEMBERSHIPS
+from ._constants import FLOOR, SMALLEST_LOG_SQUARE
+from ._graph import Graph
+from ._numbers import Numbers
+
+__all__ = ["register_onnx_converter"]
+
+# Softmax along one axis and ReduceSum with axes as an input are of this version.
+_OLDEST_OPSET = 13
+
+
+def register_onnx_converter():
+    """Teach skl2onnx to convert :class:`skanfis.ANFISRegressor`, alone or in a pipeline.
+
+    After one call, ``skl2onnx.to_onnx`` and ``skl2onnx.convert_sklearn`` know the estimator. Inputs
+    of type double give a graph in double precision, all others one in single precision. The policy
+    ``out_of_bounds`` becomes part of the graph; "raise" cannot, and is refused with a ValueError. A
+    row with an infinite number or none gives NaN.
+
+    Returns
+    -------
+    None
+
+    Raises
+    ------
+    ImportError
+        If skl2onnx is not installed.
+
+    Examples
+    --------
+    >>> import pytest
+    >>> skl2onnx = pytest.importorskip("skl2onnx")
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import register_onnx_converter
+    >>> register_onnx_converter()
+    >>> X, y = make_jang_sinc()
+    >>> onnx_model = skl2onnx.to_onnx(ANFISRegressor(n_mfs=4).fit(X, y), X[:1])
+    >>> onnx_model.graph.output[0].name
+    'variable'
+    """
+    try:
+        from skl2onnx import update_registered_converter
+    except ImportError as error:
+        raise ImportError(
+            "register_onnx_converter needs skl2onnx: pip install 'skanfis[onnx]'."
+        ) from error
+    from .. import ANFISRegressor
+
+    update_registered_converter(
+        ANFISRegressor, "SkanfisANFISRegressor", _set_shapes, _convert, overwrite=True
+    )
+
+
+def _set_shapes(operator):
+    """Type and shape of the output."""
+    from skl2onnx.common.data_types import DoubleTensorType, FloatTensorType
+
+    given = operator.inputs[0].type
+    kind = DoubleTensorType if isinstance(given, DoubleTensorType) else FloatTensorType
+    n_outputs = operator.raw_operator.model_.n_outputs
+    operator.outputs[0].type = kind([operator.inputs[0].get_first_dimension(), n_outputs])
+
+
+def _convert(scope, operator, container):
+    """Write the model of ``operator.raw_operator`` as nodes."""
+    from onnx import TensorProto
+    from skl2onnx.common.data_types import DoubleTensorType
+
+    if container.target_opset < _OLDEST_OPSET:
+        raise ValueError(
+            f"target_opset={container.target_opset} is too old for an ANFIS: it takes "
+            f"{_OLDEST_OPSET} or newer."
+        )
+    estimator, given = operator.raw_operator, operator.inputs[0]
+    model = estimator.model_.with_out_of_bounds(estimator.out_of_bounds)
+    if model.out_of_bounds == "raise":
+        raise ValueError(
+            "out_of_bounds='raise' has no counterpart in ONNX, where no value makes a graph fail: "
+            "set_params(out_of_bounds='nan') before the conversion marks such rows."
+        )
+    is_double = isinstance(given.type, DoubleTensorType)
+    dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
+    graph = Graph(scope, container, dtype)
+    x = graph.node("Cast", graph.value(given.full_name), to=kind)
+    y = _Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
+    graph.node("Identity", y, output=operator.outputs[0].full_name)
+
+
+class _Formula:
+    """The model's formula, written with values of a graph."""
+
+    def __init__(self, numbers, policy, graph):
+        self.numbers, self.policy, self.graph = numbers, policy, graph
+        self.rule_of_term = None if numbers.counts is not None else _indicator(numbers)
+
+    def outputs(self, x):
+        numbers = self.numbers
+        inside = x.at_least(numbers.low).at_most(numbers.high)
+        # Zero, unless an input is infinite or not a number: then NaN, also for a held input.
+        not_finite = (x - x).sum(keep=True)
+        way_out = x - inside if self.policy == "linear" else None
+        strengths, changes = self._strengths(inside, way_out)
+        by_rule = self._consequents(inside - numbers.reference)
+        summed = self._weigh(strengths, by_rule)
+        if self.policy == "linear":
+            summed = summed + self._change(strengths, changes, by_rule, way_out)
+        y = summed + numbers.offset + not_finite
+        if self.policy == "nan":
+            y = (_way_out(x, inside) > 0.0).where(np.full((1, 1), np.nan), y)
+        return y
+
+    def _strengths(self, inside, way_out):
+        """Strengths (n_rows, n_rules) and the change of their logarithms along the way out."""
+        numbers = self.numbers
+        if not numbers.n_terms:
+            return None, None
+        logs, slopes = [], []
+        for terms in numbers.terms:
+            positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
+            places = inside.columns(positions)
+            value, slope = _FORMULAS[terms.family](
+                [_distance(places, terms, k) for k in range(terms.n_locations)], terms.others.T
+            )
+            logs.append(value())
+            if way_out is not None:
+                slopes.append(slope() * way_out.columns(positions))
+        log_mu, change = self._joined(logs), self._joined(slopes) if slopes else None
+        if self.rule_of_term is not None:
+            shares = (log_mu @ self.rule_of_term).softmax()
+            return shares, None if change is None else _centred(change @ self.rule_of_term, shares)
+        return self._products(log_mu, change)
+
+    def _joined(self, parts):
+        return parts[0] if len(parts) == 1 else self.graph.node("Concat", *parts, axis=1)
+
+    def _products(self, log_mu, change):
+        """Of a grid: every input normalised alone, then all products of shares."""
+        strengths = changes = None
+        n_rules = 1
+        for start, count in zip(self.numbers.block_starts, self.numbers.counts, strict=True):
+            block = np.arange(start, start + count)
+            shares = log_mu.columns(block).softmax()
+            moved = None if change is None else _centred(change.columns(block), shares)
+            if strengths is None:
+                strengths, changes = shares, moved
+            else:
+                after = (n_rules * count,)
+                rows, columns = (n_rules, 1), (1, count)
+                strengths = (strengths.reshape(*rows) * shares.reshape(*columns)).reshape(*after)
+                if change is not None:
+                    changes = (changes.reshape(*rows) + moved.reshape(*columns)).reshape(*after)
+            n_rules *= count
+        return strengths, changes
+
+    def _consequents(self, z):
+        """f_r (n_rows, n_rules, n_outputs), less the offset; without rows for order 0."""
+        values = self.numbers.coefficients[:, :, 0]
+        slopes = self._slopes(z)
+        return values[None] if slopes is None else slopes + values
+
+    def _slopes(self, z):
+        """What slopes make of z, (n_rows, n_rules, n_outputs); None where there are none."""
+        numbers = self.numbers
+        if not numbers.slope_inputs.size:
+            return None
+        n_rules, n_outputs, _ = numbers.coefficients.shape
+        slopes = numbers.coefficients[:, :, 1:].reshape(n_rules * n_outputs, -1).T
+        return (z.columns(numbers.slope_inputs) @ slopes).reshape(n_rules, n_outputs)
+
+    def _weigh(self, strengths, by_rule):
+        """Sum over rules (n_rows, n_outputs)."""
+        if strengths is None:
+            # One rule: its strength is one.
+            if isinstance(by_rule, np.ndarray):
+                return self.graph.node("Identity", by_rule[:, 0])
+            return by_rule.sum(keep=False)
+        return (strengths.reshape(self.numbers.n_rules, 1) * by_rule).sum(keep=False)
+
+    def _change(self, strengths, changes, by_rule, way_out):
+        """What the outputs change by along the way out."""
+        ahead = self._slopes(way_out)
+        if strengths is not None:
+            of_strengths = changes.reshape(self.numbers.n_rules, 1) * by_rule
+            ahead = of_strengths if ahead is None else ahead + of_strengths
+        return np.zeros((1, 1)) if ahead is None else self._weigh(strengths, ahead)
+
+
+def _way_out(x, inside):
+    """How far inputs lie out of the box, in all."""
+    return (x - inside).abs().sum(keep=True)
+
+
+def _indicator(numbers):
+    """1 where rule r has term t, (n_terms, n_rules)."""
+    n_rules, n_terms = numbers.n_rules, numbers.n_terms
+    table = numbers.rule_terms
+    if table is None:
+        table = np.arange(n_terms).reshape(n_rules, -1)
+    indicator = np.zeros((n_terms + 1, n_rules))
+    indicator[table.T, np.arange(n_rules)] = 1.0
+    return indicator[:n_terms]
+
+
+def _centred(changes, shares):
+    return changes - (shares * changes).sum(keep=True)
+
+
+def _distance(places, terms, k):
+    distance = places - terms.locations[:, k]
+    return distance - terms.rests[:, k] if terms.is_in_two else distance
+
+
+# Families: of distances d from locations and other constants p, functions that give log mu and its
+# derivative by x.
+
+
+def _log_sigmoid(u):
+    return u.at_most(0.0) - ((-u.abs()).exp() + 1.0).log()
+
+
+def _gaussian(d, p):
+    t = d[0] * p[0]
+    return lambda: -(t * t), lambda: t * (-2.0 * p[0])
+
+
+def _bell(d, p):
+    u = d[0] * p[0]
+    # log |u| has a floor, as in Python; where u is zero so is the slope.
+    tiny = np.finfo(u.graph.dtype).tiny
+    far = u.abs() > tiny
+    safe = far.where(u, np.ones((1, 1)))
+    log_square = far.where(safe.abs().log() * 2.0, np.full((1, 1), SMALLEST_LOG_SQUARE))
+    exponent = log_square.at_least(SMALLEST_LOG_SQUARE) * p[1]
+
+    def slope():
+        return far.where(exponent.sigmoid() / safe * (-2.0 * p[0] * p[1]), np.zeros((1, 1)))
+
+    return lambda: _log_sigmoid(-exponent), slope
+
+
+def _two_sided_gaussian(d, p):
+    half, left, right = p
+    on_left = d[0] < 0.0
+    per_length = on_left.where(left[None], right[None])
+    t = (d[0].abs() - half).at_least(0.0) * per_length
+    side = on_left.where(np.full((1, 1), -1.0), np.ones((1, 1)))
+    return lambda: t * t * -0.5, lambda: -(t * per_length * side)
+
+
+def _linear(s):
+    return s, lambda: (s > 0.0).where((s < 1.0).where(*_one_or_zero()), np.zeros((1, 1)))
+
+
+def _spline(s):
+    """Two parabolas, 2 s^2 and 1 - 2 (1 - s)^2, for s between zero and one; and the slope."""
+    t = -(s - 1.0)
+    low = s < 0.5
+    return low.where(s * s * 2.0, -(t * t * 2.0 - 1.0)), lambda: s.at_most(t) * 4.0
+
+
+def _one_or_zero():
+    return np.ones((1, 1)), np.zeros((1, 1))
+
+
+def _flank(profile, s):
+    """Log mu of a flank over a floor, and its derivative by s; zero at the foot, one at the top."""
+    near = s.at_least(0.0).at_most(1.0)
+    mu, mu_slope = profile(near)
+    t, t_near = -(s.at_most(1.0) - 1.0), -(near - 1.0)
+    gaussian = (t_near * t_near * -0.5).exp()
+    mixture = mu + (gaussian - mu) * FLOOR
+
+    def value():
+        return mixture.log() - (t - t_near) * (t + t_near) * 0.5
+
+    def slope():
+        # Not times 1 - FLOOR: onnxruntime takes that for one and leaves it out.
+        steep = mu_slope()
+        return (steep + (t_near * gaussian - steep) * FLOOR) / mixture + (t - t_near)
+
+    return value, slope
+
+
+def _two_feet(profile):
+    def formula(d, p):
+        left, right = d[0] * p[0], -(d[1] * p[1])
+        on_left = left < right
+        value, slope = _flank(profile, on_left.where(left, right))
+
+        def signed_slope():
+            # Of a triangle, it is the corner that says on which side x lies, and slope is zero
+            # there: an input that is held at the edge of the box may lie on it.
+            is_left = d[2] < 0.0 if len(d) > 2 else on_left
+            signed = is_left.where(p[0][None], -p[1][None]) * slope()
+            if len(d) == 2:
+                return signed
+            return (d[2].abs() > 0.0).where(signed, np.zeros((1, 1)))
+
+        return value, signed_slope
+
+    return formula
+
+
+def _one_foot(d, p):
+    value, slope = _flank(_spline, d[0] * p[0])
+    return value, lambda: slope() * p[0]
+
+
+def _sigmoid_difference(d, p):
+    per_flank, v, log_gain = p
+    u = d[0] * per_flank
+    rise, fall = u + v, -(u - v)
+    return (
+        lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
+        lambda: ((-rise).sigmoid() - (-fall).sigmoid()) * per_flank,
+    )
+
+
+def _sigmoid_product(d, p):
+    per_left, per_right, at_left, at_right = p
+    rise, fall = d[0] * per_left + at_left, -(d[0] * per_right - at_right)
+    return (
+        lambda: _log_sigmoid(rise) + _log_sigmoid(fall),
+        lambda: (-rise).sigmoid() * per_left - (-fall).sigmoid() * per_right,
+    )
+
+
+_FORMULAS = {
+    MEMBERSHIPS[name]: formula
+    for name, formula in {
+        "gaussian": _gaussian,
+        "bell": _bell,
+        "triangular": _two_feet(_linear),
+        "trapezoidal": _two_feet(_linear),
+        "two_sided_gaussian": _two_sided_gaussian,
+        "pi_shaped": _two_feet(_spline),
+        "s_shaped": _one_foot,
+        "z_shaped": _one_foot,
+        "sigmoid_difference": _sigmoid_difference,
+        "sigmoid_product": _sigmoid_product,
+    }.items()
+}

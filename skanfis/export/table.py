@@ -1,0 +1,280 @@
+"""Rules, memberships and the explanation of predictions as pandas tables."""
+
+from numbers import Real
+
+import numpy as np
+import pandas as pd
+
+from ._fold import fold, fold_with_rows
+from ._reading import (
+    check_choice,
+    choose_rules,
+    conditions,
+    consequents_about,
+    premise_text,
+)
+
+__all__ = ["explain", "memberships_table", "rules_table"]
+
+
+def rules_table(estimator, *, about="origin", sort_by="rule", max_rules=None, min_weight=0.0):
+    """Tabulate the rules: what they ask, how much of the data they hold for, what they say.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
+        scalers are folded into the rules.
+    about : {"origin", "mean"}, default="origin"
+        What the constants of the consequents mean. "origin": the textbook form, p0 + p1 x1 + ...;
+        "mean": the rule's value at the mean of the training inputs, which keeps more digits where
+        a column lies far from the origin. The slopes are the same.
+    sort_by : {"rule", "weight", "rows"}, default="rule"
+        Order of the rules: by number, or the most important first.
+    max_rules : int, default=None
+        Give no more rules than this; None is all.
+    min_weight : float, default=0.0
+        Give only rules with at least this part of the weight of the training data, from 0 to 1.
+
+    Returns
+    -------
+    table : DataFrame
+        One row per rule, labelled by its number, with two levels of columns. ``"if"``: the term on
+        each input that rules look at, missing where the rule does not. ``"data"``: "weight", the
+        part of the weight of the training data on which the rule fires, and "rows", the number of
+        distinct training rows on which it is the strongest. ``"then y"``, for each output by its
+        name: the "constant", and the slope by each input.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is out of its range, or a step of a pipeline cannot be folded.
+    TypeError
+        If ``estimator`` has no rules.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import rules_table
+    >>> X, y = make_jang_sinc()
+    >>> rules = rules_table(ANFISRegressor(n_mfs=2).fit(X, y))
+    >>> rules["if"]
+            x0    x1
+    rule
+    0      low   low
+    1      low  high
+    2     high   low
+    3     high  high
+    >>> float(rules["data"]["weight"].sum())
+    1.0
+    >>> list(rules["then y"])
+    ['constant', 'x0', 'x1']
+    """
+    check_choice("about", about, ("origin", "mean"))
+    model = fold(estimator)
+    chosen = choose_rules(model, sort_by, max_rules, min_weight)
+    reference = model.reference if about == "mean" else 0.0 * model.reference
+    consequents = consequents_about(model, reference)
+    columns = {("if", name): terms for name, terms in _terms_by_input(model).items()}
+    columns["data", "weight"] = model.rule_weights
+    columns["data", "rows"] = model.rule_rows
+    for k, output in enumerate(model.output_names):
+        for i, name in enumerate(("constant", *model.input_names)):
+            columns[f"then {output}", name] = consequents[:, i, k]
+    table = pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
+    return table.iloc[chosen]
+
+
+def _terms_by_input(model):
+    """The name of each rule's term, or None, on every input that some rule looks at."""
+    by_rule = [dict(rule) for rule in conditions(model)]
+    looked_at = sorted({j for rule in by_rule for j in rule})
+    return {
+        model.input_names[j]: [model.term_names[rule[j]] if j in rule else None for rule in by_rule]
+        for j in looked_at
+    }
+
+
+def memberships_table(estimator, *, trained=True):
+    """Tabulate the membership functions.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one.
+    trained : bool, default=True
+        Whether to tell the memberships after training, or as they were before it.
+
+    Returns
+    -------
+    table : DataFrame
+        One row per term, labelled by its number, with columns "input", "name", "function" and one
+        for every parameter, in the units of the input (a bell's "slope" has none); missing where a
+        family has no such parameter.
+
+    Raises
+    ------
+    ValueError
+        If a step of a pipeline cannot be folded.
+    TypeError
+        If ``estimator`` has no rules.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import memberships_table
+    >>> X, y = make_jang_sinc()
+    >>> memberships_table(ANFISRegressor(n_mfs=[2, 1]).fit(X, y), trained=False)
+         input  name  function  center  width
+    term
+    0       x0   low  gaussian   -10.0   9.89
+    1       x0  high  gaussian    10.0   9.89
+    """
+    terms = fold(estimator).memberships(trained)
+    table = pd.DataFrame(terms, columns=None if terms else ["input", "name", "function"])
+    return table.rename_axis(index="term")
+
+
+def explain(estimator, X, *, min_strength=0.0):
+    """Tell for each row which rules fired, by how much, and what each contributed.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
+        scalers are folded into the rules.
+    X : array-like of shape (n_samples, n_features)
+        Rows to explain, as ``estimator.predict`` takes them.
+    min_strength : float, default=0.0
+        Rules that fire with less than this on a row, from 0 to 1, are told in one line, "other
+        rules".
+
+    Returns
+    -------
+    table : DataFrame
+        The strongest rule first, for each row and output. Columns:
+
+        * "row": its label in X, or its position where X has none;
+        * "output": the name of the output;
+        * "rule": the rule's number, missing for other lines;
+        * "if": its terms, "other rules", or "beyond x" (see below);
+        * "strength": the part that the rule has in the row; the sum over rules is one;
+        * "value": what the rule says there;
+        * "contribution": strength times value. **The sum of the contributions to a row's output is
+          the prediction**, to rounding errors.
+
+        A row outside the training range is explained at the nearest point in it. With
+        ``out_of_bounds="linear"``, a line "beyond x" for each input that is outside has the way to
+        the row: its "value" is the slope there, its "contribution" the slope times the distance.
+        With "nan" the values and contributions of such rows are missing.
+
+    Raises
+    ------
+    ValueError
+        If X is not finite, or has other columns than in training; if it is outside the training
+        range and ``out_of_bounds="raise"``; if a step of a pipeline cannot be folded.
+    TypeError
+        If ``estimator`` has no rules.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import explain
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=2).fit(X, y)
+    >>> table = explain(model, X[:1])
+    >>> table.drop(columns=["value", "contribution"])
+       row output  rule                        if  strength
+    0    0      y     0      x0 is low AND x1 is low   ...
+    >>> bool(abs(table["contribution"].sum() - model.predict(X[:1])[0]) < 1e-12)
+    True
+    """
+    if not isinstance(min_strength, Real) or not 0.0 <= min_strength <= 1.0:
+        raise ValueError(f"min_strength={min_strength!r} must be a number from 0 to 1.")
+    model, rows = fold_with_rows(estimator, X)
+    labels = getattr(X, "index", None)
+    labels = np.arange(len(rows)) if labels is None else np.asarray(labels)
+    inside = model.in_bounds(rows)
+    if model.out_of_bounds == "raise" and not inside.all():
+        raise ValueError(model.describe_out_of_bounds(rows))
+    nearest = np.clip(rows, model.minimum, model.maximum)
+    strengths = model.strengths(nearest)
+    values = rule_values(model, nearest)
+    if model.out_of_bounds == "nan":
+        values[~inside] = np.nan
+    lines = [_rule_lines(model, strengths, values, min_strength)]
+    if model.out_of_bounds == "linear" and not inside.all():
+        lines.append(_lines_beyond(model, rows - nearest, model.gradient(nearest)))
+    table = pd.concat(lines).sort_values(["row", "output", "place"], kind="stable")
+    table["row"] = labels[table["row"]]
+    table["output"] = np.array(model.output_names, dtype=object)[table["output"]]
+    table["rule"] = table["rule"].astype("Int64")
+    return table.drop(columns="place").reset_index(drop=True)
+
+
+def rule_values(model, rows):
+    """f_r at rows in the box, shape (n_rows, n_rules, n_outputs)."""
+    constant, slopes = model.coefficients[:, 0], model.coefficients[:, 1:]
+    if not model.order:
+        return np.tile(constant, (len(rows), 1, 1))
+    return constant + np.einsum("nj,rjo->nro", rows - model.reference, slopes)
+
+
+def _rule_lines(model, strengths, values, min_strength):
+    """A line for each rule that fires on a row, by falling strength, and one for all others."""
+    premises = np.array([premise_text(model, rule) for rule in conditions(model)], dtype=object)
+    _, n_rules, n_outputs = values.shape
+    order = np.argsort(-strengths, axis=1, kind="stable")
+    contributions = strengths[:, :, None] * values
+    told = np.take_along_axis(strengths, order, axis=1) >= min_strength
+    row, place, output = np.nonzero(np.repeat(told[:, :, None], n_outputs, axis=2))
+    rule = order[row, place]
+    fired = pd.DataFrame(
+        {
+            "row": row,
+            "output": output,
+            "rule": rule,
+            "if": premises[rule],
+            "strength": strengths[row, rule],
+            "value": values[row, rule, output],
+            "contribution": contributions[row, rule, output],
+            "place": place,
+        }
+    )
+    silent = strengths < min_strength
+    row, output = np.nonzero(np.repeat(silent.any(axis=1)[:, None], n_outputs, axis=1))
+    others = pd.DataFrame(
+        {
+            "row": row,
+            "output": output,
+            "rule": np.nan,
+            "if": "other rules",
+            "strength": (strengths * silent).sum(axis=1)[row],
+            "value": np.nan,
+            "contribution": (contributions * silent[:, :, None]).sum(axis=1)[row, output],
+            "place": n_rules,
+        }
+    )
+    return pd.concat([fired, others]) if len(others) else fired
+
+
+def _lines_beyond(model, distance, gradient):
+    """A line for each input that lies outside the box: the way along the tangent."""
+    row, j, output = np.nonzero(np.repeat((distance != 0.0)[:, :, None], model.n_outputs, axis=2))
+    names = np.array([f"beyond {name}" for name in model.input_names], dtype=object)
+    slope = gradient[row, j, output]
+    return pd.DataFrame(
+        {
+            "row": row,
+            "output": output,
+            "rule": np.nan,
+            "if": names[j],
+            "strength": np.nan,
+            "value": slope,
+            "contribution": slope * distance[row, j],
+            "place": model.n_rules + 1 + j,
+        }
+    )

@@ -1,0 +1,93 @@
+"""The gyro application: from a calibration log to a checked compensator."""
+
+from .allan import AllanCoefficients, allan_coefficients, allan_deviation
+from .compensator import GyroCompensator
+from .compose import ResidualRegressor
+from .displays import (
+    AllanDisplay,
+    CoverageDisplay,
+    ErrorDisplay,
+    GroupResidualDisplay,
+    HysteresisDisplay,
+    ResidualSurfaceDisplay,
+    ScaleFactorErrorDisplay,
+)
+from .features import ThermalLag, ThermalRate, TimeSincePowerOn
+from .groups import (
+    check_split,
+    combine_groups,
+    find_rate_levels,
+    group_by_rate_level,
+    group_by_run,
+)
+from .log import LogError, check_log, read_log
+from .metrics import (
+    bias,
+    bias_ramp_sensitivity,
+    bias_repeatability,
+    bias_stability,
+    bias_temperature_sensitivity,
+    hysteresis,
+    input_error,
+    reduction_factor,
+    residual_peak,
+    residual_peak_to_peak,
+    residual_rms,
+    scale_factor,
+    scale_factor_asymmetry,
+    scale_factor_error,
+    scale_factor_nonlinearity,
+    scale_factor_repeatability,
+    scale_factor_temperature_sensitivity,
+)
+from .physics import OpenLoopArcsineRegressor
+from .report import gyro_report
+from .tidy import clip_dwells, find_dwells, resample_in_temperature
+
+__all__ = [
+    "AllanCoefficients",
+    "AllanDisplay",
+    "CoverageDisplay",
+    "ErrorDisplay",
+    "GroupResidualDisplay",
+    "GyroCompensator",
+    "HysteresisDisplay",
+    "LogError",
+    "OpenLoopArcsineRegressor",
+    "ResidualRegressor",
+    "ResidualSurfaceDisplay",
+    "ScaleFactorErrorDisplay",
+    "ThermalLag",
+    "ThermalRate",
+    "TimeSincePowerOn",
+    "allan_coefficients",
+    "allan_deviation",
+    "bias",
+    "bias_ramp_sensitivity",
+    "bias_repeatability",
+    "bias_stability",
+    "bias_temperature_sensitivity",
+    "check_log",
+    "check_split",
+    "clip_dwells",
+    "combine_groups",
+    "find_dwells",
+    "find_rate_levels",
+    "group_by_rate_level",
+    "group_by_run",
+    "gyro_report",
+    "hysteresis",
+    "input_error",
+    "read_log",
+    "reduction_factor",
+    "resample_in_temperature",
+    "residual_peak",
+    "residual_peak_to_peak",
+    "residual_rms",
+    "scale_factor",
+    "scale_factor_asymmetry",
+    "scale_factor_error",
+    "scale_factor_nonlinearity",
+    "scale_factor_repeatability",
+    "scale_factor_temperature_sensitivity",
+]

@@ -1,0 +1,159 @@
+"""Which rows to hold out: whole devices or runs, and rate levels where these could be learnt."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from sklearn.model_selection import GroupKFold
+
+from .groups import find_rate_levels, group_by_rate_level
+from .log import LogError
+
+__all__ = ["KINDS", "Split", "choose_split"]
+
+KINDS = ("auto", "device", "run", "level", "device+level", "run+level")
+
+_FEWEST = {"device": 3, "run": 3, "level": 5}
+_N_FOLDS = 5
+# Of the levels, where runs are held out too: every fold then trains on two thirds of them.
+_N_LEVEL_FOLDS_BESIDE = 3
+# More levels than a few per term of any model cannot be learnt by heart.
+_MOST_LEVELS = 100
+_SHARED = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
+
+    ``labels`` are those that a report lists, ``sentence`` says what was held out and why.
+    """
+
+    kind: str
+    folds: list
+    labels: np.ndarray
+    sentence: str
+
+
+def choose_split(log, kind="auto", *, uses_output=True):
+    """The split of the kind asked for, or of that which the log calls for.
+
+    ``uses_output`` says whether the compensator sees the output: only then can it tell levels.
+    """
+    numbers = {name: _numbers(log, name) for name in ("device", "run")}
+    levels = _levels(log) if uses_output else None
+    if kind == "auto":
+        kind, reason = _choose(numbers, levels)
+    else:
+        reason = "as asked for"
+    parts = kind.split("+")
+    available = numbers | {"level": levels}
+    for part in parts:
+        _check(part, available[part])
+    folds = _folds(log, parts, available)
+    labels = _labels(log, parts[0])
+    held_out = " and ".join(
+        f"whole {part}s" if part != "level" else "rate levels" for part in parts
+    )
+    counts = ", ".join(
+        f"{np.unique(available[part]).size} {'levels' if part == 'level' else part + 's'}"
+        for part in parts
+    )
+    sentence = f"{held_out} held out ({counts}, {len(folds)} folds; {reason})"
+    return Split(kind, folds, labels, sentence)
+
+
+def _choose(numbers, levels):
+    """The kind of split that a log calls for, and why."""
+    whole = next((name for name, groups in numbers.items() if _is_enough(name, groups)), None)
+    few = _is_enough("level", levels) and np.unique(levels).size <= _MOST_LEVELS
+    if whole is None:
+        if not _is_enough("level", levels):
+            raise LogError(_nothing_to_hold_out(numbers, levels))
+        return "level", "too few runs to hold out"
+    if few and _share_levels(numbers[whole], levels):
+        return f"{whole}+level", f"the {whole}s share rate levels, which could be learnt by heart"
+    return whole, f"rows of one {whole} are alike"
+
+
+def _is_enough(name, groups):
+    return groups is not None and np.unique(groups).size >= _FEWEST[name]
+
+
+def _check(part, groups):
+    if groups is None:
+        what = "rate levels" if part == "level" else f"column for the {part}"
+        raise LogError(f"cannot hold out by {part}: the log has no {what}.")
+    if not _is_enough(part, groups):
+        raise LogError(
+            f"cannot hold out by {part}: the log has {np.unique(groups).size} {part}(s), and at "
+            f"least {_FEWEST[part]} are needed."
+        )
+
+
+def _nothing_to_hold_out(numbers, levels):
+    found = [
+        f"{np.unique(groups).size} {name}(s)"
+        for name, groups in numbers.items()
+        if groups is not None
+    ]
+    found.append(f"{0 if levels is None else np.unique(levels).size} rate levels")
+    return (
+        f"the compensator could not be checked: the log has {', '.join(found)}. At least 3 runs "
+        "(a column run, or one file each) or 5 rate levels are needed, to be held out in turn."
+    )
+
+
+def _numbers(log, name):
+    return None if name not in log else np.unique(log[name].astype(str), return_inverse=True)[1]
+
+
+def _levels(log):
+    """Number of each row's level of |rate|; None where the rate changes continuously."""
+    try:
+        return group_by_rate_level(log["rate"].to_numpy())
+    except ValueError:
+        return None
+
+
+def _share_levels(groups, levels):
+    """Whether more than a tenth of the levels, on average, are met by two groups or more."""
+    pairs = np.unique(np.column_stack([levels, groups]), axis=0)
+    return bool(np.mean(np.bincount(pairs[:, 0])[np.unique(levels)] > 1) > _SHARED)
+
+
+def _folds(log, parts, available):
+    level_rows = None
+    if parts[-1] == "level":
+        n_levels = _N_LEVEL_FOLDS_BESIDE if len(parts) > 1 else _N_FOLDS
+        level_rows = group_by_rate_level(log["rate"].to_numpy(), n_groups=n_levels)
+        if len(parts) == 1:
+            return _hold_out(level_rows)
+    groups = available[parts[0]]
+    n_folds = min(_N_FOLDS, np.unique(groups).size)
+    number = np.empty(len(log), dtype=int)
+    for fold, (_, test) in enumerate(GroupKFold(n_folds).split(groups, groups=groups)):
+        number[test] = fold
+    if level_rows is None:
+        return _hold_out(number)
+    return [
+        (
+            np.flatnonzero((number != fold) & (level_rows != level)),
+            np.flatnonzero((number == fold) & (level_rows == level)),
+        )
+        for fold in range(n_folds)
+        for level in np.unique(level_rows)
+        if np.any((number == fold) & (level_rows == level))
+    ]
+
+
+def _hold_out(number):
+    return [(np.flatnonzero(number != n), np.flatnonzero(number == n)) for n in np.unique(number)]
+
+
+def _labels(log, part):
+    if part != "level":
+        return log[part].astype(str).to_numpy(dtype=object)
+    sizes = np.abs(log["rate"].to_numpy())
+    levels = find_rate_levels(sizes)
+    names = np.array([f"|{level:.4g}| °/s" for level in levels], dtype=object)
+    return names[group_by_rate_level(log["rate"].to_numpy())]

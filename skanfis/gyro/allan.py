@@ -1,0 +1,220 @@
+r"""The Allan deviation by allantools, and the reading of N, B and K from it.
+
+IEEE 952 reads three coefficients off the double-logarithmic curve sigma(tau), in deg/h over s:
+
+    slope -1/2:  sigma = N sqrt(1 / tau)                      N from tau = 1 s, in deg/sqrt(h)
+    slope 0:     sigma = B sqrt(2 ln 2 / pi) = 0.664 B        at the minimum, in deg/h
+    slope +1/2:  sigma = K sqrt(tau / 3)                      K from tau = 3 s, in deg/h/sqrt(h)
+
+where N and K are constants of the fitted lines, wherever on the curve these lie. Tools differ in
+whether they call the minimum or minimum / 0.664 the bias instability: both are given here.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from ._columns import check_column
+from .metrics import rows_by_run
+
+__all__ = ["AllanCoefficients", "allan_coefficients", "allan_deviation"]
+
+_SECONDS_PER_HOUR = 3600.0
+_FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
+_POINTS_PER_SLOPE = 3
+_SLOPE_TOLERANCE = 0.15
+# A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
+_ROWS_PER_TIME = 10
+
+
+def allan_deviation(error, sampling_interval, *, run=None):
+    """Overlapping Allan deviation of the error, in octaves up to a tenth of the run.
+
+    Computed by allantools (``allantools.oadev``), an optional dependency. The runs of one log give
+    one curve: their variances are averaged with the number of differences each has.
+
+    Smoothing the error lowers this curve at short times and compensates nothing; compare curves of
+    equal bandwidth only.
+
+    Parameters
+    ----------
+    error : array-like of shape (n_rows,)
+        Error at the input, evenly sampled within each run [deg/s].
+    sampling_interval : float
+        Time between rows, positive [s].
+    run : array-like of shape (n_rows,), default=None
+        Labels of the runs; None is one run. No difference is taken from one run to another.
+
+    Returns
+    -------
+    curve : DataFrame of shape (n_times, 4)
+        averaging_time [s]; deviation [deg/h]; error, its standard error as allantools estimates it,
+        deviation / sqrt(n) [deg/h]; n, the number of differences.
+
+    Raises
+    ------
+    ImportError
+        If allantools is not installed.
+    ValueError
+        If ``sampling_interval`` is not positive, or no run has ten rows.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import allan_deviation
+    >>> white = np.random.default_rng(0).normal(scale=1 / 3600, size=4096)  # deg/s
+    >>> curve = allan_deviation(white, 1.0)  # doctest: +SKIP
+    >>> curve["deviation"].iloc[0].round(1)  # doctest: +SKIP
+    1.0
+    """
+    oadev = _import_oadev()
+    error = check_column(error, "error")
+    if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
+        raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
+    variances: dict[int, list] = {}
+    for rows in rows_by_run(run, error.size, at_least=1):
+        if rows.size < _ROWS_PER_TIME:
+            continue
+        drift = _SECONDS_PER_HOUR * error[rows]
+        times, deviations, _, counts = oadev(
+            drift, rate=1.0 / sampling_interval, data_type="freq", taus="octave"
+        )
+        for time, deviation, n in zip(times, deviations, counts, strict=True):
+            multiple = round(time / sampling_interval)
+            if multiple * _ROWS_PER_TIME <= rows.size:
+                variances.setdefault(multiple, []).append((deviation**2, n))
+    if not variances:
+        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
+    lines = []
+    for multiple, found in sorted(variances.items()):
+        squares, counts = np.transpose(found)
+        deviation, n = np.sqrt(np.average(squares, weights=counts)), counts.sum()
+        lines.append((multiple * sampling_interval, deviation, deviation / np.sqrt(n), int(n)))
+    return pd.DataFrame(lines, columns=["averaging_time", "deviation", "error", "n"])
+
+
+@dataclass(frozen=True)
+class AllanCoefficients:
+    """What an Allan curve says of the noise; None where it says nothing, with the reason.
+
+    Parameters
+    ----------
+    angle_random_walk : float or None
+        N [deg/sqrt(h)].
+    allan_minimum : float or None
+        Minimum of the curve [deg/h].
+    bias_instability : float or None
+        B = minimum / 0.664 [deg/h].
+    rate_random_walk : float or None
+        K [deg/h/sqrt(h)].
+    notes : dict of str to str
+        Why a coefficient is None, by its name.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import AllanCoefficients
+    >>> AllanCoefficients(0.05, None, None, None, {"rate_random_walk": "no slope of +1/2"}).notes
+    {'rate_random_walk': 'no slope of +1/2'}
+    """
+
+    angle_random_walk: float | None
+    allan_minimum: float | None
+    bias_instability: float | None
+    rate_random_walk: float | None
+    notes: dict = field(default_factory=dict)
+
+
+def allan_coefficients(averaging_time, deviation):
+    """Read angle random walk, bias instability and rate random walk off an Allan curve.
+
+    A slope counts as found where a line through three neighbouring points has it within 0.15; the
+    coefficient is that of the lowest such line, before the minimum for N and after it for K: what
+    else is in the noise only adds to the curve. Leave out times longer than a tenth of the
+    record (:func:`allan_deviation` does): they are hardly more than one observation. The minimum
+    counts where the curve has one inside; a curve that still falls at its longest
+    time has none.
+
+    Parameters
+    ----------
+    averaging_time : array-like of shape (n_times,)
+        Increasing, positive [s]; best in octaves.
+    deviation : array-like of shape (n_times,)
+        Allan deviation, positive [deg/h].
+
+    Returns
+    -------
+    coefficients : AllanCoefficients
+
+    Raises
+    ------
+    ValueError
+        If the curve has fewer than three points, or times or deviations are not positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import allan_coefficients
+    >>> tau = 2.0 ** np.arange(14)
+    >>> white, walk = 3.0 / np.sqrt(tau), 0.05 * np.sqrt(tau / 3)  # deg/h
+    >>> read = allan_coefficients(tau, np.hypot(white, walk))
+    >>> round(read.angle_random_walk, 3), round(read.rate_random_walk, 2)
+    (0.05, 3.0)
+    """
+    tau = check_column(averaging_time, "averaging_time")
+    deviation = check_column(deviation, "deviation", tau.size)
+    if tau.size < _POINTS_PER_SLOPE:
+        raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")
+    if tau[0] <= 0 or (np.diff(tau) <= 0).any():
+        raise ValueError("averaging_time must be positive and increase.")
+    if deviation.min() <= 0:
+        raise ValueError(f"deviation must be positive; its smallest value is {deviation.min():g}.")
+    lowest = int(np.argmin(deviation))
+    notes: dict[str, str] = {}
+    # sigma sqrt(tau) is N where the slope is -1/2: 1 deg/h at 1 s is 1/60 deg/sqrt(h).
+    walk = _level(tau, deviation, -0.5, slice(0, lowest + 1))
+    if walk is None:
+        notes["angle_random_walk"] = "no slope of -1/2"
+    minimum = float(deviation[lowest])
+    if lowest in (0, tau.size - 1):
+        side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
+        reason = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
+        notes["allan_minimum"] = notes["bias_instability"] = reason
+    drift = _level(tau, deviation, 0.5, slice(lowest, tau.size))
+    if drift is None:
+        notes["rate_random_walk"] = "no slope of +1/2"
+    return AllanCoefficients(
+        angle_random_walk=None if walk is None else walk / 60.0,
+        allan_minimum=None if "allan_minimum" in notes else minimum,
+        bias_instability=None if "bias_instability" in notes else minimum / float(_FLICKER),
+        # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
+        rate_random_walk=None if drift is None else drift * np.sqrt(3.0) * 60.0,
+        notes=notes,
+    )
+
+
+def _level(tau, deviation, slope, part):
+    """Level of the lowest line of this slope along the curve; None where it never has the slope.
+
+    The lowest, because the other parts of the noise only add to the curve.
+    """
+    x, y = np.log(tau[part]), np.log(deviation[part])
+    levels = []
+    for start in range(x.size - _POINTS_PER_SLOPE + 1):
+        window = slice(start, start + _POINTS_PER_SLOPE)
+        found = np.polynomial.Polynomial.fit(x[window], y[window], 1).convert().coef[1]
+        if abs(found - slope) <= _SLOPE_TOLERANCE:
+            levels.append(np.mean(y[window] - slope * x[window]))
+    return float(np.exp(min(levels))) if levels else None
+
+
+def _import_oadev():
+    """``allantools.oadev``, imported when it is needed."""
+    try:
+        from allantools import oadev
+    except ImportError as error:
+        raise ImportError(
+            "The Allan deviation needs allantools, which is not installed: "
+            "pip install 'skanfis[allan]' (or pip install allantools)."
+        ) from error
+    return oadev

@@ -1,0 +1,279 @@
+"""GyroCompensator: a fitted estimator, and all that it takes to apply it to a log."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..export import export_json
+from ..export.model_json import parse_json
+from ._ask import ask
+from .features import ThermalRate, TimeSincePowerOn
+
+__all__ = ["STATUS", "GyroCompensator"]
+
+INPUTS = ("time", "temperature", "temperature_rate", "output")
+
+# The status word of the exported C code has the same bits.
+STATUS = {"OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
+
+_FORMAT, _VERSION = "skanfis gyro compensator", 1
+_KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
+_MOST_BYTES = 2**24
+# Rows whose inputs, predictions and coverage are held at a time.
+_BLOCK_ROWS = 65_536
+
+
+@dataclass(frozen=True, eq=False)
+class GyroCompensator:
+    """A fitted compensator with its inputs, units and limits: what the command writes and applies.
+
+    It takes logs as :func:`read_log` returns them, and uses nothing that is not known on board:
+    never the true rate.
+
+    Parameters
+    ----------
+    estimator : fitted estimator
+        Predicts from the columns ``inputs``, in this order, and has ``in_bounds`` and ``coverage``,
+        or is a Pipeline that ends in such.
+    inputs : tuple of str
+        Of "time" (since power-on [s]), "temperature" [degC], "temperature_rate" (low-passed
+        [degC/s], see :class:`ThermalRate`) and "output" (in ``output_unit``).
+    predicts : {"error", "rate"}, default="error"
+        Whether the estimator predicts the error, indicated minus true rate, or the rate [deg/s].
+    scale_factor : float, default=1.0
+        Output per deg/s: the indicated rate is the output over this.
+    output_unit : str, default="deg/s"
+        Unit of the output, "deg/s" or a raw signal such as "counts".
+    time_constant : float, default=60.0
+        Time constant of "temperature_rate" [s].
+    min_coverage : float, default=0.1
+        Rows that the training data cover less are flagged.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_ofog
+    >>> from skanfis.gyro import GyroCompensator
+    >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
+    >>> inputs = ("time", "temperature", "output")
+    >>> model = ANFISRegressor([2, 2, 3]).fit(log[list(inputs)], log["error"])
+    >>> compensator = GyroCompensator(model, inputs)
+    >>> hotter = log.assign(temperature=log["temperature"] + 40)
+    >>> compensator.apply(hotter).query("status == 0").shape[0] < len(log)
+    True
+    """
+
+    estimator: Any
+    inputs: tuple[str, ...]
+    predicts: str = "error"
+    scale_factor: float = 1.0
+    output_unit: str = "deg/s"
+    time_constant: float = 60.0
+    min_coverage: float = 0.1
+
+    def features(self, log):
+        """The estimator's inputs.
+
+        Parameters
+        ----------
+        log : DataFrame of shape (n_rows, n_parts)
+            With the columns that the inputs are made from, and "run" where it has several.
+
+        Returns
+        -------
+        X : DataFrame of shape (n_rows, n_inputs)
+        """
+        return features(log, self.inputs, self.time_constant)
+
+    def indicated(self, log):
+        """The rate that the gyro indicates without compensation.
+
+        Parameters
+        ----------
+        log : DataFrame of shape (n_rows, n_parts)
+
+        Returns
+        -------
+        rate : ndarray of shape (n_rows,)
+            [deg/s]
+        """
+        return log["output"].to_numpy() / self.scale_factor
+
+    def apply(self, log):
+        """Compensate a log, and flag the rows in which that cannot be trusted.
+
+        Parameters
+        ----------
+        log : DataFrame of shape (n_rows, n_parts)
+            As :func:`read_log` returns it; a column for the true rate is not used.
+
+        Returns
+        -------
+        compensated : DataFrame of shape (n_rows, 4)
+            rate_indicated and rate_compensated [deg/s]; coverage, from 0 to 1, how well the
+            training data cover the row; status, the sum of 1 where an input lies outside the
+            range of the training data, 4 where the coverage is below ``min_coverage``, 8 where
+            the policy gives no rate, and the compensated rate is NaN. Zero says that all is well.
+        """
+        X, indicated = self.features(log), self.indicated(log)
+        blocks = [
+            self._apply_block(X.iloc[start : start + _BLOCK_ROWS])
+            for start in range(0, len(X), _BLOCK_ROWS)
+        ]
+        predicted, inside, coverage = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        refused = np.isnan(predicted)
+        status = (
+            STATUS["OUT_OF_RANGE"] * ~inside
+            | STATUS["UNCOVERED"] * (~refused & (coverage < self.min_coverage))
+            | STATUS["NO_OUTPUT"] * refused
+        )
+        return pd.DataFrame(
+            {
+                "rate_indicated": indicated,
+                "rate_compensated": self.compensate(indicated, predicted),
+                "coverage": coverage,
+                "status": status.astype(np.uint8),
+            },
+            index=log.index,
+        )
+
+    def compensate(self, indicated, predicted):
+        """The compensated rate from what the estimator predicts.
+
+        Parameters
+        ----------
+        indicated : ndarray of shape (n_rows,)
+            [deg/s]
+        predicted : ndarray of shape (n_rows,)
+            [deg/s]
+
+        Returns
+        -------
+        rate : ndarray of shape (n_rows,)
+            [deg/s]
+        """
+        return indicated - predicted if self.predicts == "error" else predicted
+
+    def write_json(self, path):
+        """Write it as text that runs nothing when it is read.
+
+        Parameters
+        ----------
+        path : str or path-like
+
+        Returns
+        -------
+        None
+
+        Raises
+        ------
+        ValueError, TypeError
+            If the estimator cannot be written as a model of rules: one with a law of physics.
+        OSError
+            If the file cannot be written.
+        """
+        document = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            **{key: getattr(self, key) for key in _KEYS},
+            "model": json.loads(export_json(getattr(self.estimator, "model", self.estimator))),
+        }
+        text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+        Path(path).write_text(text, encoding="utf-8", newline="\n")
+
+    @classmethod
+    def read_json(cls, path):
+        """Read one that :meth:`write_json` has written.
+
+        Parameters
+        ----------
+        path : str or path-like
+
+        Returns
+        -------
+        compensator : GyroCompensator
+            It does what that did which was written. Its estimator can predict, not be fitted.
+
+        Raises
+        ------
+        ValueError
+            If the file is not such a compensator.
+        OSError
+            If it cannot be opened.
+        """
+        try:
+            with open(path, "rb") as file:
+                data = file.read(_MOST_BYTES + 1)
+            if len(data) > _MOST_BYTES:
+                raise ValueError(f"it has more than {_MOST_BYTES} bytes")
+            document = json.loads(data.decode("utf-8"))
+            return cls(**_settings(document))
+        except (ValueError, RecursionError) as error:
+            raise ValueError(f"{path} is no gyro compensator: {error}.") from error
+
+    def _apply_block(self, X):
+        inside = ask(self.estimator, "in_bounds", X)
+        return self.estimator.predict(X), inside, ask(self.estimator, "coverage", X)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rules:
+    """A model of rules that was read from a file, as an estimator that is fitted for good."""
+
+    model: Any
+
+    def predict(self, X):
+        return self.model.predict(X.to_numpy())[:, 0]
+
+    def in_bounds(self, X):
+        return self.model.in_bounds(X.to_numpy())
+
+    def coverage(self, X):
+        return self.model.coverage(X.to_numpy())
+
+
+def features(log, inputs, time_constant):
+    """Columns that are known on board, in the order of ``inputs``."""
+    has_run = "run" in log
+    clock = log[["time", "run"] if has_run else ["time"]] if "time" in log else None
+    roles = {"time": "time", "run": "run" if has_run else None}
+    columns = {}
+    for name in inputs:
+        if name == "time":
+            columns[name] = TimeSincePowerOn(**roles).fit_transform(clock)[:, 0]
+        elif name == "temperature_rate":
+            rate = ThermalRate(time_constant, **roles)
+            columns[name] = rate.fit_transform(clock.assign(temperature=log["temperature"]))[:, 0]
+        else:
+            columns[name] = log[name].to_numpy()
+    return pd.DataFrame(columns, index=log.index)
+
+
+def _settings(document):
+    """Arguments of a compensator out of a file's content; ValueError where it is none."""
+    if not isinstance(document, dict) or document.get("format") != _FORMAT:
+        raise ValueError(f'its "format" is not "{_FORMAT}"')
+    if document.get("version") != _VERSION:
+        raise ValueError(f"its version is {document.get('version')!r}, this reads {_VERSION}")
+    if set(document) != {"format", "version", "model", *_KEYS}:
+        raise ValueError(f"its keys are {', '.join(document)}")
+    inputs = document["inputs"]
+    if not isinstance(inputs, list) or not inputs or any(name not in INPUTS for name in inputs):
+        raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
+    if document["predicts"] not in ("error", "rate"):
+        raise ValueError(f"predicts is {document['predicts']!r}")
+    for key in ("scale_factor", "time_constant", "min_coverage"):
+        value = document[key]
+        if type(value) not in (int, float) or not np.isfinite(value):
+            raise ValueError(f"{key} is {value!r}, no finite number")
+    if not isinstance(document["output_unit"], str):
+        raise ValueError("output_unit is no text")
+    model = parse_json(json.dumps(document["model"]))
+    if model.n_inputs != len(inputs) or model.n_outputs != 1:
+        raise ValueError(f"its model has {model.n_inputs} inputs and {model.n_outputs} outputs")
+    settings = {key: document[key] for key in _KEYS}
+    return {"estimator": _Rules(model), **settings, "inputs": tuple(inputs)}

@@ -1,0 +1,253 @@
+"""Two regressors in a row: the second learns what the first leaves."""
+
+import numpy as np
+from sklearn import get_config
+from sklearn.base import BaseEstimator, RegressorMixin, clone
+from sklearn.pipeline import Pipeline
+from sklearn.utils import Bunch, get_tags
+from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping, process_routing
+from sklearn.utils.metaestimators import available_if
+from sklearn.utils.validation import (
+    check_is_fitted,
+    check_scalar,
+    column_or_1d,
+    has_fit_parameter,
+    validate_data,
+)
+
+from .. import ANFISRegressor
+from .physics import OpenLoopArcsineRegressor
+
+__all__ = ["ResidualRegressor"]
+
+
+def _some_part_has(method):
+    """A check for ``available_if``: that the base or the residual model offers ``method``."""
+
+    def check(self):
+        for part in self._parts():
+            # AttributeError with the part's own words where it has no such method.
+            if hasattr(_last_step(part), method):
+                return True
+        raise AttributeError(f"Neither base nor residual of {self!r} has the method {method!r}.")
+
+    return check
+
+
+class ResidualRegressor(RegressorMixin, BaseEstimator):
+    """A base regressor, and another that learns what it leaves.
+
+    The base is fitted to the target, the residual model to the target minus what the base predicts;
+    the prediction is the sum of both. With the physics of the sensor as the base, the residual
+    model stays small, and far from the data the sum falls back to physics plus an edge value.
+
+    Parameters
+    ----------
+    base : regressor, default=None
+        Fitted to the target; None is ``OpenLoopArcsineRegressor()``. It is fitted and its residual
+        taken on the same rows: it must be stiff, as a law of few coefficients is. A flexible base
+        would leave nothing there.
+    residual : regressor, default=None
+        Fitted to what the base leaves; None is ``ANFISRegressor()``. A Pipeline will do, and may
+        begin with a selection of columns.
+    n_rounds : int, default=1
+        How often both are fitted in turn, 1 or more. From the second round on, the base is fitted
+        to the target minus what the residual model predicts (backfitting [1]_): an effect that the
+        base does not have then stops pulling at its coefficients. Three rounds are usually enough.
+        It needs a residual model that cannot do the base's work: give it few columns and rules.
+
+    Attributes
+    ----------
+    base_, residual_ : regressor
+        The fitted parts. ``residual_`` is an estimator like any other: its rules can be shown and
+        exported by themselves.
+    n_features_in_ : int
+        Number of columns of X.
+    feature_names_in_ : ndarray of shape (n_features,)
+        Their names, where X had names that are all strings.
+
+    See Also
+    --------
+    OpenLoopArcsineRegressor : The law of an open-loop fiber-optic gyro.
+
+    References
+    ----------
+    .. [1] A. Buja, T. Hastie and R. Tibshirani, "Linear smoothers and additive models", The Annals
+       of Statistics 17 (1989) 453-510.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_ofog
+    >>> from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor
+    >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
+    >>> X, rate = log[["output", "temperature", "time"]], log["rate"]
+    >>> physics = OpenLoopArcsineRegressor("output", "temperature")
+    >>> compensator = ResidualRegressor(physics, ANFISRegressor(n_mfs=2)).fit(X, rate)
+    >>> before, after = [model.predict(X) - rate for model in (compensator.base_, compensator)]
+    >>> bool(after.std() < before.std() / 3)
+    True
+    """
+
+    def __init__(self, base=None, residual=None, *, n_rounds=1):
+        self.base = base
+        self.residual = residual
+        self.n_rounds = n_rounds
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        tags.regressor_tags.poor_score = self.base is None
+        tags.input_tags.sparse = all(get_tags(part).input_tags.sparse for part in self._unfitted())
+        return tags
+
+    def get_metadata_routing(self):
+        """Metadata routing of this object, with both parts; see scikit-learn's user guide.
+
+        Returns
+        -------
+        routing : MetadataRouter
+        """
+        to_both = MethodMapping().add(caller="fit", callee="fit")
+        base, residual = self._unfitted()
+        router = MetadataRouter(owner=type(self).__name__)
+        return router.add(base=base, residual=residual, method_mapping=to_both)
+
+    def fit(self, X, y, sample_weight=None):
+        """Fit the base, then the residual model.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Inputs of both.
+        y : array-like of shape (n_samples,)
+            Target.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weights, given to both parts. To a Pipeline they are given for its last step. With
+            ``sklearn.set_config(enable_metadata_routing=True)``, they go where the parts request
+            them.
+
+        Returns
+        -------
+        self : ResidualRegressor
+
+        Raises
+        ------
+        ValueError
+            If ``n_rounds`` is less than 1, if the base has no finite prediction for some training
+            row, or if a part takes no weights.
+        """
+        check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
+        # Each part checks X for itself, here and in predict; only its columns are taken note of.
+        validate_data(self, X, skip_check_array=True)
+        y = column_or_1d(y, dtype=float, warn=True)
+        base, residual = self._unfitted()
+        weights = self._weights_by_part(base, residual, sample_weight)
+        learnt = np.zeros(y.size)
+        for _ in range(self.n_rounds):
+            self.base_ = clone(base).fit(X, y - learnt, **weights.base)
+            left = y - self.base_.predict(X)
+            _check_answered(left)
+            self.residual_ = clone(residual).fit(X, left, **weights.residual)
+            learnt = self.residual_.predict(X)
+        return self
+
+    def predict(self, X):
+        """Predict the target, as the sum of both parts.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        y : ndarray of shape (n_samples,)
+        """
+        check_is_fitted(self)
+        return self.base_.predict(X) + self.residual_.predict(X)
+
+    @available_if(_some_part_has("in_bounds"))
+    def in_bounds(self, X):
+        """Tell which rows lie in bounds of every part that has such; through Pipelines too.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        inside : ndarray of bool of shape (n_samples,)
+        """
+        check_is_fitted(self)
+        return np.logical_and.reduce(self._answers("in_bounds", X))
+
+    @available_if(_some_part_has("coverage"))
+    def coverage(self, X):
+        """Tell how well the training data cover each row: the least that a part says.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        coverage : ndarray of shape (n_samples,)
+            From 0 to 1; see :meth:`skanfis.ANFISRegressor.coverage`.
+        """
+        check_is_fitted(self)
+        return np.minimum.reduce(self._answers("coverage", X))
+
+    def _unfitted(self):
+        """Both parts, with the defaults in the place of None."""
+        base = OpenLoopArcsineRegressor() if self.base is None else self.base
+        residual = ANFISRegressor() if self.residual is None else self.residual
+        return base, residual
+
+    def _parts(self):
+        return (self.base_, self.residual_) if hasattr(self, "residual_") else self._unfitted()
+
+    def _answers(self, method, X):
+        """What the parts that have ``method`` answer."""
+        return [
+            _ask(part, method, X) for part in self._parts() if hasattr(_last_step(part), method)
+        ]
+
+    def _weights_by_part(self, base, residual, sample_weight):
+        """Keyword arguments of each part's fit."""
+        if sample_weight is None:
+            return Bunch(base={}, residual={})
+        if get_config()["enable_metadata_routing"]:
+            routed = process_routing(self, "fit", sample_weight=sample_weight)
+            return Bunch(base=routed.base.fit, residual=routed.residual.fit)
+        return Bunch(
+            base=_weight_argument(base, "base", sample_weight),
+            residual=_weight_argument(residual, "residual", sample_weight),
+        )
+
+
+def _check_answered(left):
+    refused = ~np.isfinite(left)
+    if refused.any():
+        raise ValueError(
+            f"base has no finite prediction for {refused.sum()} of {refused.size} training rows: "
+            "nothing is left there for the residual model to learn. Drop these rows, or give the "
+            "base a policy that answers."
+        )
+
+
+def _last_step(estimator):
+    return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
+
+
+def _ask(estimator, method, X):
+    """Answer of an estimator, or of a Pipeline's last step to what its other steps make of X."""
+    if isinstance(estimator, Pipeline):
+        X = estimator[:-1].transform(X) if len(estimator) > 1 else X
+    return getattr(_last_step(estimator), method)(X)
+
+
+def _weight_argument(estimator, role, sample_weight):
+    last = _last_step(estimator)
+    if not has_fit_parameter(last, "sample_weight"):
+        raise ValueError(f"sample_weight was given, but {role}={estimator!r} takes no weights.")
+    step = f"{estimator.steps[-1][0]}__" if isinstance(estimator, Pipeline) else ""
+    return {f"{step}sample_weight": sample_weight}

@@ -1,0 +1,95 @@
+"""What the Displays of a compensation have in common: where their numbers come from."""
+
+import numpy as np
+
+from ._style import PER_UNIT
+
+__all__ = ["CompensationDisplay", "binned", "check_rows", "check_unit", "compensated_rate"]
+
+PREDICTS = ("error", "rate")
+
+
+class CompensationDisplay:
+    """A picture of a rate before and after compensation."""
+
+    # Arguments of from_predictions with one value per row, which from_estimator finds in X.
+    _PER_ROW: tuple[str, ...] = ()
+
+    @classmethod
+    def from_estimator(
+        cls, estimator, X, rate, *, output="output", predicts="error", ax=None, **options
+    ):
+        """Compute from a fitted estimator, and draw.
+
+        Parameters
+        ----------
+        estimator : estimator
+            Fitted regressor; rows should be others than it was trained on.
+        X : DataFrame of shape (n_rows, n_columns)
+            What the estimator predicts from; it takes the columns that it was trained on.
+        rate : array-like of shape (n_rows,)
+            True rate [deg/s].
+        output : str or array-like of shape (n_rows,), default="output"
+            Indicated rate without compensation [deg/s], or the column of X that holds it.
+        predicts : {"error", "rate"}, default="error"
+            Whether the estimator predicts the error, indicated minus true rate, or the rate.
+        ax : matplotlib axes or array of these, default=None
+            Where to draw; None makes a figure.
+        **options
+            As for ``from_predictions``. Where that wants a value per row, the name of a column of
+            X serves too.
+
+        Returns
+        -------
+        display
+            The display, drawn.
+        """
+        before = column(X, output)
+        after = compensated_rate(estimator, X, before, predicts)
+        for name in cls._PER_ROW:
+            if name in options:
+                options[name] = column(X, options[name])
+        return cls.from_predictions(rate, before, after, ax=ax, **options)
+
+
+def column(X, values):
+    """A column of X by its name; anything else is the values themselves."""
+    return X[values] if isinstance(values, str) else values
+
+
+def compensated_rate(estimator, X, indicated, predicts):
+    """What the estimator makes of the indicated rate; X may have other columns than it uses."""
+    if predicts not in PREDICTS:
+        raise ValueError(f"predicts={predicts!r} must be one of {', '.join(PREDICTS)}.")
+    names = getattr(estimator, "feature_names_in_", None)
+    predicted = estimator.predict(X if names is None else X[list(names)])
+    return np.asarray(indicated, dtype=float) - predicted if predicts == "error" else predicted
+
+
+def check_rows(**columns):
+    """The columns as arrays of equal length; ValueError names the one that differs."""
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    n_rows = next(iter(arrays.values())).size
+    for name, values in arrays.items():
+        if values.shape != (n_rows,):
+            first = next(iter(arrays))
+            raise ValueError(
+                f"{name} has shape {values.shape}; it must have one value per row, as many as "
+                f"{first} ({n_rows})."
+            )
+    return arrays.values()
+
+
+def check_unit(unit):
+    """The unit itself; ValueError where it is none of a rate."""
+    if unit not in PER_UNIT:
+        raise ValueError(f"unit={unit!r} must be one of {', '.join(PER_UNIT)}.")
+    return unit
+
+
+def binned(positions, n_bins):
+    """Edges of equal bins over the finite positions, and the bin of each row."""
+    low, high = positions.min(), positions.max()
+    edges = np.linspace(low, high if high > low else low + 1.0, n_bins + 1)
+    bins = np.searchsorted(edges, positions, side="right") - 1
+    return edges, np.clip(bins, 0, n_bins - 1)

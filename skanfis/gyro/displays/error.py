@@ -1,0 +1,188 @@
+"""ErrorDisplay: the error against time, temperature or anything else, before and after."""
+
+import numpy as np
+
+from ._base import CompensationDisplay, binned, check_rows, check_unit
+from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
+
+__all__ = ["ErrorDisplay"]
+
+_N_BINS = 300
+_N_POINTS = 3_000
+
+
+class ErrorDisplay(CompensationDisplay):
+    """The rate error before and after compensation, against time or temperature.
+
+    Two panels, one above the other, each with its own scale: a good compensation would be a
+    straight line on the scale of what it compensates. A band reaches from the smallest to the
+    largest error of all rows, so that no peak is lost; points are some of the rows.
+
+    Make it with :meth:`from_estimator` or :meth:`from_predictions`.
+
+    Parameters
+    ----------
+    position : ndarray of shape (n_points,)
+        Where the points lie: time, temperature ...
+    before, after : ndarray of shape (n_points,)
+        Errors of these points [deg/s].
+    edges : ndarray of shape (n_bins + 1,)
+        Bins of the position.
+    range_before, range_after : ndarray of shape (n_bins, 2)
+        Smallest and largest error in each bin [deg/s]; NaN where it has no rows.
+    rms : tuple of two floats
+        Root mean square of all errors before and after [deg/s].
+    position_label : str, default="time [s]"
+        What the position is, with its unit.
+
+    Attributes
+    ----------
+    axes_ : ndarray of matplotlib axes, of shape (2,)
+        Before, after; once drawn.
+    figure_ : matplotlib figure
+        The figure that they are part of.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_ofog
+    >>> from skanfis.gyro import ErrorDisplay
+    >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
+    >>> X, old = log[["time", "temperature", "output"]], log["run"] < 3
+    >>> model = ANFISRegressor([2, 2, 3], out_of_bounds="nan", warn_out_of_bounds=False)
+    >>> model = model.fit(X[old], log["error"][old])
+    >>> display = ErrorDisplay.from_estimator(
+    ...     model, X, log["rate"], position="temperature", position_label="temperature [°C]"
+    ... )
+    >>> before, after = display.rms
+    >>> bool(after < before / 20)
+    True
+    """
+
+    _PER_ROW = ("position",)
+
+    def __init__(
+        self,
+        *,
+        position,
+        before,
+        after,
+        edges,
+        range_before,
+        range_after,
+        rms,
+        position_label="time [s]",
+    ):
+        self.position = position
+        self.before = before
+        self.after = after
+        self.edges = edges
+        self.range_before = range_before
+        self.range_after = range_after
+        self.rms = rms
+        self.position_label = position_label
+
+    @classmethod
+    def from_predictions(
+        cls,
+        rate,
+        before,
+        after,
+        *,
+        position,
+        position_label="time [s]",
+        unit="deg/s",
+        ax=None,
+    ):
+        """Compute from rates, and draw.
+
+        Parameters
+        ----------
+        rate : array-like of shape (n_rows,)
+            True rate [deg/s].
+        before, after : array-like of shape (n_rows,)
+            Indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        position : array-like of shape (n_rows,)
+            Time, temperature, or what else to draw the error against.
+        position_label : str, default="time [s]"
+            What the position is, with its unit.
+        unit : {"deg/s", "deg/h"}, default="deg/s"
+            Unit to draw the errors in.
+        ax : array of two matplotlib axes, default=None
+            For the errors before and after; None makes a figure.
+
+        Returns
+        -------
+        display : ErrorDisplay
+        """
+        rate, before, after, position = check_rows(
+            rate=rate, before=before, after=after, position=position
+        )
+        errors = before - rate, after - rate
+        edges, bins = binned(position, _N_BINS)
+        some = np.unique(np.linspace(0, rate.size - 1, min(rate.size, _N_POINTS)).astype(int))
+        display = cls(
+            position=position[some],
+            before=errors[0][some],
+            after=errors[1][some],
+            edges=edges,
+            range_before=_ranges(errors[0], bins),
+            range_after=_ranges(errors[1], bins),
+            rms=tuple(float(np.sqrt(np.nanmean(error**2))) for error in errors),
+            position_label=position_label,
+        )
+        return display.plot(ax=ax, unit=unit)
+
+    def plot(self, ax=None, *, unit="deg/s"):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : array of two matplotlib axes, default=None
+            For the errors before and after; None makes a figure.
+        unit : {"deg/s", "deg/h"}, default="deg/s"
+            Unit to draw the errors in.
+
+        Returns
+        -------
+        display : ErrorDisplay
+            Itself.
+        """
+        factor = PER_UNIT[check_unit(unit)]
+        self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.4), nrows=2, sharex=True)
+        panels = (
+            ("before", self.before, self.range_before, BEFORE),
+            ("after", self.after, self.range_after, AFTER),
+        )
+        for axes, (name, errors, ranges, color), rms in zip(
+            self.axes_, panels, self.rms, strict=True
+        ):
+            low, high = factor * ranges.T
+            axes.fill_between(
+                self.edges,
+                np.append(low, low[-1]),
+                np.append(high, high[-1]),
+                step="post",
+                color=color,
+                alpha=0.22,
+                linewidth=0,
+            )
+            axes.plot(
+                self.position, factor * errors, ".", color=color, markersize=2.5, alpha=0.6, mew=0
+            )
+            peak = np.nanmax(np.abs(factor * ranges))
+            title = f"{name}: RMS {figures(factor * rms)}, peak {figures(peak)} {SYMBOL[unit]}"
+            dress(axes, ylabel=f"error [{SYMBOL[unit]}]", title=title)
+        self.axes_[1].set_xlabel(self.position_label)
+        return self
+
+
+def _ranges(errors, bins):
+    """Smallest and largest error in each bin; NaN where there is none."""
+    low, high = np.full((2, _N_BINS), [[np.inf], [-np.inf]])
+    known = np.isfinite(errors)
+    np.minimum.at(low, bins[known], errors[known])
+    np.maximum.at(high, bins[known], errors[known])
+    ranges = np.column_stack([low, high])
+    ranges[np.isinf(low)] = np.nan
+    return ranges

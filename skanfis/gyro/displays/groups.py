@@ -1,0 +1,136 @@
+"""GroupResidualDisplay: the residual of every group that was held out."""
+
+import numpy as np
+
+from ._base import CompensationDisplay, check_rows, check_unit
+from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
+
+__all__ = ["GroupResidualDisplay"]
+
+_MOST_LINES = 30
+
+
+class GroupResidualDisplay(CompensationDisplay):
+    """RMS error of every held-out group, before and after compensation, on a logarithmic axis.
+
+    One line per run, device or rate level, the worst at the top; with more than 30, only the worst
+    are drawn. A compensation is as good as the groups on which it is bad.
+
+    Make it with :meth:`from_estimator` or :meth:`from_predictions`.
+
+    Parameters
+    ----------
+    groups : ndarray of shape (n_groups,)
+        Labels of the groups, in the order of their error after compensation, smallest first.
+    before, after : ndarray of shape (n_groups,)
+        RMS errors [deg/s]; NaN where the compensator refused all rows of the group.
+
+    Attributes
+    ----------
+    ax_ : matplotlib axes
+        Once drawn.
+    figure_ : matplotlib figure
+        The figure that it is part of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import GroupResidualDisplay
+    >>> rate, run = np.zeros(4), np.array(["cold", "cold", "hot", "hot"])
+    >>> display = GroupResidualDisplay.from_predictions(
+    ...     rate, [1.0, -1.0, 2.0, 2.0], [0.3, -0.3, 0.1, 0.1], groups=run
+    ... )
+    >>> display.groups, display.after
+    (array(['hot', 'cold'], dtype=...), array([0.1, 0.3]))
+    """
+
+    _PER_ROW = ("groups",)
+
+    def __init__(self, *, groups, before, after):
+        self.groups = groups
+        self.before = before
+        self.after = after
+
+    @classmethod
+    def from_predictions(cls, rate, before, after, *, groups, unit="deg/s", ax=None):
+        """Compute from rates, and draw.
+
+        Parameters
+        ----------
+        rate : array-like of shape (n_rows,)
+            True rate [deg/s].
+        before, after : array-like of shape (n_rows,)
+            Indicated and compensated rate [deg/s], each row compensated by an estimator that had
+            not seen its group. NaN: the compensator refused the row.
+        groups : array-like of shape (n_rows,)
+            Label of the group of each row.
+        unit : {"deg/s", "deg/h"}, default="deg/s"
+            Unit to draw in.
+        ax : matplotlib axes, default=None
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        display : GroupResidualDisplay
+        """
+        rate, before, after, groups = check_rows(
+            rate=rate, before=before, after=after, groups=groups
+        )
+        labels, codes = np.unique(groups, return_inverse=True)
+        results = [_rms_by_group(indicated - rate, codes) for indicated in (before, after)]
+        # Groups without an answer last, at the top: nothing is worse.
+        order = np.argsort(results[1], kind="stable")
+        display = cls(groups=labels[order], before=results[0][order], after=results[1][order])
+        return display.plot(ax=ax, unit=unit)
+
+    def plot(self, ax=None, *, unit="deg/s"):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : matplotlib axes, default=None
+            Where to draw; None makes a figure.
+        unit : {"deg/s", "deg/h"}, default="deg/s"
+            Unit to draw in.
+
+        Returns
+        -------
+        display : GroupResidualDisplay
+            Itself.
+        """
+        factor = PER_UNIT[check_unit(unit)]
+        shown = slice(-_MOST_LINES, None)
+        groups = self.groups[shown]
+        before, after = factor * self.before[shown], factor * self.after[shown]
+        height = 1.4 + 0.2 * len(groups)
+        self.figure_, axes = make_axes(ax, 1, (6.2, height))
+        self.ax_ = axes[0]
+        lines = np.arange(len(groups))
+        self.ax_.hlines(lines, after, before, color="0.8", linewidth=2, zorder=1)
+        self.ax_.plot(before, lines, "o", color=BEFORE, label="before", markersize=5)
+        self.ax_.plot(after, lines, "o", color=AFTER, label="after", markersize=5)
+        self.ax_.set_xscale("log")
+        self.ax_.set_yticks(lines, [str(group) for group in groups])
+        self.ax_.set_ylim(-0.7, len(groups) - 0.3)
+        left_out = len(self.groups) - len(groups)
+        extent = f"worst {len(groups)} of {len(self.groups)}" if left_out else f"{len(groups)}"
+        worst = figures(np.nanmax(after))
+        dress(
+            self.ax_,
+            f"RMS error [{SYMBOL[unit]}]",
+            "held-out group",
+            f"{extent} groups: after, {figures(np.nanmedian(factor * self.after))} in the median, "
+            f"{worst} in the worst",
+        )
+        self.ax_.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        return self
+
+
+def _rms_by_group(errors, codes):
+    known = np.isfinite(errors)
+    n_groups = codes.max() + 1
+    counts = np.bincount(codes[known], minlength=n_groups)
+    squares = np.bincount(codes[known], errors[known] ** 2, minlength=n_groups)
+    means = np.full(n_groups, np.nan)
+    np.divide(squares, counts, out=means, where=counts > 0)
+    return np.sqrt(means)

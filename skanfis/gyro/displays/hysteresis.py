@@ -1,0 +1,191 @@
+"""HysteresisDisplay: bias against temperature, warming and cooling apart."""
+
+import numpy as np
+
+from ._base import CompensationDisplay, binned, check_rows
+from ._style import COOLING, WARMING, dress, figures, make_axes
+
+__all__ = ["HysteresisDisplay"]
+
+_N_BINS = 25
+_FEWEST_ROWS = 3  # of a bin, below which its mean is not drawn
+_POWERS = (1, 3, 5, 7)
+_PER_HOUR = 3600.0
+
+
+class HysteresisDisplay(CompensationDisplay):
+    """Bias against temperature while it rises and while it falls, before and after compensation.
+
+    Where the bias depends on more than the temperature that is logged, the two branches part: the
+    thermometer lags behind the coil, and the coil's thermal rate has an effect of its own. No
+    function of temperature alone can close such a loop.
+
+    A dependence of the error on the rate (an odd polynomial, whose coefficients change linearly
+    with temperature) is fitted together with the two branches and taken off.
+
+    Make it with :meth:`from_estimator` or :meth:`from_predictions`.
+
+    Parameters
+    ----------
+    temperature : ndarray of shape (n_bins,)
+        Middles of the bins [degC].
+    before, after : ndarray of shape (2, n_bins)
+        Bias while warming, and while cooling [deg/h]; NaN where there are fewer than 3 rows.
+
+    Attributes
+    ----------
+    gap_before_, gap_after_ : float
+        Largest distance between the branches [deg/h]; NaN where they never meet at a temperature.
+    axes_ : ndarray of matplotlib axes, of shape (2,)
+        Before, after; once drawn.
+    figure_ : matplotlib figure
+        The figure that they are part of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import HysteresisDisplay
+    >>> time = np.linspace(0, 2, 2001)
+    >>> temperature = 20 + 30 * np.sin(np.pi * time)
+    >>> temperature_rate = np.cos(np.pi * time)  # degC/min
+    >>> bias = (0.5 * temperature + 10 * temperature_rate) / 3600
+    >>> rate = np.zeros(2001)
+    >>> display = HysteresisDisplay.from_predictions(
+    ...     rate, bias, rate, temperature=temperature, temperature_rate=temperature_rate
+    ... )
+    >>> round(display.gap_before_), display.gap_after_
+    (20, 0.0)
+    """
+
+    _PER_ROW = ("temperature", "temperature_rate")
+
+    def __init__(self, *, temperature, before, after):
+        self.temperature = temperature
+        self.before = before
+        self.after = after
+
+    @classmethod
+    def from_predictions(
+        cls,
+        rate,
+        before,
+        after,
+        *,
+        temperature,
+        temperature_rate,
+        least_rate_of_change=0.05,
+        ax=None,
+    ):
+        """Compute from rates, and draw.
+
+        Parameters
+        ----------
+        rate : array-like of shape (n_rows,)
+            True rate [deg/s].
+        before, after : array-like of shape (n_rows,)
+            Indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        temperature : array-like of shape (n_rows,)
+            Temperature [degC].
+        temperature_rate : array-like of shape (n_rows,)
+            How fast it changes [degC/min]; its sign tells warming from cooling.
+        least_rate_of_change : float, default=0.05
+            Rows that change more slowly [degC/min] belong to neither branch.
+        ax : array of two matplotlib axes, default=None
+            For before and after; None makes a figure.
+
+        Returns
+        -------
+        display : HysteresisDisplay
+        """
+        rate, before, after, temperature, temperature_rate = check_rows(
+            rate=rate,
+            before=before,
+            after=after,
+            temperature=temperature,
+            temperature_rate=temperature_rate,
+        )
+        edges, bins = binned(temperature, _N_BINS)
+        moving = np.abs(temperature_rate) >= least_rate_of_change
+        cells = bins + _N_BINS * (temperature_rate < 0)
+        branches = [
+            _PER_HOUR * _bias_by_cell(indicated - rate, rate, temperature, cells, moving)
+            for indicated in (before, after)
+        ]
+        display = cls(
+            temperature=0.5 * (edges[:-1] + edges[1:]), before=branches[0], after=branches[1]
+        )
+        return display.plot(ax=ax)
+
+    @property
+    def gap_before_(self):
+        """Largest distance between the branches before compensation [deg/h]."""
+        return _gap(self.before)
+
+    @property
+    def gap_after_(self):
+        """Largest distance between the branches after compensation [deg/h]."""
+        return _gap(self.after)
+
+    def plot(self, ax=None):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : array of two matplotlib axes, default=None
+            For before and after; None makes a figure.
+
+        Returns
+        -------
+        display : HysteresisDisplay
+            Itself.
+        """
+        self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.6), nrows=2, sharex=True)
+        panels = zip(
+            self.axes_,
+            ("before", "after"),
+            (self.before, self.after),
+            (self.gap_before_, self.gap_after_),
+            strict=True,
+        )
+        for axes, name, (warming, cooling), gap in panels:
+            both = np.isfinite(warming) & np.isfinite(cooling)
+            axes.fill_between(
+                self.temperature, warming, cooling, where=both, color="0.9", linewidth=0
+            )
+            axes.plot(self.temperature, warming, "^-", color=WARMING, label="warming", ms=4)
+            axes.plot(self.temperature, cooling, "v-", color=COOLING, label="cooling", ms=4)
+            what = f"largest gap {figures(gap)} °/h" if both.any() else "branches never meet"
+            dress(axes, ylabel="bias [°/h]", title=f"{name}: {what}")
+        self.axes_[1].set_xlabel("temperature [°C]")
+        self.axes_[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+        return self
+
+
+def _gap(branches):
+    distance = np.abs(branches[0] - branches[1])
+    return float(np.nanmax(distance)) if np.isfinite(distance).any() else float("nan")
+
+
+def _bias_by_cell(error, rate, temperature, cells, rows):
+    """Mean error of each cell at rest, (2, n_bins): one constant per cell beside the polynomial.
+
+    The polynomial's coefficients are those of least squares on what the cells' means leave of error
+    and of powers alike (Frisch and Waugh 1933), so that the many cells never enter a matrix.
+    """
+    rows = rows & np.isfinite(error)
+    error, rate, temperature, cells = error[rows], rate[rows], temperature[rows], cells[rows]
+    counts = np.bincount(cells, minlength=2 * _N_BINS)
+
+    def mean(values):
+        sums = np.bincount(cells, values, minlength=2 * _N_BINS)
+        return np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
+
+    largest = np.abs(rate).max(initial=0.0) or 1.0
+    spread = temperature.std() if temperature.size else 0.0
+    tau = (temperature - temperature.mean()) / spread if spread else np.zeros_like(temperature)
+    powers = [(rate / largest) ** k * factor for k in _POWERS for factor in (1.0, tau)]
+    design = np.column_stack([power - mean(power)[cells] for power in powers])
+    coefficients = np.linalg.lstsq(design, error - mean(error)[cells], rcond=None)[0]
+    by_rate = sum(c * power for c, power in zip(coefficients, powers, strict=True))
+    bias = np.where(counts >= _FEWEST_ROWS, mean(error - by_rate), np.nan)
+    return bias.reshape(2, _N_BINS)

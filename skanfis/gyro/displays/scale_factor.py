@@ -1,0 +1,192 @@
+"""ScaleFactorErrorDisplay: what is left of the scale factor's error, by rate and temperature."""
+
+import numpy as np
+
+from ._base import CompensationDisplay, binned, check_rows
+from ._style import dress, figures, make_axes
+
+__all__ = ["ScaleFactorErrorDisplay"]
+
+_PPM = 1e6
+_N_RATES = 41
+# Nearer to rest, a bias divided by the rate would fill the picture.
+_SMALLEST_SHARE = 0.05
+
+
+class ScaleFactorErrorDisplay(CompensationDisplay):
+    r"""Scale-factor error against rate, at several temperatures, before and after compensation.
+
+    The temperature's range is cut into equal bands, and the rate's into equal bins. In each, the
+    error is taken off the band's bias, the error at rest of its least-squares line, and divided by
+    the rate:
+
+    .. math:: 10^6 \, \frac{\overline{\text{error}} - \text{bias}}{\overline{\text{rate}}} .
+
+    Rates below 5 % of the largest are left out: an error of any size is a large one in ppm there.
+
+    Make it with :meth:`from_estimator` or :meth:`from_predictions`.
+
+    Parameters
+    ----------
+    rate : ndarray of shape (n_bands, n_bins)
+        Mean rate of each bin [deg/s]; NaN where a bin has no rows.
+    before, after : ndarray of shape (n_bands, n_bins)
+        Scale-factor error [ppm].
+    temperature_edges : ndarray of shape (n_bands + 1,)
+        Ends of the bands [degC].
+
+    Attributes
+    ----------
+    axes_ : ndarray of matplotlib axes, of shape (2,)
+        Before, after; once drawn.
+    figure_ : matplotlib figure
+        The figure that they are part of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import ScaleFactorErrorDisplay
+    >>> rate, temperature = np.meshgrid(np.linspace(-100, 100, 41), [0.0, 25.0, 50.0])
+    >>> error = (-410e-6 * (temperature - 25) * rate).ravel()  # -410 ppm/degC
+    >>> rate, temperature = rate.ravel(), temperature.ravel()
+    >>> display = ScaleFactorErrorDisplay.from_predictions(
+    ...     rate, rate + error, rate, temperature=temperature
+    ... )
+    >>> display.before[:, 0].round()
+    array([ 10250.,      0., -10250.])
+    """
+
+    _PER_ROW = ("temperature",)
+
+    def __init__(self, *, rate, before, after, temperature_edges):
+        self.rate = rate
+        self.before = before
+        self.after = after
+        self.temperature_edges = temperature_edges
+
+    @classmethod
+    def from_predictions(cls, rate, before, after, *, temperature, n_temperatures=3, ax=None):
+        """Compute from rates, and draw.
+
+        Parameters
+        ----------
+        rate : array-like of shape (n_rows,)
+            True rate [deg/s], of several sizes.
+        before, after : array-like of shape (n_rows,)
+            Indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        temperature : array-like of shape (n_rows,)
+            Temperature [degC].
+        n_temperatures : int, default=3
+            Number of bands of the temperature.
+        ax : array of two matplotlib axes, default=None
+            For before and after; None makes a figure.
+
+        Returns
+        -------
+        display : ScaleFactorErrorDisplay
+
+        Raises
+        ------
+        ValueError
+            If the rate never changes: then there is no scale factor.
+        """
+        rate, before, after, temperature = check_rows(
+            rate=rate, before=before, after=after, temperature=temperature
+        )
+        if rate.max() == rate.min():
+            raise ValueError(f"rate is {rate[0]:g} in all rows: there is no scale factor in that.")
+        edges, bands = binned(temperature, n_temperatures)
+        _, bins = binned(rate, _N_RATES)
+        cells = bands * _N_RATES + bins
+        shape = (n_temperatures, _N_RATES)
+        far = np.abs(rate) >= _SMALLEST_SHARE * np.abs(rate).max()
+        results = [
+            _in_ppm(rate, indicated - rate, bands, cells, far, shape)
+            for indicated in (before, after)
+        ]
+        display = cls(
+            rate=_mean_by_cell(rate, cells, far, shape),
+            before=results[0],
+            after=results[1],
+            temperature_edges=edges,
+        )
+        return display.plot(ax=ax)
+
+    def plot(self, ax=None):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : array of two matplotlib axes, default=None
+            For before and after; None makes a figure.
+
+        Returns
+        -------
+        display : ScaleFactorErrorDisplay
+            Itself.
+        """
+        import matplotlib
+
+        self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.6), nrows=2, sharex=True)
+        middles = 0.5 * (self.temperature_edges[:-1] + self.temperature_edges[1:])
+        colors = matplotlib.colormaps["plasma"](np.linspace(0.05, 0.75, len(middles)))
+        for axes, name in zip(self.axes_, ("before", "after"), strict=True):
+            values = getattr(self, name)
+            for rate, ppm, middle, color in zip(self.rate, values, middles, colors, strict=True):
+                known = np.isfinite(ppm)
+                # The line is broken at rest.
+                for side in (rate < 0, rate > 0):
+                    label = f"{middle:.0f} °C" if side[-1] or not (rate[known] > 0).any() else None
+                    axes.plot(
+                        rate[known & side],
+                        ppm[known & side],
+                        ".-",
+                        color=color,
+                        label=label,
+                        linewidth=1.2,
+                        markersize=4,
+                    )
+            largest = np.nanmax(np.abs(values))
+            dress(
+                axes,
+                ylabel="scale-factor error [ppm]",
+                title=f"{name}: largest {figures(largest)} ppm",
+            )
+        self.axes_[1].set_xlabel("true rate [°/s]")
+        _legend(self.axes_[0])
+        return self
+
+
+def _legend(axes):
+    handles, labels = axes.get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    axes.legend(
+        unique.values(),
+        unique.keys(),
+        title="around",
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.0),
+        frameon=False,
+        fontsize="small",
+    )
+
+
+def _in_ppm(rate, error, bands, cells, far, shape):
+    known = np.isfinite(error)
+    bias = np.zeros(shape[0])
+    for band in range(shape[0]):
+        rows = known & (bands == band)
+        if np.ptp(rate[rows]) > 0 if rows.any() else False:
+            bias[band] = np.polyfit(rate[rows], error[rows], 1)[1]
+    means = _mean_by_cell(error - bias[bands], cells, far & known, shape)
+    return _PPM * means / _mean_by_cell(rate, cells, far & known, shape)
+
+
+def _mean_by_cell(values, cells, rows, shape):
+    """Mean over the chosen rows of each cell; NaN where it has none."""
+    n_cells = shape[0] * shape[1]
+    counts = np.bincount(cells[rows], minlength=n_cells)
+    sums = np.bincount(cells[rows], values[rows], minlength=n_cells)
+    means = np.full(n_cells, np.nan)
+    np.divide(sums, counts, out=means, where=counts > 0)
+    return means.reshape(shape)

@@ -1,0 +1,149 @@
+"""ResidualSurfaceDisplay: where over temperature and rate error is left, and where data are."""
+
+import numpy as np
+
+from ._base import CompensationDisplay, binned, check_rows, check_unit
+from ._style import NO_DATA, PER_UNIT, SYMBOL, dress, figures, make_axes, symmetric_limit
+
+__all__ = ["ResidualSurfaceDisplay"]
+
+
+class ResidualSurfaceDisplay(CompensationDisplay):
+    """Mean error after compensation over temperature and rate, beside the number of rows.
+
+    What has a colour of its own on the left is not noise: averages over many rows are left. Where
+    the right-hand panel is empty, nothing is known of the compensation.
+
+    Make it with :meth:`from_estimator` or :meth:`from_predictions`.
+
+    Parameters
+    ----------
+    temperature_edges : ndarray of shape (n_temperatures + 1,)
+        Bins of the temperature [degC].
+    rate_edges : ndarray of shape (n_rates + 1,)
+        Bins of the true rate [deg/s].
+    residual : ndarray of shape (n_rates, n_temperatures)
+        Mean error after compensation [deg/s]; NaN where a cell has no rows.
+    counts : ndarray of shape (n_rates, n_temperatures)
+        Number of rows of each cell.
+
+    Attributes
+    ----------
+    axes_ : ndarray of matplotlib axes, of shape (2,)
+        Residual, counts; once drawn.
+    figure_ : matplotlib figure
+        The figure that they are part of.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import ResidualSurfaceDisplay
+    >>> rate, temperature = np.array([-50.0, 50.0, 50.0]), np.array([10.0, 10.0, 30.0])
+    >>> display = ResidualSurfaceDisplay.from_predictions(
+    ...     rate, rate + 1.0, rate + [0.0, 0.25, 0.5], temperature=temperature, n_bins=(2, 2)
+    ... )
+    >>> display.residual
+    array([[0.  ,  nan],
+           [0.25, 0.5 ]])
+    """
+
+    _PER_ROW = ("temperature",)
+
+    def __init__(self, *, temperature_edges, rate_edges, residual, counts):
+        self.temperature_edges = temperature_edges
+        self.rate_edges = rate_edges
+        self.residual = residual
+        self.counts = counts
+
+    @classmethod
+    def from_predictions(
+        cls, rate, before, after, *, temperature, n_bins=(24, 24), unit="deg/s", ax=None
+    ):
+        """Compute from rates, and draw.
+
+        Parameters
+        ----------
+        rate : array-like of shape (n_rows,)
+            True rate [deg/s].
+        before, after : array-like of shape (n_rows,)
+            Indicated and compensated rate [deg/s]. NaN after: the compensator refused the row,
+            which then counts as none. Before is not drawn.
+        temperature : array-like of shape (n_rows,)
+            Temperature [degC].
+        n_bins : tuple of two ints, default=(24, 24)
+            Number of cells in temperature and in rate.
+        unit : {"deg/s", "deg/h"}, default="deg/s"
+            Unit to draw the residual in.
+        ax : array of two matplotlib axes, default=None
+            For residual and counts; None makes a figure.
+
+        Returns
+        -------
+        display : ResidualSurfaceDisplay
+        """
+        rate, _, after, temperature = check_rows(
+            rate=rate, before=before, after=after, temperature=temperature
+        )
+        known = np.isfinite(after)
+        temperature_edges, columns = binned(temperature, n_bins[0])
+        rate_edges, rows = binned(rate, n_bins[1])
+        cells = (rows * n_bins[0] + columns)[known]
+        n_cells = n_bins[0] * n_bins[1]
+        counts = np.bincount(cells, minlength=n_cells)
+        residual = np.full(n_cells, np.nan)
+        sums = np.bincount(cells, (after - rate)[known], minlength=n_cells)
+        np.divide(sums, counts, out=residual, where=counts > 0)
+        shape = (n_bins[1], n_bins[0])
+        display = cls(
+            temperature_edges=temperature_edges,
+            rate_edges=rate_edges,
+            residual=residual.reshape(shape),
+            counts=counts.reshape(shape),
+        )
+        return display.plot(ax=ax, unit=unit)
+
+    def plot(self, ax=None, *, unit="deg/s"):
+        """Draw.
+
+        Parameters
+        ----------
+        ax : array of two matplotlib axes, default=None
+            For residual and counts; None makes a figure.
+        unit : {"deg/s", "deg/h"}, default="deg/s"
+            Unit to draw the residual in.
+
+        Returns
+        -------
+        display : ResidualSurfaceDisplay
+            Itself.
+        """
+        from matplotlib.colors import LogNorm
+
+        residual = PER_UNIT[check_unit(unit)] * self.residual
+        self.figure_, self.axes_ = make_axes(ax, 2, (7.0, 3.3), ncols=2, sharey=True)
+        limit = symmetric_limit(residual)
+        mesh = self._draw_cells(0, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
+        bar = self.figure_.colorbar(mesh, ax=self.axes_[0], extend="both")
+        bar.set_label(f"mean error after [{SYMBOL[unit]}]")
+        counts = np.where(self.counts > 0, self.counts, np.nan)
+        # A scale needs two ends, even where all cells have as many rows.
+        norm = LogNorm(vmin=1, vmax=max(self.counts.max(), 2))
+        mesh = self._draw_cells(1, counts, cmap="viridis", norm=norm)
+        self.figure_.colorbar(mesh, ax=self.axes_[1]).set_label("rows in the cell")
+        largest = np.nanmax(np.abs(residual))
+        dress(
+            self.axes_[0],
+            "temperature [°C]",
+            "true rate [°/s]",
+            f"residual: largest {figures(largest)} {SYMBOL[unit]}",
+        )
+        empty = np.mean(self.counts == 0)
+        dress(self.axes_[1], "temperature [°C]", title=f"data: {empty:.0%} of the cells empty")
+        return self
+
+    def _draw_cells(self, place, values, **options):
+        axes = self.axes_[place]
+        axes.set_facecolor(NO_DATA)
+        return axes.pcolormesh(
+            self.temperature_edges, self.rate_edges, values, rasterized=True, **options
+        )

@@ -1,0 +1,596 @@
+r"""The law of the open-loop interferometer, fitted to a calibration log and inverted.
+
+The Sagnac phase is proportional to the rate, and the signal of an interferometer without a feedback
+loop is its sine [Lefevre]:
+
+    V = A(T) sin(phi) + V0 ,    phi = K(T) (Omega + b(T)) ,
+
+with amplitude A, Sagnac factor K = 2 pi L D / (lambda c), bias b and an offset V0 of the
+electronics. A, K and b are polynomials in the temperature T of the coil. A thermometer that lags
+behind it by a time constant shows T_s, and T = T_s + lag dT_s/dt: a thermal rate among the columns
+lets the lag be found with the rest. With T in units of the thermometer's spread about its mean,
+tau, and the thermal rate in the same units, rho,
+
+    tau = tau_s + lag rho .
+
+The fit minimises the squared error of the *output*: there the noise is white and of one size, and
+the law is defined for every rate. It works on s = A k_0 in place of A, the scale factor at rest:
+where the sine is nearly straight, A and K cannot be told apart but s can. With A = s / k_0 its
+Jacobian is exact,
+
+    dV/ds_i  = tau^i sin(phi) / k_0
+    dV/dk_i  = tau^i A cos(phi) (Omega + b) - [i = 0] A sin(phi) / k_0
+    dV/db_i  = tau^i A K cos(phi)
+    dV/dlag  = rho {A' sin(phi) + A cos(phi) [K' (Omega + b) + K b']}
+    dV/dV0   = 1
+
+For given K the law is linear in A cos(K b) and A sin(K b), which makes a start: of a range of
+phases at the largest rate, the one that linear least squares likes best.
+
+H. C. Lefevre, "The Fiber-Optic Gyroscope", Artech House.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyder, polyval, polyvander
+from scipy.optimize import least_squares
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
+
+from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
+from ._columns import check_weights
+
+__all__ = ["OpenLoopArcsineRegressor"]
+
+_POLICIES = ("clip", "linear", "nan", "raise")
+
+# Phase at the largest rate [rad]. Below 0.01 the sine is a straight line to 20 ppm; from pi/2 on
+# two rates give one output.
+_SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
+_STARTING_PHASES = np.linspace(0.1, 1.5, 15)
+_ROWS_FOR_START = 2000
+_MAX_EVALUATIONS = 200
+
+
+class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
+    r"""Rate from the output of an open-loop fiber-optic gyro by the arcsine law.
+
+    An open-loop interferometer gives a sine of the rate,
+
+    .. math:: V = A(T) \, \sin\left[K(T) \, (\Omega + b(T))\right] + V_0 ,
+
+    whose amplitude A, Sagnac factor K and bias b depend on the temperature T. The law is fitted to
+    a calibration log by nonlinear least squares on the output, and inverted for the rate:
+
+    .. math:: \hat\Omega = \arcsin\left[(V - V_0) / A(T)\right] / K(T) - b(T) .
+
+    The target is the true *rate*, not the error of the indicated one: what is predicted is the
+    compensated rate, whatever the unit of the output, and what the law leaves of it is the target
+    of the next model; see :class:`ResidualRegressor`. The bias stands at the input, beside the
+    rate, so that what the law does not know of the bias (warm-up, thermal rate) adds to the
+    residual and does not depend on the rate.
+
+    Parameters
+    ----------
+    output : int or str, default=0
+        Column of X that holds the output of the gyro, by position, or by name where X has names.
+        Any unit (counts, volts, indicated rate), any sign.
+    temperature : int, str or None, default=1
+        Column of X that holds the temperature; None leaves temperature out. Other columns of X are
+        not used.
+    temperature_rate : int, str or None, default=None
+        Column of X that holds the rate of temperature change (:class:`ThermalRate`), where the
+        thermometer lags behind the coil: the law then takes the temperature T plus a lag, which is
+        fitted too, times this rate.
+    amplitude_degree : int, default=1
+        Degree of A(T), 0 to 5.
+    sagnac_degree : int, default=1
+        Degree of K(T), 0 to 5.
+    bias_degree : int, default=1
+        Degree of b(T), 0 to 5.
+    fit_offset : bool, default=False
+        Whether the output has an offset V0 of its own. It can be told from the bias by the sine's
+        curvature only: leave it out unless the rates of the log reach a phase of some 0.3 rad.
+    reference_temperature : float, default=None
+        Temperature at which the coefficients are given, in the unit of X; None is the mean of the
+        training data. It changes the coefficients reported, not the predictions.
+    max_phase : float, default=1.2
+        Largest phase that is inverted, in (0, pi/2) [rad]. Towards pi/2 the inverse magnifies noise
+        by 1 / cos(phase), and beyond it there is none: an output larger than the amplitude has no
+        rate.
+    out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
+        What ``predict`` does with rows beyond ``max_phase``: "clip" holds the phase at its limit;
+        "linear" goes on along the tangent; "nan" returns NaN; "raise" raises ValueError. Rows
+        within ``max_phase`` but outside the training data follow the law, and are flagged by
+        ``in_bounds``. It may be changed by ``set_params`` after training.
+    warn_out_of_bounds : bool, default=True
+        Whether ``predict`` warns of rows beyond ``max_phase`` or outside the training data.
+
+    Attributes
+    ----------
+    amplitude_ : ndarray of shape (amplitude_degree + 1,)
+        Coefficients of A in powers of T minus ``reference_temperature_``, lowest first, in the unit
+        of the output. ``1e6 * amplitude_[1] / amplitude_[0]`` is its sensitivity in ppm/degC.
+    sagnac_factor_ : ndarray of shape (sagnac_degree + 1,)
+        Coefficients of K likewise, in rad per unit of the target. With a target in deg/s,
+        ``np.rad2deg(sagnac_factor_)`` is in rad/(rad/s).
+    bias_ : ndarray of shape (bias_degree + 1,)
+        Coefficients of b likewise, in the unit of the target.
+    offset_ : float
+        V0, in the unit of the output; zero unless fitted.
+    thermometer_lag_ : float
+        Lag of the thermometer, in the unit of temperature over that of its rate (s for degC and
+        degC/s); zero unless fitted.
+    reference_temperature_ : float
+        Temperature of the coefficients.
+    minimum_, maximum_ : ndarray of shape (n_used,)
+        Range of the training data: output, then temperature and its rate if used.
+    n_iter_ : int
+        Evaluations of the law in the fit.
+    n_features_in_ : int
+        Number of columns of X.
+    feature_names_in_ : ndarray of shape (n_features,)
+        Their names, where X had names that are all strings.
+
+    Warns
+    -----
+    ConstantInputWarning
+        If the temperature never changes in the training data: no dependence on it is learnt.
+    ConvergenceWarning
+        If the fit did not settle.
+    OutOfBoundsWarning
+        From ``predict`` and ``score``; see ``out_of_bounds``.
+
+    See Also
+    --------
+    ResidualRegressor : This law, and an ANFIS for what it leaves.
+
+    References
+    ----------
+    H. C. Lefevre, "The Fiber-Optic Gyroscope", Artech House.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import OpenLoopArcsineRegressor
+    >>> rate, temperature = np.meshgrid(np.linspace(-100, 100, 21), [10.0, 20.0, 30.0])
+    >>> factor = 0.2536 * (1 - 400e-6 * (temperature - 20.0))  # rad/(rad/s)
+    >>> counts = 6e6 * np.sin(factor * np.deg2rad(rate))
+    >>> X = np.column_stack([counts.ravel(), temperature.ravel()])
+    >>> law = OpenLoopArcsineRegressor().fit(X, rate.ravel())
+    >>> np.rad2deg(law.sagnac_factor_[0]).round(4)
+    0.2536
+    >>> bool(abs(law.predict(X) - rate.ravel()).max() < 1e-6)
+    True
+    """
+
+    def __init__(
+        self,
+        output=0,
+        temperature=1,
+        *,
+        temperature_rate=None,
+        amplitude_degree=1,
+        sagnac_degree=1,
+        bias_degree=1,
+        fit_offset=False,
+        reference_temperature=None,
+        max_phase=1.2,
+        out_of_bounds="clip",
+        warn_out_of_bounds=True,
+    ):
+        self.output = output
+        self.temperature = temperature
+        self.temperature_rate = temperature_rate
+        self.amplitude_degree = amplitude_degree
+        self.sagnac_degree = sagnac_degree
+        self.bias_degree = bias_degree
+        self.fit_offset = fit_offset
+        self.reference_temperature = reference_temperature
+        self.max_phase = max_phase
+        self.out_of_bounds = out_of_bounds
+        self.warn_out_of_bounds = warn_out_of_bounds
+
+    def __sklearn_tags__(self):
+        tags = super().__sklearn_tags__()
+        # It reads two columns and knows one law: data that follow another are not for it.
+        tags.regressor_tags.poor_score = True
+        return tags
+
+    def fit(self, X, y, sample_weight=None):
+        """Fit the law.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Output and temperature, among other columns.
+        y : array-like of shape (n_samples,)
+            True rate.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weights, zero or positive; a whole number counts as so many copies of the row.
+
+        Returns
+        -------
+        self : OpenLoopArcsineRegressor
+
+        Raises
+        ------
+        ValueError
+            If a parameter or column is not what it must be, if there are fewer rows than
+            coefficients, or if output or rate never change.
+        """
+        self._check_parameters()
+        X, y = validate_data(self, X, y, dtype=float, y_numeric=True)
+        weights = check_weights(sample_weight, len(y))
+        self._columns = self._find_columns()
+        used, y, weights = X[weights > 0][:, self._columns], y[weights > 0], weights[weights > 0]
+        log = _standardise(used, y.astype(float), weights)
+        shape = _Shape(*self._degrees(used), used.shape[1] == 3, self.fit_offset)
+        _check_log(log, shape)
+        fitted = _fit(log, shape)
+        if fitted.status == 0:
+            message = f"The law did not settle within {_MAX_EVALUATIONS} evaluations."
+            warnings.warn(message, ConvergenceWarning, stacklevel=2)
+        self.n_iter_ = fitted.nfev
+        self._keep(log, shape.law(fitted.x))
+        self.minimum_, self.maximum_ = used.min(axis=0), used.max(axis=0)
+        return self
+
+    def predict(self, X):
+        """Predict the rate.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        rate : ndarray of shape (n_samples,)
+            In the unit of the target.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite; or, with ``out_of_bounds="raise"``, goes beyond ``max_phase``.
+
+        Warns
+        -----
+        OutOfBoundsWarning
+            If rows go beyond ``max_phase`` or outside the training data, unless
+            ``warn_out_of_bounds=False``.
+        """
+        self._check_parameters()
+        used = self._used(X)
+        sine, limit = self._sine(used), np.sin(self.max_phase)
+        beyond = np.abs(sine) > limit
+        if beyond.any() and self.out_of_bounds == "raise":
+            raise ValueError(self._describe(beyond, "cannot be inverted"))
+        if self.warn_out_of_bounds:
+            self._warn(used, beyond)
+        phase = np.arcsin(np.clip(sine, -limit, limit))
+        if self.out_of_bounds == "linear":
+            further = np.where(beyond, np.abs(sine) - limit, 0.0) / np.cos(self.max_phase)
+            phase += np.sign(sine) * further
+        elif self.out_of_bounds == "nan":
+            phase[beyond] = np.nan
+        difference = self._difference(used)
+        return phase / polyval(difference, self.sagnac_factor_) - polyval(difference, self.bias_)
+
+    def phase(self, X):
+        """Sagnac phase of each row, bias included.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        phase : ndarray of shape (n_samples,)
+            From -pi/2 to pi/2 [rad]; NaN where the output is larger than the amplitude.
+        """
+        sine = self._sine(self._used(X))
+        defined = np.abs(sine) <= 1.0
+        return np.where(defined, np.arcsin(np.where(defined, sine, 0.0)), np.nan)
+
+    def in_bounds(self, X):
+        """Tell which rows lie in the range of the training data and within ``max_phase``.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        inside : ndarray of bool of shape (n_samples,)
+        """
+        used = self._used(X)
+        return ~self._outside(used) & (np.abs(self._sine(used)) <= np.sin(self.max_phase))
+
+    def _check_parameters(self):
+        for name in ("amplitude_degree", "sagnac_degree", "bias_degree"):
+            check_scalar(getattr(self, name), name, (int, np.integer), min_val=0, max_val=5)
+        check_scalar(
+            self.max_phase,
+            "max_phase",
+            (float, int, np.floating),
+            min_val=0.0,
+            max_val=np.pi / 2.0,
+            include_boundaries="neither",
+        )
+        if self.out_of_bounds not in _POLICIES:
+            choices = ", ".join(_POLICIES)
+            raise ValueError(f"out_of_bounds={self.out_of_bounds!r} must be one of {choices}.")
+        if self.reference_temperature is not None and not np.isfinite(self.reference_temperature):
+            raise ValueError(f"reference_temperature={self.reference_temperature} must be finite.")
+
+    def _find_columns(self):
+        """Positions of output and, if used, of temperature and its rate."""
+        roles = ["output"]
+        if self.temperature is not None:
+            roles.append("temperature")
+        if self.temperature_rate is not None:
+            if self.temperature is None:
+                raise ValueError("temperature_rate is of no use with temperature=None.")
+            roles.append("temperature_rate")
+        columns = [self._find_column(role) for role in roles]
+        if len(set(columns)) < len(columns):
+            given = ", ".join(f"{role}={getattr(self, role)!r}" for role in roles)
+            raise ValueError(f"Two of {given} are one column.")
+        return columns
+
+    def _find_column(self, role):
+        column, n_features = getattr(self, role), self.n_features_in_
+        if isinstance(column, str):
+            names = list(getattr(self, "feature_names_in_", []))
+            if column not in names:
+                found = f"its columns are {names}" if names else "it has no column names"
+                raise ValueError(f"X has no column {role}={column!r}: {found}.")
+            return names.index(column)
+        if not isinstance(column, int | np.integer) or isinstance(column, bool):
+            raise ValueError(f"{role}={column!r} must be the position or the name of a column.")
+        if not -n_features <= column < n_features:
+            raise ValueError(
+                f"{role}={column} is no column of X, which has {n_features} feature(s)."
+            )
+        return int(column) % n_features
+
+    def _degrees(self, used):
+        """Degrees in temperature, no higher than its number of different values can tell."""
+        n_values = 1 if self.temperature is None else np.unique(used[:, 1]).size
+        if self.temperature is not None and n_values == 1:
+            warnings.warn(
+                f"The temperature is {used[0, 1]:g} in all rows: the law is learnt for it alone.",
+                ConstantInputWarning,
+                stacklevel=3,
+            )
+        wanted = (self.amplitude_degree, self.sagnac_degree, self.bias_degree)
+        return [min(degree, n_values - 1) for degree in wanted]
+
+    def _keep(self, log, law):
+        """Coefficients in the units of X and y, in powers of T minus the reference."""
+        reference = self.reference_temperature
+        self.reference_temperature_ = float(log.mean if reference is None else reference)
+        tau = Polynomial([(self.reference_temperature_ - log.mean) / log.std, 1.0 / log.std])
+
+        def in_units(coefficients, unit, degree):
+            by_degree = np.zeros(degree + 1)
+            found = Polynomial(coefficients)(tau).coef * unit
+            by_degree[: found.size] = found
+            return by_degree
+
+        used = self.temperature is not None
+        self.amplitude_ = in_units(law.a, log.output_unit, used * self.amplitude_degree)
+        self.sagnac_factor_ = in_units(law.k, 1.0 / log.rate_unit, used * self.sagnac_degree)
+        self.bias_ = in_units(law.b, log.rate_unit, used * self.bias_degree)
+        self.offset_ = float(law.offset * log.output_unit)
+        self.thermometer_lag_ = float(law.lag * log.lag_unit)
+
+    def _used(self, X):
+        check_is_fitted(self)
+        return validate_data(self, X, reset=False, dtype=float)[:, self._columns]
+
+    def _difference(self, used):
+        """The coil's temperature from the reference."""
+        if self.temperature is None:
+            return np.zeros(len(used))
+        lagging = self.thermometer_lag_ * used[:, 2] if used.shape[1] == 3 else 0.0
+        return used[:, 1] + lagging - self.reference_temperature_
+
+    def _sine(self, used):
+        """(V - V0) / A(T): the sine of the phase, where it is one."""
+        amplitude = polyval(self._difference(used), self.amplitude_)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sine = (used[:, 0] - self.offset_) / amplitude
+        # 0 / 0: no amplitude, no rate.
+        return np.where(np.isnan(sine), np.inf, sine)
+
+    def _outside(self, used):
+        return ((used < self.minimum_) | (used > self.maximum_)).any(axis=1)
+
+    def _describe(self, beyond, what):
+        return (
+            f"{beyond.sum()} of {beyond.size} rows {what}: their output means a Sagnac phase "
+            f"beyond max_phase={self.max_phase:g} rad."
+        )
+
+    def _warn(self, used, beyond):
+        messages = []
+        if beyond.any():
+            policy = f"out_of_bounds={self.out_of_bounds!r}"
+            messages.append(self._describe(beyond, f"follow the policy {policy}"))
+        outside = self._outside(used) & ~beyond
+        if outside.any():
+            messages.append(
+                f"{outside.sum()} of {outside.size} rows lie outside the output or temperature of "
+                "the training data and follow the law there."
+            )
+        if messages:
+            warnings.warn(" ".join(messages), OutOfBoundsWarning, stacklevel=3)
+
+
+@dataclass(frozen=True)
+class _Log:
+    """A calibration log, standardised: what the fit sees."""
+
+    output: np.ndarray
+    rate: np.ndarray
+    tau: np.ndarray
+    rho: np.ndarray
+    root_weights: np.ndarray
+    output_unit: float
+    rate_unit: float
+    lag_unit: float
+    mean: float
+    std: float
+
+
+def _standardise(used, rate, weights):
+    """The log with outputs of RMS 1, rates up to 1, and temperature about 0 with spread 1."""
+    output_unit = np.sqrt(np.average(used[:, 0] ** 2, weights=weights)) or 1.0
+    rate_unit = np.abs(rate).max() or 1.0
+    nothing = np.zeros(len(rate))
+    temperature = used[:, 1] if used.shape[1] > 1 else nothing
+    mean = np.average(temperature, weights=weights)
+    std = np.sqrt(np.average((temperature - mean) ** 2, weights=weights))
+    if np.ptp(temperature) == 0:
+        mean, std = temperature[0], 1.0
+    thermal_rate = used[:, 2] if used.shape[1] == 3 else nothing
+    thermal_unit = np.abs(thermal_rate).max() or 1.0
+    return _Log(
+        output=used[:, 0] / output_unit,
+        rate=rate / rate_unit,
+        tau=(temperature - mean) / std,
+        rho=thermal_rate / thermal_unit,
+        root_weights=np.sqrt(weights),
+        output_unit=output_unit,
+        rate_unit=rate_unit,
+        lag_unit=std / thermal_unit,
+        mean=mean,
+        std=std,
+    )
+
+
+def _check_log(log, shape):
+    if len(log.rate) < shape.n_coefficients:
+        raise ValueError(
+            f"The law has {shape.n_coefficients} coefficients; n_samples = {len(log.rate)} rows "
+            "cannot tell them. Give more rows, or lower the degrees."
+        )
+    for name, values in (("the output", log.output), ("the rate (y)", log.rate)):
+        if np.ptp(values) == 0:
+            raise ValueError(f"No scale factor can be found: {name} never changes.")
+
+
+@dataclass(frozen=True)
+class _Law:
+    """The law's coefficients in standardised units: of A = s / k_0, K and b."""
+
+    a: np.ndarray
+    k: np.ndarray
+    b: np.ndarray
+    lag: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Degrees of A, K and b in temperature, and whether there is a lag and an offset."""
+
+    amplitude: int
+    sagnac: int
+    bias: int
+    has_lag: bool
+    has_offset: bool
+
+    @property
+    def degrees(self):
+        return self.amplitude, self.sagnac, self.bias
+
+    @property
+    def n_coefficients(self):
+        return sum(self.degrees) + 3 + self.has_lag + self.has_offset
+
+    def law(self, parameters):
+        """From the vector that the solver works on: s, k, b; lag and offset where there are any."""
+        s, k, b, rest = np.split(parameters, np.cumsum([degree + 1 for degree in self.degrees]))
+        lag = rest[0] if self.has_lag else 0.0
+        return _Law(s / k[0], k, b, lag, rest[-1] if self.has_offset else 0.0)
+
+
+def _fit(log, shape):
+    """The solution of the least-squares problem, as SciPy gives it."""
+    start = _start(log, shape)
+    lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
+    first_of_sagnac = shape.amplitude + 1
+    lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
+    return least_squares(
+        _misfit,
+        start,
+        jac=_jacobian,
+        bounds=(lower, upper),
+        x_scale="jac",
+        # Tight, and not by the cost: where the law fits badly, that is flat long before the end.
+        ftol=None,
+        xtol=1e-12,
+        gtol=1e-13,
+        max_nfev=_MAX_EVALUATIONS,
+        args=(log, shape),
+    )
+
+
+def _misfit(parameters, log, shape):
+    """Modelled minus measured output, by the root of the weight."""
+    law = shape.law(parameters)
+    tau = log.tau + law.lag * log.rho
+    phase = polyval(tau, law.k) * (log.rate + polyval(tau, law.b))
+    output = polyval(tau, law.a) * np.sin(phase) + law.offset
+    return log.root_weights * (output - log.output)
+
+
+def _jacobian(parameters, log, shape):
+    law = shape.law(parameters)
+    tau = log.tau + law.lag * log.rho
+    amplitude, factor = polyval(tau, law.a), polyval(tau, law.k)
+    biased = log.rate + polyval(tau, law.b)
+    sine, cosine = np.sin(factor * biased), np.cos(factor * biased)
+    by_polynomial = (sine / law.k[0], amplitude * cosine * biased, amplitude * cosine * factor)
+    blocks = [
+        polyvander(tau, degree) * derivative[:, None]
+        for degree, derivative in zip(shape.degrees, by_polynomial, strict=True)
+    ]
+    blocks[1][:, 0] -= amplitude * sine / law.k[0]
+    if shape.has_lag:
+        a, k, b = (polyval(tau, polyder(of)) for of in (law.a, law.k, law.b))
+        blocks.append(
+            (log.rho * (a * sine + amplitude * cosine * (k * biased + factor * b)))[:, None]
+        )
+    if shape.has_offset:
+        blocks.append(np.ones((tau.size, 1)))
+    return log.root_weights[:, None] * np.hstack(blocks)
+
+
+def _start(log, shape):
+    """The best of several phases, the rest of the law by linear least squares; no lag."""
+    rows = slice(None, None, max(1, log.rate.size // _ROWS_FOR_START))
+    weights, powers = log.root_weights[rows], polyvander(log.tau[rows], shape.amplitude)
+    best = (np.inf, None)
+    for phase in _STARTING_PHASES:
+        sines = [powers * np.sin(phase * log.rate[rows])[:, None]]
+        design = np.hstack([*sines, np.cos(phase * log.rate[rows])[:, None]]) * weights[:, None]
+        target = weights * log.output[rows]
+        solution = np.linalg.lstsq(design, target, rcond=None)[0]
+        misfit = np.sum((design @ solution - target) ** 2)
+        if misfit < best[0]:
+            best = (misfit, (phase, solution))
+    phase, solution = best[1]
+    start = np.zeros(shape.n_coefficients)
+    start[: shape.amplitude + 1] = phase * solution[:-1]
+    start[shape.amplitude + 1] = phase
+    # tan(K b) = (A sin K b) / (A cos K b); a bias beyond the largest rate is no start.
+    bias = np.arctan2(solution[-1] * np.sign(solution[0]), np.abs(solution[0])) / phase
+    start[shape.amplitude + shape.sagnac + 2] = np.clip(bias, -1.0, 1.0)
+    return start

@@ -1,0 +1,225 @@
+"""What each rule contributes to the prediction along one input."""
+
+from numbers import Real
+
+import numpy as np
+
+from ..export._fold import fold
+from ..export._reading import check_count
+from ..export.table import rule_values
+from ._common import COVERED, colors, held_row, one_axes, position, premises, terms_text
+
+__all__ = ["RuleContributionDisplay"]
+
+
+class RuleContributionDisplay:
+    """Contributions of the rules to the prediction along one input, the rest held.
+
+    A rule contributes its strength times the distance of its value from a baseline; the sum of the
+    contributions and the baseline is the prediction.
+
+    Make it with :meth:`from_estimator`; parameters are stored as attributes.
+
+    Parameters
+    ----------
+    grid : ndarray of shape (n_points,)
+        Values of the input.
+    contributions : ndarray of shape (n_rules, n_points)
+        Strength times value less baseline, for every rule.
+    baseline : float
+        What the rules' values are compared with.
+    input_name, output_name : str
+        Names of the input and the output.
+    coverage : ndarray of shape (n_points,)
+        How well the training data cover each point, from 0 to 1.
+    rule_terms : list of str
+        The terms of each rule, on the "premise_inputs" one after the other.
+    premise_inputs : tuple of str
+        Inputs that rules look at.
+    held : dict
+        Value of every other input by its name.
+
+    Attributes
+    ----------
+    figure_ : matplotlib Figure
+        The figure, once drawn.
+    ax_ : matplotlib Axes
+        The axes, once drawn.
+
+    See Also
+    --------
+    skanfis.export.explain : The same as a table, for given rows.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import RuleContributionDisplay
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=[4, 1]).fit(X, y)
+    >>> display = RuleContributionDisplay.from_estimator(model, "x0")
+    >>> display.rule_terms
+    ['very low', 'low', 'high', 'very high']
+    """
+
+    def __init__(
+        self,
+        *,
+        grid,
+        contributions,
+        baseline,
+        coverage,
+        rule_terms,
+        premise_inputs,
+        input_name,
+        output_name,
+        held,
+    ):
+        self.grid = grid
+        self.contributions = contributions
+        self.baseline = baseline
+        self.coverage = coverage
+        self.rule_terms = rule_terms
+        self.premise_inputs = premise_inputs
+        self.input_name = input_name
+        self.output_name = output_name
+        self.held = held
+
+    @classmethod
+    def from_estimator(
+        cls,
+        estimator,
+        feature=0,
+        *,
+        held=None,
+        output=0,
+        baseline="mean",
+        n_points=201,
+        max_rules=6,
+        colormap="viridis",
+        ax=None,
+    ):
+        """Draw the contributions of the rules of a fitted estimator.
+
+        Parameters
+        ----------
+        estimator : fitted estimator or TSKModel
+            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
+            one.
+        feature : int or str, default=0
+            The input to follow over its range in training, by position or name.
+        held : dict, default=None
+            Values of other inputs, by position or name; those not named are held at their mean in
+            training.
+        output : int or str, default=0
+            Which output, by position or name.
+        baseline : "mean" or float, default="mean"
+            What the rules' values are compared with. "mean" is the mean of the prediction along the
+            line drawn; 0 gives the contributions of :func:`skanfis.export.explain`.
+        n_points : int, default=201
+            Points of each curve, 2 or more.
+        max_rules : int, default=6
+            Most rules with a line of their own, 1 or more; the others are drawn as their sum.
+        colormap : str, default="viridis"
+            Colours of the rules.
+        ax : matplotlib Axes, default=None
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        display : RuleContributionDisplay
+        """
+        check_count("n_points", n_points, 2)
+        model = fold(estimator)
+        j = position(feature, model.input_names)
+        k = position(output, model.output_names, "output")
+        row = held_row(model, held)
+        grid = np.linspace(model.minimum[j], model.maximum[j], n_points)
+        rows = np.tile(row, (n_points, 1))
+        rows[:, j] = grid
+        strengths = model.strengths(rows)
+        values = rule_values(model, rows)[:, :, k]
+        if isinstance(baseline, str) and baseline == "mean":
+            baseline = float(np.mean(np.sum(strengths * values, axis=1)))
+        elif not isinstance(baseline, Real) or not np.isfinite(baseline):
+            raise ValueError(f"baseline={baseline!r} must be 'mean' or a finite number.")
+        rules, inputs = premises(model)
+        display = cls(
+            grid=grid,
+            contributions=(strengths * (values - baseline)).T,
+            baseline=float(baseline),
+            input_name=model.input_names[j],
+            output_name=model.output_names[k],
+            coverage=model.coverage(rows),
+            rule_terms=[terms_text(model, rule, inputs) for rule in rules],
+            premise_inputs=tuple(model.input_names[i] for i in inputs),
+            held={model.input_names[i]: float(row[i]) for i in range(model.n_inputs) if i != j},
+        )
+        return display.plot(max_rules=max_rules, colormap=colormap, ax=ax)
+
+    def plot(self, *, max_rules=6, colormap="viridis", ax=None):
+        """Draw the contributions.
+
+        Parameters
+        ----------
+        max_rules : int, default=6
+            Most rules with a line of their own, 1 or more; the others are drawn as their sum.
+        colormap : str, default="viridis"
+            Colours of the rules.
+        ax : matplotlib Axes, default=None
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        display : RuleContributionDisplay
+        """
+        check_count("max_rules", max_rules, 1)
+        self.ax_ = one_axes(ax, width=7.5)
+        self.figure_ = self.ax_.figure
+        most = np.argsort(-np.abs(self.contributions).mean(axis=1), kind="stable")
+        told = np.sort(most[:max_rules])
+        total = self.baseline + self.contributions.sum(axis=0)
+        self.ax_.axhline(self.baseline, color="0.6", linewidth=0.8)
+        for r, shade in zip(told, colors(told.size, colormap), strict=True):
+            line = self.baseline + self.contributions[r]
+            self.ax_.plot(
+                self.grid, line, color=shade, linewidth=1.5, label=f"{r}: {self.rule_terms[r]}"
+            )
+        if told.size < len(self.contributions):
+            others = self.baseline + np.delete(self.contributions, told, axis=0).sum(axis=0)
+            label = f"{len(self.contributions) - told.size} other rules"
+            self.ax_.plot(self.grid, others, ":", color="0.5", linewidth=1.5, label=label)
+        self.ax_.plot(self.grid, total, color="black", linewidth=2.2, label="prediction")
+        self.ax_.set(
+            xlabel=self.input_name,
+            ylabel=f"{self.output_name}: {self.baseline:.4g} + contribution",
+            xlim=(self.grid[0], self.grid[-1]),
+        )
+        notes = [f"{name} = {value:.4g}" for name, value in self.held.items()]
+        covered = self.coverage >= COVERED
+        if covered.any() and not covered.all():
+            self._shade(covered, total)
+            notes.append("grey: few training data")
+        self.ax_.set_title("; ".join(notes), fontsize="small", loc="left")
+        self.ax_.legend(
+            loc="upper left",
+            bbox_to_anchor=(1.0, 1.0),
+            frameon=False,
+            fontsize="small",
+            title="rule: " + ", ".join(self.premise_inputs),
+            title_fontsize="small",
+            alignment="left",
+        )
+        return self
+
+    def _shade(self, covered, total):
+        """Grey where data do not cover the line; what is there does not set the limits."""
+        from matplotlib.transforms import blended_transform_factory
+
+        across = blended_transform_factory(self.ax_.transData, self.ax_.transAxes)
+        self.ax_.fill_between(
+            self.grid, 0.0, 1.0, where=~covered, color="0.93", transform=across, zorder=0
+        )
+        seen = np.vstack([self.baseline + self.contributions, total])[:, covered]
+        margin = 0.1 * np.ptp(seen)
+        self.ax_.set_ylim(seen.min() - margin, seen.max() + margin)

@@ -1,0 +1,108 @@
+"""The error during training."""
+
+import numpy as np
+
+from ..export._fold import last_step
+from ._common import one_axes
+
+__all__ = ["LossCurveDisplay"]
+
+
+class LossCurveDisplay:
+    """The training error, iteration by iteration.
+
+    Make it with :meth:`from_estimator`; parameters are stored as attributes.
+
+    Parameters
+    ----------
+    loss : ndarray of shape (n_iter + 1,)
+        Mean squared error of the standardised target: 1 is as good as the mean.
+    name : str, default=None
+        Label of the curve.
+    status : str, default=None
+        Why training stopped.
+
+    Attributes
+    ----------
+    figure_ : matplotlib Figure
+        The figure, once drawn.
+    ax_ : matplotlib Axes
+        The axes, once drawn.
+    line_ : matplotlib Line2D
+        The curve, once drawn.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import LossCurveDisplay
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=3).fit(X, y)
+    >>> display = LossCurveDisplay.from_estimator(model)
+    >>> bool(display.loss[-1] < display.loss[0])
+    True
+    """
+
+    def __init__(self, *, loss, name=None, status=None):
+        self.loss = loss
+        self.name = name
+        self.status = status
+
+    @classmethod
+    def from_estimator(cls, estimator, *, name=None, ax=None, **line_kw):
+        """Draw the training error of a fitted estimator.
+
+        Parameters
+        ----------
+        estimator : fitted estimator
+            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
+            one.
+        name : str, default=None
+            Label of the curve; None is the solver's name.
+        ax : matplotlib Axes, default=None
+            Where to draw; None makes a figure. Curves of several estimators can share axes.
+        **line_kw : dict
+            For matplotlib's ``plot``.
+
+        Returns
+        -------
+        display : LossCurveDisplay
+        """
+        last = last_step(estimator)
+        loss = getattr(last, "loss_curve_", None)
+        if loss is None:
+            raise TypeError(f"{type(last).__name__} has not been trained here: no loss_curve_.")
+        display = cls(
+            loss=np.asarray(loss),
+            name=getattr(last, "solver", None) if name is None else name,
+            status=getattr(last, "status_", None),
+        )
+        return display.plot(ax=ax, **line_kw)
+
+    def plot(self, *, ax=None, **line_kw):
+        """Draw the curve.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, default=None
+            Where to draw; None makes a figure.
+        **line_kw : dict
+            For matplotlib's ``plot``.
+
+        Returns
+        -------
+        display : LossCurveDisplay
+        """
+        self.ax_ = one_axes(ax)
+        self.figure_ = self.ax_.figure
+        iterations = np.arange(len(self.loss))
+        style = {"label": self.name, "marker": ".", "markersize": 4, "linewidth": 1.5} | line_kw
+        (self.line_,) = self.ax_.plot(iterations, self.loss, **style)
+        self.ax_.set(xlabel="iteration", ylabel="mean squared error, standardised target")
+        if np.all(self.loss > 0.0):
+            self.ax_.set_yscale("log")
+        self.ax_.xaxis.get_major_locator().set_params(integer=True)
+        self.ax_.grid(True, alpha=0.3)
+        if self.name is not None:
+            self.ax_.legend(frameon=False)
+        return self

@@ -1,0 +1,96 @@
+"""One run of a solver: what it needs beside the data and the start, and what it leaves behind."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..objective import SeparableProblem
+from ..premise import Premise
+from ..rows import Rows
+from ..solvers import SOLVERS, SolverResult
+from .structure import Structure
+
+__all__ = ["Learned", "Learner"]
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """The end of a run."""
+
+    structure: Structure
+    problem: SeparableProblem
+    premise: Premise
+    result: SolverResult
+    validation_losses: tuple[float, ...] = ()
+
+    @property
+    def displacement(self):
+        """Where the premises are, from their start."""
+        evaluation = self.result.evaluation
+        assert evaluation is not None
+        return self.premise.displacement(evaluation.antecedent.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Learner:
+    """A solver and its settings.
+
+    Parameters
+    ----------
+    solver : str
+        A key of ``SOLVERS``.
+    order : {0, 1}
+    consequent_inputs : ndarray of int
+    max_iter, tol : int, float
+        When to stop.
+    options : dict
+        What this solver takes beyond what all take.
+    map_ordered : callable
+        ``map`` or what stands in for it.
+    """
+
+    solver: str
+    order: int
+    consequent_inputs: np.ndarray
+    max_iter: int
+    tol: float
+    options: dict
+    map_ordered: Callable = map
+
+    def run(self, rows: Rows, structure: Structure, displacement=None, watch=None) -> Learned:
+        """Train from a structure's start, or from a displacement of it; ``watch`` may end it."""
+        problem, premise = self.problem(rows, structure), self.premise(rows, structure)
+        if displacement is not None:
+            displacement = np.clip(displacement, premise.lower, premise.upper)
+        result = SOLVERS[self.solver](
+            problem,
+            premise,
+            max_iter=self.max_iter,
+            tol=self.tol,
+            stiffness=structure.stiffness,
+            start=displacement,
+            on_iteration=watch,
+            **self.options,
+        )
+        return Learned(structure, problem, premise, result)
+
+    def problem(self, rows: Rows, structure: Structure):
+        """The least-squares problem at a structure."""
+        return SeparableProblem(
+            rows,
+            structure.antecedent,
+            self.order,
+            structure.alpha,
+            self.map_ordered,
+            self.consequent_inputs,
+        )
+
+    @staticmethod
+    def premise(rows: Rows, structure: Structure):
+        """What moves at a structure, within the box of the data."""
+        return Premise.of(structure.antecedent, *rows.inputs.box)
+
+    def one_by_one(self):
+        """The same learner without workers of its own, for runs that are spread over workers."""
+        return replace(self, map_ordered=map)

@@ -1,0 +1,118 @@
+"""What watches a training from outside: a line of text, scikit-learn's callbacks, Ctrl-C."""
+
+import sys
+import time
+
+import numpy as np
+
+from ..objective import Evaluation
+from ..solvers import SolverResult
+from .structure import Structure
+
+__all__ = ["CallbackBridge", "Keeper", "Printer", "watch_all"]
+
+
+def watch_all(*watchers):
+    """Several watchers as one: every one sees every iteration, any one can end the run."""
+    present = [watcher for watcher in watchers if watcher is not None]
+    if not present:
+        return None
+
+    def watch(n_iter, evaluation):
+        wishes = [watcher(n_iter, evaluation) for watcher in present]
+        return any(wishes)
+
+    return watch
+
+
+class Keeper:
+    """Remembers the best point of the run in hand, for when it is interrupted.
+
+    Once ``is_ended``, runs in other threads end at their next iteration.
+    """
+
+    def __init__(self):
+        self.best: Evaluation | None = None
+        self.structure: Structure | None = None
+        self.losses: list[float] = []
+        self.is_ended = False
+
+    def of(self, structure):
+        """A watcher of a run at a structure; where its cost is another one, the old best goes."""
+        if self.structure is not structure:
+            self.structure, self.best, self.losses = structure, None, []
+
+        def watch(n_iter, evaluation):
+            self.losses.append(evaluation.mean_squared_error)
+            if self.best is None or evaluation.cost <= self.best.cost:
+                self.best = evaluation
+            return self.is_ended
+
+        return watch
+
+    def end(self):
+        """The structure and the best point of the run in hand; other threads' runs end."""
+        self.is_ended = True
+        losses = np.array([self.losses[0], *self.losses])
+        result = SolverResult(self.best, losses, len(self.losses), "interrupted")
+        return self.structure, result
+
+
+class Printer:
+    """Writes a line after every iteration to the standard output, as verbose does elsewhere."""
+
+    def __init__(self, name):
+        self._name, self._start = name, time.perf_counter()
+
+    def note(self, text):
+        """Write a line of one's own."""
+        sys.stdout.write(f"[{self._name}] {text}\n")
+        sys.stdout.flush()
+
+    def __call__(self, n_iter, evaluation):
+        seconds = time.perf_counter() - self._start
+        loss = evaluation.mean_squared_error
+        self.note(f"iteration {n_iter}: loss {loss:.6g}, {seconds:.1f} s")
+        return False
+
+
+class CallbackBridge:
+    """Tells scikit-learn's callbacks of every iteration, and passes their wish to stop on.
+
+    Parameters
+    ----------
+    estimator : estimator
+        With ``_init_callback_context`` where this scikit-learn has callbacks.
+    context : sklearn.callback.CallbackContext
+        Of the fit.
+    data : dict
+        "X", "y" and "metadata", as callbacks are given them.
+    attributes : callable
+        The fitted attributes of the estimator at an evaluation.
+    """
+
+    def __init__(self, estimator, context, data, attributes):
+        self.estimator, self.context, self.data = estimator, context, data
+        self.attributes = attributes
+
+    def begin(self):
+        """Tell of the beginning of the fit."""
+        self.context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
+
+    def task(self, name, *state):
+        """Tell of a task that has just ended; whether a callback wants to stop."""
+        context = self.context.subcontext(task_name=name)
+        context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
+        return context.call_on_fit_task_end(
+            estimator=self.estimator,
+            reconstruction_attributes=lambda: self.attributes(*state),
+            **self.data,
+        )
+
+    def end(self, *state):
+        """Tell of the end of the fit."""
+        self.context.call_on_fit_task_end(
+            estimator=self.estimator,
+            reconstruction_attributes=lambda: self.attributes(*state),
+            **self.data,
+        )

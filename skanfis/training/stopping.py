@@ -1,0 +1,103 @@
+"""Early stopping: rows held out, the error on them followed, the best parameters restored."""
+
+from dataclasses import replace
+
+import numpy as np
+from sklearn.model_selection import GroupShuffleSplit
+
+from ..consequent import basis, rule_outputs
+from ..rows import Rows, fingerprint
+
+__all__ = ["EarlyStopping", "hold_out"]
+
+_READ_ROWS = 4096
+
+
+def hold_out(rows: Rows, groups, validation_fraction, seed):
+    """Indices to train on and to hold out, each in order: whole groups.
+
+    Where there are none, equal rows are a group: no row is on both sides, and a weight is as good
+    as so many repeats. ValueError where either part would have fewer than two rows.
+    """
+    what = f"{rows.n_rows} rows"
+    if groups is None:
+        groups = _equal_rows(rows)
+    else:
+        what += f" in {np.unique(groups).size} groups"
+    splitter = GroupShuffleSplit(1, test_size=validation_fraction, random_state=seed)
+    try:
+        training, validation = next(splitter.split(np.empty((rows.n_rows, 0)), groups=groups))
+    except ValueError:
+        training = validation = np.empty(0, dtype=int)
+    if min(training.size, validation.size) < 2:
+        raise ValueError(
+            f"early_stopping=True with validation_fraction={validation_fraction} leaves "
+            f"{training.size} rows to train on and {validation.size} to hold out, of {what}: "
+            "at least 2 of each are needed. Change validation_fraction, or use "
+            "early_stopping=False."
+        )
+    return training, validation
+
+
+def _equal_rows(rows):
+    """One number per row, the same for rows of equal inputs."""
+    numbers = np.empty(rows.n_rows)
+    for chunk in rows.chunks(_READ_ROWS):
+        for part in chunk:
+            numbers[part] = fingerprint(rows.read(part)[0])
+    return numbers
+
+
+class EarlyStopping:
+    """Watches a run: the mean squared error of held-out rows after every iteration.
+
+    Parameters
+    ----------
+    rows : Rows
+        The held-out rows, on the training rows' scales.
+    consequent_inputs : ndarray of int
+    n_iter_no_change : int
+        End after so many iterations without an error smaller by ``tol``, relatively.
+    tol : float
+    """
+
+    def __init__(self, rows: Rows, consequent_inputs, n_iter_no_change, tol):
+        self.rows, self.consequent_inputs = rows, consequent_inputs
+        self.n_iter_no_change, self.tol = n_iter_no_change, tol
+        self.losses: list[float] = []
+        self.best = None
+        self._best_loss = self._last_counted = np.inf
+        self._without_change = 0
+
+    def __call__(self, n_iter, evaluation):
+        loss = self._loss(evaluation)
+        self.losses.append(loss)
+        if loss < self._best_loss:
+            self._best_loss, self.best = loss, evaluation
+        if loss < (1.0 - self.tol) * self._last_counted:
+            self._last_counted, self._without_change = loss, 0
+        else:
+            self._without_change += 1
+        return self._without_change >= self.n_iter_no_change
+
+    def restored(self, result):
+        """The result with the parameters of the smallest held-out error."""
+        return result if self.best is None else replace(result, evaluation=self.best)
+
+    def _loss(self, evaluation):
+        """Rows beyond the training rows' range count as predict holds them, at its edge."""
+        low, high = (edge[:, None] for edge in self.rows.inputs.box)
+        coefficients = evaluation.coefficients
+        n_rules = evaluation.antecedent.n_rules
+        by_rule = coefficients.reshape(n_rules, -1, coefficients.shape[1])
+        total = 0.0
+        for chunk in self.rows.chunks(_READ_ROWS):
+            for part in chunk:
+                Z, target, weight = self.rows.read(part)
+                np.clip(Z, low, high, out=Z)
+                strengths = evaluation.antecedent.strengths(Z)
+                basis_rows = basis(Z[self.consequent_inputs])
+                for k, one in enumerate(by_rule.transpose(2, 0, 1)):
+                    squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
+                    total += squares.sum() if weight is None else weight @ squares
+        return total / self.rows.total_weight

@@ -1,0 +1,106 @@
+"""Models of every membership, partition, order and number of outputs, as a list to go through.
+
+Inputs are in everyday units, one of them far from the origin; rows are in the box and out of it.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from skanfis.antecedent import RuleTableAntecedent, TermGroup
+from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.model import OUT_OF_BOUNDS, TSKModel
+
+from ..oracles import random_grid, random_scattered
+from .rule_bases import OFFSET, SCALE, build
+
+N_ROWS = 10_000
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model, and what it is called in the list."""
+
+    label: str
+    family: str
+    partition: str
+    model: TSKModel
+
+
+def table_of(rng, family):
+    """Four rules over terms of two families on three inputs; two do not look at all of them."""
+    groups = []
+    for j, of_input in enumerate((family, Gaussian, family)):
+        centers = np.array([-1.0, 0.1, 1.2]) + 0.2 * rng.normal(size=3)
+        theta = of_input.from_center_and_width(centers, rng.uniform(0.7, 1.5, 3))
+        groups.append(TermGroup(of_input, np.full(3, j), theta))
+    table = np.array([[0, -1, 6], [1, 4, 7], [2, 3, -1], [1, 5, 8]])
+    return RuleTableAntecedent(tuple(groups), table)
+
+
+PARTITIONS = {
+    "grid": lambda rng, family: random_grid(rng, [family] * 3, (2, 3, 2)),
+    "mixed grid": lambda rng, family: random_grid(rng, [family, Gaussian], (3, 2), (0, 2)),
+    "scattered": lambda rng, family: random_scattered(rng, family, 4, (0, 1, 2)),
+    "rule table": table_of,
+}
+
+
+def generate():
+    """All combinations; the policies out of bounds go round among them."""
+    policies = ("linear", "clip", "linear", "nan", "linear", "raise")
+    combinations = product(MEMBERSHIPS.items(), PARTITIONS.items(), (0, 1), (1, 3))
+    for i, ((name, family), (kind, make), order, n_outputs) in enumerate(combinations):
+        policy = policies[i % len(policies)]
+        antecedent = make(np.random.default_rng(i), family)
+        label = f"{name}, {kind}, order {order}, {n_outputs} outputs, {policy}"
+        yield Case(label, name, kind, build(antecedent, order, n_outputs, out_of_bounds=policy))
+
+
+CASES = tuple(generate())
+assert {case.model.out_of_bounds for case in CASES} == set(OUT_OF_BOUNDS)
+
+
+def rows(dtype, n_rows=N_ROWS):
+    """Rows up to half the width of the box beyond it, as numbers of this type."""
+    unit = np.random.default_rng(5).uniform(-4.0, 3.5, (n_rows, 3))
+    unit[: n_rows // 2] = unit[: n_rows // 2] / 7.5 * 3.5
+    return (OFFSET + SCALE * unit).astype(dtype)
+
+
+def full_scale(y):
+    """The largest output of each column."""
+    return np.nanmax(np.abs(y), axis=0)
+
+
+def size_of_sum(model, X):
+    """The largest sum over rules of |w_r f_r|, of each output.
+
+    Rules that cancel each other take digits with them, in Python too: trained on few data without
+    noise they may.
+    """
+    inside = np.clip(X, model.minimum, model.maximum)
+    basis = np.column_stack([np.ones(len(X)), inside - model.reference])
+    values = np.einsum("nb,rbo->nro", basis[:, : 1 + 3 * model.order], model.coefficients)
+    return np.einsum("nr,nro->no", model.strengths(X), np.abs(values)).max(axis=0)
+
+
+def print_differences(title, cases, differences):
+    """The largest difference by family and partition, in full scales."""
+    print(f"\n{title}: largest difference in full scales")
+    kinds = list(PARTITIONS)
+    print(f"{'':20}" + "".join(f"{kind:>14}" for kind in kinds))
+    for name in MEMBERSHIPS:
+        found = [
+            max(
+                (
+                    difference
+                    for case, difference in zip(cases, differences, strict=True)
+                    if (case.family, case.partition) == (name, kind)
+                ),
+                default=np.nan,
+            )
+            for kind in kinds
+        ]
+        print(f"{name:20}" + "".join(f"{value:14.1e}" for value in found))

@@ -1,0 +1,69 @@
+"""Frozen models of every kind of rule base, order and number of outputs, in everyday units."""
+
+from itertools import product
+
+import numpy as np
+
+from skanfis.antecedent import GridAntecedent
+from skanfis.membership import Bell, Gaussian, TwoSidedGaussian
+from skanfis.model import TSKModel
+
+from .. import oracles
+
+# Of x = OFFSET + SCALE z, with z of order one.
+OFFSET, SCALE = np.array([1e6, 20.0, 0.0]), np.array([600.0, 15.0, 0.01])
+NAMES = ("time", "chip temperature", "rate")
+
+
+def _antecedents():
+    def rng():
+        return np.random.default_rng(1)
+
+    families = (Gaussian, Bell, TwoSidedGaussian)
+    return {
+        "grid": oracles.random_grid(rng(), families, (2, 3, 2)),
+        "grid on two inputs": oracles.random_grid(rng(), (Gaussian, Gaussian), (3, 2), (0, 2)),
+        "scattered": oracles.random_scattered(rng(), Gaussian, 4, (0, 1, 2)),
+        "scattered on two inputs": oracles.random_scattered(rng(), Bell, 3, (1, 2)),
+        "rule table": oracles.random_table(rng()),
+        "one rule": GridAntecedent((), counts=()),
+    }
+
+
+def build(antecedent, order=1, n_outputs=1, **changes):
+    """A model with random consequents; rule 1 has never fired where there are more than two."""
+    g = np.random.default_rng(2)
+    n_rules = antecedent.n_rules
+    coefficients = g.normal(size=(n_rules, 1 + 3 * order, n_outputs))
+    coefficients[:, 1:] /= SCALE[:, None][: 3 * order]
+    weights = g.dirichlet(np.ones(n_rules))
+    rows = np.round(40.0 * weights)
+    if n_rules > 2:
+        rows[1] = 0.0
+    moved = antecedent.change_units(OFFSET, SCALE)
+    settings = {
+        "antecedent": moved,
+        "initial_antecedent": moved.with_parameters(moved.parameters + 0.25),
+        "coefficients": coefficients,
+        "reference": OFFSET + SCALE * [0.2, -0.1, 0.4],
+        "spread": SCALE * [1.0, 1.1, 0.9],
+        "minimum": OFFSET - 2.0 * SCALE,
+        "maximum": OFFSET + 1.5 * SCALE,
+        "rule_weights": weights,
+        "rule_rows": rows,
+        "input_names": NAMES,
+    }
+    return TSKModel(**(settings | changes))
+
+
+MODELS = {
+    f"{kind}, order {order}, {n_outputs} outputs": build(antecedent, order, n_outputs)
+    for (kind, antecedent), order, n_outputs in product(_antecedents().items(), (0, 1), (1, 2))
+}
+
+
+def rows_of(model, reach, n_rows=40):
+    """Rows in the box (reach 1) or in and out of it (reach above 1)."""
+    middle, half = (model.maximum + model.minimum) / 2, (model.maximum - model.minimum) / 2
+    unit = np.random.default_rng(3).uniform(-1.0, 1.0, (n_rows, model.n_inputs))
+    return middle + reach * half * unit

@@ -1,0 +1,427 @@
+"""Exported C, compiled and run, answers what ``predict`` answers."""
+
+import re
+import subprocess
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.cluster import KMeans
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning
+from skanfis.export import export_c
+from skanfis.export._fold import fold
+from skanfis.export.c._header import BITS
+from skanfis.membership import Gaussian
+from skanfis.model import TSKModel
+
+from ..oracles import random_grid
+from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
+from .every_model import CASES, full_scale, print_differences, rows, size_of_sum
+
+MIN_COVERAGE = 0.3
+
+
+def expected_status(model, X, std):
+    """From the definitions in the header; and where rounding decides."""
+    outside = ~model.in_bounds(X)
+    coverage = model.coverage(X)
+    status = outside * BITS["OUT_OF_RANGE"]
+    if model.out_of_bounds in ("nan", "raise"):
+        status = status | outside * BITS["NO_OUTPUT"]
+    answered = (status & BITS["NO_OUTPUT"]) == 0
+    status = status | (answered & (coverage < MIN_COVERAGE)) * BITS["UNCOVERED"]
+    return status, np.abs(coverage - MIN_COVERAGE) < 1e-4
+
+
+def expected_outputs(model, X, status, std):
+    if model.out_of_bounds != "raise":
+        y = model.predict(X)
+        if model.out_of_bounds == "nan" and std == "c89":
+            y[status & BITS["NO_OUTPUT"] > 0] = UNTOUCHED
+        return y
+    y = model.with_out_of_bounds("clip").predict(X)
+    y[status & BITS["NO_OUTPUT"] > 0] = UNTOUCHED
+    return y
+
+
+@needs_compiler
+@pytest.mark.parametrize("std", ["c99", "c89"])
+@pytest.mark.parametrize(("dtype", "tolerance"), [("double", 1e-12), ("float", 1e-5)])
+def test_every_model_answers_as_predict(dtype, tolerance, std, tmp_path, capsys):
+    X = rows(np.float32 if dtype == "float" else np.float64)
+    # C89 differs by its exp and log alone: a part of the list has every family and every policy.
+    cases = CASES if std == "c99" else CASES[1::3]
+    codes = [
+        export_c(case.model, name=f"m{i}", dtype=dtype, std=std, min_coverage=MIN_COVERAGE)
+        for i, case in enumerate(cases)
+    ]
+    n_outputs = [case.model.n_outputs for case in cases]
+    answers = evaluate_all(codes, X, tmp_path, std, n_outputs)
+    differences = []
+    for case, (y, status) in zip(cases, answers, strict=True):
+        Z = X.astype(float)
+        expected, unsure = expected_status(case.model, Z, std)
+        assert (status == expected)[~unsure].all(), case.label
+        wanted = expected_outputs(case.model, Z, expected, std)
+        answered = (expected & BITS["NO_OUTPUT"]) == 0
+        assert np.array_equal(y[~answered], wanted[~answered], equal_nan=True), case.label
+        difference = np.abs(y[answered] - wanted[answered]) / full_scale(wanted[answered])
+        differences.append(difference.max())
+    with capsys.disabled():
+        print_differences(f"C, {dtype}, {std}", cases, differences)
+    assert max(differences) < tolerance
+
+
+# What lies around the list: pipelines, policies, edges, numbers of unusual size.
+
+
+def surface(n_rows=400, n_outputs=1):
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (n_rows, 3)) * [300.0, 40.0, 100.0] + [300.0, 20.0, 0.0]
+    y = np.sin(X[:, 0] / 100.0) + 1e-3 * X[:, 1] * X[:, 2]
+    return X, np.column_stack([y, 1e3 + y**2])[:, :n_outputs].squeeze()
+
+
+def around(X, dtype=np.float64, n_rows=2000):
+    low, high = X.min(axis=0), X.max(axis=0)
+    unit = np.random.default_rng(1).uniform(-0.3, 1.3, (n_rows, X.shape[1]))
+    return (low + (high - low) * unit).astype(dtype)
+
+
+def answers_of(code, X, folder, n_outputs=1, std="c99"):
+    return evaluate_all([code], X, folder, std, [n_outputs])[0]
+
+
+def scaled_target():
+    regressor = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2, out_of_bounds="linear"))
+    return TransformedTargetRegressor(regressor, transformer=MinMaxScaler())
+
+
+TRAINED = {
+    "pipeline": lambda: make_pipeline(RobustScaler(), ANFISRegressor(n_mfs=[3, 2, 2])),
+    "scaled target": scaled_target,
+    "triangles untrained": lambda: ANFISRegressor(
+        n_mfs=3, mf="triangular", solver="lse", out_of_bounds="linear"
+    ),
+    "families by input": lambda: ANFISRegressor(
+        n_mfs=2, mf=["bell", "gaussian", "s_shaped"], out_of_bounds="linear"
+    ),
+    "order 0": lambda: ANFISRegressor(n_mfs=[4, 1, 3], order=0),
+    "clusters": lambda: ANFISRegressor(partition=KMeans(5, n_init=1, random_state=0)),
+    "one cluster": lambda: ANFISRegressor(partition=KMeans(1)),
+    "plane": lambda: ANFISRegressor(n_mfs=1),
+    "constant": lambda: ANFISRegressor(n_mfs=1, order=0),
+    "scheduled": lambda: ANFISRegressor(
+        n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"
+    ),
+    "rules of others": lambda: ANFISRegressor(
+        partition=ANFISRegressor(n_mfs=2).fit(*surface()), out_of_bounds="linear"
+    ),
+}
+
+
+@needs_compiler
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.parametrize("n_outputs", [1, 2])
+@pytest.mark.parametrize("kind", TRAINED)
+def test_trained_model_answers_as_predict(kind, n_outputs, tmp_path):
+    X, y = surface(n_outputs=n_outputs)
+    estimator = TRAINED[kind]().fit(X, y)
+    for dtype, tolerance in [("double", 1e-12), ("float", 1e-5)]:
+        Z = around(X, np.float32 if dtype == "float" else float)
+        code = export_c(estimator, name="m", dtype=dtype, min_coverage=None)
+        found, status = answers_of(code, Z, tmp_path, n_outputs)
+        wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
+        scale = np.maximum(full_scale(wanted), size_of_sum(fold(estimator), Z))
+        assert (np.abs(found - wanted) / scale).max() < tolerance
+        assert set(status) == {BITS["IN_RANGE"], BITS["OUT_OF_RANGE"]}
+
+
+@needs_compiler
+def test_single_precision_bears_an_offset(tmp_path):
+    # Time stamps: a float has steps of 128 there, the inputs a range of 3e6.
+    X, y = surface()
+    X[:, 0] = 1.7e9 + 1e4 * X[:, 0]
+    X = X.astype(np.float32).astype(float)
+    estimator = ANFISRegressor(n_mfs=3).fit(X, y + 1e4)
+    Z = X.astype(np.float32)
+    code = export_c(estimator, name="m", dtype="float", min_coverage=None)
+    found, status = answers_of(code, Z, tmp_path)
+    # All that is lost is the last digit of 1e4.
+    assert np.abs(found[:, 0] - estimator.predict(X)).max() < 2 * np.spacing(np.float32(1e4))
+    assert (status == BITS["IN_RANGE"]).all()
+
+
+@needs_compiler
+@pytest.mark.parametrize("policy", ["clip", "linear", "nan", "raise"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_row_that_is_not_finite_gets_no_answer(policy, bad, tmp_path):
+    X, y = surface()
+    estimator = ANFISRegressor(n_mfs=2, out_of_bounds=policy).fit(X, y)
+    Z = X[:3].repeat(2, axis=0)
+    Z[[0, 2, 4], [0, 1, 2]] = bad
+    found, status = answers_of(export_c(estimator, name="m"), Z, tmp_path)
+    none = UNTOUCHED if policy != "nan" else np.nan
+    assert np.array_equal(found[::2, 0], np.full(3, none), equal_nan=True)
+    assert (status[::2] == BITS["NOT_FINITE"] + BITS["NO_OUTPUT"]).all()
+    np.testing.assert_allclose(found[1::2, 0], estimator.predict(X[:3]), rtol=1e-10)
+
+
+@needs_compiler
+@pytest.mark.parametrize("policy", ["clip", "linear"])
+def test_largest_numbers_are_answered(policy, tmp_path):
+    X, y = surface()
+    model = ANFISRegressor(n_mfs=2, out_of_bounds=policy, mf="bell").fit(X, y).model_
+    Z = np.array([[1.0, -1.0, 1.0]]) * [[1e100], [1e150], [np.finfo(float).max]]
+    found, status = answers_of(
+        export_c(model, name="m"), Z[: 2 if policy == "linear" else 3], tmp_path
+    )
+    wanted = model.predict(Z[: len(found)])
+    np.testing.assert_allclose(found, wanted, rtol=1e-10)
+    assert (status == BITS["OUT_OF_RANGE"] + BITS["UNCOVERED"]).all()
+
+
+@needs_compiler
+def test_constant_and_lone_columns(tmp_path):
+    X, y = surface()
+    X[:, 1] = 20.0
+    with pytest.warns(ConstantInputWarning):
+        estimator = ANFISRegressor(n_mfs=[3, 1, 2]).fit(X, y)
+    code = export_c(estimator, name="m", min_coverage=None)
+    found, _ = answers_of(code, X, tmp_path)
+    np.testing.assert_allclose(found[:, 0], estimator.predict(X), rtol=1e-11, atol=1e-11)
+
+
+@needs_compiler
+@pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6, 1e12])
+def test_units_do_not_matter_to_single_precision(scale, tmp_path):
+    X, y = surface()
+    X, y = (X * scale).astype(np.float32).astype(float), y / scale
+    estimator = ANFISRegressor(n_mfs=2).fit(X, y)
+    found, _ = answers_of(
+        export_c(estimator, name="m", dtype="float"), X.astype(np.float32), tmp_path
+    )
+    assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-5 * np.abs(y).max()
+
+
+@pytest.mark.parametrize(
+    ("scale_x", "scale_y", "what"),
+    [
+        (1e45, 1.0, "an input"),
+        (1e-45, 1.0, "an input"),
+        (1.0, 1e42, "output"),
+    ],
+)
+def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
+    X, y = surface()
+    model = ANFISRegressor(n_mfs=2).fit(X * scale_x, y * scale_y)
+    with pytest.raises(ValueError, match=rf"Single precision cannot hold .*{what}"):
+        export_c(model, name="m", dtype="float")
+    export_c(model, name="m", dtype="double")
+
+
+# What is promised of the files.
+
+
+@needs_compiler
+@pytest.mark.parametrize("dtype", ["float", "double"])
+@pytest.mark.parametrize("kind", ["grid", "rule table"])
+def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path):
+    case = next(c for c in CASES if c.partition == kind and c.model.out_of_bounds == "linear")
+    code = export_c(case.model, tmp_path / "m", dtype=dtype)
+    gcc(["-std=c99", "-Os", "-c", "m.c", "-o", "m.o"], tmp_path)
+    symbols = subprocess.run(
+        ["nm", "-S", "m.o"], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    by_kind = {}
+    for line in symbols:
+        *size, letter, name = line.split()
+        by_kind.setdefault(letter, {})[name] = int(size[1], 16) if len(size) > 1 else 0
+    # Undefined: the functions of the library. No "d", "b", "c": nothing that could be written to.
+    suffix = "f" if dtype == "float" else ""
+    assert set(by_kind["U"]) <= {f"exp{suffix}", f"log{suffix}"}
+    assert set(by_kind) <= {"U", "T", "t", "r"}
+    assert list(by_kind["T"]) == ["m_predict"]
+    tables = {name: size for name, size in by_kind["r"].items() if name.startswith("m_")}
+    declared = re.findall(r"^static const [\w ]+ (m_\w+)\[", code.source, re.MULTILINE)
+    declared = [name for name in declared if "_test" not in name]
+    # Tables of one number may become part of the code.
+    assert set(tables) <= set(declared)
+    assert code.cost.table_bytes == sum(tables.values()) or len(tables) < len(declared)
+    assert sum(tables.values()) <= code.cost.table_bytes < sum(tables.values()) + 64
+
+
+@needs_compiler
+@pytest.mark.parametrize("case", CASES[::13], ids=lambda case: case.label)
+def test_functions_of_the_library_are_called_as_often_as_reported(case, tmp_path):
+    code = export_c(case.model.with_out_of_bounds("clip"), tmp_path / "m")
+    (tmp_path / "count.c").write_text(
+        """
+#include <stdio.h>
+#include <math.h>
+static int exponentials, logarithms;
+static double counted_exp(double u) { ++exponentials; return exp(u); }
+static double counted_log(double u) { ++logarithms; return log(u); }
+#define exp counted_exp
+#define log counted_log
+#include "m.c"
+int main(void)
+{
+    double x[M_N_INPUTS], y[M_N_OUTPUTS];
+    int i, k, most_exp = 0, most_log = 0;
+    for (k = 0; k < 100; ++k) {
+        for (i = 0; i < M_N_INPUTS; ++i) {
+            x[i] = m_low[i] + (m_high[i] - m_low[i]) * 0.01 * ((k * (7 + 6 * i)) % 100 + 0.5);
+        }
+        exponentials = logarithms = 0;
+        m_predict(x, y);
+        most_exp = exponentials > most_exp ? exponentials : most_exp;
+        most_log = logarithms > most_log ? logarithms : most_log;
+    }
+    printf("%d %d", most_exp, most_log);
+    return 0;
+}
+""",
+        encoding="ascii",
+    )
+    gcc(["-std=c99", "count.c", "-o", "count", "-lm"], tmp_path)
+    counted = [int(word) for word in run(["./count"], tmp_path).stdout.split()]
+    reported = [code.cost.exponentials, code.cost.logarithms]
+    if any(name in case.label for name in ("triang", "trapez", "_shaped")):
+        # No term needs its exponential where mu is exactly zero or one.
+        assert all(c <= r for c, r in zip(counted, reported, strict=True))
+    else:
+        assert counted == reported
+
+
+def test_grid_takes_an_exponential_per_term():
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (800, 2))
+    model = ANFISRegressor(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1])
+    cost = export_c(model, name="m").cost
+    assert cost.exponentials == 12
+    assert cost.logarithms == 0
+    # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value, support.
+    assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3) + 36 * (model.model_.rule_rows < 3).any()
+    assert cost.divisions == 2
+
+
+@needs_compiler
+def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
+    X, y = surface()
+    code = export_c(ANFISRegressor(n_mfs=2).fit(X, y), tmp_path / "m")
+    flags = ["-std=c89", *STRICT, *SANITIZE, "-DM_SELF_TEST", "-DM_SELF_TEST_MAIN"]
+    gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
+    assert run(["./test"], tmp_path).returncode == 0
+    table = code.source.index("m_consequents")
+    first = re.compile(r"-?\d\.\d{6}").search(code.source, table)
+    digit = str((int(first[0][-1]) + 5) % 10)
+    spoilt = code.source[: first.end() - 1] + digit + code.source[first.end() :]
+    (tmp_path / "m.c").write_text(spoilt, encoding="ascii")
+    gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
+    assert run(["./test"], tmp_path).returncode == 1
+
+
+HOSTILE = [
+    "*/ int x; /*",
+    "??/",
+    'quote " and \\',
+    "line\nbreak\r\n#error",
+    "°C · 陀螺 \U0001f600",
+    "int",
+    "x" * 5000,
+    "//\\",
+    "/*",
+    "%s%n",
+    "\x00\x1b[31m",
+]
+
+
+@needs_compiler
+@pytest.mark.parametrize("std", ["c89", "c99"])
+def test_names_of_columns_cannot_leave_their_comment(std, tmp_path):
+    g = np.random.default_rng(0)
+    X = pd.DataFrame(g.uniform(size=(60, len(HOSTILE))), columns=HOSTILE)
+    estimator = ANFISRegressor(n_mfs=[2] + [1] * (len(HOSTILE) - 1)).fit(X, X.sum(axis=1))
+    code = export_c(estimator, tmp_path / "m", std=std)
+    assert (code.header + code.source).isascii()
+    assert max(map(len, (code.header + code.source).splitlines())) < 200
+    flags = [f"-std={std}", "-trigraphs", *STRICT, "-c"]
+    gcc([*flags, "m.c", "-o", "m.o"], tmp_path)
+    assert (tmp_path / "m.h").read_text(encoding="ascii").count("*/") == code.header.count("/*")
+    assert "int x; /" in code.header  # harmless, and so still readable
+
+
+def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
+    X, y = surface()
+    code = export_c(ANFISRegressor(n_mfs=2).fit(X, y), str(tmp_path / "gyro"))
+    assert code.name == "gyro"
+    assert (tmp_path / "gyro.h").read_text(encoding="ascii") == code.header
+    assert (tmp_path / "gyro.c").read_text(encoding="ascii") == code.source
+    other = export_c(ANFISRegressor(n_mfs=2).fit(X, y), tmp_path / "a.b-c", name="gyro")
+    assert '#include "a.b-c.h"' in other.source
+    assert (tmp_path / "a.b-c.c").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "name=None takes the name from path"),
+        ({"name": "2x"}, "name='2x' must be a C identifier"),
+        ({"name": "a b"}, "must be a C identifier"),
+        ({"name": "_x"}, "must be a C identifier"),
+        ({"name": "grün"}, "must be a C identifier"),
+        ({"name": "x\n"}, "must be a C identifier"),
+        ({"name": 3}, "must be a C identifier"),
+        ({"name": "a__b"}, "two underscores"),
+        ({"name": "double"}, "is a keyword of C"),
+        ({"name": "x" * 17}, "has 17 characters; with 16 or fewer"),
+        ({"path": "no/folder/my model"}, "path ends in 'my model'"),
+        ({"path": 'a"b', "name": "m"}, "path ends in 'a\"b'"),
+        ({"path": ".."}, r"path ends in '\.\.'"),
+        ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of double, float"),
+        ({"name": "m", "dtype": np.float32}, "must be one of double, float"),
+        ({"name": "m", "std": "c11"}, "std='c11' must be one of c99, c89"),
+        ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
+        ({"name": "m", "min_coverage": 1.5}, r"min_coverage=1\.5 must be"),
+        ({"name": "m", "min_coverage": np.nan}, "min_coverage=nan must be"),
+        ({"name": "m", "min_coverage": "0.5"}, "min_coverage='0.5' must be"),
+    ],
+)
+def test_bad_argument(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        export_c(CASES[0].model, **arguments)
+
+
+def test_family_of_ones_own_is_refused():
+    class Own(Gaussian):
+        name = "own"
+
+    X, y = surface()
+    model = ANFISRegressor(n_mfs=2, mf=Own).fit(X, y)
+    with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
+        export_c(model, name="m")
+
+
+def test_grid_too_deep_for_c89():
+    antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 13, [2] * 13)
+    model = TSKModel(
+        antecedent=antecedent,
+        initial_antecedent=antecedent,
+        coefficients=np.ones((2**13, 1, 1)),
+        reference=np.zeros(13),
+        spread=np.ones(13),
+        minimum=-np.ones(13),
+        maximum=np.ones(13),
+        rule_weights=np.full(2**13, 2.0**-13),
+        rule_rows=np.ones(2**13),
+        input_names=tuple(f"x{j}" for j in range(13)),
+    )
+    with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
+        export_c(model, name="m", std="c89")
+    assert export_c(model, name="m").cost.exponentials == 26

@@ -1,0 +1,162 @@
+"""Membership functions of the format against the definitions in MATLAB's documentation."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.export.fis.functions import function_of, theta_of
+from skanfis.membership import MEMBERSHIPS
+
+LOW, HIGH = -4.0, 4.0
+X = np.linspace(LOW, HIGH, 801)
+
+
+def gaussmf(x, sigma, c):
+    return np.exp(-((x - c) ** 2) / (2 * sigma**2))
+
+
+def gbellmf(x, a, b, c):
+    return 1 / (1 + np.abs((x - c) / a) ** (2 * b))
+
+
+def trimf(x, a, b, c):
+    return np.maximum(np.minimum((x - a) / (b - a), (c - x) / (c - b)), 0)
+
+
+def trapmf(x, a, b, c, d):
+    return np.maximum(np.minimum(np.minimum((x - a) / (b - a), 1), (d - x) / (d - c)), 0)
+
+
+def gauss2mf(x, sigma1, c1, sigma2, c2):
+    left = np.where(x < c1, gaussmf(x, sigma1, c1), 1)
+    return left * np.where(x > c2, gaussmf(x, sigma2, c2), 1)
+
+
+def smf(x, a, b):
+    middle = (a + b) / 2
+    pieces = [0 * x, 2 * ((x - a) / (b - a)) ** 2, 1 - 2 * ((x - b) / (b - a)) ** 2]
+    return np.select([x <= a, x <= middle, x <= b], pieces, 1.0)
+
+
+def zmf(x, a, b):
+    middle = (a + b) / 2
+    pieces = [0 * x + 1, 1 - 2 * ((x - a) / (b - a)) ** 2, 2 * ((x - b) / (b - a)) ** 2]
+    return np.select([x <= a, x <= middle, x <= b], pieces, 0.0)
+
+
+def pimf(x, a, b, c, d):
+    return smf(x, a, b) * zmf(x, c, d)
+
+
+def sigmf(x, a, c):
+    return 1 / (1 + np.exp(-a * (x - c)))
+
+
+def dsigmf(x, a1, c1, a2, c2):
+    return np.abs(sigmf(x, a1, c1) - sigmf(x, a2, c2))
+
+
+def psigmf(x, a1, c1, a2, c2):
+    return sigmf(x, a1, c1) * sigmf(x, a2, c2)
+
+
+BY_DEFINITION = {
+    f.__name__: f
+    for f in (gaussmf, gbellmf, trimf, trapmf, gauss2mf, smf, zmf, pimf, dsigmf, psigmf)
+}
+
+
+def mu(name, parameters):
+    """The family's textbook membership at X of a function in a file."""
+    family, theta = theta_of(name, parameters, LOW, HIGH)
+    return family.value(X[None], theta[:, None])[0]
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+def test_what_is_written_is_the_family(family, rng):
+    for _ in range(20):
+        theta = rng.normal(scale=0.7, size=(len(family.parameters), 1))
+        name, parameters = function_of(family, family.natural(theta)[:, 0])
+        expected = BY_DEFINITION[name](X, *parameters)
+        assert_allclose(family.value(X[None], theta)[0], expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+def test_what_is_written_is_read(family, rng):
+    for _ in range(20):
+        theta = rng.normal(scale=0.7, size=len(family.parameters))
+        written = function_of(family, family.natural(theta[:, None])[:, 0])
+        read, theta_read = theta_of(*written, LOW, HIGH)
+        assert read is family
+        assert_allclose(theta_read, theta, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("gaussmf", [-1.5, 0.3]),  # a deviation counts by its size
+        ("gbellmf", [-2.0, 1.5, 1.0]),
+        ("gauss2mf", [-1.0, -0.5, 0.7, 0.5]),
+        ("gauss2mf", [1.0, 0.5, 0.7, 0.5]),  # no plateau
+        ("trapmf", [-1.0, 0.5, 0.5, 2.0]),  # no plateau
+        ("pimf", [-1.0, 0.5, 0.5, 2.0]),
+        ("dsigmf", [-3.0, 1.0, -3.0, -1.0]),  # both sigmoids fall
+        ("psigmf", [-3.0, 1.0, 2.0, -1.0]),  # the fall first
+    ],
+)
+def test_other_ways_to_write_a_function_are_read(name, parameters):
+    assert_allclose(mu(name, parameters), BY_DEFINITION[name](X, *parameters), atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "like"),
+    [
+        ("trimf", [-4.0, -4.0, 1.0], lambda x: np.maximum((1 - x) / 5, 0)),
+        ("trimf", [-1.0, 4.0, 4.0], lambda x: np.maximum((x + 1) / 5, 0)),
+        ("trapmf", [-9.0, -9.0, 0.0, 2.0], lambda x: np.clip((2 - x) / 2, 0, 1)),
+        ("pimf", [0.0, 2.0, 5.0, 5.0], lambda x: smf(x, 0, 2)),
+    ],
+)
+def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
+    name, parameters, like
+):
+    assert_allclose(mu(name, parameters), like(X), atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "message"),
+    [
+        ("sigmf", [1.0, 2.0], "'sigmf' is not supported; gaussmf, gbellmf"),
+        ("gaussmf", [1.0], "gaussmf takes 2 parameters, found 1"),
+        ("gaussmf", [0.0, 1.0], "width 0, which must be between 1e-50 and 1e"),
+        ("gbellmf", [1.0, 0.0, 0.0], "b must be positive"),
+        ("gbellmf", [1.0, -2.0, 0.0], "b must be positive"),
+        ("trimf", [0.0, -1.0, 1.0], "ascending order"),
+        ("trimf", [0.0, 0.0, 1.0], r"vertical flank within its input's Range \[-4 4\]"),
+        ("trimf", [-1.0, 0.0, 0.0], "vertical flank"),
+        ("trimf", [-4.0, -4.0, -4.0], "vertical flank"),
+        ("trapmf", [0.0, 2.0, 1.0, 3.0], "ascending order"),
+        ("pimf", [0.0, 0.0, 1.0, 2.0], "vertical flank"),
+        ("gauss2mf", [1.0, 1.0, 1.0, -1.0], "does not reach 1"),
+        ("gauss2mf", [1.0, 1.0, 0.0, 2.0], "right 0"),
+        ("smf", [1.0, 1.0], "ascending order"),
+        ("zmf", [2.0, 1.0], "ascending order"),
+        ("dsigmf", [1.0, 0.0, 2.0, 1.0], "must be the same and not zero"),
+        ("dsigmf", [0.0, 0.0, 0.0, 1.0], "must be the same and not zero"),
+        ("dsigmf", [1.0, 1.0, 1.0, 0.0], "rises at 1, not before it falls at 0"),
+        ("psigmf", [1.0, 0.0, 2.0, 1.0], "one must be positive and one negative"),
+        ("psigmf", [1.0, 1.0, -1.0, 1.0], "rises at 1, not before it falls at 1"),
+        ("psigmf", [1e-300, 0.0, -1.0, 1.0], "must be between"),
+    ],
+)
+def test_refuses(name, parameters, message):
+    with pytest.raises(ValueError, match=message):
+        theta_of(name, parameters, LOW, HIGH)
+
+
+def test_refuses_to_write_a_function_that_the_format_has_not():
+    class Own(MEMBERSHIPS["gaussian"]):
+        name = "own"
+
+    with pytest.raises(ValueError, match="'own' has no function in the"):
+        function_of(Own, [0.0, 1.0])

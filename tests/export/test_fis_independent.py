@@ -1,0 +1,178 @@
+"""Programs that are not ours read our .fis files and compute what the model predicts.
+
+fuzzylite is Debian's libfuzzylite; where it is not installed, its package is downloaded by apt-get
+and unpacked, for which nobody needs to be root. Octave is used where it is there.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_jang_sinc
+from skanfis.export import read_fis, write_fis
+from skanfis.membership import MEMBERSHIPS
+
+from .rule_bases import MODELS, rows_of
+
+N_ROWS = 1000
+# In full scale. Where terms end at a foot, ours have a floor of 1e-10 there; others agree to
+# rounding errors, which in a constant about zero are those of 1e6 times the slope in time.
+TOLERANCE = dict.fromkeys(MEMBERSHIPS, 1e-10) | dict.fromkeys(
+    ("triangular", "trapezoidal", "pi_shaped", "s_shaped", "z_shaped"), 1e-6
+)
+
+# fuzzylite counts strengths below 1e-6 as zero, unless told otherwise; its command line can not be.
+FUZZYLITE = """
+import ctypes, sys
+library = ctypes.CDLL(sys.argv[1])
+ctypes.c_double.in_dll(library, "_ZN2fl9fuzzylite8_machepsE").value = 0.0
+words = [word.encode() for word in sys.argv[1:]]
+sys.exit(library._ZN2fl7Console4mainEiPPKc(len(words), (ctypes.c_char_p * len(words))(*words)))
+"""
+OCTAVE = """
+pkg load fuzzy-logic-toolkit
+dlmwrite("out.txt", evalfis(dlmread("in.txt"), readfis("model.fis")), "precision", "%.17g");
+"""
+
+
+@pytest.fixture(scope="session")
+def fuzzylite(tmp_path_factory):
+    """A function that runs fuzzylite's command line with these words."""
+    library = _installed() or _downloaded(tmp_path_factory.mktemp("fuzzylite"))
+
+    def run(*words):
+        command = [sys.executable, "-c", FUZZYLITE, library, *words, "-decimals", "17"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    return run
+
+
+def by_fuzzylite(fuzzylite, path, rows):
+    """Outputs (n_rows, n_outputs) of a .fis file."""
+    given, found = path.with_suffix(".in"), path.with_suffix(".out")
+    np.savetxt(given, rows, fmt="%.17g")
+    files = ["-i", path, "-if", "fis", "-d", given, "-o", found, "-of", "fld"]
+    fuzzylite(*files, "-dheader", "false", "-dinputs", "false")
+    return np.loadtxt(found, ndmin=2).reshape(len(rows), -1)
+
+
+def _installed():
+    return next(Path("/usr/lib").glob("*/libfuzzylite.so.6*"), None)
+
+
+def _downloaded(folder):
+    for package in ("libfuzzylite6.0", "libfuzzylite6.0t64"):
+        if _run(["apt-get", "download", package], folder):
+            _run(["dpkg-deb", "-x", *folder.glob("*.deb"), folder], folder)
+    library = next(folder.glob("usr/lib/*/libfuzzylite.so.6*"), None)
+    if library is None:
+        pytest.skip(
+            "NO INDEPENDENT READER HAS CHECKED THE .fis FILES: libfuzzylite is not installed and "
+            "could not be downloaded. On Debian or Ubuntu: apt-get install fuzzylite."
+        )
+    return library
+
+
+def _run(command, folder):
+    if shutil.which(command[0]) is None:
+        return False
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, timeout=60, check=False)
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+@pytest.fixture(scope="session")
+def octave():
+    """A function of a .fis file and rows: outputs by Octave, (n_rows, n_outputs)."""
+    program = shutil.which("octave-cli")
+    if program is None or not _run([program, "--eval", "pkg load fuzzy-logic-toolkit"], "/"):
+        pytest.skip(
+            "Octave has not checked the .fis files: it or its fuzzy toolkit is not installed. On "
+            "Debian or Ubuntu: apt-get install octave octave-fuzzy-logic-toolkit."
+        )
+
+    def evaluate(path, rows):
+        folder = path.parent
+        shutil.copy(path, folder / "model.fis")
+        np.savetxt(folder / "in.txt", rows, fmt="%.17g")
+        # Octave draws nothing here; some builds complain where they cannot.
+        environment = {**os.environ, "DISPLAY": ""}
+        subprocess.run(
+            [program, "--quiet", "--eval", OCTAVE], cwd=folder, env=environment, check=False
+        )
+        return np.loadtxt(folder / "out.txt", delimiter=",", ndmin=2).reshape(len(rows), -1)
+
+    return evaluate
+
+
+def difference(outputs, model, rows):
+    """Largest difference from the model in full scales of each output (1 of a constant one)."""
+    expected = model.predict(rows)
+    full_scale = np.ptp(expected, axis=0)
+    full_scale[full_scale == 0.0] = 1.0
+    return (np.abs(outputs - expected).max(axis=0) / full_scale).max()
+
+
+def trained(mf):
+    """A model of Jang's sinc, off centre, and rows within its box."""
+    X, y = make_jang_sinc()
+    model = ANFISRegressor(n_mfs=3, mf=mf, max_iter=20, tol=0.0).fit(X + 3.0, y).model_
+    rows = np.random.default_rng(0).uniform(model.minimum, model.maximum, (N_ROWS, 2))
+    return model, rows
+
+
+pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+
+
+@pytest.mark.parametrize("mf", MEMBERSHIPS)
+def test_fuzzylite_agrees_on_every_family(mf, fuzzylite, tmp_path):
+    model, rows = trained(mf)
+    write_fis(model, tmp_path / "model.fis")
+    outputs = by_fuzzylite(fuzzylite, tmp_path / "model.fis", rows)
+    assert difference(outputs, model, rows) < TOLERANCE[mf]
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_fuzzylite_agrees_on_every_rule_base(kind, fuzzylite, tmp_path):
+    model = MODELS[kind]
+    rows = rows_of(model, 1.0, N_ROWS)
+    write_fis(model, tmp_path / "model.fis")
+    outputs = by_fuzzylite(fuzzylite, tmp_path / "model.fis", rows)
+    assert difference(outputs, model, rows) < 1e-10
+
+
+def test_we_read_what_fuzzylite_writes(fuzzylite, tmp_path):
+    model = MODELS["rule table, order 1, 2 outputs"]
+    rows = rows_of(model, 1.0)
+    write_fis(model, tmp_path / "ours.fis")
+    files = ["-i", tmp_path / "ours.fis", "-o", tmp_path / "theirs.fis"]
+    fuzzylite(*files, "-if", "fis", "-of", "fis")
+    read = read_fis(tmp_path / "theirs.fis")
+    assert_allclose(read.predict(rows), model.predict(rows), rtol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mf", ["gaussian", "trapezoidal", "sigmoid_product"])
+def test_octave_agrees(mf, octave, tmp_path):
+    model, rows = trained(mf)
+    write_fis(model, tmp_path / "trained.fis")
+    assert difference(octave(tmp_path / "trained.fis", rows), model, rows) < TOLERANCE[mf]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [name for name in MODELS if name.startswith("scattered,")])
+def test_octave_agrees_on_scattered_rules(kind, octave, tmp_path):
+    model = MODELS[kind]
+    rows = rows_of(model, 1.0, N_ROWS)
+    write_fis(model, tmp_path / "trained.fis")
+    assert difference(octave(tmp_path / "trained.fis", rows), model, rows) < 1e-10

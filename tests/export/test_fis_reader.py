@@ -1,0 +1,391 @@
+"""Reading .fis files: what they mean, and what is refused, with the line."""
+
+import time
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
+from skanfis.export import read_fis, write_fis
+from skanfis.export.fis.reader import parse_fis
+
+from .fis_files import BY_HAND, with_line
+from .mutations import mutated, seeds
+
+SERIES = [("[Input", "]"), ("key", "=1"), ("", " 1, 1 (1) : 1")]
+GAUSS = "MF{0}='t{0}':'gaussmf',[1 {0}]"
+
+
+def system(n_terms, rules, n_outputs=1):
+    """A file with Gaussian terms at 1, 2, ... on every input and the rule's number as output."""
+    n_inputs, n_rules = len(n_terms), len(rules)
+    lines = BY_HAND.splitlines()[1:13]
+    lines[4:7] = [f"NumInputs={n_inputs}", f"NumOutputs={n_outputs}", f"NumRules={n_rules}"]
+    for j, n in enumerate(n_terms):
+        lines += [f"[Input{j + 1}]", f"Name='x{j}'", "Range=[0 4]", f"NumMFs={n}"]
+        lines += [GAUSS.format(k + 1) for k in range(n)]
+    for k in range(n_outputs):
+        lines += [f"[Output{k + 1}]", f"Name='y{k}'", "Range=[0 9]", f"NumMFs={n_rules}"]
+        lines += [f"MF{r + 1}='r':'constant',[{r + 1}]" for r in range(n_rules)]
+    lines += ["[Rules]"]
+    for r, rule in enumerate(rules):
+        lines.append(f"{' '.join(map(str, rule))}, {' '.join([str(r + 1)] * n_outputs)} (1) : 1")
+    return "\n".join(lines)
+
+
+def average(strengths, values):
+    return np.dot(strengths, values) / np.sum(strengths)
+
+
+def test_means_what_was_written_by_hand():
+    model = parse_fis(BY_HAND)
+    rows = np.array([[2.0, 0.5], [9.0, -0.25], [12.0, 0.0]])
+    for (x, z), (u, v) in zip(rows, model.predict(rows), strict=True):
+        x = min(x, 10.0)
+        low, high = max(1 - x / 8, 0), np.exp(-((x - 10) ** 2) / 12.5)
+        zero = 1 / (1 + abs(z / 0.5) ** 4)
+        strengths = [low * zero, zero, high]
+        sloped = x - 2 * z + 0.5
+        # The triangle has a floor of 1e-10 beyond its foot.
+        assert_allclose(u, average(strengths, [sloped, 3, sloped]), rtol=1e-8)
+        assert_allclose(v, average(strengths, [1, 2, 4]), rtol=1e-8)
+    assert model.input_names == ("x y", "z")
+    assert model.output_names == ("u", "v")
+    assert model.term_names == ("low", "high", "about zero")
+    assert_array_equal(model.minimum, [0, -1])
+    assert_array_equal(model.maximum, [10, 1])
+    assert model.out_of_bounds == "clip"
+
+
+def test_knows_nothing_of_data():
+    model = parse_fis(BY_HAND)
+    assert_array_equal(model.coverage(np.array([[1.0, 0.0]])), 0.0)
+    assert_allclose(model.rule_weights, 1 / 3)
+    assert_allclose(model.spread, [10 / np.sqrt(12), 2 / np.sqrt(12)])
+
+
+@pytest.mark.parametrize(
+    ("n_terms", "rules", "kind"),
+    [
+        ([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)], GridAntecedent),
+        ([2, 2], [(2, 1), (1, 1), (1, 2), (2, 2)], GridAntecedent),  # in another order
+        ([2, 0, 2], [(1, 0, 1), (1, 0, 2), (2, 0, 1), (2, 0, 2)], GridAntecedent),
+        ([3], [(1,), (3,)], GridAntecedent),  # one term unused
+        ([2, 2], [(1, 1), (2, 2)], ScatteredAntecedent),
+        ([3, 3], [(3, 1), (1, 2), (2, 3)], ScatteredAntecedent),
+        ([2, 1, 2], [(1, 0, 2), (2, 0, 1)], ScatteredAntecedent),
+        ([1, 1], [(1, 1)], ScatteredAntecedent),
+        ([1, 1], [(0, 0)], GridAntecedent),  # one rule without conditions
+        ([2, 2], [(1, 1), (1, 2), (2, 1)], RuleTableAntecedent),
+        ([2, 2], [(1, 0), (0, 2)], RuleTableAntecedent),
+        ([2, 2], [(1, 1), (1, 1), (2, 1), (2, 2)], RuleTableAntecedent),  # one twice
+        ([1, 2], [(1, 1), (1, 2)], RuleTableAntecedent),
+        ([1], [(0,), (0,)], RuleTableAntecedent),
+    ],
+)
+def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, kind, rng):
+    model = parse_fis(system(n_terms, rules, n_outputs=2))
+    assert type(model.antecedent) is kind
+    rows = rng.uniform(0.0, 4.0, (20, len(n_terms)))
+    for row, outputs in zip(rows, model.predict(rows), strict=True):
+        # Term k stands at k and has deviation 1.
+        log_mu = [
+            sum(-((x - k) ** 2) / 2 for x, k in zip(row, rule, strict=True) if k) for rule in rules
+        ]
+        assert_allclose(outputs, average(np.exp(log_mu), np.arange(len(rules)) + 1.0))
+
+
+def test_terms_of_a_grid_stay_in_order_else_rules_are_listed():
+    text = system([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)])
+    # Training moves terms of a grid by their distances, which must be positive.
+    swapped = text.replace("[1 2]", "[1 0.5]", 1)
+    assert type(parse_fis(swapped).antecedent) is RuleTableAntecedent
+    mixed = text.replace("'gaussmf',[1 2]", "'zmf',[1 2]", 1)
+    assert type(parse_fis(mixed).antecedent) is RuleTableAntecedent
+
+
+def test_names_that_stand_twice_are_numbered():
+    text = system([2, 2], [(1, 1), (2, 2)]).replace("'t2'", "'t1'").replace("'x1'", "'x0'")
+    model = parse_fis(text)
+    assert model.input_names == ("x0", "x0 (2)")
+    assert model.term_names == ("t1", "t1", "t1 (2)", "t1 (2)")
+
+
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_line_ends_of_other_systems(end):
+    rows = np.array([[2.0, 0.5]])
+    expected = parse_fis(BY_HAND).predict(rows)
+    assert_array_equal(parse_fis(BY_HAND.replace("\n", end)).predict(rows), expected)
+
+
+def test_sections_and_keys_may_stand_in_any_order():
+    blocks = BY_HAND.split("\n\n")
+    blocks[1] = "\n".join([blocks[1].split("\n")[0], *blocks[1].split("\n")[:0:-1]])
+    rows = np.array([[2.0, 0.5]])
+    expected = parse_fis(BY_HAND).predict(rows)
+    assert_array_equal(parse_fis("\n\n".join(blocks[::-1])).predict(rows), expected)
+
+
+REFUSED = [
+    # the system
+    ("Type=", "Type='mamdani'", "'mamdani': only Sugeno systems are supported"),
+    ("Type=", "Type=sugeno", "a name in single quotes"),
+    ("DefuzzMethod=", "DefuzzMethod='wtsum'", "only the weighted average"),
+    ("AndMethod=", "AndMethod='min'", "only the product"),
+    ("NumInputs=", "NumInputs=two", "a whole number, found 'two'"),
+    ("NumInputs=", "NumInputs=-1", "a whole number"),
+    ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
+    ("NumInputs=", "NumInputs=0", "0 is not between 1 and 1000"),
+    ("NumRules=", "NumRules=999999999", "is not between 1 and 100000"),
+    ("NumRules=", f"NumRules={'9' * 5000}", "a whole number"),
+    ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
+    ("Version=", "Type='sugeno'", "'Type' for the second time"),
+    ("Version=", "Version 2.0", "key=value"),
+    # names
+    ("Name='by hand'", "Name='by 'hand'", "single quotes"),
+    ("Name='by hand'", "Name='by \N{BELL}\x07'", "cannot be printed"),
+    ("Name='by hand'", "Name=__import__('os').abort()", "a name in single quotes"),
+    # sections
+    ("[Input1]", "[Input01]", "is no section"),
+    ("[Input2]", "[Input1]", r"\[Input1\] stands here for the second time"),
+    ("[Output2]", "[Output2", "is no section"),
+    ("% A comment", "stray", r"expected \[System\]"),
+    # variables
+    ("Range=[0 10]", "Range=[10 0]", "low < high"),
+    ("Range=[0 10]", "Range=[0 0]", "low < high"),
+    ("Range=[0 10]", "Range=[0 10 20]", "low < high"),
+    ("Range=[0 10]", "Range=[0 inf]", "a finite number, found 'inf'"),
+    ("Range=[0 10]", "Range=[0 nan]", "a finite number, found 'nan'"),
+    ("Range=[0 10]", "Range=[0 1e999]", "beyond 1e"),
+    ("Range=[0 10]", "Range=[0 1_0]", "a finite number"),
+    ("Range=[0 10]", "Range=[0 0x10]", "a finite number"),
+    ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a finite number"),
+    ("Range=[0 10]", "Range=0 10", r"expected \[low high\]"),
+    ("Range=[-1, +1.0]", "Range=[-1,, 1]", "a finite number, found ''"),
+    # membership functions
+    ("MF1='low'", "MF1='low':'trimf',[2 2 8]", r"vertical flank within its input's Range \[0 10\]"),
+    ("MF1='low'", "MF1='low':'sigmf',[1 2]", "'sigmf' is not supported"),
+    ("MF1='low'", "MF1='low':'os.system',[1 2]", "'os.system' is not supported"),
+    ("MF1='low'", "MF1='low':'gaussmf',[1 2", "'name':'function'"),
+    ("MF1='low'", "MF1='low':'gaussmf',[1 exp(2)]", "a finite number"),
+    ("MF1='low'", "MF1='low':'gaussmf',[1e-60 2]", "must be between"),
+    ("MF1='low'", "MF3='low':'gaussmf',[1 2]", None),
+    ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' is not supported; constant"),
+    ("MF1='flat'", "MF1='flat':'constant',[3 4]", "constant takes 1 parameters, found 2"),
+    ("MF2='sloped'", "MF2='sloped':'linear',[1 2]", "linear takes 3 parameters, found 2"),
+    # rules
+    ("1 1, 2 1", "1 1 1, 2 1 (1) : 1", "3 numbers for 2 inputs"),
+    ("1 1, 2 1", "1 1, 2 (1) : 1", "1 numbers for 2 outputs"),
+    ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight 0.5; only weight 1"),
+    ("1 1, 2 1", "1 1, 2 1 (1) : 2", r"by OR \(2\)"),
+    ("1 1, 2 1", "1 1, 2 1 (1) : 3", "the connection is 1 or 2"),
+    ("1 1, 2 1", "1 1, 2 1 () : 1", "the connection is 1 or 2"),
+    ("1 1, 2 1", "1 1, 2 1", "expected a rule"),
+    ("1 1, 2 1", "-1 1, 2 1 (1) : 1", "NOT, a negative number"),
+    ("1 1, 2 1", "1.2 1, 2 1 (1) : 1", "hedges"),
+    ("1 1, 2 1", "3 1, 2 1 (1) : 1", "3 for input 'x y', which has 2"),
+    ("1 1, 2 1", "1 1, 0 1 (1) : 1", "0 for output 'u'"),
+    ("1 1, 2 1", "1 1, 2 9 (1) : 1", "9 for output 'v', which has 3"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), REFUSED)
+def test_refuses_with_the_line(old, new, message):
+    text, line = with_line(old, new)
+    place = "line" if message is None else f"line {line}: .*{message}"
+    with pytest.raises(ValueError, match=place):
+        parse_fis(text)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[System]", "[Rules]", "has no Type|second time|no .System"),
+        ("Type=", "", r"line 2: \[System\] has no Type"),
+        ("NumInputs=", "NumInputs=3", r"line 2: \[System\] counts \[Input3\]"),
+        ("NumInputs=", "NumInputs=1", r"line \d+: "),
+        ("NumOutputs=", "NumOutputs=1", r"line \d+: "),
+        ("NumRules=", "NumRules=4", r"counts 4 rules, \[Rules\] has 3"),
+        ("2 0, 2 3", "", r"counts 3 rules, \[Rules\] has 2"),
+        ("NumMFs=1", "NumMFs=2", r"\[Input2\] has no MF2"),
+        ("NumMFs=1", "NumMFs=0", r"\[Input2\] has the unknown key 'MF1'"),
+    ],
+)
+def test_refuses_counts_that_do_not_agree(old, new, message):
+    with pytest.raises(ValueError, match=message):
+        parse_fis(with_line(old, new)[0])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "\n\n", "% only a comment", "[System]", "[Rules]\n1, 1 (1) : 1"]
+)
+def test_refuses_next_to_nothing(text):
+    with pytest.raises(ValueError, match=r"line \d"):
+        parse_fis(text)
+
+
+def test_one_condition_needs_no_and(rng):
+    rules = [(1, 0), (0, 2)]
+    text = system([2, 2], rules).replace("'prod'", "'min'").replace(": 1", ": 2")
+    rows = rng.uniform(0.0, 4.0, (5, 2))
+    assert_array_equal(
+        parse_fis(text).predict(rows), parse_fis(system([2, 2], rules)).predict(rows)
+    )
+
+
+def test_says_which_file(tmp_path):
+    path = tmp_path / "spoilt.fis"
+    path.write_text(BY_HAND.replace("'sugeno'", "'mamdani'"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"spoilt\.fis: line 4: Type='mamdani'"):
+        read_fis(path)
+
+
+def test_reads_utf_8_with_and_without_mark(tmp_path):
+    path = tmp_path / "named.fis"
+    for encoding in ("utf-8", "utf-8-sig"):
+        path.write_text(BY_HAND.replace("'z'", "'température'"), encoding=encoding)
+        assert read_fis(str(path)).input_names == ("x y", "température")
+
+
+def test_refuses_other_encodings_with_the_line(tmp_path):
+    path = tmp_path / "latin.fis"
+    path.write_text(BY_HAND.replace("'z'", "'température'"), encoding="latin-1")
+    with pytest.raises(ValueError, match="line 23: byte 0xe9 is not UTF-8"):
+        read_fis(path)
+    path.write_text(BY_HAND, encoding="utf-16")
+    with pytest.raises(ValueError, match="line 1: byte 0xff is not UTF-8"):
+        read_fis(path)
+
+
+def test_takes_names_of_columns(tmp_path):
+    path = tmp_path / "by_hand.fis"
+    path.write_text(BY_HAND, encoding="utf-8")
+    assert read_fis(path, input_names=["time", "rate"]).input_names == ("time", "rate")
+    for names in (["time"], ["time", "time"], ["a", "b", "c"]):
+        with pytest.raises(ValueError, match="must be 2 different names"):
+            read_fis(path, input_names=names)
+
+
+def test_missing_file_is_the_systems_error(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        read_fis(tmp_path / "none.fis")
+
+
+def test_refuses_a_large_file_without_reading_it(tmp_path):
+    path = tmp_path / "large.fis"
+    with open(path, "wb") as file:
+        file.truncate(2**40)
+    start = time.process_time()
+    with pytest.raises(ValueError, match="larger than 4,194,304 bytes"):
+        read_fis(path)
+    assert time.process_time() - start < 1.0
+
+
+def test_refuses_many_rules_over_wide_consequents_before_memory_is_asked_for():
+    # A short file: 20,000 rules share one linear consequent of 1,000 inputs.
+    n_inputs, n_rules = 1000, 20_000
+    head = system([0] * n_inputs, [(0,) * n_inputs])
+    text = head.replace("NumRules=1\n", f"NumRules={n_rules}\n") + f"\n{'0 , 1 (1) : 1'}" * (
+        n_rules - 1
+    )
+    with pytest.raises(ValueError, match="are 20,020,000 numbers; at most 20,000,000 are read"):
+        parse_fis(text)
+
+
+@pytest.mark.parametrize(
+    "part",
+    ["".join(f"{before}{k}{after}\n" for k in range(1, 120_000)) for before, after in SERIES],
+    ids=["sections", "keys", "rules"],
+)
+def test_long_series_end_early(part):
+    with pytest.raises(ValueError, match=r"line 1000\d\d: 100,000 like this are the most"):
+        parse_fis(f"[System]\n[Rules]\n{part}" if part[0] == "1" else f"[System]\n{part}")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "MF1='" + "a" * 1_000_000,
+        "MF1=" + "'a':" * 250_000,
+        "MF1='a':'gaussmf',[" + "1 " * 500_000,
+        "MF1='a':'gaussmf',[" + "1, " * 300_000 + "]",
+        "MF1='a':'gaussmf',[" + " " * 1_000_000 + "]",
+        "MF1='a'" + " " * 1_000_000 + ":",
+        "Range=[" + "1" * 1_000_000 + " 2]",
+        "=" * 1_000_000,
+        "[" * 1_000_000,
+        "\t" * 1_000_000 + "x",
+    ],
+    ids=lambda line: line[:20],
+)
+def test_long_lines_take_no_long_time(line):
+    start = time.process_time()
+    with pytest.raises(ValueError, match=r"line \d+: "):
+        parse_fis(with_line("MF1='low'", line)[0])
+    assert time.process_time() - start < 1.0
+
+
+@pytest.mark.parametrize(
+    "rule",
+    ["1 1" + " " * 10**6 + "1 1", "1 " * 5 * 10**5, "1 1, 2 1 (" + "(" * 10**6, ":" * 10**6],
+    ids=lambda rule: rule[:20],
+)
+def test_long_rules_take_no_long_time(rule):
+    start = time.process_time()
+    with pytest.raises(ValueError, match=r"line \d+: "):
+        parse_fis(with_line("1 1, 2 1", rule)[0])
+    assert time.process_time() - start < 1.0
+
+
+def test_what_an_error_shows_of_the_file_is_short_and_ascii():
+    text, _ = with_line("Type=", "Type='\N{RIGHT-TO-LEFT OVERRIDE}" + "x" * 10_000 + "'")
+    with pytest.raises(ValueError, match="cannot be printed") as caught:
+        parse_fis(text)
+    assert str(caught.value).isascii()
+    for old, new in [
+        ("Type=", "Type='{}'"),
+        ("Name='x y'", "Name='{}'"),
+        ("AndMethod=", "AndMethod='{}'"),
+        ("MF1='low'", "MF1='low':'{}',[1 2]"),
+        ("MF1='flat'", "MF1='flat':'{}',[1 2]"),
+        ("MF1='low'", "{}=1"),
+        ("1 1, 2 1", "{} 1, 2 1 (1) : 1"),
+        ("1 1, 2 1", "{}"),
+    ]:
+        text, _ = with_line(old, new.format("é" * 10_000))
+        with pytest.raises(ValueError, match="line") as caught:
+            parse_fis(text.replace("2 0, 2 3", "9 9, 2 3"))
+        assert str(caught.value).isascii()
+        assert len(str(caught.value)) < 400
+
+
+def test_training_goes_on_from_a_file_and_back(tmp_path, rng):
+    path = tmp_path / "prior.fis"
+    path.write_text(system([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)]), encoding="utf-8")
+    X = rng.uniform(0.0, 4.0, (200, 2))
+    y = np.sin(X[:, 0]) * X[:, 1]
+    estimator = ANFISRegressor(partition=read_fis(path)).fit(X, y)
+    write_fis(estimator, tmp_path / "trained.fis")
+    trained = read_fis(tmp_path / "trained.fis")
+    assert_allclose(trained.predict(X)[:, 0], estimator.predict(X), atol=1e-10 * np.ptp(y))
+    again = ANFISRegressor(partition=trained, solver="lse").fit(X, y)
+    assert again.n_rules_ == 4
+
+
+def test_spoilt_files_are_read_or_refused_with_the_line(tmp_path):
+    # benchmarks/fuzz_fis.py does this 100,000 times.
+    rng, sound, path = np.random.default_rng(1), seeds(), tmp_path / "spoilt.fis"
+    n_read, refusals = 0, []
+    for _ in range(1000):
+        path.write_bytes(mutated(rng, sound))
+        try:
+            model = read_fis(path)
+        except ValueError as error:
+            refusals.append(str(error))
+        else:
+            assert np.isfinite(model.predict(np.stack([model.minimum, model.maximum]))).all()
+            n_read += 1
+    assert 100 < n_read < 900
+    assert all("line " in refusal for refusal in refusals)

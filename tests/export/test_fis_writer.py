@@ -1,0 +1,229 @@
+"""Writing .fis files: what is in them, and that they come back."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MinMaxScaler, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning
+from skanfis.export import export_fis, read_fis, write_fis
+from skanfis.export.fis.reader import parse_fis
+from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.model import OUT_OF_BOUNDS
+
+from .. import oracles
+from .rule_bases import MODELS, build, rows_of
+
+ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+A_GRID = MODELS["grid, order 1, 1 outputs"]
+
+
+def of_family(family, rng):
+    """A grid whose terms of this family leave no gap."""
+    return build(oracles.random_grid(rng, [family] * 2, (3, 2), (0, 2)))
+
+
+def full_scale(model):
+    return np.ptp(model.predict(rows_of(model, 1.0, 200)), axis=0).max()
+
+
+@ALL
+def test_comes_back_as_it_was(model):
+    read = parse_fis(export_fis(model))
+    rows = rows_of(model, 1.3, 200)
+    # Time lies at 1e6 with a range of 2,000: this many digits a constant about zero loses.
+    assert_allclose(read.predict(rows), model.predict(rows), atol=1e-11 * full_scale(model))
+    assert_array_equal(read.minimum, model.minimum)
+    assert_array_equal(read.maximum, model.maximum)
+    assert read.antecedent.n_rules == model.n_rules
+    assert read.order == model.order
+
+
+@pytest.mark.filterwarnings("ignore:At .* no rule of the .fis file fires")
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+def test_every_family_comes_back(family, rng):
+    model = of_family(family, rng)
+    read = parse_fis(export_fis(model))
+    assert {group.family for group in read.antecedent.groups} == {family}
+    rows = rows_of(model, 1.3, 200)
+    assert_allclose(read.predict(rows), model.predict(rows), atol=1e-9 * full_scale(model))
+
+
+@ALL
+def test_file_of_a_file_is_the_same(model):
+    # Of a file that was read: terms that no rule uses are gone.
+    first = export_fis(parse_fis(export_fis(model)))
+    second = export_fis(parse_fis(first))
+    comments = re.compile(r"^%.*\n", re.MULTILINE)
+    numbers = re.compile(r"-?\d+\.?\d*(?:e[-+]\d+)?")
+    assert numbers.sub("#", comments.sub("", second)) == numbers.sub("#", comments.sub("", first))
+
+
+def test_looks_as_matlab_writes_it():
+    model = build(oracles.random_grid(np.random.default_rng(0), [Gaussian], [2], [1]), order=0)
+    text = export_fis(model)
+    assert text.isascii()
+    assert re.fullmatch(
+        r"""% Sugeno system of 2 rules, written by skanfis\.
+% It holds within the Range of its inputs: clamp them to it\.
+% Input2 is 'chip temperature'\.
+\[System\]
+Name='skanfis'
+Type='sugeno'
+Version=2\.0
+NumInputs=3
+NumOutputs=1
+NumRules=2
+AndMethod='prod'
+OrMethod='probor'
+ImpMethod='prod'
+AggMethod='sum'
+DefuzzMethod='wtaver'
+
+\[Input1\]
+Name='time'
+Range=\[998800\.0 1000900\.0\]
+NumMFs=0
+
+\[Input2\]
+Name='chip_temperature'
+Range=\[-10\.0 42\.5\]
+NumMFs=2
+MF1='low':'gaussmf',\[\S+ \S+\]
+MF2='high':'gaussmf',\[\S+ \S+\]
+
+\[Input3\]
+Name='rate'
+Range=\[-0\.02 0\.015\]
+NumMFs=0
+
+\[Output1\]
+Name='y'
+Range=\[\S+ \S+\]
+NumMFs=2
+MF1='rule1':'constant',\[\S+\]
+MF2='rule2':'constant',\[\S+\]
+
+\[Rules\]
+0 1 0, 1 \(1\) : 1
+0 2 0, 2 \(1\) : 1
+""",
+        text,
+    )
+
+
+@ALL
+def test_range_of_the_output_holds_it(model):
+    read = export_fis(model)
+    outputs = model.predict(rows_of(model, 3.0, 500))
+    for k in range(model.n_outputs):
+        found = re.search(rf"\[Output{k + 1}\]\nName='\w+'\nRange=\[(\S+) (\S+)\]", read)
+        low, high = map(float, found.groups())
+        assert low < high
+        assert low - 1e-9 <= outputs[:, k].min()
+        assert outputs[:, k].max() <= high + 1e-9
+
+
+@pytest.mark.parametrize("policy", OUT_OF_BOUNDS)
+def test_says_the_policy_that_the_format_cannot(policy):
+    text = export_fis(replace(A_GRID, out_of_bounds=policy))
+    assert (f"out_of_bounds={policy!r}" in text) is (policy != "clip")
+    assert parse_fis(text).out_of_bounds == "clip"
+
+
+def test_names_become_identifiers_that_stay_apart():
+    names = ("naïve (1)", "naïve [1]", "'; rm -rf /\n[Rules]")
+    model = replace(
+        A_GRID,
+        input_names=names,
+        term_names=("is", "is not", "-1.5", "1.5", "\N{SNOWMAN}", "a'b", "AND"),
+    )
+    text = export_fis(model)
+    read = parse_fis(text)
+    assert read.input_names == ("naive_1", "naive_1_2", "rm_rf_Rules")
+    assert read.term_names == ("term_is", "is_not", "minus_1_5", "term_1_5", "term3", "a_b", "AND")
+    # In a comment, where a line end would have begun a line of its own.
+    assert '% Input3 is "\'; rm -rf /\\n[Rules]".\n' in text
+    rows = rows_of(model, 1.0)
+    assert_allclose(read.predict(rows), model.predict(rows), atol=1e-11 * full_scale(model))
+
+
+def test_scalers_are_folded_in(rng):
+    X = pd.DataFrame(rng.normal(size=(200, 2)) * [100.0, 0.01] + [300.0, 0.0], columns=["a", "b"])
+    y = 1e4 + 50.0 * np.tanh(X["a"] / 100.0 - 3.0) * X["b"]
+    pipeline = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2))
+    estimator = TransformedTargetRegressor(pipeline, transformer=MinMaxScaler()).fit(X, y)
+    read = parse_fis(export_fis(estimator))
+    assert read.input_names == ("a", "b")
+    expected = estimator.predict(X)
+    assert_allclose(read.predict(X.to_numpy())[:, 0], expected, atol=1e-10 * np.ptp(expected))
+
+
+@pytest.mark.parametrize("kind", ["one rule, order 1, 1 outputs", "rule table, order 1, 1 outputs"])
+def test_every_rule_has_a_condition(kind):
+    # Without one, fuzzylite gives NaN. The term is 1 on the whole Range.
+    model = MODELS[kind]
+    if kind.startswith("rule table"):
+        table = model.antecedent.table.copy()
+        table[0] = -1
+        model = replace(model, antecedent=replace(model.antecedent, table=table))
+    text = export_fis(model)
+    rules = text[text.index("[Rules]") :].splitlines()[1:]
+    assert not any(rule.startswith("0 0 0,") for rule in rules)
+    rows = rows_of(model, 1.3)
+    assert_allclose(
+        parse_fis(text).predict(rows), model.predict(rows), atol=1e-11 * full_scale(model)
+    )
+
+
+def test_constant_input_has_a_range_that_is_not_empty(rng):
+    X = np.column_stack([rng.normal(size=50), np.full(50, 7.0)])
+    with pytest.warns(ConstantInputWarning):
+        estimator = ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2)
+    read = parse_fis(export_fis(estimator))
+    assert read.minimum[1] == 7.0 < read.maximum[1] < 7.0 + 1e-14
+    assert_allclose(read.predict(X)[:, 0], estimator.predict(X), atol=1e-12)
+
+
+def test_warns_where_no_rule_of_the_file_fires(rng):
+    family = MEMBERSHIPS["triangular"]
+    centers = np.array([-1.5, 1.5])
+    for spacing, gap in ((1.0, True), (6.0, False)):
+        theta = family.start(centers, np.full(2, spacing), 0.5)
+        antecedent = oracles.random_grid(rng, [family], [2], [0])
+        model = build(antecedent.with_parameters(theta.ravel()), order=0)
+        if gap:
+            with pytest.warns(UserWarning, match=r"At \d+\.\d% of 1000 points"):
+                export_fis(model)
+        else:
+            export_fis(model)
+
+
+def test_writes_the_text(tmp_path):
+    write_fis(A_GRID, tmp_path / "grid.fis")
+    assert (tmp_path / "grid.fis").read_bytes() == export_fis(A_GRID).encode("ascii")
+    rows = rows_of(A_GRID, 1.0)
+    assert_array_equal(
+        read_fis(tmp_path / "grid.fis").predict(rows), parse_fis(export_fis(A_GRID)).predict(rows)
+    )
+
+
+def test_refuses_what_is_no_model():
+    with pytest.raises(TypeError, match="estimator must be"):
+        export_fis("model")
+
+
+def test_refuses_a_membership_that_the_format_has_not(rng):
+    class Own(Gaussian):
+        name = "own"
+
+    model = build(oracles.random_grid(rng, [Own], [2], [0]))
+    with pytest.raises(ValueError, match="'own' has no function in the"):
+        export_fis(model)

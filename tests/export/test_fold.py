@@ -1,0 +1,341 @@
+"""A model with its scalers folded in predicts, on raw rows, what the pipeline predicts."""
+
+from itertools import product
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+from sklearn.decomposition import PCA
+from sklearn.exceptions import NotFittedError
+from sklearn.feature_selection import SelectKBest, VarianceThreshold, f_regression
+from sklearn.impute import SimpleImputer
+from sklearn.linear_model import LinearRegression
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import FeatureUnion, make_pipeline
+from sklearn.preprocessing import (
+    FunctionTransformer,
+    MaxAbsScaler,
+    MinMaxScaler,
+    Normalizer,
+    PolynomialFeatures,
+    PowerTransformer,
+    RobustScaler,
+    StandardScaler,
+)
+
+from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning
+from skanfis.export._fold import fold, fold_with_rows
+
+NAMES = ["hours", "kelvin", "rate"]
+POLICIES = ("clip", "linear", "nan")
+KINDS = {
+    "grid": {"n_mfs": [2, 3, 1]},
+    "bells": {"n_mfs": 2, "mf": "bell"},
+    "triangles": {"n_mfs": 2, "mf": "triangular"},
+    "order 0": {"n_mfs": [3, 1, 2], "order": 0},
+    "scattered": {"partition": KMeans(4, n_init=1, random_state=0)},
+}
+SCALERS = {
+    "standard": StandardScaler(),
+    "uncentred": StandardScaler(with_mean=False),
+    "unscaled": StandardScaler(with_std=False),
+    "min-max": MinMaxScaler((-3, 7)),
+    "max-abs": MaxAbsScaler(),
+    "robust": RobustScaler(),
+    "robust, centred only": RobustScaler(with_scaling=False),
+    "identity": FunctionTransformer(),
+    "passthrough": "passthrough",
+    "two": make_pipeline(RobustScaler(), "passthrough", MinMaxScaler()),
+    "columns": ColumnTransformer(
+        [("r", RobustScaler(), [2]), ("s", make_pipeline(StandardScaler(), MaxAbsScaler()), [0])],
+        remainder="passthrough",
+    ),
+}
+
+# A triangle that training has not moved has its corner on the edge of the box, where the last bit
+# decides on which side of it the tangent is taken.
+CASES = [
+    case
+    for case in product(KINDS, SCALERS, POLICIES)
+    if (case[0], case[2]) != ("triangles", "linear")
+]
+
+
+def fresh(scaler):
+    return clone(SCALERS[scaler], safe=False)
+
+
+def data(n_outputs=1, n_rows=120):
+    """Columns of very different units, one of them far from the origin."""
+    g = np.random.default_rng(0)
+    z = g.uniform(-1.5, 1.5, (n_rows, 3))
+    y = np.column_stack([np.sin(2 * z[:, 0]) + z[:, 1] * z[:, 2], 1e3 + 50 * z[:, 1] ** 2])
+    X = z * [200.0, 15.0, 1e-4] + [5e4, 290.0, 0.0]
+    return X, (y[:, 0] if n_outputs == 1 else y)
+
+
+def around(X, n_rows=400):
+    """Rows in and out of the box."""
+    middle, half = (X.max(axis=0) + X.min(axis=0)) / 2, np.ptp(X, axis=0) / 2
+    g = np.random.default_rng(1)
+    return np.vstack([X, middle + half * g.uniform(-2.5, 2.5, (n_rows, X.shape[1]))])
+
+
+def regressor(**settings):
+    return ANFISRegressor(**({"solver": "lse", "warn_out_of_bounds": False} | settings))
+
+
+def assert_same_predictions(estimator, X, full_scale):
+    model, rows = fold_with_rows(estimator, X)
+    expected = estimator.predict(X).reshape(len(X), -1)
+    assert_allclose(model.predict(rows), expected, rtol=0, atol=1e-12 * full_scale)
+
+
+@pytest.mark.parametrize("n_outputs", [1, 2])
+@pytest.mark.parametrize(("kind", "scaler", "policy"), CASES)
+def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_outputs):
+    X, y = data(n_outputs)
+    last = regressor(**KINDS[kind], out_of_bounds=policy)
+    pipe = make_pipeline(fresh(scaler), last).fit(X, y)
+    assert_same_predictions(pipe, around(X), np.ptp(y, axis=0).max() * 20)
+    assert_array_equal(fold(pipe).predict(X).shape, (len(X), n_outputs))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_scale_of_the_target_is_folded(kind):
+    X, y = data(2)
+    inner = make_pipeline(StandardScaler(), regressor(**KINDS[kind], out_of_bounds="linear"))
+    target = make_pipeline(MinMaxScaler((-1, 3)), StandardScaler())
+    both = TransformedTargetRegressor(inner, transformer=target).fit(X, y)
+    assert_same_predictions(both, around(X), 1e4)
+    only_target = make_pipeline(
+        MaxAbsScaler(),
+        TransformedTargetRegressor(regressor(**KINDS[kind]), transformer=RobustScaler()),
+    ).fit(X, y[:, 0])
+    assert_same_predictions(only_target, around(X), 10.0)
+    neither = TransformedTargetRegressor(inner).fit(X, y)
+    assert_same_predictions(neither, around(X), 1e4)
+
+
+@pytest.mark.parametrize("scaler", SCALERS)
+def test_no_training_row_leaves_the_box_and_no_other_enters_it(scaler):
+    X, y = data()
+    pipe = make_pipeline(fresh(scaler), regressor(n_mfs=2)).fit(X, y)
+    model = fold(pipe)
+    assert model.in_bounds(X).all()
+    for edge, side in ((model.minimum, -np.inf), (model.maximum, np.inf)):
+        for j in range(3):
+            row = X.mean(axis=0)
+            row[j] = edge[j]
+            beyond = row.copy()
+            beyond[j] = np.nextafter(edge[j], side)
+            transformed = pipe[:-1].transform(np.array([row, beyond]))
+            assert_array_equal(pipe[-1].in_bounds(transformed), [True, False])
+    assert_allclose(model.minimum, X.min(axis=0), rtol=1e-12)
+    assert_allclose(model.maximum, X.max(axis=0), rtol=1e-12)
+
+
+def test_folded_model_is_the_model_of_the_raw_data():
+    # Least squares with memberships over the box of the data do not depend on units, so that a
+    # scaler in front changes nothing: the folded model is the one trained without it.
+    X, y = data(2)
+    bare = regressor(n_mfs=[2, 3, 1], alpha=1e-6).fit(X, y).model_
+    folded = fold(make_pipeline(MinMaxScaler(), regressor(n_mfs=[2, 3, 1], alpha=1e-6)).fit(X, y))
+    assert_allclose(folded.antecedent.parameters, bare.antecedent.parameters, rtol=1e-9)
+    assert folded.term_names == bare.term_names
+    for name in ("reference", "spread", "minimum", "maximum", "rule_weights", "rule_rows"):
+        assert_allclose(getattr(folded, name), getattr(bare, name), rtol=1e-9, atol=1e-12)
+    span = np.ptp(X, axis=0)[:, None]
+    assert_allclose(folded.coefficients[:, 0], bare.coefficients[:, 0], rtol=1e-6)
+    assert_allclose(
+        folded.coefficients[:, 1:] * span, bare.coefficients[:, 1:] * span, rtol=1e-5, atol=1e-6
+    )
+
+
+def test_moved_and_dropped_columns_go_back_to_their_place():
+    X, y = data()
+    frame = pd.DataFrame(np.column_stack([X[:, 2], X[:, 0], X[:, 1], X[:, 0]]))
+    frame.columns = ["rate", "dropped", "kelvin", "hours"]
+    chosen = ColumnTransformer(
+        [
+            ("by name", StandardScaler(), ["hours"]),
+            ("by mask", MinMaxScaler(), [False, False, True, False]),
+            ("none", StandardScaler(), []),
+            ("left out", "drop", ["dropped"]),
+        ],
+        remainder=RobustScaler(),
+    )
+    pipe = make_pipeline(chosen, regressor(n_mfs=[2, 3, 1], out_of_bounds="linear"))
+    pipe.fit(frame, y)
+    model, rows = fold_with_rows(pipe, frame)
+    assert model.input_names == ("rate", "kelvin", "hours")
+    assert [term["input"] for term in model.memberships()] == ["hours"] * 2 + ["kelvin"] * 3
+    assert_array_equal(rows, frame[["rate", "kelvin", "hours"]])
+    assert_same_predictions(pipe, frame, 10.0)
+    assert_same_predictions(pipe, pd.DataFrame(around(frame.to_numpy()), columns=frame.columns), 50)
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        slice("kelvin", "rate"),
+        slice(None, "kelvin"),
+        slice("kelvin", None),
+        slice(1, 3),
+        slice(-2, None),
+        "kelvin",
+        1,
+        -1,
+        [2, 0],
+        ["rate", "hours"],
+        np.array([True, False, True]),
+        lambda frame: ["rate"],
+    ],
+)
+def test_columns_are_chosen_as_scikit_learn_does(columns):
+    X, y = data()
+    frame = pd.DataFrame(X, columns=NAMES)
+    one = isinstance(columns, str | int)
+    chosen = ColumnTransformer([("some", StandardScaler(), [columns] if one else columns)])
+    pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, y)
+    assert_same_predictions(pipe, frame, 10.0)
+
+
+def test_selected_columns_are_the_inputs():
+    X, y = data()
+    pipe = make_pipeline(
+        VarianceThreshold(), SelectKBest(f_regression, k=2), StandardScaler(), regressor(n_mfs=2)
+    ).fit(X, y)
+    kept = pipe[1].get_support(indices=True)
+    assert fold(pipe).input_names == tuple(f"x{j}" for j in kept)
+    assert_same_predictions(pipe, around(X), 10.0)
+
+
+def test_constant_column_has_no_terms_and_no_slope_in_raw_units_either():
+    X, y = data()
+    X[:, 1] = 290.0
+    pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2, out_of_bounds="nan"))
+    with pytest.warns(ConstantInputWarning, match="x1"):
+        pipe.fit(X, y)
+    model = fold(pipe)
+    assert (model.minimum[1], model.maximum[1]) == (290.0, 290.0)
+    assert_array_equal(model.coefficients[:, 2], 0.0)
+    assert_same_predictions(pipe, X, 10.0)
+
+
+def test_names_are_those_of_the_table_that_the_user_gives():
+    X, y = data()
+    frame = pd.DataFrame(X, columns=NAMES)
+    for first in (StandardScaler(), "passthrough"):
+        pipe = make_pipeline(first, regressor(n_mfs=2)).fit(frame, y)
+        assert fold(pipe).input_names == tuple(NAMES)
+        assert fold(pipe.fit(X, y)).input_names == ("x0", "x1", "x2")
+
+
+def test_scattered_terms_are_named_by_where_they_stand_in_raw_units():
+    X, y = data()
+    pipe = make_pipeline(StandardScaler(), regressor(**KINDS["scattered"])).fit(X, y)
+    for term in fold(pipe).memberships():
+        assert term["name"].startswith("near ")
+        assert float(term["name"].split()[1]) == pytest.approx(term["center"], rel=5e-3)
+
+
+def test_policy_is_the_one_set_last():
+    X, y = data()
+    pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(X, y)
+    pipe.set_params(anfisregressor__out_of_bounds="linear")
+    assert fold(pipe).out_of_bounds == "linear"
+
+
+def test_a_model_is_its_own_folding():
+    X, y = data()
+    bare = regressor(n_mfs=2).fit(X, y)
+    assert fold(bare.model_) is bare.model_
+    assert_array_equal(fold(bare).predict(X), bare.model_.predict(X))
+    model, rows = fold_with_rows(bare.model_, pd.DataFrame(X, columns=["x0", "x1", "x2"]))
+    assert model is bare.model_
+    assert_array_equal(rows, X)
+
+
+def test_a_search_stands_for_its_best():
+    X, y = data()
+    pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2))
+    search = GridSearchCV(pipe, {"anfisregressor__n_mfs": [2, [2, 3, 1]]}, cv=2).fit(X, y)
+    assert_same_predictions(search, around(X), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        (PCA(2), r"step 'pca' \(PCA\) cannot be folded into the rules: .* every column alone"),
+        (PolynomialFeatures(2), "'polynomialfeatures'"),
+        (Normalizer(), "Normalizer"),
+        (SimpleImputer(), "SimpleImputer"),
+        (FunctionTransformer(np.negative), "FunctionTransformer"),
+        (FeatureUnion([("a", StandardScaler())]), "FeatureUnion"),
+        (MinMaxScaler(clip=True), "clip=True bends it"),
+        (ColumnTransformer([("mix", PCA(2), [0, 2])]), r"step 'mix' \(PCA\)"),
+        (ColumnTransformer([("a", "passthrough", [0]), ("b", StandardScaler(), [0])]), "'x0' .* 2"),
+    ],
+)
+def test_what_does_not_fold_is_named(step, message):
+    X, y = data()
+    pipe = make_pipeline(
+        step, regressor(n_mfs=2 if not isinstance(step, PolynomialFeatures) else 1)
+    )
+    if isinstance(step, PolynomialFeatures):
+        step.set_params(include_bias=False)
+    pipe.fit(X, y)
+    with pytest.raises(ValueError, match=message):
+        fold(pipe)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"func": np.log, "inverse_func": np.exp},
+        {"transformer": PowerTransformer()},
+        {"transformer": MinMaxScaler(clip=True)},
+    ],
+)
+def test_a_bent_target_is_refused(settings):
+    X, y = data()
+    target = TransformedTargetRegressor(regressor(n_mfs=2), **settings, check_inverse=False)
+    with pytest.raises(ValueError, match="cannot be folded"):
+        fold(target.fit(X, y + 10.0))
+
+
+def test_what_has_no_rules_is_refused():
+    X, y = data()
+    with pytest.raises(TypeError, match=r"LinearRegression.* has no rules"):
+        fold(make_pipeline(StandardScaler(), LinearRegression()).fit(X, y))
+    with pytest.raises(TypeError, match="got 3"):
+        fold(3)
+    with pytest.raises(TypeError, match="fitted ANFIS estimator"):
+        fold(ANFISRegressor)
+    for unfitted in (
+        ANFISRegressor(),
+        make_pipeline(StandardScaler(), ANFISRegressor()),
+        TransformedTargetRegressor(ANFISRegressor()),
+        GridSearchCV(ANFISRegressor(), {}),
+    ):
+        with pytest.raises(NotFittedError):
+            fold(unfitted)
+
+
+def test_rows_are_checked():
+    X, y = data()
+    frame = pd.DataFrame(X, columns=NAMES)
+    pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(frame, y)
+    with pytest.raises(ValueError, match="X must have the columns 'hours', 'kelvin', 'rate', in"):
+        fold_with_rows(pipe, frame[["kelvin", "hours", "rate"]])
+    with pytest.raises(ValueError, match="X has 2 columns, the estimator takes 3: 'hours'"):
+        fold_with_rows(pipe, X[:, :2])
+    frame.loc[3, "kelvin"] = np.nan
+    with pytest.raises(ValueError, match="NaN in column 'kelvin', first at row 3"):
+        fold_with_rows(pipe, frame)

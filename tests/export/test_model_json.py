@@ -1,0 +1,244 @@
+"""JSON of a model: exact, readable, and strict on the way in."""
+
+import json
+import re
+import time
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from skanfis import ANFISRegressor
+from skanfis.export import export_json, read_json, write_json
+from skanfis.export.model_json import parse_json
+from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.model import OUT_OF_BOUNDS, TSKModel
+
+from .. import oracles
+from .rule_bases import MODELS, build, rows_of
+
+ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+A_GRID = MODELS["grid, order 1, 2 outputs"]
+
+
+def changed(change, model=A_GRID):
+    """The model's JSON after a change of the document."""
+    document = json.loads(export_json(model))
+    change(document)
+    return json.dumps(document)
+
+
+def assert_same(read, model):
+    """All that a model consists of, to the last bit."""
+    for field in fields(TSKModel):
+        ours, theirs = getattr(model, field.name), getattr(read, field.name)
+        if field.name.endswith("antecedent"):
+            assert type(theirs) is type(ours)
+            assert_array_equal(theirs.parameters, ours.parameters)
+            assert_array_equal(theirs.rule_terms, ours.rule_terms)
+            for group, read_group in zip(ours.groups, theirs.groups, strict=True):
+                assert read_group.family is group.family
+                assert_array_equal(read_group.inputs, group.inputs)
+        else:
+            assert_array_equal(theirs, ours)
+
+
+@ALL
+def test_comes_back_to_the_last_bit(model):
+    read = parse_json(export_json(model))
+    assert_same(read, model)
+    rows = rows_of(model, 1.3)
+    assert_array_equal(read.predict(rows), model.predict(rows))
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+def test_every_family_comes_back(family, rng):
+    model = build(oracles.random_grid(rng, [family] * 2, (3, 2), (0, 2)))
+    assert_same(parse_json(export_json(model)), model)
+
+
+@pytest.mark.parametrize("policy", OUT_OF_BOUNDS)
+def test_policy_comes_back(policy):
+    assert parse_json(export_json(replace(A_GRID, out_of_bounds=policy))).out_of_bounds == policy
+
+
+def test_names_of_all_kinds_come_back():
+    names = ('"quoted"\n', "Temperatur in °C", "</script>")
+    assert parse_json(export_json(replace(A_GRID, input_names=names))).input_names == names
+
+
+def test_file_of_a_trained_model(tmp_path, rng):
+    X = rng.normal(size=(100, 2)) * [1e-3, 1e5]
+    estimator = ANFISRegressor(n_mfs=2).fit(X, X[:, 0] * X[:, 1])
+    write_json(estimator, tmp_path / "model.json")
+    read = read_json(tmp_path / "model.json")
+    assert_same(read, estimator.model_)
+    assert_array_equal(read.predict(X)[:, 0], estimator.predict(X))
+    onward = ANFISRegressor(partition=read, solver="lse").fit(X, X[:, 0])
+    assert onward.n_rules_ == 4
+
+
+def test_a_person_can_read_it():
+    text = export_json(A_GRID)
+    assert text.startswith('{\n  "format": "skanfis-model",\n  "version": 1,\n  "inputs": [\n')
+    assert re.search(
+        r'^    \{"name": "low", "input": 0, "function": "gaussian", "center": ', text, re.M
+    )
+    # One line per input, output, term and rule; eight keys, the ends of four lists, two braces.
+    assert text.count("\n") == 3 + 2 + 7 + 12 + 8 + 4 + 2
+
+
+def test_later_version_says_so():
+    with pytest.raises(ValueError, match="of version 2, this skanfis reads version 1: upgrade"):
+        parse_json(changed(lambda d: d.update(version=2, rules="of another kind")))
+
+
+def _set(*path):
+    """A change that sets what stands at a path to its last entry."""
+    *keys, last, value = path
+
+    def change(document):
+        for key in keys:
+            document = document[key]
+        document[last] = value
+
+    return change
+
+
+REFUSED = [
+    (_set("format", "pickle"), "not a model of skanfis"),
+    (_set("version", 0), '"version" is 0'),
+    (_set("version", True), '"version" is True'),
+    (_set("version", 1.0), '"version" is 1.0'),
+    (_set("more", 1), "the file has the unknown key 'more'"),
+    (lambda d: d.pop("rules"), "the file has no 'rules'"),
+    (_set("out_of_bounds", "wrap"), "out_of_bounds is 'wrap'"),
+    (_set("out_of_bounds", ["clip"]), "out_of_bounds is"),
+    (_set("outputs", []), "outputs: .* is not a list of 1 or more"),
+    (_set("outputs", [1, 2]), "outputs: 1 is not a name"),
+    (_set("outputs", ["y"]), r'"consequents" of rules\[0\] must be one list per output'),
+    (_set("inputs", {}), "inputs: .* is not a list"),
+    (_set("inputs", 0, []), r"inputs\[0\] is \[\], not an object"),
+    (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),
+    (_set("inputs", 0, "spread", -1), r"inputs\[0\]: .* spread is negative"),
+    (_set("inputs", 0, "name", None), "None is not a name"),
+    (_set("inputs", 0, "reference", "0"), "'0' is not a number"),
+    (_set("inputs", 0, "reference", 1e60), "not a number of size up to 1e"),
+    (_set("inputs", 0, "reference", 10**4000), "not a number of size up to 1e"),
+    (_set("inputs", 0, "reference", True), "True is not a number"),
+    (_set("terms", 0, "function", "gauss"), r'terms\[0\] has no "function" among gaussian'),
+    (_set("terms", 0, "function", ["bell"]), r'terms\[0\] has no "function" among gaussian'),
+    (_set("terms", 0, 3), r'terms\[0\] has no "function"'),
+    (_set("terms", 0, "function", "bell"), r"terms\[0\] has no 'log_width'|'log_slope'"),
+    (_set("terms", 0, "input", 3), r"is not a whole number from 0 to 2"),
+    (_set("terms", 0, "input", -1), r"is not a whole number from 0 to 2"),
+    (_set("terms", 0, "input", 1), "rules are not those"),
+    (_set("terms", 0, "log_width", 200.0), "not a number of size up to 115"),
+    (_set("terms", 0, "before_training", {}), r'"before_training" of terms\[0\] has no'),
+    (_set("terms", 0, "extra", 1), r"terms\[0\] has the unknown key 'extra'"),
+    (_set("rule_base", "tree"), "\"rule_base\" is 'tree'"),
+    (_set("rule_base", ["grid"]), '"rule_base" is'),
+    (_set("rule_base", "scattered"), 'the rules are not those of "rule_base": "scattered"'),
+    (_set("rules", 0, "terms", [0, 2, 6]), 'the rules are not those of "rule_base": "grid"'),
+    (_set("rules", 0, "terms", [0, 2]), "other numbers of terms"),
+    (_set("rules", 0, "terms", [0, 2, 99]), "99 is not a whole number from -1 to 6"),
+    (_set("rules", 0, "terms", [0, 2, -2]), "-2 is not a whole number"),
+    (_set("rules", 0, "terms", [0, 2, 5.0]), "5.0 is not a whole number"),
+    (_set("rules", 0, "weight", -0.1), "must not be negative"),
+    (_set("rules", 0, "rows", None), "None is not a number"),
+    (_set("rules", 0, "consequents", 0, [1.0, 2.0]), "of 1 or 4 numbers"),
+    (_set("rules", 0, "consequents", 1, [1.0]), "other numbers of terms or coefficients"),
+    (_set("rules", 1, "consequents", [[1.0], [1.0]]), "other numbers of terms or coefficients"),
+    (lambda d: d["rules"].pop(), 'the rules are not those of "rule_base": "grid"'),
+    (_set("rules", []), "rules: .* is not a list of 1 or more"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), REFUSED)
+def test_refuses(change, message):
+    with pytest.raises(ValueError, match=message):
+        parse_json(changed(change))
+
+
+def test_refuses_a_table_with_two_terms_of_one_input():
+    table = MODELS["rule table, order 1, 1 outputs"]
+    with pytest.raises(ValueError, match="at one place of the rules are of different inputs"):
+        parse_json(changed(_set("rules", 0, "terms", [3, 3, -1]), table))
+
+    def move(document):
+        for rule in document["rules"]:
+            rule["terms"] = [rule["terms"][0], rule["terms"][0], rule["terms"][2]]
+
+    with pytest.raises(ValueError, match="two terms of one input"):
+        parse_json(changed(move, table))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "Expecting value"),
+        ("[]", "not a model of skanfis"),
+        ('"skanfis-model"', "not a model of skanfis"),
+        ("{", "line 1 column 2"),
+        ('{"format": NaN}', "NaN is not a number of JSON"),
+        ('{"format": -Infinity}', "-Infinity is not a number of JSON"),
+        ('{"format": 1, "format": 2}', "'format' stands twice"),
+        (export_json(A_GRID) + "}", "Extra data"),
+        (export_json(A_GRID).replace("0.015", "1e999"), "inf is not a number of size up to"),
+    ],
+)
+def test_refuses_text_that_is_no_such_json(text, message):
+    with pytest.raises(ValueError, match=message):
+        parse_json(text)
+
+
+def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
+    path = tmp_path / "model.json"
+    path.write_text("[" * 1_000_000, encoding="utf-8")
+    with pytest.raises(ValueError, match=r"model\.json: nested too deeply"):
+        read_json(path)
+    path.write_text(export_json(A_GRID), encoding="utf-16")
+    with pytest.raises(ValueError, match=r"model\.json: 'utf-8' codec"):
+        read_json(path)
+    path.write_text('{"a": ' + "9" * 5000 + "}", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"model\.json: "):
+        read_json(path)
+    with open(path, "wb") as file:
+        file.truncate(2**40)
+    start = time.perf_counter()
+    with pytest.raises(ValueError, match="larger than 16,777,216 bytes"):
+        read_json(path)
+    assert time.perf_counter() - start < 1.0
+
+
+def test_refuses_a_rule_base_too_large_before_memory_is_asked_for():
+    # Rules without conditions over terms that none uses: a matrix of 5,000 x 5,000.
+    def grow(document):
+        document["rule_base"] = "table"
+        document["terms"] = document["terms"][:1] * 5000
+        document["rules"] = [dict(document["rules"][0], terms=[])] * 5000
+
+    with pytest.raises(ValueError, match=r"5000 rules over 5000 terms.*at most 20,000,000"):
+        parse_json(changed(grow))
+
+
+def test_refuses_to_write_a_membership_of_the_users_own(rng):
+    class Own(Gaussian):
+        name = "own"
+
+    with pytest.raises(ValueError, match="'own' is not one of skanfis' own"):
+        export_json(build(oracles.random_grid(rng, [Own], [2], [0])))
+
+
+def test_small_damage_is_never_anything_but_a_value_error(rng):
+    text = export_json(A_GRID)
+    for _ in range(2000):
+        spoilt = bytearray(text, "ascii")
+        for place in rng.integers(0, len(spoilt), rng.integers(1, 5)):
+            spoilt[place] = rng.integers(32, 127)
+        try:
+            model = parse_json(spoilt.decode())
+        except ValueError:
+            continue
+        assert np.isfinite(model.predict(rows_of(A_GRID, 1.0, 5))).all()

@@ -1,0 +1,169 @@
+"""The ONNX graph, run by onnxruntime, answers what ``predict`` answers."""
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.compose import ColumnTransformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.export import register_onnx_converter
+from skanfis.export._fold import fold
+
+from .every_model import CASES, full_scale, print_differences, rows, size_of_sum
+
+REASON = "{} IS NOT INSTALLED (pip install '.[onnx]'): THE ONNX CONVERTER IS NOT TESTED"
+skl2onnx = pytest.importorskip("skl2onnx", reason=REASON.format("skl2onnx"))
+onnxruntime = pytest.importorskip("onnxruntime", reason=REASON.format("onnxruntime"))
+
+PRECISIONS = pytest.mark.parametrize(
+    ("dtype", "tolerance"), [(np.float64, 1e-9), (np.float32, 1e-5)], ids=["double", "float"]
+)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _converter():
+    register_onnx_converter()
+
+
+def holding(model):
+    """A fitted regressor with this model in it."""
+    estimator = ANFISRegressor(out_of_bounds=model.out_of_bounds, warn_out_of_bounds=False)
+    g = np.random.default_rng(0)
+    y = g.normal(size=(20, model.n_outputs))
+    estimator.set_params(n_mfs=1).fit(g.normal(size=(20, model.n_inputs)), y.squeeze())
+    estimator.model_ = model
+    return estimator
+
+
+def answers(estimator, X, **options):
+    """Outputs of the converted estimator, (n_rows, n_outputs)."""
+    graph = skl2onnx.to_onnx(estimator, X[:1], **options).SerializeToString()
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    (y,) = session.run(None, {"X": X})
+    assert y.dtype == X.dtype
+    return y
+
+
+@PRECISIONS
+def test_every_model_answers_as_predict(dtype, tolerance, capsys):
+    X = rows(dtype)
+    differences = []
+    cases = [case for case in CASES if case.model.out_of_bounds != "raise"]
+    for case in cases:
+        found = answers(holding(case.model), X)
+        wanted = case.model.predict(X.astype(float))
+        assert found.shape == wanted.shape
+        assert np.array_equal(np.isnan(found), np.isnan(wanted)), case.label
+        differences.append(np.nanmax(np.abs(found - wanted) / full_scale(wanted)))
+    with capsys.disabled():
+        print_differences(f"ONNX, {np.dtype(dtype).name}", cases, differences)
+    assert max(differences) < tolerance
+
+
+def surface(n_rows=400, n_outputs=1):
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (n_rows, 3)) * [300.0, 40.0, 100.0] + [300.0, 20.0, 0.0]
+    y = np.sin(X[:, 0] / 100.0) + 1e-3 * X[:, 1] * X[:, 2]
+    return X, np.column_stack([y, 1e3 + y**2])[:, :n_outputs].squeeze()
+
+
+COLUMNS = ColumnTransformer(
+    [("first", StandardScaler(), [2]), ("second", MinMaxScaler(), [0])], remainder="passthrough"
+)
+PIPELINES = {
+    "standard": (StandardScaler(), {"n_mfs": [3, 2, 2]}),
+    "min-max": (MinMaxScaler(), {"n_mfs": 2, "out_of_bounds": "linear"}),
+    "robust": (RobustScaler(), {"n_mfs": 2, "mf": "bell", "out_of_bounds": "nan"}),
+    "columns": (COLUMNS, {"partition": KMeans(4, n_init=1, random_state=0)}),
+    "two": (make_pipeline(RobustScaler(), StandardScaler()), {"n_mfs": [1, 3, 1], "order": 0}),
+    "plane": (StandardScaler(), {"n_mfs": 1}),
+    "constant": (StandardScaler(), {"n_mfs": 1, "order": 0}),
+    "scheduled": (StandardScaler(), {"n_mfs": [1, 3, 1], "consequent_features": [2]}),
+    "triangles": (
+        StandardScaler(),
+        {"n_mfs": 3, "mf": ["triangular", "s_shaped", "gaussian"], "out_of_bounds": "linear"},
+    ),
+}
+
+
+@PRECISIONS
+@pytest.mark.parametrize("n_outputs", [1, 2])
+@pytest.mark.parametrize("kind", PIPELINES)
+def test_pipeline_answers_as_predict(kind, n_outputs, dtype, tolerance):
+    scaler, settings = PIPELINES[kind]
+    X, y = surface(n_outputs=n_outputs)
+    pipeline = make_pipeline(clone(scaler), ANFISRegressor(warn_out_of_bounds=False, **settings))
+    pipeline.fit(X, y)
+    Z = (X.mean(axis=0) + 1.3 * (X - X.mean(axis=0))).astype(dtype)
+    found, wanted = answers(pipeline, Z), pipeline.predict(Z.astype(float)).reshape(len(Z), -1)
+    # A scaler in single precision may move a row across the edge of the box by its last bit.
+    same = np.isnan(found) == np.isnan(wanted)
+    assert same.mean() > (0.99 if dtype == np.float32 else 0.9999)
+    scale = np.maximum(full_scale(wanted), size_of_sum(fold(pipeline), Z))
+    difference = np.abs(found - wanted) / scale
+    assert np.nanmax(difference[same]) < tolerance
+
+
+@PRECISIONS
+@pytest.mark.parametrize("n_rows", [0, 1, 7])
+def test_any_number_of_rows(n_rows, dtype, tolerance):
+    X, y = surface()
+    for settings in ({"n_mfs": 2}, {"n_mfs": 1, "order": 0}):
+        estimator = ANFISRegressor(**settings).fit(X, y)
+        graph = skl2onnx.to_onnx(estimator, X[:1].astype(dtype)).SerializeToString()
+        session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+        (found,) = session.run(None, {"X": X[:n_rows].astype(dtype)})
+        assert found.shape == (n_rows, 1)
+        if n_rows:
+            wanted = estimator.predict(X[:n_rows])
+            np.testing.assert_allclose(found[:, 0], wanted, atol=tolerance * np.abs(y).max())
+
+
+@pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
+def test_row_that_is_not_finite_gives_nan(policy):
+    X, y = surface()
+    estimator = ANFISRegressor(n_mfs=2, out_of_bounds=policy).fit(X, y)
+    Z = X[:6].copy()
+    Z[[0, 1, 2], [0, 1, 2]] = [np.nan, np.inf, -np.inf]
+    found = answers(estimator, Z)
+    assert np.isnan(found[:, 0]).tolist() == [True, True, True, False, False, False]
+
+
+def test_policy_is_that_of_the_estimator_at_conversion():
+    X, y = surface()
+    estimator = ANFISRegressor(n_mfs=2, warn_out_of_bounds=False).fit(X, y)
+    Z = X.max(axis=0, keepdims=True) * 1.5
+    held = answers(estimator, Z)
+    estimator.set_params(out_of_bounds="linear")
+    assert abs(answers(estimator, Z)[0, 0] - held[0, 0]) > 0.1
+    np.testing.assert_allclose(answers(estimator, Z)[:, 0], estimator.predict(Z))
+
+
+def test_whole_numbers_are_taken():
+    X, y = surface()
+    estimator = ANFISRegressor(n_mfs=2).fit(np.round(X), y)
+    whole = np.round(X).astype(np.int64)
+    graph = skl2onnx.to_onnx(estimator, whole[:1]).SerializeToString()
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    (found,) = session.run(None, {"X": whole})
+    np.testing.assert_allclose(found[:, 0], estimator.predict(whole), atol=1e-5 * np.abs(y).max())
+
+
+def test_raise_is_refused():
+    X, y = surface()
+    estimator = ANFISRegressor(n_mfs=2, out_of_bounds="raise").fit(X, y)
+    with pytest.raises(ValueError, match="out_of_bounds='raise' has no counterpart in ONNX"):
+        skl2onnx.to_onnx(estimator, X[:1])
+
+
+def test_opset_too_old_is_refused():
+    X, y = surface()
+    estimator = ANFISRegressor(n_mfs=2).fit(X, y)
+    with pytest.raises(ValueError, match="target_opset=12 is too old"):
+        skl2onnx.to_onnx(estimator, X[:1], target_opset=12)
+    expected = estimator.predict(X)
+    for opset in (13, 17, 18, 21):
+        np.testing.assert_allclose(answers(estimator, X, target_opset=opset)[:, 0], expected)

@@ -1,0 +1,72 @@
+"""A model in a file comes back the same: joblib, and skops for files from strangers."""
+
+from importlib import import_module
+from io import BytesIO
+
+import joblib
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
+from skanfis.export import TRUSTED_TYPES
+from skanfis.export.fis.reader import parse_fis
+from skanfis.membership import MEMBERSHIPS
+
+from .fis_files import BY_HAND
+
+ESTIMATORS = {
+    "auto": ANFISRegressor(),
+    "grid": ANFISRegressor(n_mfs=2),
+    "subtractive": ANFISRegressor(partition="subtractive"),
+    "fcm": ANFISRegressor(partition="fcm"),
+    "own subtractive": ANFISRegressor(partition=SubtractiveClustering(radius=0.6)),
+    "own fcm": ANFISRegressor(partition=FuzzyCMeans(3)),
+    "clusterer": ANFISRegressor(partition=KMeans(3, random_state=0)),
+    "model": ANFISRegressor(partition=parse_fis(BY_HAND)),
+    "pipeline": make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)),
+    **{mf: ANFISRegressor(n_mfs=2, mf=mf) for mf in MEMBERSHIPS},
+}
+EACH = pytest.mark.parametrize("estimator", ESTIMATORS.values(), ids=list(ESTIMATORS))
+X = np.random.default_rng(0).uniform(0.0, [10.0, 1.0], (120, 2))
+Y = np.column_stack([np.sin(X[:, 0]) + X[:, 1], X[:, 0] * X[:, 1]])
+
+pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+
+
+def fitted(estimator):
+    short = {name: 5 for name in estimator.get_params() if name.endswith("regressor__max_iter")}
+    return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
+
+
+@EACH
+def test_joblib(estimator):
+    estimator = fitted(estimator)
+    file = BytesIO()
+    joblib.dump(estimator, file)
+    assert_array_equal(joblib.load(file).predict(X), estimator.predict(X))
+
+
+@EACH
+def test_skops_with_the_listed_types(estimator):
+    io = pytest.importorskip(
+        "skops.io", reason="skops IS NOT INSTALLED: its files are not checked (pip install skops)"
+    )
+    estimator = fitted(estimator)
+    data = io.dumps(estimator)
+    assert set(io.get_untrusted_types(data=data)) <= set(TRUSTED_TYPES)
+    loaded = io.loads(data, trusted=TRUSTED_TYPES)
+    assert_array_equal(loaded.predict(X), estimator.predict(X))
+
+
+def test_trusted_types_are_all_there_and_no_more():
+    for name in TRUSTED_TYPES:
+        module, _, name = name.rpartition(".")
+        assert isinstance(getattr(import_module(module), name), type)
+    families = {f"{family.__module__}.{family.__name__}" for family in MEMBERSHIPS.values()}
+    assert families == {name for name in TRUSTED_TYPES if ".membership." in name}

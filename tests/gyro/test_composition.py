@@ -1,0 +1,216 @@
+"""Physics plus what it leaves: sums, weights, nested parameters, and flags through Pipelines."""
+
+import io
+
+import joblib
+import numpy as np
+import pytest
+import sklearn
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.compose import make_column_transformer
+from sklearn.dummy import DummyRegressor
+from sklearn.linear_model import LinearRegression
+from sklearn.model_selection import GridSearchCV, KFold
+from sklearn.neighbors import KNeighborsRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.utils.estimator_checks import estimator_checks_generator
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_ofog
+from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.gyro.compose import ResidualRegressor
+from skanfis.gyro.physics import OpenLoopArcsineRegressor
+
+QUIET = {"warn_out_of_bounds": False}
+
+
+@pytest.fixture(scope="module")
+def data():
+    """Four runs of one gyro."""
+    log = make_ofog(n_devices=1, n_runs=4, duration=2400, sampling_interval=20, random_state=0)
+    return log[["output", "temperature", "time"]], log["rate"].to_numpy()
+
+
+def compensator(**anfis):
+    return ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), ANFISRegressor(**QUIET, **anfis))
+
+
+def test_the_second_learns_what_the_first_leaves(rng):
+    """A line and a parabola orthogonal to it: each part finds its own."""
+    x = np.linspace(-1.0, 1.0, 41)[:, None]
+    y = 3.0 * x[:, 0] + 2.0 * (x[:, 0] ** 2 - np.mean(x**2))
+    square = make_pipeline(PolynomialFeatures(2), LinearRegression())
+    model = ResidualRegressor(LinearRegression(), square).fit(x, y)
+    assert model.base_.coef_ == pytest.approx(3.0)
+    assert model.residual_[-1].coef_ == pytest.approx([0.0, 0.0, 2.0], abs=1e-12)
+    np.testing.assert_allclose(model.predict(x), y, atol=1e-12)
+
+
+def test_prediction_is_the_sum_of_the_parts(data):
+    X, rate = data
+    model = compensator(n_mfs=2).fit(X, rate)
+    total = model.base_.predict(X) + model.residual_.predict(X)
+    np.testing.assert_array_equal(model.predict(X), total)
+    left = rate - model.base_.predict(X)
+    assert np.std(rate - model.predict(X)) < 0.3 * np.std(left)
+
+
+def test_rounds_take_from_the_base_what_is_not_its_own(rng):
+    """Two columns that go together: least squares in turn ends where least squares of both is."""
+    x = rng.normal(size=(200, 2)) @ [[1.0, 0.7], [0.0, 0.7]]
+    y = 2.0 * x[:, 0] - 1.0 * x[:, 1]
+    parts = [
+        make_pipeline(make_column_transformer(("passthrough", [j])), LinearRegression())
+        for j in (0, 1)
+    ]
+    slopes = {}
+    for n_rounds in (1, 3, 60):
+        model = ResidualRegressor(*parts, n_rounds=n_rounds).fit(x, y)
+        slopes[n_rounds] = [model.base_[-1].coef_[0], model.residual_[-1].coef_[0]]
+    distance = {n: np.abs(np.subtract(slope, [2.0, -1.0])).max() for n, slope in slopes.items()}
+    assert distance[1] > 0.5
+    assert distance[3] < 0.5 * distance[1]
+    assert distance[60] < 1e-6
+    with pytest.raises(ValueError, match="n_rounds == 0"):
+        ResidualRegressor(n_rounds=0).fit(x, y)
+
+
+def test_the_parts_given_stay_unfitted(data):
+    X, rate = data
+    model = compensator(n_mfs=2).fit(X, rate)
+    assert not hasattr(model.base, "amplitude_")
+    assert not hasattr(model.residual, "model_")
+
+
+def test_grid_search_reaches_into_the_parts(data):
+    X, rate = data
+    grid = {"residual__n_mfs": [1, 2], "base__bias_degree": [0, 1]}
+    # Random rows: it is the search that is looked at, not the compensation.
+    search = GridSearchCV(compensator(), grid, cv=KFold(2, shuffle=True, random_state=0))
+    search.fit(X, rate)
+    assert search.best_params_["residual__n_mfs"] == 2
+    assert len(search.cv_results_["params"]) == 4
+    assert clone(search.best_estimator_).get_params()["residual__n_mfs"] == 2
+
+
+def test_a_file_brings_it_back(data):
+    X, rate = data
+    model = compensator(n_mfs=2).fit(X, rate)
+    file = io.BytesIO()
+    joblib.dump(model, file)
+    file.seek(0)
+    np.testing.assert_array_equal(joblib.load(file).predict(X), model.predict(X))
+
+
+@pytest.mark.parametrize("residual", [LinearRegression(), make_pipeline(LinearRegression())])
+def test_weights_reach_both_parts(rng, residual):
+    x, weights = rng.normal(size=(30, 2)), rng.integers(0, 3, 30)
+    y = x[:, 0] ** 2 + x[:, 1]
+    model = ResidualRegressor(LinearRegression(fit_intercept=False), residual)
+    weighted = model.fit(x, y, sample_weight=weights).predict(x)
+    copies = model.fit(np.repeat(x, weights, axis=0), np.repeat(y, weights)).predict(x)
+    np.testing.assert_allclose(weighted, copies)
+
+
+def test_a_part_that_takes_no_weights_is_named(rng):
+    model = ResidualRegressor(LinearRegression(), KNeighborsRegressor())
+    with pytest.raises(ValueError, match=r"residual=KNeighborsRegressor.* takes no weights"):
+        model.fit(rng.normal(size=(9, 2)), np.arange(9.0), sample_weight=np.ones(9))
+
+
+def test_weights_go_where_they_are_requested(rng):
+    x, weights = rng.normal(size=(30, 1)), rng.uniform(0.1, 2.0, 30)
+    y = np.exp(x[:, 0])
+    with sklearn.config_context(enable_metadata_routing=True):
+        base = LinearRegression().set_fit_request(sample_weight=False)
+        residual = DummyRegressor().set_fit_request(sample_weight=True)
+        model = ResidualRegressor(base, residual).fit(x, y, sample_weight=weights)
+    np.testing.assert_allclose(model.base_.coef_, LinearRegression().fit(x, y).coef_)
+    left = y - model.base_.predict(x)
+    assert model.residual_.constant_.item() == pytest.approx(np.average(left, weights=weights))
+
+
+@pytest.mark.parametrize("scaled", [False, True])
+def test_flags_of_both_parts_come_through(data, scaled):
+    X, rate = data
+    anfis = ANFISRegressor(n_mfs=2, **QUIET)
+    residual = make_pipeline(StandardScaler(), anfis) if scaled else anfis
+    model = ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), residual)
+    model.fit(X.to_numpy(), rate)
+    rows = X.to_numpy()[[0, 0, 0]]
+    rows[1, 2] = 1e5  # a time that only the residual model looks at
+    rows[2, 0] = 1e5  # an output beyond the sine
+    np.testing.assert_array_equal(model.in_bounds(rows), [True, False, False])
+    coverage = model.coverage(rows)
+    assert coverage[0] > 0.3
+    assert np.all(coverage[1:] < 1e-6)
+
+
+def test_every_extrapolated_row_is_flagged(data):
+    X, rate = data
+    slow = np.abs(rate) <= 65.0
+    model = compensator(n_mfs=2).fit(X[slow], rate[slow])
+    edge = np.abs(X["output"][slow]).max()
+    assert not model.in_bounds(X[np.abs(X["output"]) > edge]).any()
+    assert model.in_bounds(X[slow]).all()
+
+
+def test_parts_warn_for_themselves(data):
+    X, rate = data
+    model = ResidualRegressor(OpenLoopArcsineRegressor(), DummyRegressor()).fit(X, rate)
+    with pytest.warns(OutOfBoundsWarning, match="follow the law"):
+        model.predict(X.assign(temperature=90.0))
+
+
+def test_flags_exist_only_where_a_part_has_them(rng):
+    model = ResidualRegressor(LinearRegression(), LinearRegression())
+    assert not hasattr(model, "in_bounds")
+    assert not hasattr(
+        ResidualRegressor(OpenLoopArcsineRegressor(), LinearRegression()), "coverage"
+    )
+    assert hasattr(ResidualRegressor(), "coverage")
+
+
+def test_a_base_that_refuses_training_rows_is_refused(data):
+    X, rate = data
+    base = OpenLoopArcsineRegressor(max_phase=0.3, out_of_bounds="nan", **QUIET)
+    with pytest.raises(ValueError, match=r"base has no finite prediction for .* training rows"):
+        ResidualRegressor(base, LinearRegression()).fit(X, rate)
+
+
+def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
+    X, rate = data
+    selected = make_pipeline(
+        make_column_transformer(("passthrough", ["time", "temperature"])),
+        ANFISRegressor(n_mfs=2, **QUIET),
+    )
+    base = OpenLoopArcsineRegressor("output", "temperature", **QUIET)
+    model = ResidualRegressor(base, selected).fit(X, rate)
+    assert model.residual_[-1].n_features_in_ == 2
+    assert model.in_bounds(X).all()
+
+
+KMEANS = KMeans(n_clusters=2, n_init=1, random_state=0)
+ESTIMATORS = {
+    "two rules": ResidualRegressor(residual=ANFISRegressor(partition=KMEANS, max_iter=5)),
+    "as it comes": ResidualRegressor(),
+    "plain": ResidualRegressor(LinearRegression(), LinearRegression()),
+}
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+@pytest.mark.parametrize(
+    ("estimator", "check"),
+    [
+        pytest.param(clone, check, id=f"{label}-{getattr(check, 'func', check).__name__}")
+        for label, estimator in ESTIMATORS.items()
+        for clone, check in estimator_checks_generator(estimator)
+    ],
+)
+def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
+    check(estimator)

@@ -1,0 +1,292 @@
+"""The arcsine law: planted coefficients, exact derivatives, and what lies past the sine."""
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV
+from sklearn.utils.estimator_checks import estimator_checks_generator
+
+from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
+from skanfis.gyro import physics
+from skanfis.gyro.physics import OpenLoopArcsineRegressor
+
+REFERENCE = 20.0
+PLANTED = {
+    "amplitude": [-6.2e6, -6.2e6 * -40e-6],
+    "sagnac_factor": [0.2536, 0.2536 * -370e-6],  # rad/(rad/s)
+    "bias": [0.02, 3e-4],  # deg/s
+}
+
+
+def planted_output(rate, temperature, offset=0.0, **changed):
+    """Counts of a gyro that follows the law exactly."""
+    a, k, b = ((PLANTED | changed)[name] for name in PLANTED)
+    powers = np.polynomial.polynomial.polyval
+    difference = temperature - REFERENCE
+    phase = powers(difference, k) * np.deg2rad(rate + powers(difference, b))
+    return powers(difference, a) * np.sin(phase) + offset
+
+
+def calibration(rng, n_rows=600, max_rate=150.0, **planted):
+    rate = rng.uniform(-max_rate, max_rate, n_rows)
+    temperature = rng.uniform(-20.0, 60.0, n_rows)
+    return np.column_stack([planted_output(rate, temperature, **planted), temperature]), rate
+
+
+def arcsine(**parameters):
+    return OpenLoopArcsineRegressor(reference_temperature=REFERENCE, **parameters)
+
+
+def test_planted_coefficients_come_back(rng):
+    X, rate = calibration(rng)
+    law = arcsine().fit(X, rate)
+    np.testing.assert_allclose(law.amplitude_, PLANTED["amplitude"], rtol=1e-7)
+    np.testing.assert_allclose(np.rad2deg(law.sagnac_factor_), PLANTED["sagnac_factor"], rtol=1e-7)
+    np.testing.assert_allclose(law.bias_, PLANTED["bias"], rtol=1e-6)
+    assert law.offset_ == 0.0
+    np.testing.assert_allclose(law.predict(X), rate, atol=1e-7)
+
+
+def test_planted_offset_and_curvature_come_back(rng):
+    amplitude = [6e6, -240.0, -3.0]
+    X, rate = calibration(rng, amplitude=amplitude, offset=5000.0)
+    law = arcsine(amplitude_degree=2, fit_offset=True).fit(X, rate)
+    np.testing.assert_allclose(law.amplitude_, amplitude, rtol=1e-6)
+    assert law.offset_ == pytest.approx(5000.0, rel=1e-6)
+    np.testing.assert_allclose(law.bias_, PLANTED["bias"], rtol=1e-5)
+
+
+def test_phase_is_that_of_the_planted_law(rng):
+    X, rate = calibration(rng)
+    factor = np.polynomial.polynomial.polyval(X[:, 1] - REFERENCE, PLANTED["sagnac_factor"])
+    bias = np.polynomial.polynomial.polyval(X[:, 1] - REFERENCE, PLANTED["bias"])
+    # The planted amplitude is negative; the law's factor is positive by convention.
+    expected = factor * np.deg2rad(rate + bias)
+    np.testing.assert_allclose(arcsine().fit(X, rate).phase(X), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("has_offset", [False, True])
+@pytest.mark.parametrize("has_lag", [False, True])
+def test_jacobian_is_that_of_the_misfit(rng, has_lag, has_offset):
+    X, rate = calibration(rng, n_rows=40)
+    thermal_rate = rng.normal(size=(40, int(has_lag)))
+    log = physics._standardise(np.hstack([X, thermal_rate]), rate, rng.uniform(0.5, 2.0, 40))
+    shape = physics._Shape(2, 1, 3, has_lag, has_offset)
+    # Far from the optimum, where no term of the derivative is hidden by a small residual.
+    point = rng.uniform(0.2, 0.8, shape.n_coefficients)
+    exact = physics._jacobian(point, log, shape)
+    for j, column in enumerate(exact.T):
+        step = np.zeros(point.size, dtype=complex)
+        step[j] = 1e-30j
+        # Complex step: no difference is taken, so that the derivative is exact to rounding.
+        by_step = complex_misfit(point + step, log, shape).imag / 1e-30
+        np.testing.assert_allclose(column, by_step, rtol=1e-12, atol=1e-13)
+
+
+def complex_misfit(parameters, log, shape):
+    """The misfit from its definition, for complex parameters."""
+    s, k, b, rest = np.split(parameters, np.cumsum([degree + 1 for degree in shape.degrees]))
+    tau = log.tau + (rest[0] if shape.has_lag else 0.0) * log.rho
+    value = np.polynomial.polynomial.polyval
+    phase = value(tau, k) * (log.rate + value(tau, b))
+    output = value(tau, s) / k[0] * np.sin(phase) + (rest[-1] if shape.has_offset else 0.0)
+    misfit = log.root_weights * (output - log.output)
+    found = physics._misfit(parameters.real, log, shape)
+    np.testing.assert_allclose(found, misfit.real, atol=1e-13)
+    return misfit
+
+
+def test_lag_of_the_thermometer_comes_back(rng):
+    """The coil is ahead of the thermometer by the lag times the thermal rate."""
+    rate, shown = rng.uniform(-150, 150, 600), rng.uniform(-20, 60, 600)
+    ramp = rng.uniform(-0.05, 0.05, 600)  # degC/s
+    X = np.column_stack([planted_output(rate, shown + 170.0 * ramp), shown, ramp])
+    law = arcsine(temperature_rate=2).fit(X, rate)
+    assert law.thermometer_lag_ == pytest.approx(170.0, rel=1e-7)
+    np.testing.assert_allclose(law.predict(X), rate, atol=1e-7)
+    np.testing.assert_allclose(law.amplitude_, PLANTED["amplitude"], rtol=1e-7)
+    assert law.minimum_.shape == (3,)
+    assert arcsine().fit(X, rate).thermometer_lag_ == 0.0
+
+
+def test_units_do_not_matter(rng):
+    X, rate = calibration(rng)
+    X[:, 0] += 1000.0 * rng.standard_normal(len(X))
+    law = OpenLoopArcsineRegressor().fit(X, rate)
+    scaled = OpenLoopArcsineRegressor().fit(X * [1e-6, 1.8] + [0.0, 32.0], rate * 3600.0)
+    np.testing.assert_allclose(
+        scaled.predict(X * [1e-6, 1.8] + [0.0, 32.0]) / 3600.0, law.predict(X), rtol=1e-7, atol=1e-7
+    )
+
+
+def test_noise_in_the_output_reaches_the_rate_by_the_slope(rng):
+    """The estimate's variance is sigma^2 / (A K cos phi)^2, and the ends have no bias."""
+    X, rate = calibration(rng, n_rows=20_000)
+    noisy = X + np.outer(600.0 * rng.standard_normal(len(X)), [1.0, 0.0])
+    law = arcsine().fit(noisy, rate)
+    slope = 6.2e6 * np.deg2rad(0.2536) * np.cos(law.phase(X))
+    normalised = (law.predict(noisy) - rate) * slope / 600.0
+    assert normalised.std() == pytest.approx(1.0, abs=0.03)  # 6 standard errors
+    fastest = np.abs(rate) > 120.0
+    assert abs(np.mean(normalised[fastest] * np.sign(rate[fastest]))) < 0.08  # 5 standard errors
+
+
+def test_weights_count_as_copies(rng):
+    X, rate = calibration(rng, n_rows=60)
+    X[:, 0] += 1e4 * rng.standard_normal(60)
+    weights = rng.integers(0, 4, 60)
+    weighted = arcsine().fit(X, rate, sample_weight=weights)
+    repeated = arcsine().fit(np.repeat(X, weights, axis=0), np.repeat(rate, weights))
+    np.testing.assert_allclose(weighted.predict(X[weights > 0]), repeated.predict(X[weights > 0]))
+    np.testing.assert_array_equal(weighted.minimum_, repeated.minimum_)
+
+
+def test_columns_by_name_and_place(rng):
+    pd = pytest.importorskip("pandas")
+    X, rate = calibration(rng)
+    plain = arcsine().fit(X, rate)
+    frame = pd.DataFrame({"time": np.arange(len(X)), "T": X[:, 1], "counts": X[:, 0]})
+    named = arcsine(output="counts", temperature="T").fit(frame, rate)
+    np.testing.assert_array_equal(named.predict(frame), plain.predict(X))
+    placed = arcsine(output=-1, temperature=1).fit(frame.to_numpy(), rate)
+    np.testing.assert_array_equal(placed.predict(frame.to_numpy()), plain.predict(X))
+
+
+def test_without_temperature(rng):
+    rate = rng.uniform(-100, 100, 50)
+    counts = planted_output(rate, np.full(50, REFERENCE))[:, None]
+    law = OpenLoopArcsineRegressor(temperature=None).fit(counts, rate)
+    np.testing.assert_allclose(law.predict(counts), rate, atol=1e-7)
+    assert law.amplitude_.shape == law.sagnac_factor_.shape == law.bias_.shape == (1,)
+
+
+def test_constant_temperature_is_said_and_survived(rng):
+    X, rate = calibration(rng)
+    X[:, 1] = REFERENCE
+    X[:, 0] = planted_output(rate, X[:, 1])
+    with pytest.warns(ConstantInputWarning, match="20 in all rows"):
+        law = arcsine().fit(X, rate)
+    np.testing.assert_allclose(law.predict(X), rate, atol=1e-7)
+    np.testing.assert_array_equal(law.amplitude_[1:], 0.0)
+
+
+def test_a_straight_line_is_fitted_as_one(rng):
+    """A linearised gyro has no sine: the factor goes to its lower bound, and nothing breaks."""
+    rate, temperature = rng.uniform(-100, 100, 200), rng.uniform(0, 50, 200)
+    X = np.column_stack([2.0 * rate + 1e-3 * rng.standard_normal(200), temperature])
+    law = OpenLoopArcsineRegressor().fit(X, rate)
+    np.testing.assert_allclose(law.predict(X), rate, atol=5e-3)
+
+
+class TestBeyondTheSine:
+    LIMIT = 1.0
+
+    def fitted(self, rng, **parameters):
+        X, rate = calibration(rng)
+        return arcsine(max_phase=self.LIMIT, **parameters).fit(X, rate)
+
+    def row(self, phase):
+        """A row at the reference temperature with this phase, or this multiple of the sine's."""
+        return np.array([[PLANTED["amplitude"][0] * np.sin(phase), REFERENCE]])
+
+    def rate(self, phase):
+        return np.rad2deg(phase / PLANTED["sagnac_factor"][0]) - PLANTED["bias"][0]
+
+    @pytest.mark.parametrize("sign", [1.0, -1.0])
+    def test_clip_holds_the_phase(self, rng, sign):
+        law = self.fitted(rng)
+        with pytest.warns(OutOfBoundsWarning, match="1 of 1 rows follow the policy out_of_bounds"):
+            held = law.predict(self.row(sign * 1.3))
+        assert held == pytest.approx(self.rate(sign * self.LIMIT), rel=1e-7)
+
+    def test_linear_is_the_tangent(self, rng):
+        law = self.fitted(rng, out_of_bounds="linear", warn_out_of_bounds=False)
+        edge, step = self.row(self.LIMIT)[0, 0], 1e4
+        at, below = law.predict([[edge, REFERENCE], [edge * (1 - 1e-6), REFERENCE]])
+        slope = (at - below) / (1e-6 * edge)
+        beyond = law.predict([[edge + 50 * np.sign(edge) * step, REFERENCE]])[0]
+        assert beyond == pytest.approx(at + slope * 50 * np.sign(edge) * step, rel=1e-4)
+
+    def test_nan_refuses(self, rng):
+        law = self.fitted(rng, out_of_bounds="nan", warn_out_of_bounds=False)
+        predicted = law.predict(np.vstack([self.row(1.3), self.row(0.5), [[1e9, REFERENCE]]]))
+        np.testing.assert_array_equal(np.isnan(predicted), [True, False, True])
+
+    def test_raise_refuses_all(self, rng):
+        law = self.fitted(rng, out_of_bounds="raise", warn_out_of_bounds=False)
+        with pytest.raises(ValueError, match=r"1 of 2 rows cannot be inverted.*max_phase=1 rad"):
+            law.predict(np.vstack([self.row(1.3), self.row(0.5)]))
+
+    def test_flags(self, rng):
+        law = self.fitted(rng)
+        rows = np.vstack([self.row(0.5), self.row(1.3), [[1e9, REFERENCE]], [[0.0, 80.0]]])
+        np.testing.assert_array_equal(law.in_bounds(rows), [True, False, False, False])
+        np.testing.assert_array_equal(np.isnan(law.phase(rows)), [False, False, True, False])
+
+    def test_law_goes_on_outside_the_training_data_and_says_so(self, rng):
+        X, rate = calibration(rng, max_rate=65.0)
+        law = arcsine().fit(X, rate)
+        faster = np.array([[planted_output(100.0, 30.0), 30.0]])
+        with pytest.warns(OutOfBoundsWarning, match="1 of 1 rows lie outside the output or temp"):
+            assert law.predict(faster) == pytest.approx(100.0, abs=1e-5)
+        assert not law.in_bounds(faster)[0]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"output": 2}, r"output=2 is no column of X, which has 2 feature"),
+        ({"temperature": "T"}, r"X has no column temperature='T': it has no column names"),
+        ({"temperature": 0}, "Two of output=0, temperature=0 are one column"),
+        ({"temperature_rate": 1}, "Two of .* temperature_rate=1 are one column"),
+        ({"temperature": None, "temperature_rate": 1}, "of no use with temperature=None"),
+        ({"output": True}, "output=True must be the position or the name"),
+        ({"bias_degree": 6}, "bias_degree == 6"),
+        ({"max_phase": 1.6}, "max_phase == 1.6"),
+        ({"out_of_bounds": "hold"}, "out_of_bounds='hold' must be one of clip, linear, nan, raise"),
+        ({"reference_temperature": np.nan}, "reference_temperature=nan must be finite"),
+    ],
+)
+def test_bad_parameters_are_named(rng, parameters, message):
+    X, rate = calibration(rng)
+    with pytest.raises(ValueError, match=message):
+        OpenLoopArcsineRegressor(**parameters).fit(X, rate)
+
+
+def test_bad_logs_are_refused(rng):
+    X, rate = calibration(rng, n_rows=20)
+    with pytest.raises(ValueError, match="6 coefficients; n_samples = 5 rows"):
+        OpenLoopArcsineRegressor().fit(X[:5], rate[:5])
+    with pytest.raises(ValueError, match=r"the rate \(y\) never changes"):
+        OpenLoopArcsineRegressor().fit(X, np.full(20, 3.0))
+    with pytest.raises(ValueError, match="the output never changes"):
+        OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
+    with pytest.raises(ValueError, match="sample_weight must be zero or positive"):
+        OpenLoopArcsineRegressor().fit(X, rate, sample_weight=-np.ones(20))
+
+
+def test_degrees_are_found_by_grid_search(rng):
+    X, rate = calibration(rng, n_rows=300, bias=[0.0, 1e-3, 1e-4])
+    X[:, 0] += 300.0 * rng.standard_normal(300)
+    search = GridSearchCV(
+        arcsine(warn_out_of_bounds=False),
+        {"bias_degree": [0, 1, 2]},
+        cv=3,
+        scoring="neg_root_mean_squared_error",
+    ).fit(X, rate)
+    assert search.best_params_ == {"bias_degree": 2}
+    assert clone(search.best_estimator_).bias_degree == 2
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+@pytest.mark.parametrize(
+    ("estimator", "check"),
+    [
+        pytest.param(clone, check, id=getattr(check, "func", check).__name__)
+        for clone, check in estimator_checks_generator(OpenLoopArcsineRegressor())
+    ],
+)
+def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
+    check(estimator)

@@ -1,0 +1,120 @@
+"""Rules that do nothing are found, and can go."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
+from skanfis.membership import Bell, Gaussian
+from skanfis.training import redundant_rules, rule_statistics, without_rules
+
+from .. import oracles
+
+
+def scattered(centers, width=0.5):
+    centers = np.array(centers, dtype=float)
+    theta = Gaussian.from_center_and_width(centers, np.full(centers.shape, width))
+    return ScatteredAntecedent.build(Gaussian, np.arange(centers.shape[1]), theta)
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_statistics_are_those_of_the_dense_strengths(weighted):
+    g = np.random.default_rng(0)
+    rows = oracles.bumpy_rows(g, 300, 2, 1, weighted)
+    antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
+    dense = oracles.DenseProblem(rows, antecedent, 1, 1.0)
+    w = oracles.strengths(antecedent, antecedent.parameters, dense.Z)
+    found = rule_statistics(rows, antecedent)
+    assert_allclose(found.overlap, (w * dense.weight) @ w.T, rtol=1e-10)
+    assert_allclose(found.peak, w.max(axis=1), rtol=1e-10)
+    expected = [dense.weight[w.argmax(axis=0) == r].sum() for r in range(6)]
+    assert_allclose(found.strongest, expected, atol=1e-12)
+
+
+def test_rules_far_away_and_rules_alike_are_found():
+    rows = oracles.bumpy_rows(np.random.default_rng(0), 300, 2)
+    antecedent = scattered([[-1, 0], [1, 0], [1, 0], [40, 40]])
+    found = redundant_rules(rule_statistics(rows, antecedent))
+    assert [entry["rule"] for entry in found] == [2, 3]
+    assert [entry["reason"] for entry in found] == ["repeats rule 1", "never fires"]
+    assert found[1]["weight"] < 1e-6
+    assert found[0]["weight"] > 0.1
+
+
+def test_sound_rules_are_left_alone():
+    rows = oracles.bumpy_rows(np.random.default_rng(0), 300, 2)
+    grid = oracles.random_grid(np.random.default_rng(0), [Gaussian] * 2, [3, 3])
+    assert redundant_rules(rule_statistics(rows, grid)) == []
+
+
+@pytest.mark.parametrize("kind", ["grid", "scattered", "table"])
+def test_the_rest_fires_as_before_in_proportion(kind, rng):
+    g, Z = np.random.default_rng(1), rng.normal(size=(3, 50))
+    antecedent = {
+        "grid": lambda: oracles.random_grid(g, [Gaussian, Bell, Gaussian], [2, 3, 2]),
+        "scattered": lambda: oracles.random_scattered(g, Gaussian, 5, [0, 1, 2]),
+        "table": lambda: oracles.random_table(g),
+    }[kind]()
+    left, terms = without_rules(antecedent, [0, 3])
+    kept = np.setdiff1d(np.arange(antecedent.n_rules), [0, 3])
+    before = antecedent.strengths(Z)[kept]
+    assert isinstance(left, RuleTableAntecedent)
+    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
+    assert terms.size == left.n_terms
+
+
+def test_a_grid_without_a_whole_term_is_a_grid(rng):
+    antecedent = oracles.random_grid(np.random.default_rng(1), [Gaussian, Bell], [3, 2])
+    left, terms = without_rules(antecedent, [2, 3])  # the middle term of the first input
+    assert isinstance(left, GridAntecedent)
+    assert left.counts == (2, 2)
+    assert_array_equal(terms, [0, 2, 3, 4])
+    Z = rng.normal(size=(2, 50))
+    before = antecedent.strengths(Z)[[0, 1, 4, 5]]
+    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-10)
+
+
+def test_an_input_left_with_one_term_has_none(rng):
+    antecedent = oracles.random_grid(np.random.default_rng(1), [Gaussian, Bell], [3, 2])
+    left, terms = without_rules(antecedent, [1, 3, 5])
+    assert left.counts == (3,)
+    assert_array_equal(terms, [0, 1, 2])
+    Z = rng.normal(size=(2, 50))
+    assert_allclose(left.strengths(Z).sum(axis=0), 1.0)
+
+
+def gap(seed=0, n_rows=400):
+    """Two clumps of rows on the diagonal: half of a grid's cells are empty."""
+    g = np.random.default_rng(seed)
+    clump = g.integers(0, 2, n_rows)
+    X = np.column_stack([clump, clump]) * 40.0 + 0.3 * g.normal(size=(n_rows, 2))
+    return X, np.where(clump, X[:, 0], -X[:, 1]) + 0.05 * g.normal(size=n_rows)
+
+
+def test_empty_cells_are_reported_and_pruned_with_the_loss_measured():
+    X, y = gap()
+    settings = {"n_mfs": 4, "solver": "lse", "alpha": 1e-8}
+    whole = ANFISRegressor(**settings).fit(X, y)
+    pruned = ANFISRegressor(prune=True, **settings).fit(X, y)
+    # Terms 0 and 1 of one input never meet terms 2 and 3 of the other.
+    empty = [4 * i + j for i in range(4) for j in range(4) if (i < 2) != (j < 2)]
+    assert [r["rule"] for r in whole.redundant_rules_] == empty
+    assert {r["reason"] for r in whole.redundant_rules_} == {"never fires"}
+    assert whole.pruning_ is None
+    assert pruned.n_rules_ == 8
+    assert [r["rule"] for r in pruned.pruning_["rules"]] == empty
+    loss = np.mean((pruned.predict(X) - y) ** 2) / np.var(y)
+    assert_allclose(pruned.pruning_["loss_after"], loss, rtol=1e-6)
+    assert_allclose(pruned.pruning_["loss_before"], whole.loss_curve_[-1], rtol=1e-6)
+    assert_allclose(loss, whole.loss_curve_[-1], rtol=1e-2)
+    assert pruned.model_.term_names == ("very low", "low", "high", "very high") * 2
+    assert pruned.initial_memberships_ == whole.initial_memberships_
+    assert_allclose(pruned.predict(X), whole.predict(X), atol=0.05)
+
+
+def test_pruning_without_need_changes_nothing():
+    X, y = gap()
+    one, other = (ANFISRegressor(n_mfs=[2, 1], prune=prune).fit(X, y) for prune in (False, True))
+    assert other.pruning_ is None
+    assert_array_equal(one.predict(X), other.predict(X))

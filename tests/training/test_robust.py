@@ -1,0 +1,96 @@
+"""Huber's loss: against the linear estimator written out, and with planted outliers."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.linear_model import LinearRegression
+
+from skanfis import ANFISRegressor
+from skanfis.training import robust
+
+
+def with_outliers(n_rows=600, part=0.05, seed=0):
+    g = np.random.default_rng(seed)
+    X = g.uniform(-3, 3, (n_rows, 2))
+    truth = np.sin(X[:, 0]) + 0.5 * X[:, 1]
+    y = truth + 0.1 * g.normal(size=n_rows)
+    is_outlier = g.random(n_rows) < part
+    y[is_outlier] += 8.0
+    return X, y, truth, is_outlier
+
+
+def linear_huber(X, y, epsilon, sample_weight=None):
+    """Reweighted least squares of a linear model, written out."""
+    own = np.ones(len(y)) if sample_weight is None else sample_weight
+    weights = np.ones(len(y))
+    for _ in range(500):
+        residual = y - LinearRegression().fit(X, y, sample_weight=own * weights).predict(X)
+        order = np.argsort(np.abs(residual))
+        upto = np.cumsum(own[order])
+        median = np.abs(residual)[order][np.searchsorted(upto, 0.5 * upto[-1])]
+        if sample_weight is None:
+            median = np.median(np.abs(residual))
+        weights = np.minimum(1.0, epsilon * median / 0.6744897501960817 / np.abs(residual))
+    return LinearRegression().fit(X, y, sample_weight=own * weights), weights
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("epsilon", [1.0, 1.35, 3.0])
+def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
+    monkeypatch.setattr(robust, "_SETTLED", 1e-12)
+    monkeypatch.setattr(robust, "_MOST_ROUNDS", 500)
+    X, y, *_ = with_outliers(200)
+    weight = np.random.default_rng(1).uniform(0.5, 2.0, 200) if weighted else None
+    model = ANFISRegressor(n_mfs=1, loss="huber", epsilon=epsilon).fit(X, y, sample_weight=weight)
+    linear, weights = linear_huber(X, y, epsilon, weight)
+    expected = [linear.intercept_, *linear.coef_]
+    assert_allclose(model.consequents_[0], expected, rtol=1e-6)
+    assert_allclose(model.robust_weights_, weights, rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize("settings", [{}, {"n_mfs": [3, 1]}, {"partition": "fcm"}])
+def test_outliers_do_little(settings):
+    X, y, truth, is_outlier = with_outliers()
+    error = {}
+    for loss in ("squared_error", "huber"):
+        model = ANFISRegressor(loss=loss, tol=1e-2, **settings).fit(X, y)
+        error[loss] = np.sqrt(np.mean((model.predict(X) - truth) ** 2))
+    assert error["huber"] < 0.06
+    assert error["huber"] < 0.2 * error["squared_error"]
+    assert model.robust_weights_[is_outlier].max() < 0.1
+    assert np.median(model.robust_weights_[~is_outlier]) == 1.0
+
+
+def test_weights_are_one_or_fall_with_the_residual():
+    X, y, *_ = with_outliers()
+    model = ANFISRegressor(n_mfs=[3, 1], loss="huber", epsilon=1.35).fit(X, y)
+    residual = np.abs(y - model.predict(X))
+    scale = np.median(residual) / 0.6744897501960817
+    expected = np.minimum(1.0, 1.35 * scale / residual)
+    assert_allclose(model.robust_weights_, expected, atol=0.02)
+
+
+def test_exact_data_with_a_few_outliers_are_met_exactly():
+    g = np.random.default_rng(5)
+    X = g.uniform(-1, 1, (300, 2))
+    y = 2.0 + X @ [1.0, -3.0]
+    y[:10] += 5.0
+    model = ANFISRegressor(n_mfs=1, loss="huber").fit(X, y)
+    assert_allclose(model.consequents_[0], [2.0, 1.0, -3.0], atol=1e-3)
+
+
+def test_several_outputs_share_their_weights():
+    X, y, truth, is_outlier = with_outliers()
+    both = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, np.column_stack([y, -2.0 * truth]))
+    assert both.robust_weights_.shape == (len(y),)
+    assert both.robust_weights_[is_outlier].max() < 0.1
+
+
+def test_rows_that_were_not_trained_on_have_no_weight():
+    X, y, *_ = with_outliers(200)
+    model = ANFISRegressor(n_mfs=2, loss="huber", early_stopping=True, validation_fraction=0.25)
+    assert np.isnan(model.fit(X, y).robust_weights_).sum() == 50
+    weight = np.ones(200)
+    weight[3] = 0.0
+    dropped = ANFISRegressor(n_mfs=2, loss="huber", tol=1e-2).fit(X, y, sample_weight=weight)
+    assert_array_equal(np.flatnonzero(np.isnan(dropped.robust_weights_)), [3])

@@ -1,0 +1,285 @@
+"""Starts: imported rules, named partitions, mixed families, chosen features, warm starts."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+from sklearn.datasets import make_friedman1
+
+from skanfis import ANFISRegressor
+from skanfis.cluster import SubtractiveClustering
+from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.membership import Gaussian
+
+QUIET = {"warn_out_of_bounds": False}
+
+
+def surface(n_rows=300, seed=0):
+    g = np.random.default_rng(seed)
+    frame = pd.DataFrame(
+        {
+            "time": g.uniform(0, 600, n_rows),
+            "temperature": g.uniform(-40, 60, n_rows),
+            "rate": g.uniform(-100, 100, n_rows),
+        }
+    )
+    y = 0.01 * frame["rate"] * np.sin(frame["temperature"] / 20) + np.exp(-frame["time"] / 200)
+    return frame, y + 0.01 * g.normal(size=n_rows)
+
+
+@pytest.fixture(scope="module", name="data")
+def measured():
+    return surface()
+
+
+@pytest.fixture(scope="module", params=[{"n_mfs": [2, 3, 1]}, {"partition": "fcm"}])
+def known(request, data):
+    return ANFISRegressor(tol=1e-2, **request.param).fit(*data)
+
+
+class TestImported:
+    def test_without_iterations_nothing_is_learnt(self, data, known):
+        X, y = surface(50, seed=1)
+        for given in (known, known.model_):
+            model = ANFISRegressor(partition=given, max_iter=0, **QUIET).fit(X, y + 5.0)
+            assert_array_equal(model.predict(data[0]), known.predict(data[0]))
+            assert model.memberships_ == model.initial_memberships_ == known.memberships_
+            loss = np.mean((model.predict(X) - y - 5.0) ** 2) / np.var(y)
+            assert_allclose(model.loss_curve_, loss, rtol=1e-9)
+            assert "as they were given" in model.status_
+
+    def test_with_least_squares_the_consequents_alone_are_learnt(self, data, known):
+        X, y = data
+        model = ANFISRegressor(partition=known, solver="lse").fit(X, 3.0 * y - 1.0)
+        for one, other in zip(model.memberships_, known.memberships_, strict=True):
+            assert one["name"] == other["name"]
+            assert_allclose(
+                [v for v in one.values() if isinstance(v, float)],
+                [v for v in other.values() if isinstance(v, float)],
+                rtol=1e-9,
+            )
+        again = ANFISRegressor(partition=known, solver="lse").fit(X, y)
+        assert_allclose(model.predict(X), 3.0 * again.predict(X) - 1.0, atol=1e-8)
+
+    def test_training_goes_on_from_there(self, data, known):
+        model = ANFISRegressor(partition=known.model_, tol=1e-3).fit(*data)
+        assert_allclose(model.loss_curve_[0], known.loss_curve_[-1], rtol=0.02)
+        assert model.loss_curve_[-1] <= model.loss_curve_[0]
+
+    def test_other_data_may_have_another_range(self, known):
+        X, y = surface(300, seed=2)
+        X["rate"] *= 10.0
+        model = ANFISRegressor(partition=known.model_, solver="lse").fit(X, y)
+        first, second = (m.memberships_[0] for m in (model, known))
+        assert_allclose(first["center"], second["center"])
+
+    def test_a_grid_whose_terms_are_not_in_order_can_be_trained(self, data):
+        X, y = data
+        model = ANFISRegressor(n_mfs=[3, 1, 1], max_iter=0).fit(X, y).model_
+        theta = model.antecedent.groups[0].theta.copy()
+        theta[0] = theta[0, [1, 0, 2]]
+        turned = model.antecedent.with_parameters(theta.ravel())
+        object.__setattr__(model, "antecedent", turned)
+        trained = ANFISRegressor(partition=model, tol=1e-2).fit(X, y)
+        assert trained.loss_curve_[-1] < trained.loss_curve_[0]
+
+    def test_a_clone_has_lost_its_rules_and_says_so(self, data, known):
+        model = clone(ANFISRegressor(partition=known))
+        with pytest.raises(ValueError, match=r"has no rules: .* Give its model_ instead"):
+            model.fit(*data)
+        clone(ANFISRegressor(partition=known.model_, max_iter=0)).fit(*data)
+
+    def test_inputs_must_be_the_same(self, data, known):
+        X, y = data
+        with pytest.raises(ValueError, match=r"rules on 3 inputs .* but X has 2 columns"):
+            ANFISRegressor(partition=known).fit(X[["time", "rate"]], y)
+        with pytest.raises(ValueError, match="give them in this order and by these names"):
+            ANFISRegressor(partition=known).fit(X[["time", "rate", "temperature"]], y)
+        ANFISRegressor(partition=known, max_iter=0).fit(X.to_numpy(), y)
+
+    def test_outputs_must_be_as_many_where_nothing_is_learnt(self, data, known):
+        X, y = data
+        with pytest.raises(ValueError, match="a model of 1 outputs, but y has 2"):
+            ANFISRegressor(partition=known, max_iter=0).fit(X, np.column_stack([y, y]))
+
+    def test_a_number_of_terms_contradicts_it(self, data, known):
+        with pytest.raises(ValueError, match=r"n_mfs=3 .* for the imported rules"):
+            ANFISRegressor(n_mfs=3, partition=known).fit(*data)
+
+
+def friedman(n_rows):
+    X, y = make_friedman1(n_rows, n_features=8, noise=1.0, random_state=0)
+    return X, y
+
+
+@pytest.mark.parametrize("partition", ["subtractive", "fcm"])
+def test_named_clusterings_find_rules_that_generalise(partition):
+    X, y = friedman(2000)
+    model = ANFISRegressor(partition=partition, **QUIET).fit(X[:1000], y[:1000])
+    assert 2 <= model.n_rules_ <= 12
+    # The noise is 1, a linear model leaves 2.6.
+    assert np.sqrt(np.mean((model.predict(X[1000:]) - y[1000:]) ** 2)) < 1.2
+
+
+def test_subtractive_is_the_clusterer_of_that_radius(data):
+    X, y = data
+    radius = 0.5 * np.sqrt(4 / 2)
+    named = ANFISRegressor(partition="subtractive", tol=1e-2).fit(X, y)
+    given = ANFISRegressor(partition=SubtractiveClustering(radius=radius), tol=1e-2).fit(X, y)
+    assert_array_equal(named.predict(X), given.predict(X))
+
+
+def test_number_of_fuzzy_clusters_is_reported(data):
+    model = ANFISRegressor(partition="fcm").fit(*data)
+    assert model.structures_[0]["structure"] == f"{model.n_rules_} fuzzy clusters"
+
+
+def test_families_may_differ_from_input_to_input(data):
+    X, y = data
+    mixed = ["bell", "gaussian", "triangular"]
+    for settings in ({"n_mfs": 2}, {"partition": KMeans(3, random_state=0)}, {}):
+        model = ANFISRegressor(mf=mixed, tol=1e-2, **settings).fit(X, y)
+        found = {term["input"]: term["function"] for term in model.memberships_}
+        expected = dict(zip(X.columns, mixed, strict=True))
+        assert found.items() <= expected.items()
+        assert model.loss_curve_[-1] < 0.5
+
+
+def test_a_family_of_ones_own_by_its_class(data):
+    one, other = (ANFISRegressor(n_mfs=2, mf=mf).fit(*data) for mf in (Gaussian, "gaussian"))
+    assert_array_equal(one.predict(data[0]), other.predict(data[0]))
+
+
+@pytest.mark.parametrize(
+    ("mf", "message"),
+    [
+        (["bell"], "has 1 entries, but X has 3 columns"),
+        (["bell", "gaussian", "square"], "mf holds 'square': it must be one of 'gaussian'"),
+        (int, "mf holds <class 'int'>"),
+    ],
+)
+def test_families_that_are_none_are_refused(data, mf, message):
+    with pytest.raises(ValueError, match=message):
+        ANFISRegressor(n_mfs=2, mf=mf).fit(*data)
+
+
+class TestFeatures:
+    @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
+    def test_rules_are_on_the_premise_features_alone(self, data, settings):
+        model = ANFISRegressor(premise_features=["time", "temperature"], **settings).fit(*data)
+        assert {term["input"] for term in model.memberships_} <= {"time", "temperature"}
+        assert model.n_rules_ > 1
+
+    @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
+    def test_consequents_are_in_the_consequent_features_alone(self, data, settings):
+        X, y = data
+        model = ANFISRegressor(consequent_features=["rate"], **settings).fit(X, y)
+        assert_array_equal(model.consequents_[:, 1:3], 0.0)
+        assert (model.consequents_[:, 3] != 0.0).all()
+        assert_allclose(
+            np.mean((model.predict(X) - y) ** 2) / np.var(y), model.loss_curve_[-1], rtol=1e-8
+        )
+
+    def test_a_scheduled_scale_factor_is_found(self):
+        # y = K(T) rate: rules on temperature, consequents in rate.
+        X, _ = surface(400)
+        y = (1.0 + 1e-3 * X["temperature"]) * X["rate"]
+        model = ANFISRegressor(
+            n_mfs=[1, 2, 1], premise_features=[1], consequent_features=[False, False, True]
+        ).fit(X, y)
+        assert_allclose(model.predict(X), y, atol=0.05)
+        assert_allclose(model.model_.coverage(X.to_numpy()), 1.0)
+
+    def test_they_may_be_masks_positions_or_names(self, data):
+        given = (["rate", "time"], [0, 2], [-1, 0], [True, False, True], np.array([0, 2]))
+        found = [
+            ANFISRegressor(n_mfs=2, max_iter=0, consequent_features=f).fit(*data).predict(data[0])
+            for f in given
+        ]
+        for one, other in pairwise(found):
+            assert_array_equal(one, other)
+
+    @pytest.mark.parametrize(
+        ("settings", "message"),
+        [
+            ({"premise_features": ["speed"]}, "'speed', which is no column of X; .*'time'"),
+            ({"premise_features": [3]}, "premise_features names 3, which is no column"),
+            ({"premise_features": [0, 0]}, "names a column twice"),
+            ({"premise_features": []}, "names no column"),
+            ({"premise_features": [True, False]}, "a mask of 2 entries, but X has 3"),
+            ({"consequent_features": [0], "order": 0}, "means nothing with order=0"),
+            (
+                {"n_mfs": [2, 1, 1], "premise_features": ["rate"]},
+                "'time', which is not among premise_features",
+            ),
+        ],
+    )
+    def test_what_does_not_fit_is_refused(self, data, settings, message):
+        with pytest.raises(ValueError, match=message):
+            ANFISRegressor(**settings).fit(*data)
+
+
+class TestWarmStart:
+    def test_two_short_fits_go_as_far_as_one(self, data):
+        X, y = data
+        settings = {"n_mfs": 2, "solver": "lbfgs", "tol": 1e-9, "max_iter": 10}
+        model = ANFISRegressor(warm_start=True, **settings)
+        with pytest.warns(match="max_iter was reached"):
+            losses = [model.fit(X, y).loss_curve_ for _ in range(3)]
+        for before, after in pairwise(losses):
+            assert_allclose(after[0], before[-1], rtol=0.2)
+            assert after[-1] < before[-1]
+
+    def test_the_ridge_that_was_chosen_stays(self, data):
+        model = ANFISRegressor(warm_start=True).fit(*data)
+        alpha, rules = model.alpha_, model.n_rules_
+        model.fit(*surface(200, seed=3))
+        assert (model.alpha_, model.n_rules_) == (alpha, rules)
+        assert model.structures_ == []
+
+    def test_other_parameters_of_the_start_are_refused(self, data):
+        model = ANFISRegressor(n_mfs=2, warm_start=True, tol=1e-1).fit(*data)
+        with pytest.raises(ValueError, match="but n_mfs has been changed"):
+            model.set_params(n_mfs=3).fit(*data)
+        model.set_params(warm_start=False).fit(*data)
+        assert model.n_rules_ == 27
+
+    def test_other_inputs_are_refused(self, data):
+        X, y = data
+        model = ANFISRegressor(n_mfs=2, warm_start=True, tol=1e-1).fit(X, y)
+        with pytest.raises(ValueError, match=r"warm_start=True has rules on 3 inputs"):
+            model.fit(X[["time", "rate"]], y)
+
+
+def test_names_of_terms_are_carried(data):
+    X, y = data
+    settings = {"n_mfs": [3, 2, 1], "tol": 1e-1}
+    model = ANFISRegressor(term_names={"temperature": ["cold", "hot"]}, **settings).fit(X, y)
+    assert model.model_.term_names == ("low", "medium", "high", "cold", "hot")
+    assert [term["name"] for term in model.memberships_] == list(model.model_.term_names)
+    later = ANFISRegressor(partition=model.model_, max_iter=0).fit(X, y)
+    assert later.model_.term_names == model.model_.term_names
+    with pytest.raises(ValueError, match="3 names for input 'temperature', which has 2 terms"):
+        ANFISRegressor(term_names={"temperature": ["a", "b", "c"]}, **settings).fit(X, y)
+
+
+def test_outputs_are_named_by_the_target(data):
+    X, y = data
+    model = ANFISRegressor(n_mfs=1)
+    assert model.fit(X, y.rename("error")).model_.output_names == ("error",)
+    both = pd.DataFrame({"bias": y, "scale": -y})
+    assert model.fit(X, both).model_.output_names == ("bias", "scale")
+    assert model.fit(X, y.to_numpy()).model_.output_names == ("y",)
+    assert model.fit(X, both.to_numpy()).model_.output_names == ("y0", "y1")
+
+
+def test_imported_rules_warn_of_rows_out_of_their_own_range(data, known):
+    X, y = data
+    model = ANFISRegressor(partition=known, max_iter=0).fit(X[:5], y[:5])
+    far = X[:2].assign(rate=1e4)
+    with pytest.warns(OutOfBoundsWarning, match="'rate'"):
+        model.predict(far)
