@@ -8,8 +8,17 @@ from shlex import join
 from .fresh import alone, run_benchmark
 from .report import Results, machine, markdown
 
-ALWAYS = ("jang", "gyro", "campaign", "one_pass", "memory", "one_row", "file_size")
-ON_REQUEST = ("structure", "start", "peers", "fuzz_fis")
+ALWAYS = ("jang", "gyro", "campaign", "one_pass", "memory", "one_row", "file_size", "command")
+ON_REQUEST = (
+    "compensation",
+    "solvers",
+    "partitions",
+    "structure",
+    "start",
+    "peers",
+    "fuzz_fis",
+    "compiled",
+)
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
 

@@ -40,8 +40,8 @@ print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X))
 # Rules as text
 # -------------
 #
-# The weightiest first, to three digits. Consequents are told by the distance from round numbers near
-# the mean, so that their constants are values which the model takes there.
+# The weightiest first, to three digits. Consequents are told by the distance from round numbers
+# near the mean, so that their constants are values which the rules take there.
 
 print(export_text(model, precision=3, max_rules=4, output_names=["error"]))
 

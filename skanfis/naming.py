@@ -75,7 +75,7 @@ def _terms(antecedent):
 def _near(places):
     """Places in as few digits as tell them apart; equal ones are numbered."""
     for digits in range(3, _MOST_DIGITS + 1):
-        written = [f"{place:.{digits}g}" for place in places]
+        written = [_plain(place, digits) for place in places]
         if len(set(written)) == len(set(places)):
             break
     counts: dict[str, int] = {}
@@ -84,6 +84,14 @@ def _near(places):
         counts[text] = counts.get(text, 0) + 1
         names.append(f"near {text}" + (f" ({counts[text]})" if counts[text] > 1 else ""))
     return names
+
+
+def _plain(number, digits):
+    """So many significant digits, without an exponent where a person would write none."""
+    if 1e-4 <= abs(number) < 1e9:
+        shown = {"precision": digits, "unique": False, "fractional": False, "trim": "-"}
+        return np.format_float_positional(number, **shown)
+    return f"{number:.{digits}g}"
 
 
 def _check_given(given, n_terms, input_name):

@@ -10,6 +10,7 @@ from sklearn.utils import check_random_state, column_or_1d
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from ._anfis import TrainingData, train
+from ._notebook import RulesReprMixin
 from ._sklearn import (
     CallbackSupportMixin,
     HasMethods,
@@ -29,7 +30,7 @@ from .training import CallbackBridge, Partition
 __all__ = ["ANFISRegressor"]
 
 
-class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
+class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseEstimator):
     r"""Adaptive neuro-fuzzy inference system for regression.
 
     A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN

@@ -41,23 +41,23 @@ TABLE = {
     "training": ([*KERNEL, "_validation", "cluster", "partition"], LEARNING),
     "_anfis": ([*KERNEL, "_sklearn", "_validation", "partition", "training"], LEARNING),
     "regressor": (
-        [*KERNEL, "_sklearn", "_validation", "partition", "training", "_anfis"],
-        LEARNING,
-    ),
-    "classifier": (
-        [*KERNEL, "_sklearn", "_validation", "partition", "training", "_anfis"],
+        [*KERNEL, "_sklearn", "_validation", "_notebook", "partition", "training", "_anfis"],
         LEARNING,
     ),
     "inspection": (["model", "naming", "_validation", "export"], [*PLOTTING, "pandas"]),
     "export": (
-        ["exceptions", "membership", "antecedent", "naming", "model", "_validation"],
-        [*NUMERIC, "sklearn", "pandas"],
+        [PUBLIC, "exceptions", "membership", "antecedent", "naming", "model", "_validation"],
+        [*NUMERIC, "sklearn", "pandas", "onnx", "skl2onnx"],
     ),
+    "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
-    "gyro": ([PUBLIC, "exceptions", "inspection", "datasets"], [*PLOTTING, "pandas"]),
-    PUBLIC: (["exceptions", "regressor", "classifier"], []),
+    "gyro": (
+        [PUBLIC, "exceptions", "inspection", "export", "datasets"],
+        [*PLOTTING, "pandas", "allantools", "joblib"],
+    ),
+    PUBLIC: (["exceptions", "regressor"], []),
 }
-ONLY_INSIDE_FUNCTIONS = {"matplotlib"}
+ONLY_INSIDE_FUNCTIONS = {"matplotlib", "allantools", "onnx", "skl2onnx"}
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 
 

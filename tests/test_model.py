@@ -73,6 +73,7 @@ MODELS = {
     "order 0": build(grid(), order=0),
     "order 0, outputs": build(scattered(Bell), order=0, n_outputs=3),
     "scattered": build(scattered(), n_outputs=2),
+    "no terms": build(GridAntecedent((), counts=())),
     "rule table": build(oracles.random_table(np.random.default_rng(1)), n_outputs=2),
     "scattered on two inputs": build(scattered(Gaussian, (0, 2))),
 }

@@ -33,6 +33,14 @@ def test_other_terms_are_named_by_where_they_stand():
     assert found == ("near 21.3", "near 1000000001", "near -3", "near 1000000002")
 
 
+@pytest.mark.parametrize(
+    ("place", "name"),
+    [(2213.4, "2210"), (-0.0123456, "-0.0123"), (0.0, "0"), (1e12, "1e+12"), (3e-7, "3e-07")],
+)
+def test_places_are_written_as_a_person_would(place, name):
+    assert default_term_names(scattered([[place]])) == (f"near {name}",)
+
+
 def test_terms_at_one_place_are_told_apart():
     assert default_term_names(scattered([[1.0], [1.0]])) == ("near 1", "near 1 (2)")
 

@@ -9,7 +9,14 @@ import pytest
 
 import skanfis
 
-PUBLIC_MODULES = ["skanfis", "skanfis.cluster", "skanfis.datasets", "skanfis.gyro"]
+PUBLIC_MODULES = [
+    "skanfis",
+    "skanfis.cluster",
+    "skanfis.datasets",
+    "skanfis.export",
+    "skanfis.gyro",
+    "skanfis.inspection",
+]
 API_PAGE = Path(__file__).parents[1] / "docs" / "api.rst"
 
 

@@ -83,6 +83,8 @@ class GridAntecedent(Antecedent):
         return strengths, log_mu
 
     def term_sensitivity(self, rule_outputs, output, shares):
+        if not self.counts:
+            return np.empty((0, rule_outputs.shape[1]))
         sensitivity = _grid_indicator(self.counts) @ rule_outputs
         sensitivity -= shares * output
         return sensitivity

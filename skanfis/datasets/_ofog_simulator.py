@@ -196,7 +196,7 @@ def make_ofog(
     with the coil's temperature :math:`T`, S = 1 + scale_factor, its warm-up w, and the bias
     :math:`b` a sum of seven; each part's share of the error is the part of b times
     [y(b) - y(0)] / b. Temperature coefficients count from 25 degC. Counts are
-    :math:`A K_0 y` with the nominal amplitude A.
+    :math:`A K_0 y` with the amplitude A and the Sagnac factor of the nominal gyro, y in rad/s.
 
     The coil follows :math:`\tau_{th} \, \dot T = T_{ambient} + \Delta T_{self} - T`, and the
     thermometer the coil with a lag :math:`\tau_s \, \dot T_s = T - T_s`, both starting equal;

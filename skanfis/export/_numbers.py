@@ -194,11 +194,11 @@ def _term_tables(model, low, high):
         locations = [(*parts, beyond) for parts in locations]
         exact = np.array([[fsum(parts) for parts in zip(*loc, strict=True)] for loc in locations])
         near = _rounded(exact, dtype, what)
-        rest = [
+        parts_left = [
             [fsum([*parts, -float(first)]) for *parts, first in zip(*loc, row, strict=True)]
             for loc, row in zip(locations, near, strict=True)
         ]
-        rest = np.array(rest).reshape(near.shape).astype(dtype)
+        rest = np.array(parts_left).reshape(near.shape).astype(dtype)
         others = np.array([_rounded(other, dtype, what) for other in others])
         tables.append((group, start, near, rest, others))
         start += group.n_terms

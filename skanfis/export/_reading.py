@@ -12,12 +12,18 @@ __all__ = [
     "choose_rules",
     "conditions",
     "consequents_about",
+    "knows_data",
     "premise_text",
     "renamed",
     "round_reference",
 ]
 
 SORT_BY = ("weight", "rows", "rule")
+
+
+def knows_data(model):
+    """Whether the model remembers training data; one read from a .fis file has none."""
+    return bool(np.any(model.rule_rows))
 
 
 def conditions(model):
@@ -44,7 +50,7 @@ def choose_rules(model, sort_by, max_rules, min_weight):
     check_choice("sort_by", sort_by, SORT_BY)
     if max_rules is not None:
         check_count("max_rules", max_rules, 1)
-    if not isinstance(min_weight, Real) or not 0.0 <= min_weight <= 1.0:
+    if not isinstance(min_weight, Real) or not 0.0 <= float(min_weight) <= 1.0:
         raise ValueError(
             f"min_weight={min_weight!r} must be a number from 0 to 1: a part of the weight of the "
             "training data."

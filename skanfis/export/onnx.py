@@ -6,6 +6,8 @@ strengths. The continuation "linear" carries the derivative along the way out of
 same operations.
 """
 
+import operator
+
 import numpy as np
 
 from ..membership import MEMBERSHIPS
@@ -62,18 +64,18 @@ def register_onnx_converter():
     )
 
 
-def _set_shapes(operator):
+def _set_shapes(node):
     """Type and shape of the output."""
     from skl2onnx.common.data_types import DoubleTensorType, FloatTensorType
 
-    given = operator.inputs[0].type
+    given = node.inputs[0].type
     kind = DoubleTensorType if isinstance(given, DoubleTensorType) else FloatTensorType
-    n_outputs = operator.raw_operator.model_.n_outputs
-    operator.outputs[0].type = kind([operator.inputs[0].get_first_dimension(), n_outputs])
+    n_outputs = node.raw_operator.model_.n_outputs
+    node.outputs[0].type = kind([node.inputs[0].get_first_dimension(), n_outputs])
 
 
-def _convert(scope, operator, container):
-    """Write the model of ``operator.raw_operator`` as nodes."""
+def _convert(scope, node, container):
+    """Write the model of ``node.raw_operator`` as nodes."""
     from onnx import TensorProto
     from skl2onnx.common.data_types import DoubleTensorType
 
@@ -82,7 +84,7 @@ def _convert(scope, operator, container):
             f"target_opset={container.target_opset} is too old for an ANFIS: it takes "
             f"{_OLDEST_OPSET} or newer."
         )
-    estimator, given = operator.raw_operator, operator.inputs[0]
+    estimator, given = node.raw_operator, node.inputs[0]
     model = estimator.model_.with_out_of_bounds(estimator.out_of_bounds)
     if model.out_of_bounds == "raise":
         raise ValueError(
@@ -94,7 +96,7 @@ def _convert(scope, operator, container):
     graph = Graph(scope, container, dtype)
     x = graph.node("Cast", graph.value(given.full_name), to=kind)
     y = _Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
-    graph.node("Identity", y, output=operator.outputs[0].full_name)
+    graph.node("Identity", y, output=node.outputs[0].full_name)
 
 
 class _Formula:
@@ -146,22 +148,25 @@ class _Formula:
 
     def _products(self, log_mu, change):
         """Of a grid: every input normalised alone, then all products of shares."""
-        strengths = changes = None
-        n_rules = 1
-        for start, count in zip(self.numbers.block_starts, self.numbers.counts, strict=True):
-            block = np.arange(start, start + count)
-            shares = log_mu.columns(block).softmax()
-            moved = None if change is None else _centred(change.columns(block), shares)
-            if strengths is None:
-                strengths, changes = shares, moved
-            else:
-                after = (n_rules * count,)
-                rows, columns = (n_rules, 1), (1, count)
-                strengths = (strengths.reshape(*rows) * shares.reshape(*columns)).reshape(*after)
-                if change is not None:
-                    changes = (changes.reshape(*rows) + moved.reshape(*columns)).reshape(*after)
+        edges = zip(self.numbers.block_starts, self.numbers.counts, strict=True)
+        blocks = [np.arange(start, start + count) for start, count in edges]
+        shares = [log_mu.columns(block).softmax() for block in blocks]
+        strengths = self._combined(shares, operator.mul)
+        if change is None:
+            return strengths, None
+        pairs = zip(blocks, shares, strict=True)
+        changes = [_centred(change.columns(block), share) for block, share in pairs]
+        return strengths, self._combined(changes, operator.add)
+
+    def _combined(self, by_input, operation):
+        """One value per rule from one per term of each input."""
+        first, *others = by_input
+        n_rules = self.numbers.counts[0]
+        for count, other in zip(self.numbers.counts[1:], others, strict=True):
+            pairs = operation(first.reshape(n_rules, 1), other.reshape(1, count))
             n_rules *= count
-        return strengths, changes
+            first = pairs.reshape(n_rules)
+        return first
 
     def _consequents(self, z):
         """f_r (n_rows, n_rules, n_outputs), less the offset; without rows for order 0."""

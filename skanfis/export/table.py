@@ -156,7 +156,7 @@ def explain(estimator, X, *, min_strength=0.0):
     table : DataFrame
         The strongest rule first, for each row and output. Columns:
 
-        * "row": its label in X, or its position where X has none;
+        * "row": its position in X, from 0;
         * "output": the name of the output;
         * "rule": the rule's number, missing for other lines;
         * "if": its terms, "other rules", or "beyond x" (see below);
@@ -192,11 +192,9 @@ def explain(estimator, X, *, min_strength=0.0):
     >>> bool(abs(table["contribution"].sum() - model.predict(X[:1])[0]) < 1e-12)
     True
     """
-    if not isinstance(min_strength, Real) or not 0.0 <= min_strength <= 1.0:
+    if not isinstance(min_strength, Real) or not 0.0 <= float(min_strength) <= 1.0:
         raise ValueError(f"min_strength={min_strength!r} must be a number from 0 to 1.")
     model, rows = fold_with_rows(estimator, X)
-    labels = getattr(X, "index", None)
-    labels = np.arange(len(rows)) if labels is None else np.asarray(labels)
     inside = model.in_bounds(rows)
     if model.out_of_bounds == "raise" and not inside.all():
         raise ValueError(model.describe_out_of_bounds(rows))
@@ -209,7 +207,6 @@ def explain(estimator, X, *, min_strength=0.0):
     if model.out_of_bounds == "linear" and not inside.all():
         lines.append(_lines_beyond(model, rows - nearest, model.gradient(nearest)))
     table = pd.concat(lines).sort_values(["row", "output", "place"], kind="stable")
-    table["row"] = labels[table["row"]]
     table["output"] = np.array(model.output_names, dtype=object)[table["output"]]
     table["rule"] = table["rule"].astype("Int64")
     return table.drop(columns="place").reset_index(drop=True)

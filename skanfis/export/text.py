@@ -11,6 +11,7 @@ from ._reading import (
     choose_rules,
     conditions,
     consequents_about,
+    knows_data,
     premise_text,
     renamed,
     round_reference,
@@ -73,7 +74,8 @@ def export_text(
     text : str
         Rules by their number, from 0, as in ``rules_`` and ``consequents_``; with the part of the
         weight of the training data on which each fires, and the number of distinct training rows on
-        which it is the strongest.
+        which it is the strongest; these two are left out where a model that was read from a file
+        knows of no data.
 
     Raises
     ------
@@ -193,13 +195,17 @@ def _count(number_of, what):
 
 
 def _heading(model, r):
+    if not knows_data(model):
+        return f"Rule {r}:"
     rows = rows_text(model.rule_rows[r])
     return f"Rule {r}, {100.0 * model.rule_weights[r]:.3g} % of the weight, strongest on {rows}:"
 
 
 def _what_is_left_out(model, chosen):
-    weight = 1.0 - model.rule_weights[chosen].sum()
     left_out = _count(model.n_rules - chosen.size, "rule")
+    if not knows_data(model):
+        return f"{left_out} left out."
+    weight = 1.0 - model.rule_weights[chosen].sum()
     return f"{left_out} with {100.0 * max(weight, 0.0):.3g} % of the weight left out."
 
 

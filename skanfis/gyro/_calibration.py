@@ -154,12 +154,10 @@ def _search(X, target, error, split, recipe, rng, tell):
 
     def score(terms, degree=1):
         make = partial(make_estimator, recipe, (degree, terms))
-        return held_out_rms(partial(_errors_of_fold, make, X, target), len(X), folds)
+        return held_out_rms(partial(_errors_of_fold, make, X, target), folds)
 
     baselines = {
-        name: held_out_rms(
-            partial(_errors_of_fold, partial(_polynomial, d), X, error), len(X), folds
-        )
+        name: held_out_rms(partial(_errors_of_fold, partial(_polynomial, d), X, error), folds)
         for name, d in _BASELINES.items()
     }
     degree = 1

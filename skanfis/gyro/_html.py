@@ -121,7 +121,7 @@ class Page:
         ]
 
     def figures(self, entries):
-        """Pictures side by side where there is room: (matplotlib figure, what it shows, caption)."""
+        """Pictures, side by side where there is room: (figure, what it shows, caption)."""
         self._parts.append('<div class="figures">')
         for figure, alt, caption in entries:
             source = f"data:image/png;base64,{base64.b64encode(_png(figure)).decode('ascii')}"

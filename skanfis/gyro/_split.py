@@ -19,6 +19,7 @@ _N_LEVEL_FOLDS_BESIDE = 3
 # More levels than a few per term of any model cannot be learnt by heart.
 _MOST_LEVELS = 100
 _SHARED = 0.1
+_ROWS_PER_LEVEL = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +111,11 @@ def _numbers(log, name):
 def _levels(log):
     """Number of each row's level of |rate|; None where the rate changes continuously."""
     try:
-        return group_by_rate_level(log["rate"].to_numpy())
+        levels = group_by_rate_level(log["rate"].to_numpy())
     except ValueError:
         return None
+    # A level for nearly every row is none: holding it out would hold out single rows.
+    return levels if np.unique(levels).size * _ROWS_PER_LEVEL <= levels.size else None
 
 
 def _share_levels(groups, levels):

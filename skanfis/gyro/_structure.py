@@ -37,7 +37,7 @@ def grow_terms(score, n_inputs, max_rules, tell):
         tell(f"terms {','.join(map(str, terms))}: held-out RMS {best:.4g} deg/s")
 
 
-def held_out_rms(fit_and_predict, n_rows, folds):
+def held_out_rms(fit_and_predict, folds):
     """RMS over the rows of all folds that were in the bounds of what was trained on.
 
     ``fit_and_predict(train, test)`` gives errors and whether each row was in bounds.

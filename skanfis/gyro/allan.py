@@ -188,7 +188,7 @@ def allan_coefficients(averaging_time, deviation):
         allan_minimum=None if "allan_minimum" in notes else minimum,
         bias_instability=None if "bias_instability" in notes else minimum / float(_FLICKER),
         # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
-        rate_random_walk=None if drift is None else drift * np.sqrt(3.0) * 60.0,
+        rate_random_walk=None if drift is None else float(drift * np.sqrt(3.0) * 60.0),
         notes=notes,
     )
 

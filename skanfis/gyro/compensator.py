@@ -1,6 +1,7 @@
 """GyroCompensator: a fitted estimator, and all that it takes to apply it to a log."""
 
 import json
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..exceptions import OutOfBoundsWarning
 from ..export import export_json
 from ..export.model_json import parse_json
 from ._ask import ask
@@ -216,8 +218,12 @@ class GyroCompensator:
             raise ValueError(f"{path} is no gyro compensator: {error}.") from error
 
     def _apply_block(self, X):
+        with warnings.catch_warnings():
+            # The status tells, row by row.
+            warnings.simplefilter("ignore", OutOfBoundsWarning)
+            predicted = self.estimator.predict(X)
         inside = ask(self.estimator, "in_bounds", X)
-        return self.estimator.predict(X), inside, ask(self.estimator, "coverage", X)
+        return predicted, inside, ask(self.estimator, "coverage", X)
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,10 +245,10 @@ class _Rules:
 def features(log, inputs, time_constant):
     """Columns that are known on board, in the order of ``inputs``."""
     has_run = "run" in log
-    clock = log[["time", "run"] if has_run else ["time"]] if "time" in log else None
     roles = {"time": "time", "run": "run" if has_run else None}
     columns = {}
     for name in inputs:
+        clock = log[[part for part in ("time", "run") if part in log]]
         if name == "time":
             columns[name] = TimeSincePowerOn(**roles).fit_transform(clock)[:, 0]
         elif name == "temperature_rate":

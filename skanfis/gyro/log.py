@@ -5,8 +5,8 @@ The columns of a log play parts: ``time``, ``temperature``, ``output`` (the gyro
 A log that has been read has its columns by these names, in s, degC and deg/s.
 """
 
+import csv
 import difflib
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +63,7 @@ class LogError(ValueError):
 
 
 def read_log(paths, *, columns=None, units=None, require=None, separator=",", decimal="."):
-    """Read one log from one or several CSV files.
+    r"""Read one log from one or several CSV files.
 
     Only the columns that play a part are read. Without a column for the run, each file is a run.
     A run never extends over two files or devices: two that only share a label are told apart.
@@ -110,7 +110,7 @@ def read_log(paths, *, columns=None, units=None, require=None, separator=",", de
     >>> from skanfis.gyro import read_log
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "log.csv"
-    ...     _ = path.write_text("t_s,temp,counts,table\\n0,293.15,-190,10\\n1,293.25,-380,20\\n")
+    ...     _ = path.write_text("t_s,temp,counts,table\n0,293.15,-190,10\n1,293.25,-380,20\n")
     ...     names = {"time": "t_s", "temperature": "temp", "output": "counts", "rate": "table"}
     ...     read_log(path, columns=names, units={"temperature": "K", "output": "counts"})
        time  temperature  output  rate
@@ -171,13 +171,13 @@ def check_log(log, *, inputs=("temperature", "output"), units=None, min_temperat
     --------
     >>> from skanfis.datasets import make_ofog
     >>> from skanfis.gyro import check_log
-    >>> log = make_ofog(n_devices=1, n_runs=3, random_state=0)
-    >>> check_log(log).shape
-    (1080, 16)
+    >>> log = make_ofog(n_devices=1, n_runs=3, random_state=0).round({"temperature": 1})
+    >>> check_log(log) is log
+    True
     >>> check_log(log.assign(temperature=log["temperature"] + 273.15))
     Traceback (most recent call last):
         ...
-    skanfis.gyro.log.LogError: column 'temperature', row 0: 248.0 degC is not plausible ...
+    skanfis.gyro.log.LogError: column 'temperature', row 0: ... degC is not plausible ...
     """
     units = CANONICAL | declared_units(units)
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
@@ -207,22 +207,23 @@ def _checked(given, what, allowed):
 
 def _read_table(path, names, units, wanted, separator, decimal):
     """The parts of one file, converted; LogError with the file's name, column and line."""
-    parts = _parts_in(path, names, wanted, separator)
+    header = _header(path, separator)
+    for part in COLUMNS:
+        if part in wanted and names[part] not in header:
+            raise LogError(f"{path}: {_no_column(part, names[part], header)}")
+    parts = [part for part in COLUMNS if names[part] in header]
     quantities = [part for part in QUANTITIES if part in parts]
-    options = {"sep": separator, "decimal": decimal, "encoding": "utf-8-sig", "compression": None}
-    options |= {"skipinitialspace": True, "index_col": False}
     dtypes = {names[part]: float if part in quantities else "category" for part in parts}
+    _check_lengths(path, separator, len(header))
+    options = _options(separator) | {"decimal": decimal, "usecols": list(dtypes)}
     try:
-        with warnings.catch_warnings():
-            # Rows longer than the header: pandas would go on, with what it thinks is meant.
-            warnings.simplefilter("error", pd.errors.ParserWarning)
-            table = pd.read_csv(path, usecols=list(dtypes), dtype=dtypes, **options)
-    except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+        table = pd.read_csv(path, dtype=dtypes, **options)
+    except pd.errors.ParserError as error:
         raise LogError(f"{path}: is no table: {error}") from error
     except ValueError as error:
-        text = pd.read_csv(path, usecols=list(dtypes), dtype=str, **options)
+        text = pd.read_csv(path, dtype=str, **options)
         raise _no_number(text, path, quantities, names, decimal, error) from error
-    table = table.rename(columns={names[part]: part for part in parts})
+    table = table.rename(columns={names[part]: part for part in parts})[parts]
     try:
         for part in quantities:
             _check_finite(table[part], part)
@@ -233,35 +234,52 @@ def _read_table(path, names, units, wanted, separator, decimal):
             table[part] = table[part].cat.rename_categories(str)
     except LogError as error:
         raise _located(path, names, error) from error
-    return table[list(parts)]
+    return table
 
 
-def _parts_in(path, names, wanted, separator):
-    """The parts that a file has; LogError where it lacks one that is wanted."""
+def _header(path, separator):
+    """Names of the columns of a file; LogError where it has none."""
     try:
-        header = list(
-            pd.read_csv(
-                path,
-                sep=separator,
-                nrows=0,
-                encoding="utf-8-sig",
-                skipinitialspace=True,
-                compression=None,
-            )
-        )
+        return list(pd.read_csv(path, nrows=0, **_options(separator)))
     except pd.errors.EmptyDataError as error:
         raise LogError(f"{path}: is empty.") from error
     except UnicodeDecodeError as error:
         raise LogError(f"{path}: is not text in UTF-8; save it as such.") from error
-    for part in COLUMNS:
-        if part in wanted and names[part] not in header:
-            raise LogError(f"{path}: {_no_column(part, names[part], header)}")
-    return tuple(part for part in COLUMNS if names[part] in header)
+    except pd.errors.ParserError as error:
+        raise LogError(f"{path}: is no table: {error}") from error
+
+
+def _check_lengths(path, separator, n_columns):
+    """Refuse rows longer than the header, such as those of a decimal comma beside commas.
+
+    pandas cuts them without a word where it reads some columns only.
+    """
+    with open(path, encoding="utf-8-sig", newline="") as file:
+        for number, line in enumerate(file, start=1):
+            # Counting is fast, and nearly always enough: quotes may hide a separator.
+            if line.count(separator) >= n_columns:
+                values = next(csv.reader([line], delimiter=separator))
+                if any(value.strip() for value in values[n_columns:]):
+                    raise LogError(
+                        f"{path}, line {number}: has {len(values)} values, more than the "
+                        f"{n_columns} columns of the header."
+                    )
+
+
+def _options(separator):
+    """What is the same for every reading of a file."""
+    return {
+        "sep": separator,
+        "encoding": "utf-8-sig",
+        "compression": None,
+        "skipinitialspace": True,
+        "index_col": False,
+    }
 
 
 def _no_column(part, name, header):
     found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
-    close = difflib.get_close_matches(name, header, n=1)
+    close = difflib.get_close_matches(name, header, n=1, cutoff=0.4)
     advice = f"{part}={close[0]}" if close else f"{part}=NAME"
     hint = ""
     for sign in ";\t|":
@@ -322,7 +340,7 @@ def _join(tables, paths):
     if len(set(stems)) < len(stems):
         stems = [str(path) for path in paths]
     codes = np.repeat(np.arange(len(tables)), [len(table) for table in tables])
-    return log.assign(file=pd.Categorical.from_codes(codes, categories=stems))
+    return log.assign(file=pd.Categorical.from_codes(codes, categories=pd.Index(stems)))
 
 
 def _name_runs(log):
@@ -338,7 +356,7 @@ def _name_runs(log):
         if set(parts) <= set(owners) and not labels.duplicated(parts).any():
             break
     names = labels[parts].agg(" / ".join, axis=1)
-    log["run"] = pd.Categorical.from_codes(runs, categories=list(names))
+    log["run"] = pd.Categorical.from_codes(runs, categories=pd.Index(names))
     return log[[part for part in COLUMNS if part in log]]
 
 
@@ -419,8 +437,8 @@ def _check_temperature_span(temperature, least):
     if high - low < least:
         raise LogError(
             f"the temperature spans {high - low:.3g} degC only ({low:.4g} to {high:.4g}); "
-            f"at least {least:g} degC are needed to learn from it. Log over a wider range, or leave "
-            "temperature and temperature_rate out of the inputs.",
+            f"at least {least:g} degC are needed to learn from it. Log over a wider range, or "
+            "leave temperature and temperature_rate out of the inputs.",
             "temperature",
         )
 
@@ -447,8 +465,8 @@ def _check_output_follows_rate(log, units):
     slope = np.polyfit(rate, output, 1)[0]
     if units["output"] not in SIGNALS and not 0.5 < slope < 2.0:
         raise LogError(
-            f"changes by {slope:.4g} deg/s per deg/s of rate: {_diagnosis(slope, units)} A raw signal "
-            "with a scale factor of its own is declared as counts.",
+            f"changes by {slope:.4g} deg/s per deg/s of rate: {_diagnosis(slope, units)} A raw "
+            "signal with a scale factor of its own is declared as counts.",
             "output",
         )
 

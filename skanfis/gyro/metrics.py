@@ -139,7 +139,7 @@ def scale_factor_nonlinearity(rate, output, *, statistic="max", full_scale=None)
     --------
     >>> from skanfis.gyro import scale_factor_nonlinearity
     >>> scale_factor_nonlinearity([-10, -5, 0, 5, 10], [-9.99, -5.02, 0.0, 5.02, 9.99])
-    2400.0
+    2000.0
     """
     if statistic not in ("max", "rms"):
         raise ValueError(f"statistic={statistic!r} must be 'max' or 'rms'.")

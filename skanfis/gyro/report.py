@@ -19,7 +19,7 @@ _FEWEST_RUNS = 5
 _N_BLOCKS = 30
 # Row figures of a resample cost time in proportion to its rows, and their spread comes from the
 # runs or blocks: evenly thinned rows show it as well.
-_MOST_ROWS = 5_000
+_MOST_ROWS = 2_000
 # A nonlinearity is looked for in means over such parts of the range of rates.
 _RATE_BINS = 101
 _UNEVEN = 0.01  # largest deviation of the time between rows, relative
@@ -132,7 +132,7 @@ def gyro_report(
     The intervals are percentiles of a bootstrap over whole runs where a group has five or more, and
     otherwise over some thirty blocks of consecutive rows, because neighbouring rows are alike: an
     interval over single rows would be far too narrow. Blocks within one run tell nothing of the
-    next run. Figures of rows are resampled on at most 5,000 evenly chosen rows. Peaks have no
+    next run. Figures of rows are resampled on at most 2,000 evenly chosen rows. Peaks have no
     interval: the largest of a resample says nothing of the largest to come.
 
     The nonlinearity is that of means over 101 bins of the rate's range, so that noise is not taken
@@ -433,7 +433,7 @@ class _Bootstrap:
                 for figure in figures:
                     found = by_run.get((figure.name, side))
                     if found is not None:
-                        value = figure.combine(found[drawn])
+                        value = _or_nan(figure.combine, found[drawn])[0]
                         spreads.setdefault((figure.name, side), []).append(value)
         return {key: np.array(values) for key, values in spreads.items()}
 
@@ -442,17 +442,20 @@ def _evaluated(figure, rows, side):
     """The figure's value and "", or NaN and why there is none."""
     if figure.only_after and side == "before":
         return _NAN, ""
+    return _or_nan(figure.value, rows, side)
+
+
+def _or_nan(function, *arguments):
+    """What the function gives and "", or NaN and what its ValueError says."""
     try:
-        return figure.value(rows, side), ""
+        return function(*arguments), ""
     except ValueError as error:
         return _NAN, str(error)
 
 
 def _per_run(figure, rows, side):
-    try:
-        return figure.of(rows, side)
-    except ValueError:
-        return None
+    found, missing = _or_nan(figure.of, rows, side)
+    return None if missing else found
 
 
 def _columns(**columns):
@@ -465,22 +468,21 @@ def _columns(**columns):
             found[name] = check_column(values, name, rate.size)
     refused = np.zeros(rate.size, dtype=bool)
     if after is not None:
-        after = np.asarray(after, dtype=float)
-        refused = np.isnan(after) if after.shape == rate.shape else refused
-        answered = check_column(np.where(refused, 0.0, after), "after", rate.size)
-        found["after"] = np.where(refused, _NAN, answered)
+        after = np.array(after, dtype=float)
+        refused = np.isnan(after)
+        after[refused] = 0.0
+        found["after"] = check_column(after, "after", rate.size)
     return found, refused
 
 
 def _labels(n_rows, run, groups, inside):
     labels = {"run": run, "groups": groups, "inside": inside}
-    found = {
+    if inside is not None and np.asarray(inside).dtype != bool:
+        raise ValueError(f"inside must be bool; its dtype is {np.asarray(inside).dtype}.")
+    return {
         name: None if values is None else check_labels(values, name, n_rows)
         for name, values in labels.items()
     }
-    if inside is not None and found["inside"].dtype != bool:
-        raise ValueError(f"inside must be bool; its dtype is {found['inside'].dtype}.")
-    return found
 
 
 def _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples):

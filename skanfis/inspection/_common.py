@@ -5,11 +5,12 @@ from numbers import Integral, Real
 
 import numpy as np
 
-from ..export._reading import conditions
+from ..export._reading import conditions, knows_data
 
 __all__ = [
     "COVERED",
     "colors",
+    "coverage_if_known",
     "held_row",
     "one_axes",
     "panels",
@@ -74,7 +75,7 @@ def position(feature, names, what="input"):
     """Position of an input or output given by its name or position."""
     if isinstance(feature, str) and feature in names:
         return names.index(feature)
-    if isinstance(feature, Integral) and -len(names) <= feature < len(names):
+    if isinstance(feature, Integral) and -len(names) <= int(feature) < len(names):
         return int(feature) % len(names)
     raise ValueError(
         f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
@@ -93,9 +94,19 @@ def terms_text(model, rule, inputs):
     return ", ".join(model.term_names[rule[j]] if j in rule else "any" for j in inputs)
 
 
+def coverage_if_known(model, rows):
+    """How well the training data cover each row; 1 where the model knows of no data."""
+    return model.coverage(rows) if knows_data(model) else np.ones(len(rows))
+
+
 def held_row(model, held):
-    """A row of the inputs' means, but for what the mapping ``held`` says by input."""
-    row = np.clip(model.reference, model.minimum, model.maximum)
+    """A row of the inputs' means, but for what the mapping ``held`` says by input.
+
+    Without data that a mean could be of, the middle of the ranges.
+    """
+    middle = 0.5 * (model.minimum + model.maximum)
+    mean = model.reference if knows_data(model) else middle
+    row = np.clip(mean, model.minimum, model.maximum)
     if held is None:
         return row
     if not isinstance(held, Mapping):

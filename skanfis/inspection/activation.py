@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..export._fold import fold, fold_with_rows
+from ..export._reading import knows_data
 from ..export.text import rows_text
 from ._common import one_axes, premises
 
@@ -87,9 +88,16 @@ class RuleActivationDisplay:
         Returns
         -------
         display : RuleActivationDisplay
+
+        Raises
+        ------
+        ValueError
+            If X is None, and the model was read from a file without data.
         """
         if X is None:
             model = fold(estimator)
+            if not knows_data(model):
+                raise ValueError("The model was read from a file and knows of no data: give X.")
             weights, rows = model.rule_weights, model.rule_rows
         else:
             model, table = fold_with_rows(estimator, X)

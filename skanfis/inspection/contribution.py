@@ -7,7 +7,16 @@ import numpy as np
 from ..export._fold import fold
 from ..export._reading import check_count
 from ..export.table import rule_values
-from ._common import COVERED, colors, held_row, one_axes, position, premises, terms_text
+from ._common import (
+    COVERED,
+    colors,
+    coverage_if_known,
+    held_row,
+    one_axes,
+    position,
+    premises,
+    terms_text,
+)
 
 __all__ = ["RuleContributionDisplay"]
 
@@ -28,14 +37,15 @@ class RuleContributionDisplay:
         Strength times value less baseline, for every rule.
     baseline : float
         What the rules' values are compared with.
-    input_name, output_name : str
-        Names of the input and the output.
     coverage : ndarray of shape (n_points,)
-        How well the training data cover each point, from 0 to 1.
+        How well the training data cover each point, from 0 to 1; 1 for a model that was read from a
+        file without data.
     rule_terms : list of str
         The terms of each rule, on the "premise_inputs" one after the other.
     premise_inputs : tuple of str
         Inputs that rules look at.
+    input_name, output_name : str
+        Names of the input and the output.
     held : dict
         Value of every other input by its name.
 
@@ -110,7 +120,7 @@ class RuleContributionDisplay:
             The input to follow over its range in training, by position or name.
         held : dict, default=None
             Values of other inputs, by position or name; those not named are held at their mean in
-            training.
+            training; in a model that knows of no data, at the middle of their range.
         output : int or str, default=0
             Which output, by position or name.
         baseline : "mean" or float, default="mean"
@@ -141,7 +151,7 @@ class RuleContributionDisplay:
         values = rule_values(model, rows)[:, :, k]
         if isinstance(baseline, str) and baseline == "mean":
             baseline = float(np.mean(np.sum(strengths * values, axis=1)))
-        elif not isinstance(baseline, Real) or not np.isfinite(baseline):
+        elif not isinstance(baseline, Real) or not np.isfinite(float(baseline)):
             raise ValueError(f"baseline={baseline!r} must be 'mean' or a finite number.")
         rules, inputs = premises(model)
         display = cls(
@@ -150,7 +160,7 @@ class RuleContributionDisplay:
             baseline=float(baseline),
             input_name=model.input_names[j],
             output_name=model.output_names[k],
-            coverage=model.coverage(rows),
+            coverage=coverage_if_known(model, rows),
             rule_terms=[terms_text(model, rule, inputs) for rule in rules],
             premise_inputs=tuple(model.input_names[i] for i in inputs),
             held={model.input_names[i]: float(row[i]) for i in range(model.n_inputs) if i != j},

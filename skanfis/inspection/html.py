@@ -9,35 +9,18 @@ from ..export._reading import (
     check_count,
     choose_rules,
     consequents_about,
+    knows_data,
     round_reference,
 )
 from ..export.text import consequent_text, range_text, term_text
 from ._common import premises
 
-__all__ = ["RulesReprMixin", "rules_html"]
+__all__ = ["rules_html"]
 
 # Hues of terms from the lowest to the highest, from blue to red; they show on white and on black.
 _HUES = (220, 10)
 _WIDTH, _HEIGHT = 130, 34
 _POINTS = 61
-
-
-class RulesReprMixin:
-    """Adds the rules of a fitted estimator to scikit-learn's HTML representation of it.
-
-    scikit-learn 1.6 and 1.9 make the representation in different places, but both reach it through
-    the two methods here, and only while ``sklearn.set_config(display="diagram")`` holds.
-    """
-
-    def _repr_html_inner(self):
-        diagram = super()._repr_html_inner()
-        return diagram + rules_html(self) if hasattr(self, "model_") else diagram
-
-    def _repr_mimebundle_(self, **kwargs):
-        bundle = super()._repr_mimebundle_(**kwargs)
-        if "text/html" in bundle and hasattr(self, "model_"):
-            bundle["text/html"] += rules_html(self)
-        return bundle
 
 
 def rules_html(estimator, *, max_rules=10, precision=4):
@@ -80,9 +63,11 @@ def rules_html(estimator, *, max_rules=10, precision=4):
         _table(model, chosen, precision),
     ]
     if chosen.size < model.n_rules:
-        weight = max(1.0 - float(model.rule_weights[chosen].sum()), 0.0)
-        left_out = _count(model.n_rules - chosen.size, "rule")
-        parts.append(f"<div>and {left_out} with {100.0 * weight:.3g} % of the weight</div>")
+        left_out = "and " + _count(model.n_rules - chosen.size, "rule")
+        if knows_data(model):
+            weight = max(1.0 - float(model.rule_weights[chosen].sum()), 0.0)
+            left_out += f" with {100.0 * weight:.3g} % of the weight"
+        parts.append(f"<div>{left_out}</div>")
     return "".join([*parts, "</div>"])
 
 
@@ -115,7 +100,7 @@ def _table(model, chosen, precision):
     reference = round_reference(model)
     consequents = consequents_about(model, reference)
     largest = float(np.max(model.rule_weights))
-    lines = [_line("th", ["rule", "weight", *pictures, "then"])]
+    lines = [_line("th", ["rule", *(["weight"] if knows_data(model) else []), *pictures, "then"])]
     for r in chosen:
         terms = [_chip(model, rules[r].get(j), hues) for j in looked_at]
         formulas = [
@@ -125,7 +110,8 @@ def _table(model, chosen, precision):
         named = zip(model.output_names, formulas, strict=True)
         then = "<br>".join(escape(f"{name} = {formula}") for name, formula in named)
         then = f'<span style="font-family:monospace">{then}</span>'
-        lines.append(_line("td", [str(r), _weight(model, r, largest), *terms, then]))
+        weight = [_weight(model, r, largest)] if knows_data(model) else []
+        lines.append(_line("td", [str(r), *weight, *terms, then]))
     return f'<table style="border-collapse:collapse">{"".join(lines)}</table>'
 
 

@@ -9,7 +9,7 @@ __all__ = ["LossCurveDisplay"]
 
 
 class LossCurveDisplay:
-    """The training error, iteration by iteration.
+    """The error in training, iteration by iteration, and that of the rows held out if any.
 
     Make it with :meth:`from_estimator`; parameters are stored as attributes.
 
@@ -17,6 +17,8 @@ class LossCurveDisplay:
     ----------
     loss : ndarray of shape (n_iter + 1,)
         Mean squared error of the standardised target: 1 is as good as the mean.
+    validation_loss : ndarray of shape (n_iter,), default=None
+        That of the rows held out for early stopping, from the first iteration on.
     name : str, default=None
         Label of the curve.
     status : str, default=None
@@ -30,6 +32,8 @@ class LossCurveDisplay:
         The axes, once drawn.
     line_ : matplotlib Line2D
         The curve, once drawn.
+    validation_line_ : matplotlib Line2D or None
+        That of the rows held out, dashed in the same colour.
 
     Examples
     --------
@@ -43,8 +47,9 @@ class LossCurveDisplay:
     True
     """
 
-    def __init__(self, *, loss, name=None, status=None):
+    def __init__(self, *, loss, validation_loss=None, name=None, status=None):
         self.loss = loss
+        self.validation_loss = validation_loss
         self.name = name
         self.status = status
 
@@ -74,6 +79,7 @@ class LossCurveDisplay:
             raise TypeError(f"{type(last).__name__} has not been trained here: no loss_curve_.")
         display = cls(
             loss=np.asarray(loss),
+            validation_loss=getattr(last, "validation_loss_curve_", None),
             name=getattr(last, "solver", None) if name is None else name,
             status=getattr(last, "status_", None),
         )
@@ -98,6 +104,16 @@ class LossCurveDisplay:
         iterations = np.arange(len(self.loss))
         style = {"label": self.name, "marker": ".", "markersize": 4, "linewidth": 1.5} | line_kw
         (self.line_,) = self.ax_.plot(iterations, self.loss, **style)
+        self.validation_line_ = None
+        if self.validation_loss is not None:
+            (self.validation_line_,) = self.ax_.plot(
+                np.arange(1, len(self.validation_loss) + 1),
+                self.validation_loss,
+                "--",
+                color=self.line_.get_color(),
+                linewidth=self.line_.get_linewidth(),
+                label=None if self.name is None else f"{self.name}, rows held out",
+            )
         self.ax_.set(xlabel="iteration", ylabel="mean squared error, standardised target")
         if np.all(self.loss > 0.0):
             self.ax_.set_yscale("log")

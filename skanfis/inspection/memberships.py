@@ -63,7 +63,7 @@ class MembershipDisplay:
     ('low', 'medium', 'high')
     """
 
-    def __init__(self, inputs):
+    def __init__(self, *, inputs):
         self.inputs = inputs
 
     @classmethod
@@ -117,7 +117,7 @@ class MembershipDisplay:
             for j in chosen:
                 if j not in with_terms:
                     raise ValueError(f"Input {model.input_names[j]!r} has no terms.")
-        display = cls([_terms_on(model, j, n_points, rows, bins) for j in chosen])
+        display = cls(inputs=[_terms_on(model, j, n_points, rows, bins) for j in chosen])
         return display.plot(ax=ax, show_before=show_before, colormap=colormap)
 
     def plot(self, *, show_before=True, colormap="viridis", ax=None):

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..export._fold import fold, fold_with_rows
 from ..export._reading import check_choice, check_count
-from ._common import COVERED, held_row, one_axes, position
+from ._common import COVERED, coverage_if_known, held_row, one_axes, position
 
 __all__ = ["ResponseSurfaceDisplay"]
 
@@ -24,7 +24,8 @@ class ResponseSurfaceDisplay:
     response : ndarray of shape (grid_resolution, grid_resolution)
         Prediction there.
     coverage : ndarray of shape (grid_resolution, grid_resolution)
-        How well the training data cover each point, from 0 to 1.
+        How well the training data cover each point, from 0 to 1; 1 for a model that was read from a
+        file without data.
     input_names : tuple of str
         Names of the two inputs.
     output_name : str
@@ -99,7 +100,7 @@ class ResponseSurfaceDisplay:
             The inputs across and up, by position or name.
         held : dict, default=None
             Values of other inputs, by position or name; those not named are held at their mean in
-            training.
+            training; in a model that knows of no data, at the middle of their range.
         output : int or str, default=0
             Which output, by position or name.
         grid_resolution : int, default=60
@@ -137,7 +138,7 @@ class ResponseSurfaceDisplay:
             xx0=xx0,
             xx1=xx1,
             response=model.predict(rows)[:, k].reshape(xx0.shape),
-            coverage=model.coverage(rows).reshape(xx0.shape),
+            coverage=coverage_if_known(model, rows).reshape(xx0.shape),
             input_names=(model.input_names[first], model.input_names[second]),
             output_name=model.output_names[k],
             held={model.input_names[j]: float(row[j]) for j in others},

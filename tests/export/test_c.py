@@ -1,7 +1,10 @@
 """Exported C, compiled and run, answers what ``predict`` answers."""
 
 import re
+import runpy
 import subprocess
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -425,3 +428,22 @@ def test_grid_too_deep_for_c89():
     with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
         export_c(model, name="m", std="c89")
     assert export_c(model, name="m").cost.exponentials == 26
+
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_c_export.py"
+
+
+@needs_compiler
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
+def test_example_runs(capsys):
+    pytest.importorskip("matplotlib")
+    runpy.run_path(str(EXAMPLE))
+    assert "self-test: passed" in capsys.readouterr().out
+
+
+def test_rules_that_have_seen_no_data_are_not_called_uncovered():
+    model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
+    unseen = replace(model, rule_rows=np.zeros(model.n_rules))
+    assert "support" not in export_c(unseen, name="m").source
+    assert "|= M_UNCOVERED" not in export_c(unseen, name="m").source
+    assert "|= M_UNCOVERED" in export_c(model, name="m").source

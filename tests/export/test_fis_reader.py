@@ -1,6 +1,7 @@
 """Reading .fis files: what they mean, and what is refused, with the line."""
 
 import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -361,17 +362,43 @@ def test_what_an_error_shows_of_the_file_is_short_and_ascii():
         assert len(str(caught.value)) < 400
 
 
-def test_training_goes_on_from_a_file_and_back(tmp_path, rng):
-    path = tmp_path / "prior.fis"
-    path.write_text(system([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)]), encoding="utf-8")
+@pytest.mark.parametrize(
+    "rules",
+    [
+        [(1, 1), (1, 2), (2, 1), (2, 2)],
+        [(1, 1), (2, 2)],
+        [(1, 0), (0, 2), (2, 1)],
+    ],
+    ids=["grid", "scattered", "table"],
+)
+def test_training_goes_on_from_a_file_and_back(rules, tmp_path, rng):
+    prior = parse_fis(system([2, 2], rules))
     X = rng.uniform(0.0, 4.0, (200, 2))
     y = np.sin(X[:, 0]) * X[:, 1]
-    estimator = ANFISRegressor(partition=read_fis(path)).fit(X, y)
+    estimator = ANFISRegressor(partition=prior).fit(X, y)
     write_fis(estimator, tmp_path / "trained.fis")
     trained = read_fis(tmp_path / "trained.fis")
-    assert_allclose(trained.predict(X)[:, 0], estimator.predict(X), atol=1e-10 * np.ptp(y))
-    again = ANFISRegressor(partition=trained, solver="lse").fit(X, y)
-    assert again.n_rules_ == 4
+    assert type(trained.antecedent) is type(prior.antecedent)
+    assert_allclose(trained.predict(X)[:, 0], estimator.predict(X), atol=1e-12 * np.ptp(y))
+    again = ANFISRegressor(partition=trained, solver="lse", alpha=estimator.alpha_).fit(X, y)
+    # The same premises: the consequents differ by what the ridge leaves open.
+    assert_allclose(again.predict(X), estimator.predict(X), atol=1e-4 * np.ptp(y))
+
+
+def test_many_constants_beside_many_inputs_take_little_memory():
+    # As slopes of zero they would be 160 MB.
+    constants = "\n".join(f"MF{k + 1}='r':'constant',[1]" for k in range(10_000))
+    head, _, rules = system([0] * 1000, [(0,) * 1000], 2).partition("[Output1]")
+    outputs, _, rules = rules.partition("[Rules]")
+    outputs = outputs.replace("NumMFs=1", "NumMFs=10000").replace(
+        "MF1='r':'constant',[1]", constants
+    )
+    tracemalloc.start()
+    model = parse_fis(f"{head}[Output1]{outputs}[Rules]{rules}")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5e7
+    assert_array_equal(model.predict(np.zeros((1, 1000))), 1.0)
 
 
 def test_spoilt_files_are_read_or_refused_with_the_line(tmp_path):

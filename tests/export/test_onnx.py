@@ -1,5 +1,9 @@
 """The ONNX graph, run by onnxruntime, answers what ``predict`` answers."""
 
+import re
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sklearn.base import clone
@@ -167,3 +171,16 @@ def test_opset_too_old_is_refused():
     expected = estimator.predict(X)
     for opset in (13, 17, 18, 21):
         np.testing.assert_allclose(answers(estimator, X, target_opset=opset)[:, 0], expected)
+
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_onnx.py"
+
+
+@pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
+def test_example_runs(capsys):
+    pytest.importorskip("matplotlib")
+    runpy.run_path(str(EXAMPLE))
+    found = re.findall(r"(float\d\d): largest difference (\S+)", capsys.readouterr().out)
+    differences = {dtype: float(value) for dtype, value in found}
+    assert differences["float64"] < 1e-9
+    assert differences["float32"] < 1e-5

@@ -99,9 +99,9 @@ def test_a_pipeline_is_told_in_raw_units():
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
 @pytest.mark.parametrize("min_strength", [0.0, 0.1])
-@pytest.mark.parametrize("kind", [kind for kind in MODELS if not kind.startswith("one rule")])
-def test_contributions_add_up_to_the_prediction(kind, policy, min_strength):
-    model = MODELS[kind].with_out_of_bounds(policy)
+@ALL
+def test_contributions_add_up_to_the_prediction(model, policy, min_strength):
+    model = model.with_out_of_bounds(policy)
     rows = np.vstack([rows_of(model, 1.0, 10), rows_of(model, 2.0, 30)])
     inside = model.in_bounds(rows)
     assert 0 < inside.sum() < len(rows)
@@ -158,7 +158,7 @@ def test_raise_raises_as_predict_does():
         explain(A_GRID.with_out_of_bounds("raise"), rows)
 
 
-def test_lines_have_the_labels_and_units_of_the_users_table():
+def test_explanations_are_in_the_users_units():
     g = np.random.default_rng(0)
     X = pd.DataFrame(g.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"])
     y = np.column_stack([1e3 + np.sin(X["kelvin"] / 20), 100 * X["rate"]])
@@ -166,12 +166,18 @@ def test_lines_have_the_labels_and_units_of_the_users_table():
         make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2, solver="lse")),
         transformer=MinMaxScaler(),
     ).fit(X, y)
-    X.index = [f"run {i}" for i in range(80)]
+    # Labels may repeat, where runs have been put together: rows are told by their positions.
+    X.index = np.zeros(80, dtype=int)
     table = explain(pipe, X.iloc[:3])
-    assert list(table["row"].unique()) == ["run 0", "run 1", "run 2"]
+    assert list(table["row"].unique()) == [0, 1, 2]
     assert list(table["output"].unique()) == ["y0", "y1"]
     by_row = table.groupby(["row", "output"])["contribution"].sum().to_numpy().reshape(3, 2)
     assert_allclose(by_row, pipe.predict(X.iloc[:3]), rtol=0, atol=1e-9)
+
+
+def test_rows_may_be_a_list():
+    rows = rows_of(A_GRID, 1.0, 3)
+    pd.testing.assert_frame_equal(explain(A_GRID, rows.tolist()), explain(A_GRID, rows))
 
 
 @pytest.mark.parametrize("min_strength", [-0.1, 1.5, "all"])

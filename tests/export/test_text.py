@@ -1,6 +1,7 @@
 """What is written is the model: read back by a person's means, it predicts what the model does."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from skanfis.export import export_text
 from skanfis.export.text import number, place
 
 from ..oracles import textbook_membership
-from .rule_bases import MODELS, NAMES, build, rows_of
+from .rule_bases import MODELS, NAMES, rows_of
 
 ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -152,7 +153,7 @@ def test_an_input_without_terms_and_a_rule_without_inputs():
 def test_a_slope_that_moves_no_digit_is_left_out():
     coefficients = A_GRID.coefficients.copy()
     coefficients[:, 2] = 1e-9
-    model = build(A_GRID.antecedent, coefficients=coefficients)
+    model = replace(A_GRID, coefficients=coefficients)
     assert "* ([chip temperature]" not in export_text(model)
     assert "* ([chip temperature]" in export_text(model, precision=12)
 
@@ -189,3 +190,11 @@ def test_a_fitted_estimator_is_told_in_its_units():
 def test_parameters_are_checked(settings, error, message):
     with pytest.raises(error, match=message):
         export_text(A_GRID, **settings)
+
+
+def test_a_model_without_data_has_no_weights_to_tell():
+    # As read from a .fis file.
+    model = replace(A_GRID, rule_weights=np.full(12, 1 / 12), rule_rows=np.zeros(12))
+    text = export_text(model, max_rules=2)
+    assert "\nRule 0:\n  IF" in text
+    assert "\n10 rules left out.\n" in text

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import sklearn
 from sklearn.base import clone
-from sklearn.cluster import KMeans
 from sklearn.compose import make_column_transformer
 from sklearn.dummy import DummyRegressor
 from sklearn.linear_model import LinearRegression
@@ -192,10 +191,8 @@ def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
     assert model.in_bounds(X).all()
 
 
-KMEANS = KMeans(n_clusters=2, n_init=1, random_state=0)
 ESTIMATORS = {
-    "two rules": ResidualRegressor(residual=ANFISRegressor(partition=KMEANS, max_iter=5)),
-    "as it comes": ResidualRegressor(),
+    "default": ResidualRegressor(),
     "plain": ResidualRegressor(LinearRegression(), LinearRegression()),
 }
 

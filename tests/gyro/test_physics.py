@@ -71,7 +71,7 @@ def test_jacobian_is_that_of_the_misfit(rng, has_lag, has_offset):
     X, rate = calibration(rng, n_rows=40)
     thermal_rate = rng.normal(size=(40, int(has_lag)))
     log = physics._standardise(np.hstack([X, thermal_rate]), rate, rng.uniform(0.5, 2.0, 40))
-    shape = physics._Shape(2, 1, 3, has_lag, has_offset)
+    shape = physics._Shape((2, 1, 3), has_lag, has_offset)
     # Far from the optimum, where no term of the derivative is hidden by a small residual.
     point = rng.uniform(0.2, 0.8, shape.n_coefficients)
     exact = physics._jacobian(point, log, shape)

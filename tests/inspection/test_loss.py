@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from skanfis import ANFISRegressor
 from skanfis.inspection import LossCurveDisplay
 
 from .drawing import A_GRID, drawn, plt
@@ -30,3 +31,15 @@ def test_losses_share_axes():
 def test_a_model_alone_has_no_loss_curve():
     with pytest.raises(TypeError, match="estimator must be a fitted ANFIS estimator"):
         LossCurveDisplay.from_estimator(A_GRID)
+
+
+def test_rows_held_out_are_a_dashed_line_of_the_same_colour():
+    X = np.random.default_rng(0).uniform(-3, 3, (80, 1))
+    model = ANFISRegressor(n_mfs=3, early_stopping=True, random_state=0).fit(X, np.sin(X[:, 0]))
+    display = drawn(LossCurveDisplay.from_estimator(model))
+    line = display.validation_line_
+    assert_array_equal(line.get_ydata(), model.validation_loss_curve_)
+    assert line.get_xdata()[0] == 1
+    assert line.get_xdata()[-1] <= len(model.loss_curve_)
+    assert (line.get_linestyle(), line.get_color()) == ("--", display.line_.get_color())
+    assert line.get_label() == "varpro, rows held out"

@@ -114,7 +114,7 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
     _check_choice("dtype", dtype, DTYPES)
     _check_choice("std", std, STANDARDS)
     if min_coverage is not None and not (
-        isinstance(min_coverage, Real) and 0.0 < min_coverage <= 1.0
+        isinstance(min_coverage, Real) and 0.0 < float(min_coverage) <= 1.0
     ):
         raise ValueError(
             f"min_coverage={min_coverage!r} must be a number above 0 and at most 1, or None."

@@ -128,7 +128,7 @@ class _Variable:
 def _read_system(section):
     """Numbers of inputs, outputs and rules, and the entry of the AND method."""
     section.take("Name").name()
-    _expect(section, "Type", ["sugeno"], "only Sugeno systems are supported")
+    _expect(section, "Type", "sugeno", "only Sugeno systems are supported")
     section.entries.pop("Version", None)
     n_inputs = section.take("NumInputs").whole(1, _MOST_VARIABLES)
     n_outputs = section.take("NumOutputs").whole(1, _MOST_VARIABLES)
@@ -138,16 +138,15 @@ def _read_system(section):
     # These three have no part in a Sugeno system of rules joined by AND.
     for key in ("OrMethod", "ImpMethod", "AggMethod"):
         section.take(key).name()
-    _expect(section, "DefuzzMethod", ["wtaver"], "only the weighted average is supported")
+    _expect(section, "DefuzzMethod", "wtaver", "only the weighted average is supported")
     section.check_empty()
     return n_inputs, n_outputs, n_rules, and_method
 
 
-def _expect(section, key, allowed, reason):
+def _expect(section, key, wanted, reason):
     entry = section.take(key)
-    found = entry.name()
-    if found not in allowed:
-        raise entry.error(f"{key}={shown(found)}: {reason} ({' or '.join(map(repr, allowed))}).")
+    if entry.name() != wanted:
+        raise entry.error(f"{key}={shown(entry.name())}: {reason} ({wanted!r}).")
 
 
 def _variable(sections, kind, number, read_term):
@@ -174,7 +173,7 @@ def _variable(sections, kind, number, read_term):
 
 
 def _consequent(n_inputs):
-    """A reader of consequents: p0, p1 .. pd, and whether they are linear."""
+    """A reader of consequents: p0 of a constant; p0, p1 .. pd of a linear one."""
 
     def read(function, parameters, low, high):
         lengths = {"constant": 1, "linear": n_inputs + 1}
@@ -186,7 +185,7 @@ def _consequent(n_inputs):
             raise ValueError(
                 f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
             )
-        return [parameters[-1], *(parameters[:-1] or [0.0] * n_inputs)], function == "linear"
+        return [parameters[-1], *parameters[:-1]]
 
     return read
 
@@ -255,21 +254,13 @@ def _model(inputs, outputs, antecedents, consequents):
         antecedent, term_names = _scattered(inputs, antecedents)
     else:
         antecedent, term_names = _table(inputs, antecedents)
-    coefficients = np.stack(
-        [
-            np.array([numbers for numbers, _ in output.terms])[numbers_of - 1]
-            for output, numbers_of in zip(outputs, consequents.T, strict=True)
-        ],
-        axis=2,
-    )
-    is_linear = any(linear for output in outputs for _, linear in output.terms)
     n_rules = len(antecedents)
     low = np.array([variable.low for variable in inputs])
     high = np.array([variable.high for variable in inputs])
     return TSKModel(
         antecedent=antecedent,
         initial_antecedent=antecedent,
-        coefficients=coefficients if is_linear else coefficients[:, :1].copy(),
+        coefficients=_coefficients(outputs, consequents),
         # About another point the file's own p0 would be rounded.
         reference=np.zeros(len(inputs)),
         # That of rows spread evenly over the Range.
@@ -282,6 +273,17 @@ def _model(inputs, outputs, antecedents, consequents):
         term_names=term_names,
         output_names=_distinct(variable.name for variable in outputs),
     )
+
+
+def _coefficients(outputs, consequents):
+    """As of a model; constants beside linear consequents have no slopes."""
+    n_basis = max(len(term) for output in outputs for term in output.terms)
+    coefficients = np.zeros((len(consequents), n_basis, len(outputs)))
+    for k, output in enumerate(outputs):
+        for r, number in enumerate(consequents[:, k]):
+            term = output.terms[number - 1]
+            coefficients[r, : len(term), k] = term
+    return coefficients
 
 
 def _grid_rows(inputs, antecedents):

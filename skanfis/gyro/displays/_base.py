@@ -1,5 +1,8 @@
 """What the Displays of a compensation have in common: where their numbers come from."""
 
+from collections.abc import Callable
+from typing import ClassVar
+
 import numpy as np
 
 from ._style import PER_UNIT
@@ -14,6 +17,8 @@ class CompensationDisplay:
 
     # Arguments of from_predictions with one value per row, which from_estimator finds in X.
     _PER_ROW: tuple[str, ...] = ()
+    # Each picture has options of its own.
+    from_predictions: ClassVar[Callable]
 
     @classmethod
     def from_estimator(

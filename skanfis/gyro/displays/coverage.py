@@ -160,7 +160,9 @@ class CoverageDisplay:
             self.ax_.plot(
                 x[[0, -1, -1, 0, 0]], y[[0, 0, -1, -1, 0]], "--", color="0.15", linewidth=1.2
             )
-        dress(self.ax_, *self.names, "outside the dashed line every row is flagged")
+        dress(
+            self.ax_, self.names[0], self.names[1], "outside the dashed line every row is flagged"
+        )
         self.ax_.grid(False)
         return self
 

@@ -1,0 +1,131 @@
+"""Every solver on Jang's three problems and the gyro-like surface, and how fast each gets there.
+
+A pass is one reading of all rows; what a solver does with it differs. The error to get to is the
+least training error of Jang's rule in 500 epochs, at the best of several sizes of its first step.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from unittest.mock import patch
+
+import numpy as np
+
+from skanfis import ANFISRegressor
+from skanfis.objective import SeparableProblem
+
+from .gyro import SIGMA, make_surface, score
+from .jang import PROBLEMS
+from .report import Measure, Results, Row, Table
+from .timing import side_by_side
+
+__all__ = ["run"]
+
+_EPOCHS = 500
+_STEP_SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+_SETTINGS = {
+    "varpro": {},
+    "varpro, tol=1e-6": {"tol": 1e-6},
+    "lbfgs": {"solver": "lbfgs"},
+    "lbfgs, tol=1e-6": {"solver": "lbfgs", "tol": 1e-6, "max_iter": 5000},
+    "lse": {"solver": "lse"},
+}
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Task:
+    """A problem with the terms given, and how its errors are measured."""
+
+    name: str
+    unit: str
+    parameters: dict
+    X: np.ndarray
+    y: np.ndarray
+    errors: Callable
+
+    def fit(self, settings):
+        return ANFISRegressor(**self.parameters, **settings).fit(self.X, self.y)
+
+
+def tasks():
+    for problem in PROBLEMS:
+        parameters = {"n_mfs": problem.n_mfs, "mf": problem.mf}
+        what = problem.names[0].split()[-1] + (f" [{problem.unit}]" if problem.unit else "")
+        yield Task(problem.name, what, parameters, *problem.train, problem.errors)
+    X, y, X_test, truth = make_surface(seed=0)
+
+    def errors(model):
+        rms = np.sqrt(np.mean((model.predict(X) - y) ** 2))
+        return float(rms / SIGMA), score(model.predict(X_test), X, X_test, truth)[0]
+
+    yield Task("gyro-like, 27 rules", "RMSE [σ]", {"n_mfs": 3}, X, y, errors)
+
+
+def count_passes(function):
+    """How often a function's trainings read all rows, and what it returned."""
+    n_passes = 0
+    one_pass = SeparableProblem._sum_over_chunks
+
+    def counted(*args):
+        nonlocal n_passes
+        n_passes += 1
+        return one_pass(*args)
+
+    with patch.object(SeparableProblem, "_sum_over_chunks", counted):
+        returned = function()
+    return n_passes, returned
+
+
+def best_step(task, solver):
+    """The settings of a descent, its first step being the best of several."""
+    every = [{"solver": solver, "step_size": size, "max_iter": _EPOCHS} for size in _STEP_SIZES]
+    losses = [task.fit(settings).loss_curve_.min() for settings in every]
+    return every[int(np.argmin(losses))]
+
+
+def until(settings, model, loss):
+    """The settings that end as soon as ``loss`` is reached; None if it never was."""
+    reached = np.flatnonzero(model.loss_curve_ <= loss)
+    if not reached.size:
+        return None
+    # With no iteration at all, premises stay as they start: least squares alone.
+    return {**settings, "max_iter": int(reached[0])}
+
+
+def compare(task):
+    """Lines of the table; passes and time to the common error, by solver."""
+    settings = dict(_SETTINGS)
+    for solver in ("hybrid", "gradient"):
+        settings[solver] = best_step(task, solver)
+    runs = {name: partial(task.fit, given) for name, given in settings.items()}
+    counted = {name: count_passes(fit) for name, fit in runs.items()}
+    goal = counted["hybrid"][1].loss_curve_.min()
+    to_goal = {name: until(settings[name], model, goal) for name, (_, model) in counted.items()}
+    short = {name: partial(task.fit, given) for name, given in to_goal.items() if given}
+    seconds, seconds_to_goal = side_by_side(runs, _ROUNDS), side_by_side(short, _ROUNDS)
+    reached = {name: (count_passes(fit)[0], seconds_to_goal[name]) for name, fit in short.items()}
+    lines = []
+    for name, (n_passes, model) in counted.items():
+        step = settings[name].get("step_size")
+        label = name if step is None else f"{name}, step_size={step:g}"
+        cells = [*task.errors(model), model.n_iter_, n_passes, seconds[name]]
+        lines.append([task.name, label, *cells, *reached.get(name, ("never", ""))])
+    return lines, reached
+
+
+def run(options):
+    lines, rows = [], []
+    for task in tasks():
+        own, reached = compare(task)
+        lines += own
+        (passes, seconds), (few, short) = reached["hybrid"], reached["varpro"]
+        work = f"varpro to the best of 500 epochs of Jang's rule, of its cost: {task.name}"
+        measures = [
+            Measure("passes", few / passes, "x", 0.1),
+            Measure("CPU", short / seconds, "x", 0.2),
+        ]
+        rows.append(Row(work, measures))
+    head = ["problem", "solver", "error, train", "error, check", "iterations", "passes", "CPU [s]"]
+    head += ["passes to Jang's best", "CPU [s]"]
+    return Results(rows, [Table("Solvers; errors as in the first table", head, lines)])

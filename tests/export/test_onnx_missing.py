@@ -1,0 +1,13 @@
+"""Without skl2onnx, the converter says how to get it."""
+
+import sys
+
+import pytest
+
+from skanfis.export import register_onnx_converter
+
+
+def test_missing_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "skl2onnx", None)
+    with pytest.raises(ImportError, match=r"needs skl2onnx: pip install 'skanfis\[onnx\]'"):
+        register_onnx_converter()

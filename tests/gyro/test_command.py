@@ -1,0 +1,283 @@
+"""The command: what it writes, says and refuses."""
+
+import json
+import subprocess
+import sys
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from skanfis.datasets import make_ofog
+from skanfis.gyro import GyroCompensator
+from skanfis.gyro.command import main
+
+RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=table"]
+UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
+FACTOR = -27_000.0
+FILES = ["compensator.joblib", "compensator.json", "report.html", "rules.txt"]
+
+
+def simulated(**options):
+    return make_ofog(n_devices=1, duration=900.0, random_state=0, **options)
+
+
+MEASURED = ("time", "temperature", "output", "rate", "run")
+
+
+def write_log(path, log, columns=MEASURED):
+    log[list(columns)].to_csv(path, index=False)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def log():
+    return simulated(n_runs=5)
+
+
+@pytest.fixture
+def no_report(monkeypatch):
+    """Leave out the report, which takes longer than all else together."""
+    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda calibration, title: title)
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory, log):
+    """A folder after one calibration from counts, milliseconds and kelvin."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    raw = pd.DataFrame(
+        {
+            "t_ms": 1000 * log["time"] + 5e6,
+            "T": log["temperature"] + 273.15,
+            "counts": FACTOR * log["output"],
+            "table": log["rate"],
+            "run": log["run"],
+        }
+    )
+    path = write_log(folder / "raw.csv", raw, raw.columns)
+    arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
+    assert main([*arguments, "--c", "c99"]) == 0
+    return folder
+
+
+def test_writes_what_it_says(calibrated):
+    found = sorted(path.name for path in (calibrated / "out").iterdir())
+    assert found == sorted([*FILES, "compensator.c", "compensator.h"])
+
+
+def test_the_compensator_knows_units_and_scale_factor(calibrated, log):
+    compensator = joblib.load(calibrated / "out" / "compensator.joblib")
+    slope = np.polyfit(log["rate"], FACTOR * log["output"], 1)[0]
+    assert compensator.scale_factor == pytest.approx(slope, rel=1e-9)
+    assert compensator.output_unit == "counts"
+    assert compensator.inputs == ("time", "temperature", "temperature_rate", "output")
+    compensated = compensator.apply(log.assign(output=FACTOR * log["output"]))
+    assert (compensated["rate_compensated"] - log["rate"]).std() < 0.01
+
+
+def test_the_compensator_uses_nothing_unknown_on_board(calibrated):
+    text = (calibrated / "out" / "rules.txt").read_text(encoding="utf-8")
+    assert "error = " in text
+    assert "table" not in text
+    document = json.loads((calibrated / "out" / "compensator.json").read_text())
+    assert "rate" not in document["inputs"]
+
+
+def test_apply_by_json_and_by_joblib_is_the_same(calibrated, capsys):
+    tables = []
+    for model in ("compensator.json", "compensator.joblib"):
+        target = calibrated / f"{model}.csv"
+        arguments = [str(calibrated / "raw.csv"), *RENAMED, *UNITS, "--output", str(target)]
+        assert main(["--apply", str(calibrated / "out" / model), *arguments]) == 0
+        tables.append(pd.read_csv(target))
+    np.testing.assert_allclose(tables[0], tables[1], rtol=1e-8, atol=1e-9)
+    assert list(tables[0])[-4:] == ["rate_indicated", "rate_compensated", "coverage", "status"]
+    assert (tables[0]["status"] == 0).all()
+    assert "before" in capsys.readouterr().out
+
+
+def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path, log, capsys):
+    hot = pd.DataFrame(
+        {
+            "t_ms": 1000 * log["time"],
+            "T": log["temperature"] + 293.15,
+            "counts": FACTOR * log["output"],
+            "run": log["run"],
+        }
+    )
+    path = write_log(tmp_path / "hot.csv", hot, hot.columns)
+    target = tmp_path / "hot-rates.csv"
+    model = str(calibrated / "out" / "compensator.json")
+    arguments = [path, *RENAMED[:-1], *UNITS, "--output", str(target)]
+    assert main(["--apply", model, *arguments]) == 0
+    outside = log["temperature"] + 20.0 > log["temperature"].max()
+    assert (pd.read_csv(target)["status"].to_numpy() & 1 != 0)[outside.to_numpy()].all()
+    out = capsys.readouterr().out
+    assert "out of range" in out
+    assert "before" not in out
+
+
+def test_apply_refuses_another_unit_and_other_files(calibrated, tmp_path, log, capsys):
+    path = write_log(tmp_path / "log.csv", log)
+    model = str(calibrated / "out" / "compensator.json")
+    with pytest.raises(SystemExit) as caught:
+        main(["--apply", model, path])
+    assert caught.value.code == 2
+    assert "calibrated for an output in counts; this is in deg/s" in capsys.readouterr().err
+    joblib.dump([1], tmp_path / "list.joblib")
+    with pytest.raises(SystemExit):
+        main(["--apply", str(tmp_path / "list.joblib"), path])
+    assert "holds a list, not a GyroCompensator" in capsys.readouterr().err
+
+
+def test_never_replaces_without_force(calibrated, capsys):
+    arguments = [str(calibrated / "raw.csv"), *RENAMED, *UNITS, "--output", str(calibrated / "out")]
+    before = (calibrated / "out" / "report.html").stat().st_mtime_ns
+    assert main(arguments) == 4
+    assert "exists already" in capsys.readouterr().err
+    assert (calibrated / "out" / "report.html").stat().st_mtime_ns == before
+    model = str(calibrated / "out" / "compensator.json")
+    arguments[-1] = str(calibrated / "out" / "rules.txt")
+    assert main(["--apply", model, *arguments]) == 4
+
+
+@pytest.mark.usefixtures("no_report")
+def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = write_log(tmp_path / "log.csv", log)
+    assert main([path, "--max-rules", "2", "--inputs", "temperature", "output"]) == 0
+    out, err = capsys.readouterr()
+    assert (tmp_path / "log-compensator" / "report.html").exists()
+    for text in ("reading", "300 rows, 5 runs"[-6:], "choosing the terms", "fold 5 of 5", "done"):
+        assert text in err
+    assert "whole runs held out (5 runs, 5 folds; rows of one run are alike)" in out
+    assert "error before" in out
+    assert "held-out rows in range" in out
+
+
+@pytest.mark.usefixtures("no_report")
+def test_physics_and_policy(tmp_path, log, capsys):
+    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
+    (out).mkdir()
+    (out / "compensator.json").write_text("of another model")
+    arguments = [path, "--physics", "--terms", "1,2,1,1", "--outside", "nan", "--quiet"]
+    assert main([*arguments, "--output", str(out), "--force"]) == 0
+    assert capsys.readouterr().err == ""
+    # There is none of this model, and none may be taken for it.
+    assert not (out / "compensator.json").exists()
+    compensator = joblib.load(out / "compensator.joblib")
+    assert compensator.predicts == "rate"
+    hot = compensator.apply(log.assign(temperature=log["temperature"] + 100.0))
+    assert hot["rate_compensated"].isna().all()
+    assert (hot["status"] == 1 + 8).all()
+
+
+@pytest.mark.usefixtures("no_report")
+def test_at_rest(tmp_path, capsys):
+    log = simulated(n_runs=5, rates=[0.0], profile="ramps")
+    path = write_log(tmp_path / "log.csv", log, ["time", "temperature", "output", "run"])
+    arguments = [path, "--at-rest", "--max-rules", "2", "--output", str(tmp_path / "out")]
+    assert main([*arguments, "--quiet"]) == 0
+    compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+    assert compensator.inputs == ("time", "temperature", "temperature_rate")
+    assert main([path, "--output", str(tmp_path / "two")]) == 3
+    assert "no column 'rate'" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("no_report")
+def test_one_device_of_several(tmp_path, capsys):
+    log = make_ofog(n_devices=3, n_runs=3, duration=600.0, random_state=0)
+    path = write_log(tmp_path / "log.csv", log, [*MEASURED, "device"])
+    arguments = [path, "--terms", "1,1,1,2", "--output", str(tmp_path / "out"), "--quiet"]
+    assert main([*arguments, "--device", "1"]) == 0
+    assert "whole runs held out (3 runs" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main([*arguments, "--device", "7", "--force"])
+    assert "--device 7: the log has 0, 1, 2" in capsys.readouterr().err
+
+
+def without_value(log):
+    return log.assign(rate=log["rate"].where(log.index != 7))
+
+
+def one_run_without_levels(log):
+    rate = log["output"] + np.random.default_rng(0).normal(size=len(log))
+    return log.assign(run=1, time=np.arange(len(log)), rate=rate)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda log: log.drop(columns="temperature"), "no column 'temperature'"),
+        (without_value, "line 9, column 'rate'"),
+        (lambda log: log.assign(time=-log["time"]), "'time', row 1: time does not increase"),
+        (lambda log: log.assign(temperature=20.0), "'temperature': the temperature spans 0"),
+        (lambda log: log.assign(output=-log["output"]), "its sign is reversed"),
+        (one_run_without_levels, "could not be checked: the log has 1 device(s), 1 run(s)"),
+    ],
+)
+def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, capsys):
+    spoiled = spoil(log)
+    path = write_log(tmp_path / "log.csv", spoiled, spoiled.columns)
+    assert main([path, "--output", str(tmp_path / "out"), "--quiet"]) == 3
+    err = capsys.readouterr().err
+    assert message in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--columns", "time"], "'time' must be of the form PART=..."),
+        (["--columns", "speed=v"], "columns: there is no 'speed'"),
+        (["--columns", "time=a", "time=b"], "time is given twice"),
+        (["--units", "time=year"], "time has no unit 'year'"),
+        (["--terms", "2,x"], "must be search, auto, or numbers"),
+        (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
+        (["--min-coverage", "2"], "must be a number from 0 to 1"),
+        (["--fit-rows", "0"], "must be a whole number, 1 or more"),
+        (["--time-constant", "-1"], "must be a positive number"),
+        (["--physics", "--inputs", "temperature"], "needs the output"),
+        (["--physics", "--c", "c99"], "not exported as C"),
+        (["--inputs", "rate"], "invalid choice: 'rate'"),
+        (["--device", "a"], "no column for the device"),
+    ],
+)
+def test_options_that_make_no_sense(tmp_path, log, arguments, message, capsys):
+    path = write_log(tmp_path / "log.csv", log)
+    with pytest.raises(SystemExit) as caught:
+        main([path, "--output", str(tmp_path / "out"), *arguments])
+    assert caught.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_that_is_not_there(tmp_path, capsys):
+    assert main([str(tmp_path / "none.csv"), "--output", str(tmp_path / "out")]) == 1
+    assert "none.csv" in capsys.readouterr().err
+
+
+def test_runs_as_a_module():
+    done = subprocess.run(
+        [sys.executable, "-m", "skanfis.gyro", "--help"], capture_output=True, text=True, check=True
+    )
+    for text in (
+        "exit codes",
+        "can run any code when it is loaded",
+        "--apply MODEL",
+        "outside the",
+    ):
+        assert text in done.stdout
+
+
+@pytest.mark.usefixtures("no_report")
+def test_more_rows_than_it_fits_to(tmp_path, log):
+    path = write_log(tmp_path / "log.csv", log)
+    arguments = [path, "--terms", "1,1,1,3", "--fit-rows", "200", "--quiet"]
+    assert main([*arguments, "--output", str(tmp_path / "out")]) == 0
+    compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+    # The ends of every input's range are among the rows fitted to.
+    assert (compensator.apply(log)["status"] & 1 == 0).all()

@@ -1,0 +1,213 @@
+"""Reading a log, and refusing what no compensator should learn from."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.datasets import make_ofog
+from skanfis.gyro import LogError, check_log, read_log
+
+CALLED_T = {"columns": {"temperature": "T"}}
+MEASURED = ["time", "temperature", "output", "rate", "run"]
+
+
+@pytest.fixture
+def log():
+    return make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)[MEASURED]
+
+
+def written(folder, text, name="log.csv"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def table(folder, log, name="log.csv", **options):
+    path = folder / name
+    log.to_csv(path, index=False, **options)
+    return path
+
+
+def test_values_come_back(tmp_path, log):
+    read = read_log(table(tmp_path, log))
+    assert list(read) == MEASURED
+    np.testing.assert_allclose(read.drop(columns="run"), log.drop(columns="run"), rtol=1e-12)
+    assert list(read["run"].cat.categories) == ["0", "1", "2"]
+
+
+@pytest.mark.parametrize(
+    ("part", "unit", "values", "expected"),
+    [
+        ("time", "ms", [0, 1500], [0.0, 1.5]),
+        ("time", "us", [0, 1500], [0.0, 1.5e-3]),
+        ("time", "min", [0, 2], [0.0, 120.0]),
+        ("time", "h", [0, 2], [0.0, 7200.0]),
+        ("temperature", "K", [273.15, 300.0], [0.0, 26.85]),
+        ("temperature", "degF", [32.0, 212.0], [0.0, 100.0]),
+        ("temperature", "°C", [1.0, 2.0], [1.0, 2.0]),
+        ("rate", "rad/s", [0.0, np.pi], [0.0, 180.0]),
+        ("rate", "deg/h", [0.0, 3600.0], [0.0, 1.0]),
+        ("rate", "rpm", [0.0, 1.0], [0.0, 6.0]),
+        ("output", "mrad/s", [0.0, 1000 * np.pi], [0.0, 180.0]),
+        ("output", "counts", [0.0, 7.0], [0.0, 7.0]),
+        ("output", "dps", [0.0, 7.0], [0.0, 7.0]),
+    ],
+)
+def test_units_are_converted(tmp_path, part, unit, values, expected):
+    frame = pd.DataFrame({"time": [0, 1], "temperature": 20, "output": 1, "rate": 1})
+    frame[part] = values
+    read = read_log(table(tmp_path, frame), units={part: unit})
+    np.testing.assert_allclose(read[part], expected, atol=1e-12)
+
+
+def test_columns_by_other_names_separator_and_decimal(tmp_path):
+    text = "t;T;U;w;x\n0;20,5;1;2;a\n1;21,5;3;4;b\n"
+    read = read_log(
+        written(tmp_path, text),
+        columns={"time": "t", "temperature": "T", "output": "U", "rate": "w"},
+        separator=";",
+        decimal=",",
+    )
+    assert list(read) == ["time", "temperature", "output", "rate"]
+    assert read["temperature"].tolist() == [20.5, 21.5]
+
+
+def test_each_file_is_a_run(tmp_path, log):
+    paths = [
+        table(tmp_path, part.drop(columns="run"), name)
+        for name, (_, part) in zip(
+            ["cold.csv", "mild.csv", "hot.csv"], log.groupby("run"), strict=True
+        )
+    ]
+    read = read_log(paths)
+    assert list(read["run"].cat.categories) == ["cold", "mild", "hot"]
+    assert (read["run"].cat.codes == log["run"].to_numpy()).all()
+
+
+def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
+    frame = pd.DataFrame({"temperature": 20.0, "output": 1.0, "rate": 1.0}, index=range(4))
+    frame["device"], frame["run"] = ["a", "a", "b", "b"], [1, 2, 1, 2]
+    read = read_log(table(tmp_path, frame))
+    assert list(read["run"]) == ["a / 1", "a / 2", "b / 1", "b / 2"]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        ("", {}, r"log.csv: is empty"),
+        ("temp,output,rate\n1,2,3\n", {}, "no column 'temperature' .* temperature=temp"),
+        ("temperature;output;rate\n1;2;3\n", {}, "separator seems to be ';'"),
+        ("temperature,output,rate\n1,2,3\n1,2,x\n", {}, r"line 3, column 'rate': 'x' is not a num"),
+        ("temperature,output,rate\n1,2,3\n\n1,,3\n", {}, r"line 4, column 'output': .* missing"),
+        ("T,output,rate\n1,2,3\n,2,3\n", CALLED_T, r"line 3, column 'T' \(temperature\)"),
+        ("temperature,output,rate\n1,2,inf\n", {}, r"line 2, column 'rate': .* infinite"),
+        ("temperature,output,rate\n1,2,3,4\n", {}, "line 2: has . values"),
+        ("temperature,output,rate\n1,2,3\n\n1,2,3,4,5\n", {}, "line 4: has . values"),
+        ('temperature,output,rate\n1,2,"3\n', {}, "is no table"),
+        ("temperature,output,rate,run\n1,2,3,\n", {}, "line 2, column 'run': no label"),
+        ("temperature,output,rate\n1,2,3\n", {"columns": {"rate": "output"}}, "two parts"),
+        ("temperature,output,rate\n1,2,3\n", {"columns": {"time": "t"}}, "'t' for the time"),
+    ],
+)  # fmt: skip
+def test_files_that_are_refused(tmp_path, text, options, message):
+    with pytest.raises(LogError, match=message):
+        read_log(written(tmp_path, text), **options)
+
+
+def test_binary_files_are_refused(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"\xff\xfe\x00\x81,\n")
+    with pytest.raises(LogError, match="UTF-8"):
+        read_log(path)
+
+
+def test_files_with_different_columns_are_refused(tmp_path, log):
+    paths = [table(tmp_path, log, "a.csv"), table(tmp_path, log.drop(columns="time"), "b.csv")]
+    with pytest.raises(LogError, match=r"b.csv: the files differ in having time"):
+        read_log(paths)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"columns": {"speed": "v"}}, "columns: there is no 'speed'"),
+        ({"units": {"run": "s"}}, "units: there is no 'run'"),
+        ({"units": {"time": "deg/s"}}, "time has no unit 'deg/s'.* s, ms"),
+        ({"require": ["speed"]}, "require: there is no 'speed'"),
+    ],
+)
+def test_unknown_names_are_no_matter_of_the_log(tmp_path, log, options, message):
+    with pytest.raises(ValueError, match=message) as caught:
+        read_log(table(tmp_path, log), **options)
+    assert not isinstance(caught.value, LogError)
+
+
+def test_a_good_log_passes(log):
+    assert check_log(log, inputs=("time", "temperature", "temperature_rate", "output")) is log
+
+
+def bad(log, part, row, value):
+    log = log.copy()
+    log.iloc[row, log.columns.get_loc(part)] = value
+    return log
+
+
+TO_RADIANS = np.pi / 180
+
+
+def scaled(part, factor):
+    return lambda log: log.assign(**{part: factor * log[part]})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "column", "row", "message"),
+    [
+        (lambda log: bad(log, "output", 7, np.nan), "output", 7, "missing"),
+        (lambda log: bad(log, "rate", 9, np.inf), "rate", 9, "infinite"),
+        (lambda log: bad(log, "temperature", 5, -999.0), "temperature", 5, "not plausible"),
+        (lambda log: log.assign(temperature=270 + log.index), "temperature", 0, "is it in K"),
+        (scaled("rate", 3600), "rate", 0, "is it in deg/h"),
+        (lambda log: bad(log, "time", 11, 100.0), "time", 11, "does not increase"),
+        (lambda log: log.drop(columns="run"), "time", 60, "which column tells them apart"),
+        (scaled("time", 1e6), "time", None, "smaller unit than s"),
+        (scaled("time", 1e-4), "time", None, "larger unit than s"),
+        (lambda log: log[log["run"] == 0], "temperature", None, "at least 10 degC"),
+        (lambda log: log.assign(rate=5.0), "rate", None, "leave output out"),
+        (lambda log: log.assign(output=log["rate"]), "output", None, "wrong one"),
+        (lambda log: log.assign(output=log["temperature"]), "output", None, "does not follow"),
+        (scaled("output", -1), "output", None, "sign is reversed"),
+        (scaled("output", TO_RADIANS), "output", None, "is the output in rad/s"),
+        (scaled("rate", TO_RADIANS), "output", None, "the rate in rad/s"),
+        (scaled("output", 3), "output", None, "are the units right"),
+    ],
+)
+def test_logs_that_are_refused(log, spoil, column, row, message):
+    with pytest.raises(LogError, match=message) as caught:
+        check_log(spoil(log).reset_index(drop=True))
+    assert (caught.value.column, caught.value.row) == (column, row)
+
+
+def test_a_raw_signal_may_have_any_scale_and_sign(log):
+    check_log(log.assign(output=-3e4 * log["output"]), units={"output": "counts"})
+
+
+def test_a_gyro_at_rest_has_a_bias_to_learn(log):
+    at_rest = log.assign(output=log["output"] - log["rate"], rate=0.0)
+    check_log(at_rest, inputs=("temperature",))
+    with pytest.raises(LogError, match="leave output out"):
+        check_log(at_rest, inputs=("temperature", "output"))
+
+
+def test_a_log_that_is_not_learnt_from_may_be_short_and_narrow(log):
+    check_log(log.iloc[:3], inputs=())
+    with pytest.raises(LogError, match="too few"):
+        check_log(log.iloc[:3])
+
+
+def test_the_span_may_be_declared_enough(log):
+    check_log(log[log["run"] == 0], min_temperature_span=0.5)
+
+
+def test_runs_may_be_mixed(log):
+    mixed = log.sort_values("time", kind="stable").reset_index(drop=True)
+    assert check_log(mixed) is mixed

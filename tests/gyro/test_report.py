@@ -1,0 +1,249 @@
+"""The table of figures: planted truth, before and after, groups, intervals and what is missing."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.gyro import metrics
+from skanfis.gyro.report import gyro_report
+
+HOUR = 3600.0
+VALUES = ["before", "before_low", "before_high", "after", "after_low", "after_high"]
+
+
+@pytest.fixture
+def log(rng):
+    """Eight runs of 100 rows with planted errors, and a compensation that leaves a tenth of them.
+
+    Scale factor 1000 ppm high, and 2 ppm/degC more with temperature; bias 10 deg/h, 0.5
+    deg/h/degC, 4 deg/h/(degC/min).
+    """
+    run = np.repeat(np.arange(8), 100)
+    time = np.tile(np.arange(100.0), 8)
+    rate = rng.permuted(np.tile(np.linspace(-100, 100, 100), (8, 1)), axis=1).ravel()
+    temperature = 20.0 + 5.0 * (run - 3.5) + 2.0 * np.sin(time / 9.0)
+    ramp = np.cos(time / 9.0)
+    dt, dr = temperature - temperature.mean(), ramp - ramp.mean()
+    error = (1e-3 + 2e-6 * dt) * rate + (10.0 + 0.5 * dt + 4.0 * dr) / HOUR
+    error += 1e-3 * rng.normal(size=800)
+    return pd.DataFrame(
+        {
+            "run": run,
+            "time": time,
+            "rate": rate,
+            "temperature": temperature,
+            "temperature_rate": ramp,
+            "before": rate + error,
+            "after": rate + 0.1 * error,
+        }
+    )
+
+
+def report_of(log, *names, **options):
+    columns = {name: log[name] for name in names}
+    options = {"random_state": 0, "n_resamples": 50} | options
+    return gyro_report(log["rate"], log["before"], log["after"], **columns, **options)
+
+
+def figures(report, group="all"):
+    return report[report["group"] == group].set_index("figure")
+
+
+ALL = ("temperature", "temperature_rate", "time", "run")
+
+
+def test_planted_truth_is_in_the_table(log):
+    table = figures(report_of(log, *ALL))
+    planted = {
+        "scale_factor_error": (1000.0, 5.0),
+        "scale_factor_temperature_sensitivity": (2.0 / 1.001, 0.1),
+        "bias": (10.0, 0.5),
+        "bias_temperature_sensitivity": (0.5, 0.05),
+        "bias_ramp_sensitivity": (4.0, 1.0),
+    }
+    for name, (value, tolerance) in planted.items():
+        assert table.loc[name, "before"] == pytest.approx(value, abs=tolerance), name
+        assert table.loc[name, "after"] == pytest.approx(0.1 * value, abs=tolerance), name
+    assert table.loc["reduction_factor", "after"] == pytest.approx(10.0)
+    assert table.loc["rows", "after"] == len(log)
+
+
+def test_figures_are_those_of_the_plain_functions(log):
+    table = figures(report_of(log, *ALL))
+    rate, error = log["rate"], metrics.input_error(log["rate"], log["before"])
+    expected = {
+        "residual_rms": metrics.residual_rms(log["before"] - rate),
+        "residual_peak": metrics.residual_peak(log["before"] - rate),
+        "scale_factor_asymmetry": metrics.scale_factor_asymmetry(rate, log["before"]),
+        "scale_factor_repeatability": metrics.scale_factor_repeatability(
+            rate, log["before"], log["run"]
+        ),
+        "bias_repeatability": metrics.bias_repeatability(error, log["run"]),
+        "bias_stability_10s": metrics.bias_stability(error, log["time"], run=log["run"]),
+        "hysteresis": metrics.hysteresis(error, log["temperature"], log["temperature_rate"]),
+    }
+    for name, value in expected.items():
+        assert table.loc[name, "before"] == pytest.approx(value, rel=1e-12), name
+
+
+def test_figures_without_their_input_are_left_out(log):
+    assert list(figures(report_of(log)).index) == [
+        "rows",
+        "rows_refused",
+        "residual_rms",
+        "residual_peak",
+        "residual_peak_to_peak",
+        "reduction_factor",
+        "scale_factor_error",
+        "scale_factor_nonlinearity",
+        "scale_factor_nonlinearity_rms",
+        "scale_factor_asymmetry",
+        "bias",
+    ]
+
+
+def test_before_alone(log):
+    report = gyro_report(log["rate"], log["before"], random_state=0, n_resamples=0)
+    assert list(report.columns) == ["group", "figure", "unit", *VALUES[:3], "note"]
+    assert "reduction_factor" not in set(report["figure"])
+
+
+def test_groups_are_tables_of_their_own_in_order_of_appearance(log):
+    labels = np.where(log["run"] < 4, "warm", "cold")
+    report = report_of(log, *ALL, groups=labels)
+    assert list(report["group"].unique()) == ["all", "warm", "cold"]
+    warm = log["run"] < 4
+    alone = report_of(log[warm], *ALL, full_scale=log["rate"].abs().max())
+    together = figures(report, "warm")
+    np.testing.assert_allclose(together["before"], figures(alone)["before"], equal_nan=True)
+    assert report.attrs["resampled"] == {
+        "all": "runs",
+        "warm": "blocks of rows",
+        "cold": "blocks of rows",
+    }
+
+
+def test_groups_do_not_change_the_whole(log):
+    whole = figures(report_of(log, *ALL))
+    grouped = figures(report_of(log, *ALL, groups=log["run"]))
+    pd.testing.assert_frame_equal(whole.drop(columns="group"), grouped.drop(columns="group"))
+
+
+def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
+    one, two = report_of(log, *ALL), report_of(log, *ALL)
+    pd.testing.assert_frame_equal(one, two)
+    table = figures(one)
+    for side in ("before", "after"):
+        known = table.dropna(subset=[f"{side}_low"])
+        assert len(known) >= 13
+        assert (known[f"{side}_low"] <= known[f"{side}_high"]).all()
+    bias = table.loc["bias"]
+    assert bias["before_low"] < bias["before"] < bias["before_high"]
+    assert table.loc["residual_peak", "note"] == "largest value: no interval"
+
+
+def test_interval_is_that_of_the_runs_not_of_the_rows(rng):
+    """Each run has a bias of its own: the mean of 10 is known to 1 / sqrt(10) of their spread."""
+    n_runs, biases = 10, 5.0 * rng.normal(size=10) / HOUR
+    rate = np.tile(np.linspace(-100, 100, 400), n_runs)
+    before = rate + np.repeat(biases, 400)
+    run = np.repeat(np.arange(n_runs), 400)
+    report = gyro_report(rate, before, run=run, n_resamples=2000, random_state=0)
+    bias = figures(report).loc["bias"]
+    expected = 2 * 1.96 * HOUR * biases.std() / np.sqrt(n_runs)
+    # The binomial spread of percentiles of 2,000 resamples is some 3 %, the skewness of 10 more.
+    assert bias["before_high"] - bias["before_low"] == pytest.approx(expected, rel=0.12)
+
+
+def test_confidence_level_widens_the_interval(log):
+    widths = []
+    for level in (0.5, 0.95):
+        bias = figures(report_of(log, confidence_level=level)).loc["bias"]
+        widths.append(bias["before_high"] - bias["before_low"])
+    assert widths[0] < 0.6 * widths[1]
+
+
+def test_refused_rows_are_counted_and_left_out_of_both_sides(log):
+    refused = np.arange(len(log)) % 10 == 0
+    patchy = log.assign(after=log["after"].where(~refused))
+    table = figures(report_of(patchy, "run", inside=~refused))
+    kept = figures(report_of(log[~refused], "run"))
+    assert table.loc["rows_refused", "after"] == refused.sum()
+    assert table.loc["rows_outside", "after"] == refused.sum()
+    assert table.loc["residual_rms", "before"] == kept.loc["residual_rms", "before"]
+    assert table.loc["bias", "after"] == kept.loc["bias", "after"]
+
+
+def test_a_group_that_was_refused_whole_says_so(log):
+    patchy = log.assign(after=log["after"].where(log["run"] > 0))
+    table = figures(report_of(patchy, groups=log["run"]), group=0)
+    assert table.loc["rows_refused", "after"] == 100
+    assert np.isnan(table.loc["residual_rms", "after"])
+    assert table.loc["residual_rms", "note"] == "no row is left in this group"
+
+
+def test_nonlinearity_is_not_that_of_the_noise(rng):
+    rate = rng.uniform(-100, 100, 100_000)
+    noisy = rate + 0.1 * rng.normal(size=rate.size)
+    table = figures(gyro_report(rate, noisy, n_resamples=0))
+    # Single rows are 4 sigma off, 4,000 ppm; a mean over 1,000 of them 4 sigma / 32.
+    assert table.loc["scale_factor_nonlinearity", "before"] < 200.0
+
+
+def test_what_is_missing_is_said(log):
+    rest = log.assign(rate=0.0, before=log["before"] - log["rate"], after=0.001)
+    table = figures(report_of(rest, *ALL, full_scale=100.0))
+    assert table.loc["scale_factor_error", "note"] == (
+        "No scale factor: the rate is 0 deg/s in all rows."
+    )
+    assert np.isnan(table.loc["scale_factor_error", "before"])
+    few = figures(report_of(log[log["run"] < 2], "run"))
+    assert few.loc["bias_repeatability", "note"] == "no interval: fewer than 5 runs"
+    assert np.isfinite(few.loc["bias_repeatability", "before"])
+    long = figures(report_of(log, "time", "run", averaging_times=(90.0,)))
+    assert "no run is as long as two averaging times" in long.loc["bias_stability_90s", "note"]
+
+
+def test_a_million_rows_in_seconds(rng):
+    """Resampling works on thinned rows; the figures themselves on all."""
+    rate = np.tile(np.linspace(-100, 100, 1000), 1000)
+    before = rate + 0.01 + 1e-3 * rng.normal(size=rate.size)
+    run = np.repeat(np.arange(10), 100_000)
+    report = gyro_report(rate, before, run=run, time=np.tile(np.arange(1e5), 10), n_resamples=20)
+    assert figures(report).loc["bias", "before"] == pytest.approx(36.0, rel=1e-3)
+
+
+def test_allan_deviation_is_read(rng):
+    pytest.importorskip("allantools")
+    error = 0.05 / 60.0 * rng.normal(size=4096)
+    report = gyro_report(
+        np.zeros(4096), error, time=np.arange(4096.0), full_scale=1.0, allan=True, n_resamples=10
+    )
+    table = figures(report)
+    assert table.loc["angle_random_walk", "before"] == pytest.approx(0.05, rel=0.1)
+    assert table.loc["angle_random_walk", "note"].startswith("no interval: see the standard errors")
+    assert "still falls" in table.loc["bias_instability", "note"]
+    uneven = np.arange(4096.0) ** 1.01
+    report = gyro_report(np.zeros(4096), error, time=uneven, full_scale=1.0, allan=True)
+    assert "not evenly spaced" in figures(report).loc["angle_random_walk", "note"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"before": [1.0, np.nan]}, "before must be finite"),
+        ({"after": [1.0, np.inf]}, "after must be finite"),
+        ({"after": [1.0]}, "after has 1 rows"),
+        ({"run": [0]}, "run has 1 rows"),
+        ({"inside": [0, 1]}, "inside must be bool"),
+        ({"full_scale": 0.0}, "full_scale=0.0 must be positive"),
+        ({"averaging_times": (10.0, -1.0)}, "averaging_times=.* must be positive"),
+        ({"confidence_level": 95}, "confidence_level=95 must lie between 0 and 1"),
+        ({"n_resamples": -1}, "n_resamples=-1"),
+        ({"allan": True}, "allan=True needs the column time"),
+    ],
+)
+def test_bad_arguments_are_named(options, message):
+    arguments = {"rate": [1.0, 2.0], "before": [1.0, 2.0]} | options
+    with pytest.raises(ValueError, match=message):
+        gyro_report(**arguments)

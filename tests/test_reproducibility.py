@@ -1,0 +1,77 @@
+"""The same data give the same model, to the last bit: whatever was fitted before, wherever."""
+
+import hashlib
+import json
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.cluster import KMeans
+
+from skanfis import ANFISRegressor
+
+SETTINGS = {
+    "default": {},
+    "grid": {"partition": "grid"},
+    "grid of a given size": {"n_mfs": [2, 3, 1]},
+    "subtractive": {"partition": "subtractive"},
+    "fcm": {"partition": "fcm"},
+    "clusterer": {"partition": KMeans(4, random_state=0)},
+    "hybrid": {"n_mfs": 2, "solver": "hybrid", "max_iter": 20},
+    "gradient": {"n_mfs": 2, "solver": "gradient", "max_iter": 20},
+    "lbfgs": {"n_mfs": 2, "solver": "lbfgs"},
+    "lse": {"n_mfs": 2, "solver": "lse"},
+    "starts": {"n_mfs": 2, "n_init": 4},
+    "huber": {"n_mfs": 2, "loss": "huber"},
+    "early stopping": {"n_mfs": 3, "early_stopping": True},
+    "ridge": {"n_mfs": 3, "alpha": "gcv"},
+    "pruning": {"n_mfs": 4, "prune": True},
+}
+# Enough for several chunks of rows, so that workers have something to share.
+N_ROWS = 9_000
+
+
+def data(n_rows):
+    g = np.random.default_rng(11)
+    X = g.normal(size=(n_rows, 3)) * [1.0, 100.0, 1e-3]
+    return X, np.sin(X[:, 0]) + 1e-2 * X[:, 1] * X[:, 0] + 0.1 * g.normal(size=n_rows)
+
+
+def digest(name, n_rows=300, **more):
+    """What a fit is, in short."""
+    X, y = data(n_rows)
+    model = ANFISRegressor(**(SETTINGS[name] | {"tol": 1e-2, "warn_out_of_bounds": False} | more))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        clone(model).fit(X, y)
+        model.fit(X, y)
+    parts = [model.predict(X), model.consequents_, model.loss_curve_]
+    return hashlib.sha256(b"".join(np.ascontiguousarray(part) for part in parts)).hexdigest()
+
+
+@pytest.fixture(scope="module", name="elsewhere")
+def digests_of_another_process():
+    """Every digest, each fitted first thing in a process of its own kind, in reverse order."""
+    script = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import test_reproducibility as t; "
+        "print(t.json.dumps({name: t.digest(name) for name in reversed(t.SETTINGS)}))"
+    )
+    folder = __file__.rpartition("/")[0]
+    done = subprocess.run(
+        [sys.executable, "-c", script, folder], capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_nothing_fitted_before_matters(name, elsewhere):
+    assert digest(name) == elsewhere[name]
+
+
+@pytest.mark.parametrize("name", ["default", "grid of a given size", "lbfgs", "starts", "huber"])
+def test_number_of_workers_does_not_matter(name):
+    settings = {"max_iter": 3}
+    assert digest(name, N_ROWS, n_jobs=2, **settings) == digest(name, N_ROWS, **settings)
