@@ -36,7 +36,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.polynomial import polyder, polyval, polyvander
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, root
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
@@ -55,7 +55,7 @@ _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
 _ROWS_FOR_START = 2000
 _ROWS_FOR_TRIAL = 10_000
 _MAX_EVALUATIONS = 200
-_MOST_POLISHING_STEPS = 20
+_NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 
 
 class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
@@ -564,20 +564,17 @@ def _fit(log, shape):
 
 
 def _polish(parameters, log, shape):
-    """Plain Gauss-Newton steps, as long as each is much shorter than the one before.
+    """The nearby zero of the gradient.
 
     A trust region compares costs, and near the minimum these differ by less than their rounding
-    errors as soon as the parameters are right to eight digits.
+    errors as soon as the parameters are right to eight digits. The gradient goes on to tell.
     """
-    last = np.inf
-    for _ in range(_MOST_POLISHING_STEPS):
-        jacobian = _jacobian(parameters, log, shape)
-        step = np.linalg.lstsq(jacobian, -_misfit(parameters, log, shape), rcond=None)[0]
-        length = np.linalg.norm(step)
-        if not length < 0.5 * min(last, 1e-4):
-            break
-        parameters, last = parameters + step, length
-    return parameters
+
+    def gradient(trial):
+        return _jacobian(trial, log, shape).T @ _misfit(trial, log, shape)
+
+    found = root(gradient, parameters, method="hybr", options={"xtol": 1e-14, "maxfev": 60}).x
+    return found if np.abs(found - parameters).max() < _NEARBY else parameters
 
 
 def _misfit(parameters, log, shape):

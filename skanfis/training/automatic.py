@@ -51,6 +51,9 @@ _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Pairs of alpha and stiffness from loose to stiff. The first two are for data with little noise.
 _LEVELS = ((1e-12, 0.0), (1e-8, 0.0), (1e-6, 1e-5), (1e-4, 1e-4), (1e-3, 1e-3), (1e-2, 1e-2))
 _FIRST_LEVEL = 1
+# Without any pull, a model of noisy data can be wild where rows are few, which a mean over training
+# rows hardly shows: the levels before this one have to be better by _MUCH_BETTER.
+_FIRST_FIRM_LEVEL = 2
 _MOST_ITERATIONS = 12
 _TOLERANCE = 1e-3
 # A larger model must promise to be better by this part ...
@@ -61,9 +64,9 @@ _SCORE_ERROR = 0.3
 _MOST_PARAMETERS = 1 / 3
 # The linear model is the last resort; where it has too many, its ridge grows until it has fewer.
 _MOST_OF_LINEAR = 0.8
-# Of the levels within this part of the best score the stiffest is taken; within three times it, the
+# Of the levels within the first part of the best score the stiffest is taken; within the second, the
 # next one is tried.
-_AS_GOOD = 0.01
+_AS_GOOD, _MUCH_BETTER = 0.01, 0.03
 
 
 @dataclass(frozen=True)
@@ -184,12 +187,18 @@ class StructureSearch:
             level = best.level + direction
             while 0 <= level < len(_LEVELS):
                 candidate = replace(best, level=level)
-                if self._score(candidate) > (1.0 + 3.0 * _AS_GOOD) * self._score(best):
+                if self._score(candidate) > (1.0 + _MUCH_BETTER) * self._score(best):
                     break
                 tried.append(candidate)
                 level += direction
-        enough = (1.0 + _AS_GOOD) * min(map(self._score, tried))
-        return max((c for c in tried if self._score(c) <= enough), key=lambda c: c.level)
+        best_score = min(map(self._score, tried))
+        enough = [c for c in tried if self._score(c) <= (1.0 + _AS_GOOD) * best_score]
+        stiffest = max(enough, key=lambda c: c.level)
+        firm = [c for c in tried if c.level == _FIRST_FIRM_LEVEL]
+        if stiffest.level < _FIRST_FIRM_LEVEL and firm:
+            if self._score(firm[0]) <= (1.0 + _MUCH_BETTER) * best_score:
+                return firm[0]
+        return stiffest
 
     def _better(self, smaller, larger):
         return larger if self._is_better(larger, smaller) else smaller

@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
+from skanfis.membership import Gaussian
+from skanfis.rows import Rows
 from skanfis.training import automatic
 
 QUIET = {"warn_out_of_bounds": False}
@@ -155,3 +157,27 @@ def test_noise_free_data_get_next_to_no_ridge():
     assert model.alpha_ <= 1e-8
     assert model.score(X, y) > 0.9999
     assert_array_equal(model.predict(X), ANFISRegressor().fit(X, y).predict(X))
+
+
+@pytest.mark.parametrize(
+    ("scores", "chosen"),
+    [
+        # The stiffest of those that are as good as the best ...
+        ([0.5, 0.4, 0.3001, 0.3, 0.302, 0.5], 4),
+        # ... and a loose one only where it is much better.
+        ([0.300, 0.301, 0.305, 0.4, 0.5, 0.6], 2),
+        ([0.300, 0.301, 0.320, 0.4, 0.5, 0.6], 1),
+        ([0.100, 0.300, 0.305, 0.4, 0.5, 0.6], 0),
+    ],
+)
+def test_the_stiffest_level_that_is_as_good_is_taken(rng, scores, chosen):
+    X = inputs(rng)
+    rows = Rows.standardised(X, X[:, :1] ** 2)
+    every = np.arange(X.shape[1])
+    search = automatic.StructureSearch(
+        rows, [Gaussian] * 3, 1, every, every, len(X), 0, None, None, 0.6
+    )
+    start = automatic.Candidate((2, 1, 1), None, 1)
+    for level, score in enumerate(scores):
+        search.scores[automatic.replace(start, level=level)] = score
+    assert search._tune(start).level == chosen
