@@ -1,0 +1,117 @@
+"""
+How a model is trained
+======================
+
+Four solvers on one problem; training that stops before it learns the noise; and a loss to which
+outliers do little. :doc:`/training` describes these options and the others, :doc:`/choosing` says
+which to choose.
+"""
+
+import warnings
+
+import matplotlib.pyplot as plt
+import numpy as np
+from sklearn.exceptions import ConvergenceWarning
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_jang_sinc
+from skanfis.inspection import LossCurveDisplay
+
+# %%
+# Solvers
+# -------
+#
+# Four terms on each of two inputs, from the same start. Variable projection has met the data to
+# four digits before Jang's hybrid rule, with the best size of its steps, has left the start. Plain
+# gradient descent on premises and consequents together gets almost nowhere. L-BFGS sees some of the
+# curvature and gets as far as Jang's rule: premises and consequents move together along a curved
+# valley, and without eliminating one of them it has to be followed step by step.
+
+X, y = make_jang_sinc()
+SOLVERS = {
+    "varpro": {},
+    "hybrid": {"solver": "hybrid", "step_size": 0.003},
+    "gradient": {"solver": "gradient", "step_size": 0.1},
+    "lbfgs": {"solver": "lbfgs", "tol": 1e-6},
+}
+
+models = {}
+with warnings.catch_warnings():
+    # 500 iterations are not enough for L-BFGS, as the picture shows.
+    warnings.simplefilter("ignore", ConvergenceWarning)
+    for name, settings in SOLVERS.items():
+        models[name] = ANFISRegressor(n_mfs=4, **settings).fit(X, y)
+
+figure, panel = plt.subplots(figsize=(6, 3.5), layout="constrained")
+for name, model in models.items():
+    panel.loglog(1 + np.arange(model.loss_curve_.size), np.sqrt(model.loss_curve_), label=name)
+panel.set_xlabel("1 + iterations")
+panel.set_ylabel("RMS error [deviations of the target]")
+panel.legend()
+
+# %%
+# What they did to the memberships of one input: dashed as they started, solid as they ended.
+
+
+def draw(panel, memberships, **style):
+    """The Gaussian terms of the first input."""
+    x = np.linspace(-10.0, 10.0, 401)
+    own = [term for term in memberships if term["input"] == "x0"]
+    for number, term in enumerate(own):
+        z = (x - term["center"]) / term["width"]
+        panel.plot(x, np.exp(-0.5 * z**2), color=f"C{number}", **style)
+
+
+figure, panels = plt.subplots(1, 4, figsize=(10, 2.4), sharey=True, layout="constrained")
+for panel, (name, model) in zip(panels, models.items(), strict=True):
+    draw(panel, model.initial_memberships_, linestyle="--", alpha=0.5)
+    draw(panel, model.memberships_)
+    rms = np.sqrt(np.mean((model.predict(X) - y) ** 2))
+    panel.set_title(f"{name}: RMS {rms:.1e}", fontsize="medium")
+figure.supxlabel("input x0")
+panels[0].set_ylabel("membership")
+
+# %%
+# Early stopping
+# --------------
+#
+# Twelve terms on one input, for a hundred noisy rows. The training error falls all the way. The
+# error on the rows held out does not, and the model of its minimum is the one that is kept.
+
+rng = np.random.default_rng(7)
+x_noisy = rng.uniform(0.0, 10.0, (100, 1))
+y_noisy = np.sin(x_noisy[:, 0]) + 0.3 * rng.standard_normal(100)
+settings = {"n_mfs": 12, "early_stopping": True, "validation_fraction": 0.3, "tol": 1e-4}
+stopped = ANFISRegressor(**settings).fit(x_noisy, y_noisy)
+
+figure, panel = plt.subplots(figsize=(6, 4), layout="constrained")
+LossCurveDisplay.from_estimator(stopped, ax=panel)
+panel.axvline(1 + stopped.validation_loss_curve_.argmin(), color="grey", linestyle=":")
+
+# %%
+# Outliers
+# --------
+#
+# A tenth of the targets are off by as much as the whole range of the others. Least squares follows
+# them; Huber's loss gives them the weight that is left in ``robust_weights_``.
+
+x = np.sort(rng.uniform(0.0, 10.0, (300, 1)), axis=0)
+truth = np.sin(x[:, 0])
+measured = truth + 0.1 * rng.standard_normal(300)
+hit = rng.random(300) < 0.1
+measured[hit] += rng.uniform(1.0, 4.0, hit.sum())
+
+figure, panel = plt.subplots(figsize=(7, 3.5), layout="constrained")
+for loss in ("squared_error", "huber"):
+    model = ANFISRegressor(loss=loss).fit(x, measured)
+    error = np.sqrt(np.mean((model.predict(x) - truth) ** 2))
+    panel.plot(x, model.predict(x), label=f'"{loss}": {error:.3f} from the truth')
+panel.plot(x, truth, color="black", linestyle=":", label="truth")
+dots = panel.scatter(x, measured, c=model.robust_weights_, s=9, cmap="viridis", vmin=0.0, vmax=1.0)
+figure.colorbar(dots, label="weight left by Huber's loss")
+panel.set_xlabel("input")
+panel.set_ylabel("target")
+panel.set_ylim(top=7.5)
+panel.legend(loc="upper right")
+
+plt.show()
