@@ -72,6 +72,8 @@ class _Progress:
 def _calibrate(options, tell):
     units = _pairs(options.units, "--units")
     folder = options.output or Path(f"{Path(options.logs[0]).stem}-compensator")
+    if folder.exists() and not folder.is_dir():
+        raise FileExistsError(f"{folder} is a file; --output is the folder to write to.")
     files = [*_FILES.values(), *(_C_FILES if options.c else ())]
     _refuse_existing([folder / name for name in files], options.force)
     if options.c and options.physics:

@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
@@ -116,9 +117,9 @@ TRAINED = {
     ),
     "order 0": lambda: ANFISRegressor(n_mfs=[4, 1, 3], order=0),
     "clusters": lambda: ANFISRegressor(partition=KMeans(5, n_init=1, random_state=0)),
-    "one cluster": lambda: ANFISRegressor(partition=KMeans(1)),
-    "plane": lambda: ANFISRegressor(n_mfs=1),
-    "constant": lambda: ANFISRegressor(n_mfs=1, order=0),
+    "one cluster": lambda: ANFISRegressor(partition=KMeans(1), out_of_bounds="linear"),
+    "plane": lambda: ANFISRegressor(n_mfs=1, out_of_bounds="linear"),
+    "constant": lambda: ANFISRegressor(n_mfs=1, order=0, out_of_bounds="linear"),
     "scheduled": lambda: ANFISRegressor(
         n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"
     ),
@@ -300,6 +301,18 @@ int main(void)
         assert all(c <= r for c, r in zip(counted, reported, strict=True))
     else:
         assert counted == reported
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+@pytest.mark.parametrize("dtype", ["float", "double"])
+def test_files_are_cpp_too(dtype, tmp_path):
+    for i, case in enumerate(CASES[::17]):
+        export_c(case.model, tmp_path / f"m{i}", dtype=dtype)
+    (tmp_path / "all.cpp").write_text(
+        "".join(f'#include "m{i}.c"\n' for i in range(len(CASES[::17]))), encoding="ascii"
+    )
+    flags = ["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic"]
+    subprocess.run(["g++", *flags, "-c", "all.cpp", "-o", "all.o"], cwd=tmp_path, check=True)
 
 
 def test_grid_takes_an_exponential_per_term():

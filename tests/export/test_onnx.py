@@ -83,8 +83,8 @@ PIPELINES = {
     "robust": (RobustScaler(), {"n_mfs": 2, "mf": "bell", "out_of_bounds": "nan"}),
     "columns": (COLUMNS, {"partition": KMeans(4, n_init=1, random_state=0)}),
     "two": (make_pipeline(RobustScaler(), StandardScaler()), {"n_mfs": [1, 3, 1], "order": 0}),
-    "plane": (StandardScaler(), {"n_mfs": 1}),
-    "constant": (StandardScaler(), {"n_mfs": 1, "order": 0}),
+    "plane": (StandardScaler(), {"n_mfs": 1, "out_of_bounds": "linear"}),
+    "constant": (StandardScaler(), {"n_mfs": 1, "order": 0, "out_of_bounds": "linear"}),
     "scheduled": (StandardScaler(), {"n_mfs": [1, 3, 1], "consequent_features": [2]}),
     "triangles": (
         StandardScaler(),

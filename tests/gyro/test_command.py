@@ -139,8 +139,10 @@ def test_never_replaces_without_force(calibrated, capsys):
     assert main(arguments) == 4
     assert "exists already" in capsys.readouterr().err
     assert (calibrated / "out" / "report.html").stat().st_mtime_ns == before
-    model = str(calibrated / "out" / "compensator.json")
     arguments[-1] = str(calibrated / "out" / "rules.txt")
+    assert main([*arguments, "--force"]) == 4
+    assert "is a file; --output is the folder" in capsys.readouterr().err
+    model = str(calibrated / "out" / "compensator.json")
     assert main(["--apply", model, *arguments]) == 4
 
 

@@ -1,5 +1,6 @@
 """Starts: imported rules, named partitions, mixed families, chosen features, warm starts."""
 
+from inspect import signature
 from itertools import pairwise
 
 import numpy as np
@@ -7,14 +8,18 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
-from sklearn.cluster import KMeans
+from sklearn.cluster import HDBSCAN, AgglomerativeClustering, KMeans, MiniBatchKMeans
 from sklearn.datasets import make_friedman1
+from sklearn.mixture import GaussianMixture
+from sklearn.model_selection import GridSearchCV
 
 from skanfis import ANFISRegressor
-from skanfis.cluster import SubtractiveClustering
+from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
 from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.membership import Gaussian
 
+# Its default changes: to be quiet, newer versions have to be told.
+HDBSCAN_TAKES_COPY = "copy" in signature(HDBSCAN).parameters
 QUIET = {"warn_out_of_bounds": False}
 
 
@@ -283,3 +288,33 @@ def test_imported_rules_warn_of_rows_out_of_their_own_range(data, known):
     far = X[:2].assign(rate=1e4)
     with pytest.warns(OutOfBoundsWarning, match="'rate'"):
         model.predict(far)
+
+
+@pytest.mark.parametrize(
+    "clusterer",
+    [
+        KMeans(3, random_state=0),
+        MiniBatchKMeans(3, random_state=0),
+        GaussianMixture(3, random_state=0),
+        AgglomerativeClustering(3),
+        HDBSCAN(min_cluster_size=15, **({"copy": True} if HDBSCAN_TAKES_COPY else {})),
+        FuzzyCMeans(3, random_state=0),
+    ],
+    ids=lambda clusterer: type(clusterer).__name__,
+)
+def test_any_clusterer_gives_a_rule_per_cluster(clusterer):
+    # Three clumps with planes of their own, and a few rows between them.
+    g = np.random.default_rng(8)
+    clump = np.arange(300) % 3
+    X = np.array([[0, 0], [8, 0], [0, 8]])[clump] + 0.5 * g.normal(size=(300, 2))
+    X[:9] = g.uniform(0, 8, (9, 2))
+    y = np.choose(clump, [X[:, 0], 5.0 - X[:, 1], X[:, 0] + X[:, 1]])
+    model = ANFISRegressor(partition=clusterer).fit(X[9:], y[9:])
+    assert model.n_rules_ == 3
+    assert_allclose(model.predict(X[9:]), y[9:], atol=0.05)
+
+
+def test_parameters_of_a_clusterer_can_be_searched(data):
+    model = ANFISRegressor(partition=KMeans(random_state=0), tol=1e-2, **QUIET)
+    search = GridSearchCV(model, {"partition__n_clusters": [1, 4]}, cv=3).fit(*data)
+    assert search.best_estimator_.n_rules_ == search.best_params_["partition__n_clusters"] == 4
