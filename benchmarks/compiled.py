@@ -113,12 +113,17 @@ class Converters:
         self.script = Path(__file__).with_name("_to_c.py")
 
     def code(self, model, converter):
-        path = self.folder / "model.joblib"
-        joblib.dump(model, path)
-        return called([self.python, self.script, path, converter])
+        joblib.dump(model, self.folder / "model.joblib")
+        return self._answer("model.joblib", converter)
 
     def headers(self):
-        return called([self.python, self.script]).strip()
+        return self._answer().strip()
+
+    def _answer(self, *arguments):
+        # emlearn leaves files in the working folder.
+        command = [self.python, self.script, *arguments]
+        done = subprocess.run(command, cwd=self.folder, capture_output=True, text=True, check=True)
+        return done.stdout
 
 
 def compare(problem, converters, compiler, folder):

@@ -20,6 +20,8 @@ from .timing import best_of
 __all__ = ["run"]
 
 _N_TEST = 5000
+# What few or noisy rows ask for; "stiff" below.
+_STIFF = {"alpha": 1e-3, "stiffness": 1e-2}
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,10 @@ def partitions(task):
     yield "as it comes", {}
     yield 'partition="grid"', {"partition": "grid"}
     yield "n_mfs=2", {"n_mfs": 2}
+    yield "n_mfs=2, stiff", {"n_mfs": 2, **_STIFF}
     yield "n_mfs=3", {"n_mfs": 3}
     yield 'partition="subtractive"', {"partition": "subtractive"}
+    yield 'partition="subtractive", stiff', {"partition": "subtractive", **_STIFF}
     yield 'partition="fcm"', {"partition": "fcm"}
     yield "KMeans(5)", {"partition": KMeans(5, n_init=3, random_state=0)}
     yield "GaussianMixture(5)", {"partition": GaussianMixture(5, random_state=0)}

@@ -1,7 +1,8 @@
 """Every solver on Jang's three problems and the gyro-like surface, and how fast each gets there.
 
 A pass is one reading of all rows; what a solver does with it differs. The error to get to is the
-least training error of Jang's rule in 500 epochs, at the best of several sizes of its first step.
+least training error that Jang's rule meets in 500 epochs, at the best of several sizes of its first
+step; what it returns is the epoch of the least cost, ridge included, which may be another.
 """
 
 from collections.abc import Callable
@@ -26,6 +27,7 @@ _STEP_SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SETTINGS = {
     "varpro": {},
     "varpro, tol=1e-6": {"tol": 1e-6},
+    "varpro, n_init=20": {"n_init": 20},
     "lbfgs": {"solver": "lbfgs"},
     "lbfgs, tol=1e-6": {"solver": "lbfgs", "tol": 1e-6, "max_iter": 5000},
     "lse": {"solver": "lse"},
@@ -35,10 +37,10 @@ _ROUNDS = 3
 
 @dataclass(frozen=True)
 class Task:
-    """A problem with the terms given, and how its errors are measured."""
+    """A problem with the terms given, whether there is a bar, and how its errors are measured."""
 
     name: str
-    unit: str
+    has_bar: bool
     parameters: dict
     X: np.ndarray
     y: np.ndarray
@@ -51,15 +53,14 @@ class Task:
 def tasks():
     for problem in PROBLEMS:
         parameters = {"n_mfs": problem.n_mfs, "mf": problem.mf}
-        what = problem.names[0].split()[-1] + (f" [{problem.unit}]" if problem.unit else "")
-        yield Task(problem.name, what, parameters, *problem.train, problem.errors)
+        yield Task(problem.name, True, parameters, *problem.train, problem.errors)
     X, y, X_test, truth = make_surface(seed=0)
 
     def errors(model):
         rms = np.sqrt(np.mean((model.predict(X) - y) ** 2))
         return float(rms / SIGMA), score(model.predict(X_test), X, X_test, truth)[0]
 
-    yield Task("gyro-like, 27 rules", "RMSE [σ]", {"n_mfs": 3}, X, y, errors)
+    yield Task("gyro-like, 27 rules", False, {"n_mfs": 3}, X, y, errors)
 
 
 def count_passes(function):
@@ -85,9 +86,9 @@ def best_step(task, solver):
 
 
 def until(settings, model, loss):
-    """The settings that end as soon as ``loss`` is reached; None if it never was."""
+    """The settings that end as soon as ``loss`` is reached; None if a single start never did."""
     reached = np.flatnonzero(model.loss_curve_ <= loss)
-    if not reached.size:
+    if not reached.size or "n_init" in settings:
         return None
     # With no iteration at all, premises stay as they start: least squares alone.
     return {**settings, "max_iter": int(reached[0])}
@@ -110,7 +111,8 @@ def compare(task):
         step = settings[name].get("step_size")
         label = name if step is None else f"{name}, step_size={step:g}"
         cells = [*task.errors(model), model.n_iter_, n_passes, seconds[name]]
-        lines.append([task.name, label, *cells, *reached.get(name, ("never", ""))])
+        missing = "" if "n_init" in settings[name] else "never"
+        lines.append([task.name, label, *cells, *reached.get(name, (missing, ""))])
     return lines, reached
 
 
@@ -119,13 +121,20 @@ def run(options):
     for task in tasks():
         own, reached = compare(task)
         lines += own
-        (passes, seconds), (few, short) = reached["hybrid"], reached["varpro"]
-        work = f"varpro to the best of 500 epochs of Jang's rule, of its cost: {task.name}"
-        measures = [
-            Measure("passes", few / passes, "x", 0.1),
-            Measure("CPU", short / seconds, "x", 0.2),
-        ]
-        rows.append(Row(work, measures))
+        if task.has_bar:
+            (passes, seconds), (few, short) = reached["hybrid"], reached["varpro"]
+            work = (
+                f"varpro to the best of {_EPOCHS} epochs of Jang's rule, of its cost: {task.name}"
+            )
+            measures = [
+                Measure("passes", few / passes, "x", 0.1),
+                Measure("CPU", short / seconds, "x", 0.2),
+            ]
+            rows.append(Row(work, measures))
     head = ["problem", "solver", "error, train", "error, check", "iterations", "passes", "CPU [s]"]
     head += ["passes to Jang's best", "CPU [s]"]
-    return Results(rows, [Table("Solvers; errors as in the first table", head, lines)])
+    title = (
+        "Solvers; errors of what fit returns: RMSE, average percentage error (three-input), RMSE "
+        "over the noise (gyro-like)"
+    )
+    return Results(rows, [Table(title, head, lines)])

@@ -69,10 +69,11 @@ class TrainingData:
     output_names: tuple[str, ...]
     kept: np.ndarray | None = None
 
-    def part(self, indices):
-        """Some of the rows."""
+    def rows(self, indices=slice(None)):
+        """Some of the rows, on scales of their own."""
         weight = None if self.sample_weight is None else self.sample_weight[indices]
-        return self.X[indices], self.y[indices], weight
+        groups = None if self.groups is None else self.groups[indices]
+        return Rows.standardised(self.X[indices], self.y[indices], weight, groups)
 
     def spread_over_rows(self, values, indices):
         """Values of some rows as values of all rows given, NaN elsewhere."""
@@ -158,18 +159,14 @@ class _Trainer:
         self.estimator, self.data, self.partition, self.bridge = estimator, data, partition, bridge
         self.rng = np.random.default_rng(partition.seed)
         self.training, self.held_out = slice(None), None
+        self.rows = data.rows()
         if estimator.early_stopping:
-            every = Rows.standardised(data.X, data.y, data.sample_weight)
             self.training, validation = hold_out(
-                every,
-                data.groups,
-                estimator.validation_fraction,
-                int(self.rng.integers(2**31 - 1)),
+                self.rows, estimator.validation_fraction, int(self.rng.integers(2**31 - 1))
             )
-        self.rows = Rows.standardised(*data.part(self.training))
-        if estimator.early_stopping:
-            X, y, weight = data.part(validation)
-            self.held_out = Rows(X, y, weight, self.rows.inputs, self.rows.targets)
+            self.rows, every = data.rows(self.training), self.rows
+            held_out = every.part(validation)
+            self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
         self.n_distinct = count_distinct_inputs(self.rows, ENOUGH_ROWS)
         self.learner = Learner(
             "lse" if estimator.max_iter == 0 else estimator.solver,

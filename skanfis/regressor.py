@@ -214,8 +214,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     iterations on at most 1,000 representative rows. They are compared by Akaike's final prediction
     error [3]_, MSE (1 + k / N) / (1 - k / n), with the effective number of parameters k, those of
     the premises counted twice. Nothing is held out, and nothing is random. It counts rows, and
-    cannot see that the rows of one run are alike: with few runs of many rows each, choose ``n_mfs``
-    by cross-validation over the runs.
+    cannot see that the rows of one run are alike: where they come in runs, give these to ``fit`` as
+    ``groups``. The structures are then compared by their error on the groups left out, a fifth of
+    them at a time.
 
     References
     ----------
@@ -354,8 +355,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             Weights, zero or positive. A whole number counts as so many copies of the row, zero as
             the row's absence, in initialisation and scaling too.
         groups : array-like of shape (n_samples,), default=None
-            The run, device or level that each row belongs to: ``early_stopping`` holds out whole
-            groups. Not looked at without it.
+            The run, device or level that each row belongs to. Where the structure is chosen from
+            the data, it is by its error on groups left out; ``early_stopping`` holds out whole
+            groups. Not looked at otherwise.
 
         Returns
         -------

@@ -109,16 +109,17 @@ def _weights_of(sample_weight, part, n_rows):
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, and the scales of both."""
+    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups."""
 
     X: np.ndarray
     y: np.ndarray
     sample_weight: np.ndarray | None
     inputs: Scale
     targets: Scale
+    groups: np.ndarray | None = None  # the run, device, ... that each row belongs to
 
     @classmethod
-    def standardised(cls, X, y, sample_weight=None):
+    def standardised(cls, X, y, sample_weight=None, groups=None):
         """Rows with the scales found from the data; every weight must be positive."""
         return cls(
             X,
@@ -126,7 +127,14 @@ class Rows:
             sample_weight,
             column_statistics(X, sample_weight),
             column_statistics(y, sample_weight),
+            groups,
         )
+
+    def part(self, indices):
+        """Some of the rows, on the same scales."""
+        weight = None if self.sample_weight is None else self.sample_weight[indices]
+        groups = None if self.groups is None else self.groups[indices]
+        return Rows(self.X[indices], self.y[indices], weight, self.inputs, self.targets, groups)
 
     @property
     def n_rows(self):

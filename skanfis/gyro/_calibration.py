@@ -24,6 +24,8 @@ __all__ = ["Calibration", "Recipe", "calibrate"]
 
 # For comparing structures; what neighbours in time say twice is left out.
 _SEARCH_ROWS = 6_000
+# Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
+_ROUNDS = 3
 _BASELINES = {"straight line": 1, "cubic polynomial": 3}
 
 
@@ -133,16 +135,18 @@ def make_estimator(recipe, choice):
     pipeline = make_pipeline(StandardScaler(), anfis)
     if not recipe.physics:
         return pipeline
+    knows_lag = {"temperature", "temperature_rate"} <= set(recipe.inputs)
     law = OpenLoopArcsineRegressor(
         "output",
         "temperature" if "temperature" in recipe.inputs else None,
+        # The lag of the thermometer is part of the law where it can be known.
+        temperature_rate="temperature_rate" if knows_lag else None,
         amplitude_degree=degree,
-        sagnac_degree=degree,
         bias_degree=degree,
         out_of_bounds=recipe.outside,
         warn_out_of_bounds=False,
     )
-    return ResidualRegressor(law, pipeline)
+    return ResidualRegressor(law, pipeline, n_rounds=_ROUNDS)
 
 
 def _search(X, target, error, split, recipe, rng, tell):

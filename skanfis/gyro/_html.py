@@ -29,7 +29,7 @@ section { background: var(--paper); border: 1px solid var(--line); border-radius
 .cards div { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
   padding: 12px 16px; }
 .cards dt { color: var(--soft); font-size: .85rem; }
-.cards dd { margin: 2px 0 0; font-size: 1.2rem; font-weight: 650; line-height: 1.25;
+.cards dd { margin: 2px 0 0; font-size: 1.1rem; font-weight: 650; line-height: 1.25;
   font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
 .cards small { display: block; font-size: .82rem; font-weight: 400; color: var(--soft); }
 .figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 440px), 1fr));

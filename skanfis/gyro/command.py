@@ -14,7 +14,7 @@ from ._options import PROGRAM, make_parser
 from ._split import choose_split
 from .compensator import INPUTS, STATUS, GyroCompensator
 from .html_report import report_page, rules_text
-from .log import LogError, check_log, declared_units, read_log
+from .log import LogError, check_log, declared_units, located, read_log
 
 __all__ = ["main"]
 
@@ -86,7 +86,7 @@ def _calibrate(options, tell):
     inputs = tuple(options.inputs or _default_inputs(log, options.at_rest))
     if options.physics and "output" not in inputs:
         raise _UsageError("--physics: the arcsine law needs the output among the inputs.")
-    check_log(log, inputs=inputs, units=units, min_temperature_span=options.min_temperature_span)
+    _check(log, options, inputs=inputs, min_temperature_span=options.min_temperature_span)
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise _UsageError(
             f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs "
@@ -133,7 +133,7 @@ def _apply(options, tell):
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
     log = _read(options, sorted(needed), tell)
-    check_log(log, inputs=(), units=_pairs(options.units, "--units"))
+    _check(log, options, inputs=())
     tell("compensating")
     compensated = compensator.apply(log)
     labels = [name for name in ("device", "run", "time") if name in log]
@@ -169,6 +169,16 @@ def _read(options, require, tell):
         log = _of_device(log, options.device)
     tell(f"{len(log):,} rows{_counts(log)}")
     return log
+
+
+def _check(log, options, **requirements):
+    """As :func:`check_log`, with errors in the words of the file."""
+    try:
+        check_log(log, units=_pairs(options.units, "--units"), **requirements)
+    except LogError as error:
+        is_whole_file = len(options.logs) == 1 and options.device is None
+        path = options.logs[0] if is_whole_file else None
+        raise located(error, _pairs(options.columns, "--columns"), path) from error
 
 
 def _of_device(log, device):

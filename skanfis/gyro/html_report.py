@@ -195,9 +195,12 @@ def _limits(page, results):
     page.paragraph(
         f"Outside the ranges below, input by input, a row is flagged (status 1) and "
         f"{_POLICIES[calibration.recipe.outside]}. Inside them, rows near which there are hardly "
-        f"any data (coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C "
-        "code that skanfis.export writes flags the same rows with the same numbers."
+        f"any data (coverage below {compensator.min_coverage:g}) are flagged too (status 4)."
     )
+    if not calibration.recipe.physics:
+        page.paragraph(
+            "The C code that skanfis.export writes flags the same rows with the same numbers."
+        )
     low, high = calibration.X.min(), calibration.X.max()
     page.table(
         ("input", "from", "to", "unit"),
@@ -240,7 +243,7 @@ def _on_board(compensator):
     if compensator.predicts == "error":
         lines.append(f"rate = output / {compensator.scale_factor:.9g} - error({arguments});")
     else:
-        lines.append(f"rate = law(output, temperature) + rules({arguments});")
+        lines.append(f"rate = law({arguments}) + rules({arguments});")
     return "\n".join(lines)
 
 
@@ -270,7 +273,7 @@ def _data(page, results):
     if calibration.recipe.output_unit in SIGNALS:
         unit = f"{calibration.recipe.output_unit} per °/s"
         lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
-    page.table(("", "", ""), lines)
+    page.table(("quantity", "value", "unit"), lines)
 
 
 def _value(line, which):
@@ -287,6 +290,8 @@ def _law_text(law):
     for name in ("amplitude_", "sagnac_factor_", "bias_"):
         values = ", ".join(f"{value:.8g}" for value in getattr(law, name))
         lines.append(f"{_words(name.rstrip('_'))}: {values}")
+    if law.temperature_rate is not None:
+        lines.append(f"lag of the thermometer: {law.thermometer_lag_:.6g} s")
     return "\n".join(lines)
 
 

@@ -311,6 +311,19 @@ def _located(path, names, error):
     return LogError(f"{path}{place}{column}: {error.reason}")
 
 
+def located(error, columns, path=None):
+    """An error of :func:`check_log` in the names of the file's columns, and by its line.
+
+    Without ``path``, where rows are not one file's, the row stays.
+    """
+    if error.column is None:
+        return error
+    names = {part: part for part in COLUMNS} | columns
+    if path is not None:
+        return _located(path, names, error)
+    return LogError(error.reason, names[error.column], error.row)
+
+
 def _line(path, row):
     """Line of the file, from 1, that holds a row; blank lines are none."""
     filled = -1

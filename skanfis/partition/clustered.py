@@ -30,7 +30,7 @@ def _fingerprints(rows: Rows):
 
 
 def representative_rows(rows: Rows, most=_MOST_ROWS):
-    """Distinct rows of [z, y], standardised, and their weights, in lexical order.
+    """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
@@ -39,6 +39,8 @@ def representative_rows(rows: Rows, most=_MOST_ROWS):
     -------
     table : ndarray of shape (n_distinct, n_inputs + n_outputs)
     weight : ndarray of shape (n_distinct,)
+    indices : ndarray of shape (n_distinct,)
+        The first row of each.
     """
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     numbers = _fingerprints(rows)
@@ -52,7 +54,7 @@ def representative_rows(rows: Rows, most=_MOST_ROWS):
         distinct, weight = distinct[chosen], times.astype(float)
     table = rows.table(distinct)
     order = np.lexsort(table.T[::-1])
-    return table[order], weight[order]
+    return table[order], weight[order], distinct[order]
 
 
 def clustered_antecedent(families, rows: Rows, label, premise_inputs):
@@ -64,7 +66,7 @@ def clustered_antecedent(families, rows: Rows, label, premise_inputs):
     ``label`` returns one integer per row; negative ones (noise) belong to no rule. A single cluster
     is a single rule without terms: a linear model.
     """
-    table, weight = representative_rows(rows)
+    table, weight, _ = representative_rows(rows)
     n_inputs = rows.X.shape[1]
     inputs = premise_inputs[~rows.inputs.is_constant[premise_inputs]]
     seen = table

@@ -94,9 +94,7 @@ def _reweighted(rows, weights):
 
 
 def _without_outliers(rows, weights):
-    keep = weights >= _OUTLIER
-    own = None if rows.sample_weight is None else rows.sample_weight[keep]
-    return replace(rows, X=rows.X[keep], y=rows.y[keep], sample_weight=own)
+    return rows.part(weights >= _OUTLIER)
 
 
 def _is_same(one, other):

@@ -8,18 +8,19 @@ from sklearn.model_selection import GroupShuffleSplit
 from ..consequent import basis, rule_outputs
 from ..rows import Rows, fingerprint
 
-__all__ = ["EarlyStopping", "hold_out"]
+__all__ = ["EarlyStopping", "held_out_loss", "hold_out"]
 
 _READ_ROWS = 4096
 
 
-def hold_out(rows: Rows, groups, validation_fraction, seed):
-    """Indices to train on and to hold out, each in order: whole groups.
+def hold_out(rows: Rows, validation_fraction, seed):
+    """Indices to train on and to hold out, each in order: whole groups of the rows.
 
     Where there are none, equal rows are a group: no row is on both sides, and a weight is as good
     as so many repeats. ValueError where either part would have fewer than two rows.
     """
     what = f"{rows.n_rows} rows"
+    groups = rows.groups
     if groups is None:
         groups = _equal_rows(rows)
     else:
@@ -70,7 +71,7 @@ class EarlyStopping:
         self._without_change = 0
 
     def __call__(self, n_iter, evaluation):
-        loss = self._loss(evaluation)
+        loss = held_out_loss(self.rows, self.consequent_inputs, evaluation)
         self.losses.append(loss)
         if loss < self._best_loss:
             self._best_loss, self.best = loss, evaluation
@@ -84,20 +85,23 @@ class EarlyStopping:
         """The result with the parameters of the smallest held-out error."""
         return result if self.best is None else replace(result, evaluation=self.best)
 
-    def _loss(self, evaluation):
-        """Rows beyond the training rows' range count as predict holds them, at its edge."""
-        low, high = (edge[:, None] for edge in self.rows.inputs.box)
-        coefficients = evaluation.coefficients
-        n_rules = evaluation.antecedent.n_rules
-        by_rule = coefficients.reshape(n_rules, -1, coefficients.shape[1])
-        total = 0.0
-        for chunk in self.rows.chunks(_READ_ROWS):
-            for part in chunk:
-                Z, target, weight = self.rows.read(part)
-                np.clip(Z, low, high, out=Z)
-                strengths = evaluation.antecedent.strengths(Z)
-                basis_rows = basis(Z[self.consequent_inputs])
-                for k, one in enumerate(by_rule.transpose(2, 0, 1)):
-                    squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
-                    total += squares.sum() if weight is None else weight @ squares
-        return total / self.rows.total_weight
+
+def held_out_loss(rows: Rows, consequent_inputs, evaluation):
+    """Mean squared error of rows that were not trained on, standardised, summed over outputs.
+
+    Rows beyond the training rows' range count as predict holds them, at its edge.
+    """
+    low, high = (edge[:, None] for edge in rows.inputs.box)
+    coefficients = evaluation.coefficients
+    by_rule = coefficients.reshape(evaluation.antecedent.n_rules, -1, coefficients.shape[1])
+    total = 0.0
+    for chunk in rows.chunks(_READ_ROWS):
+        for part in chunk:
+            Z, target, weight = rows.read(part)
+            np.clip(Z, low, high, out=Z)
+            strengths = evaluation.antecedent.strengths(Z)
+            basis_rows = basis(Z[consequent_inputs])
+            for k, one in enumerate(by_rule.transpose(2, 0, 1)):
+                squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
+                total += squares.sum() if weight is None else weight @ squares
+    return total / rows.total_weight

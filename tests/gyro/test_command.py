@@ -215,8 +215,14 @@ def one_run_without_levels(log):
     [
         (lambda log: log.drop(columns="temperature"), "no column 'temperature'"),
         (without_value, "line 9, column 'rate'"),
-        (lambda log: log.assign(time=-log["time"]), "'time', row 1: time does not increase"),
-        (lambda log: log.assign(temperature=20.0), "'temperature': the temperature spans 0"),
+        (
+            lambda log: log.assign(time=-log["time"]),
+            "log.csv, line 3, column 'time': time does not increase",
+        ),
+        (
+            lambda log: log.assign(temperature=20.0),
+            "log.csv, column 'temperature': the temperature spans 0",
+        ),
         (lambda log: log.assign(output=-log["output"]), "its sign is reversed"),
         (one_run_without_levels, "could not be checked: the log has 1 device(s), 1 run(s)"),
     ],
@@ -229,6 +235,19 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, cap
     assert message in err
     assert err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
+    renamed = log.rename(columns={"temperature": "T"}).assign(T=300.0)
+    paths = [
+        write_log(tmp_path / f"{name}.csv", renamed, ["time", "T", "output", "rate", "run"])
+        for name in "ab"
+    ]
+    arguments = ["--columns", "temperature=T", "--output", str(tmp_path / "out"), "--quiet"]
+    assert main([paths[0], *arguments]) == 3
+    assert "a.csv, line 2, column 'T' (temperature): 300.0 degC" in capsys.readouterr().err
+    assert main([*paths, *arguments]) == 3
+    assert "column 'T', row 0: 300.0 degC is not plausible" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

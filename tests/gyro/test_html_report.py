@@ -133,17 +133,24 @@ def test_a_gyro_at_rest_has_no_scale_factor_pictures():
     assert "no rate is given" in text
 
 
-def test_physics_shows_its_law():
+@pytest.mark.parametrize("has_time", [True, False])
+def test_physics_shows_its_law(has_time):
     log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
-    log = log.drop(columns="time")
-    calibration = calibration_of(
-        log, inputs=("temperature", "output"), terms=(1, 1), physics=True, outside="linear"
-    )
+    inputs = ("temperature", "temperature_rate", "output")
+    if not has_time:
+        log, inputs = log.drop(columns="time"), ("temperature", "output")
+    terms = (1,) * len(inputs)
+    calibration = calibration_of(log, inputs, terms=terms, physics=True, outside="linear")
     text = " ".join(Outline(report_page(calibration, "law.csv")).text)
     law = calibration.compensator.estimator.base_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert "the model goes on linearly" in text
-    assert "the log has no time" in text or "allantools is not installed" in text
+    if has_time:
+        assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
+        # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.
+        assert 100.0 < law.thermometer_lag_ < 260.0
+    else:
+        assert "the log has no time" in text or "allantools is not installed" in text
 
 
 def test_page_refuses_no_text():

@@ -176,7 +176,7 @@ def many(rng, n_rows=300):
 def standing_for(X, y, weight=None, most=10_000):
     """Table in the user's units, and weight as part of the whole."""
     rows = Rows.standardised(X, y, None if weight is None else weight.astype(float))
-    table, share = representative_rows(rows, most)
+    table, share, _ = representative_rows(rows, most)
     scales = np.concatenate([rows.inputs.scale, rows.targets.scale])
     return table * scales + np.concatenate(
         [rows.inputs.offset, rows.targets.offset]
@@ -224,7 +224,7 @@ class TestRepresentativeRows:
         X = rng.normal(size=(5000, 2))
         y = X.sum(axis=1, keepdims=True)
         rows = Rows.standardised(X, y)
-        table, weight = representative_rows(rows, 500)
+        table, weight, _ = representative_rows(rows, 500)
         assert len(table) <= 500
         assert weight.sum() == 500
         every = {row.tobytes() for row in rows.table(slice(None))}
@@ -237,7 +237,7 @@ class TestRepresentativeRows:
         X = rng.normal(size=(1000, 1))
         weight = np.where(X[:, 0] > 0.0, 9.0, 1.0)
         rows = Rows.standardised(X, np.zeros((1000, 1)), weight)
-        table, share = representative_rows(rows, 200)
+        table, share, _ = representative_rows(rows, 200)
         heavy = table[:, 0] > -rows.inputs.offset[0] / rows.inputs.scale[0]
         assert_allclose(
             share[heavy].sum() / share.sum(), weight[X[:, 0] > 0.0].sum() / weight.sum(), atol=0.01

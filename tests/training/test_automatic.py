@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
@@ -181,3 +182,53 @@ def test_the_stiffest_level_that_is_as_good_is_taken(rng, scores, chosen):
     for level, score in enumerate(scores):
         search.scores[automatic.replace(start, level=level)] = score
     assert search._tune(start).level == chosen
+
+
+def runs(n_runs=6, n_rows=120, seed=0):
+    """Runs of an instrument: each has a bias of its own, which a wiggle in the run's input fits."""
+    g = np.random.default_rng(seed)
+    run = np.repeat(np.arange(n_runs), n_rows)
+    temperature = g.uniform(-1, 1, n_runs)[run] + 0.02 * g.normal(size=run.size)
+    rate = g.uniform(-1, 1, run.size)
+    y = np.sin(2 * rate) + 0.3 * g.normal(size=n_runs)[run] + 0.02 * g.normal(size=run.size)
+    return np.column_stack([temperature, rate]), y, run
+
+
+def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
+    X, y, run = runs()
+    alone, grouped = (ANFISRegressor().fit(X, y, groups=groups) for groups in (None, run))
+    on_temperature = [
+        [term["input"] for term in model.memberships_].count("x0") for model in (alone, grouped)
+    ]
+    assert on_temperature[0] > on_temperature[1] == 0
+    # It knows how well it will do on new runs, as far as six runs tell; the other has no idea.
+    X_new, y_new, _ = runs(40, seed=1)
+    errors = []
+    for model in (alone, grouped):
+        model.set_params(warn_out_of_bounds=False)
+        errors.append(np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std())
+    assert_allclose(grouped.structures_[0]["expected_error"], errors[1], rtol=0.5)
+    assert alone.structures_[0]["expected_error"] < 0.5 * errors[0]
+
+
+def test_score_of_groups_is_that_of_trainings_without_them():
+    X, y, run = runs(5)
+    model = ANFISRegressor(n_mfs="auto", partition="grid", alpha=1e-6, stiffness=1e-5)
+    model.fit(X, y, groups=run)
+    linear = next(s for s in model.structures_ if s["structure"] == "grid [1, 1]")
+    squares = []
+    for held in range(5):
+        kept = run != held
+        low, high = X[kept].min(axis=0), X[kept].max(axis=0)
+        inside = ~kept & ((low <= X) & (high >= X)).all(axis=1)
+        plane = LinearRegression().fit(X[kept], y[kept])
+        if inside.any():
+            squares.append((plane.predict(X[inside]) - y[inside]) ** 2)
+    expected = np.sqrt(np.mean(np.concatenate(squares))) / y.std()
+    assert_allclose(linear["expected_error"], expected, rtol=1e-3)
+
+
+def test_a_single_group_says_nothing():
+    X, y, run = runs(3)
+    one, none = (ANFISRegressor().fit(X, y, groups=g) for g in (np.zeros(run.size), None))
+    assert_array_equal(one.predict(X), none.predict(X))

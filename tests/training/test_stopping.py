@@ -1,5 +1,7 @@
 """Early stopping: what is held out, when it ends, what is restored."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -20,7 +22,7 @@ def overfitting(n_rows=150, seed=0):
 
 def held_out_by_default(X, y):
     seed = int(np.random.default_rng(0).integers(2**31 - 1))
-    return hold_out(Rows.standardised(X, y.reshape(len(y), -1)), None, 0.1, seed)[1]
+    return hold_out(Rows.standardised(X, y.reshape(len(y), -1)), 0.1, seed)[1]
 
 
 def test_best_parameters_are_restored():
@@ -59,7 +61,7 @@ def test_whole_groups_are_held_out():
     g = np.random.default_rng(2)
     groups = np.repeat(np.arange(10), 20)
     rows = Rows.standardised(g.normal(size=(200, 2)), g.normal(size=(200, 1)))
-    training, validation = hold_out(rows, groups, 0.3, 0)
+    training, validation = hold_out(replace(rows, groups=groups), 0.3, 0)
     assert set(groups[training]).isdisjoint(groups[validation])
     assert np.unique(groups[validation]).size == 3
     # Every group has a level of its own: what is held out cannot have been learnt.
@@ -72,7 +74,7 @@ def test_whole_groups_are_held_out():
     assert grouped.validation_loss_curve_.min() > 5 * alone.validation_loss_curve_.min()
 
 
-def test_groups_mean_nothing_without_early_stopping():
+def test_groups_mean_nothing_where_nothing_is_held_out():
     X, y = overfitting()
     groups = np.arange(150) % 5
     one, other = ANFISRegressor(n_mfs=2).fit(X, y), ANFISRegressor(n_mfs=2).fit(X, y, groups=groups)
@@ -85,7 +87,7 @@ def test_held_out_rows_are_weighted_and_have_several_outputs():
     both = np.column_stack([y, X[:, 1]])
     model = ANFISRegressor(n_mfs=2, **SETTINGS).fit(X, both, sample_weight=weight)
     every = Rows.standardised(X, both, weight)
-    _, held = hold_out(every, None, 0.1, int(np.random.default_rng(0).integers(2**31 - 1)))
+    _, held = hold_out(every, 0.1, int(np.random.default_rng(0).integers(2**31 - 1)))
     kept = np.setdiff1d(np.arange(150), held)
     mean = np.average(both[kept], axis=0, weights=weight[kept])
     variance = np.average((both[kept] - mean) ** 2, axis=0, weights=weight[kept])
@@ -97,7 +99,7 @@ def test_held_out_rows_are_weighted_and_have_several_outputs():
 def test_random_state_chooses_the_rows():
     g = np.random.default_rng(0)
     rows = Rows.standardised(g.normal(size=(100, 2)), g.normal(size=(100, 1)))
-    one, again, other = (hold_out(rows, None, 0.2, seed)[1] for seed in (0, 0, 1))
+    one, again, other = (hold_out(rows, 0.2, seed)[1] for seed in (0, 0, 1))
     assert one.size == 20
     assert_array_equal(one, again)
     assert not np.array_equal(one, other)
@@ -106,7 +108,7 @@ def test_random_state_chooses_the_rows():
 def test_equal_rows_are_on_one_side():
     g = np.random.default_rng(0)
     X = g.normal(size=(50, 2))[np.arange(200) % 50]
-    training, held = hold_out(Rows.standardised(X, g.normal(size=(200, 1))), None, 0.2, 0)
+    training, held = hold_out(Rows.standardised(X, g.normal(size=(200, 1))), 0.2, 0)
     assert held.size == 40
     assert set(training % 50).isdisjoint(held % 50)
 
