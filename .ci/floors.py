@@ -8,6 +8,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+# Those that the package itself can use.
+EXTRAS = ("plot", "allan", "onnx")
 PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
 
 
@@ -28,7 +30,8 @@ def main():
     running = ".".join(map(str, sys.version_info[:2]))
     if running != python_floor:
         sys.exit(f"the floors are tested on Python {python_floor}, this is {running}")
-    for requirement in project["dependencies"] + project["optional-dependencies"]["plot"] + frames:
+    extras = [r for name in EXTRAS for r in project["optional-dependencies"][name]]
+    for requirement in project["dependencies"] + extras + frames:
         print("==".join(floor(requirement)))
 
 
