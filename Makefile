@@ -47,7 +47,7 @@ help:
 	@echo "make lint         style, format, types"
 	@echo "make format       put style and format right where a tool can"
 	@echo "make test-floors  all tests at the oldest dependencies that pyproject.toml allows"
-	@echo "make test-wheel   all tests against the built wheel, away from the source"
+	@echo "make test-wheel   all but the slow tests against the built wheel, away from the source"
 	@echo "make wheel        sdist and wheel, in dist/"
 	@echo "make docs         the documentation, in docs/_build/html"
 	@echo "make benchmarks   all benchmarks"
@@ -97,7 +97,8 @@ wheel: $(DEV)/.installed
 	rm -rf dist
 	$(DEV)/bin/python -m build --outdir dist
 
-# The tests read pyproject.toml for pytest's settings and docs/api.rst for the names it lists.
+# The tests read pyproject.toml for pytest's settings and docs/api.rst for the names it lists. What a
+# wheel may lack is files: the slow tests, long lists of models through the same code, add nothing.
 test-wheel: wheel
 	@set -e; away=$$(mktemp -d); trap 'rm -rf "$$away"' EXIT; trap 'exit 1' INT TERM; \
 	mkdir "$$away/docs"; cp -R tests pyproject.toml "$$away"; cp docs/api.rst "$$away/docs"; \
@@ -106,7 +107,7 @@ test-wheel: wheel
 	venv/bin/python -m pip install --upgrade "pip>=25.1"; \
 	venv/bin/python -m pip install "$$wheel[plot,allan,onnx]" --group test; \
 	venv/bin/python -c "import skanfis; print('Testing', skanfis.__file__)"; \
-	$(call pytest,venv) tests --pyargs skanfis
+	$(call pytest,venv) -m "not slow" tests --pyargs skanfis
 
 docs: $(DOCS)/.installed
 	$(DOCS)/bin/python -m sphinx --fail-on-warning --keep-going docs docs/_build/html

@@ -56,7 +56,7 @@ def friedman(n_rows, n_inputs, seed):
 
 TASKS = [
     Task("gyro-like, 2,000 x 3", SIGMA, make_surface, 3),
-    Task("Friedman 1, 5,000 x 8", 1.0, lambda seed: friedman(5000, 8, seed), 5),
+    Task("Friedman 1, 5,000 x 8", 1.0, lambda seed: friedman(5000, 8, seed), 10),
     Task("Friedman 1, 100 x 5", 1.0, lambda seed: friedman(100, 5, seed), 10),
 ]
 

@@ -351,10 +351,11 @@ class _Trainer:
         estimator = self.estimator
         if result.converged or estimator.max_iter == 0:
             return
+        hint = "" if result.status == "interrupted" else "; increase max_iter or tol"
         warn_user(
             f"solver={estimator.solver!r} with {structure.antecedent.n_rules} rules on "
             f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}, tol={estimator.tol:g}: "
-            f"{result.message} The model is the best one found; increase max_iter or tol.",
+            f"{result.message} The model is the best one found{hint}.",
             ConvergenceWarning,
         )
 

@@ -64,7 +64,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         together, as is the custom since Chiu's subtractive clustering. A fitted ANFISRegressor, or
         a model such as its ``model_`` or what a file was read into: training starts from its rules
         and memberships, in the units of X. With ``solver="lse"`` only the consequents are then
-        learnt, with ``max_iter=0`` nothing is.
+        learnt, with ``max_iter=0`` nothing is, and the model's own ``order`` holds.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, one for all inputs or one each: "gaussian",
         :math:`\exp(-(x-c)^2 / 2\sigma^2)`; "bell", Jang's generalised bell
@@ -356,8 +356,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             the row's absence, in initialisation and scaling too.
         groups : array-like of shape (n_samples,), default=None
             The run, device or level that each row belongs to. Where the structure is chosen from
-            the data, it is by its error on groups left out; ``early_stopping`` holds out whole
-            groups. Not looked at otherwise.
+            the data, it is by its error on groups left out, if there are two or more;
+            ``early_stopping`` holds out whole groups. Not looked at otherwise.
 
         Returns
         -------
@@ -373,13 +373,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         context = None
         if hasattr(self, "_skl_callbacks"):
             is_single_run = self.n_init == 1 and self.loss != "huber" and self.alpha != "gcv"
-            most = self.max_iter if is_single_run and not self.prune else None
+            most = max(self.max_iter, 1) if is_single_run and not self.prune else None
             context = self._init_callback_context(max_subtasks=most)
         before = self.__dict__.copy()
         try:
             data = self._check_training_data(X, y, sample_weight, groups)
             partition = self._partition(data.input_names)
-            bridge = None if context is None else self._bridge(context, data)
+            bridge = None if context is None else self._bridge(context, X, y, sample_weight)
             training = train(self, data, partition, bridge)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
@@ -570,6 +570,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _imported(self, names):
         """``partition``, with the model in place of the estimator that holds it."""
         given = self.partition
+        if isinstance(given, type):
+            raise ValueError(
+                f"partition={given!r} is a class: give an object of it, {given.__name__}(...)."
+            )
         if isinstance(given, str) or hasattr(given, "fit_predict"):
             return given
         model = getattr(given, "model_", given)
@@ -579,21 +583,26 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
             )
         check_inputs(model, names, "partition")
+        if self.premise_features is not None:
+            raise ValueError(
+                f"premise_features={self.premise_features!r} means nothing to imported rules, "
+                "which are on the inputs that they are on: leave it at None."
+            )
+        if self.max_iter == 0 and self.consequent_features is not None:
+            raise ValueError(
+                f"consequent_features={self.consequent_features!r} means nothing where imported "
+                "rules are taken as they are (max_iter=0): leave it at None, or use solver='lse'."
+            )
         return model
 
-    def _bridge(self, context, data):
-        """To scikit-learn's callbacks."""
+    def _bridge(self, context, X, y, sample_weight):
+        """To scikit-learn's callbacks, which are given the data as the user gave them."""
 
         def attributes(*state):
-            model = state[0] if len(state) == 1 else state[0].freeze(*state[1:])
-            return {"model_": model}
+            return {"model_": state[0] if len(state) == 1 else state[0].freeze(*state[1:])}
 
-        targets = data.y[:, 0] if self._single_output else data.y
-        weight = data.sample_weight
-        metadata = None if weight is None else {"sample_weight": weight}
-        bridge = CallbackBridge(
-            self, context, {"X": data.X, "y": targets, "metadata": metadata}, attributes
-        )
+        metadata = None if sample_weight is None else {"sample_weight": sample_weight}
+        bridge = CallbackBridge(self, context, {"X": X, "y": y, "metadata": metadata}, attributes)
         bridge.begin()
         return bridge
 
@@ -618,7 +627,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             output_names = ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
         check_finite(X, "X", self._input_names())
         check_finite(targets, "y", output_names)
-        groups = None if groups is None else column_or_1d(groups)
+        groups = None if groups is None else _checked_groups(groups)
         keep = None
         if sample_weight is not None:
             sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
@@ -657,3 +666,16 @@ def _target_names(y):
         names = [getattr(y, "name", None)]
     names = list(names)
     return tuple(names) if all(isinstance(name, str) and name for name in names) else None
+
+
+def _checked_groups(groups):
+    """Groups as numbers; ValueError where one is missing."""
+    groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else groups
+    groups = column_or_1d(groups)
+    missing = [i for i, group in enumerate(groups) if group is None or group != group]
+    if missing:
+        raise ValueError(
+            f"groups has no value for {len(missing)} of {len(groups)} rows, first at row "
+            f"{missing[0]}: every row must belong to a group."
+        )
+    return np.unique(groups, return_inverse=True)[1]

@@ -1,6 +1,7 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
 from .allan import AllanCoefficients, allan_coefficients, allan_deviation
+from .c_code import export_c_physics
 from .compensator import GyroCompensator
 from .compose import ResidualRegressor
 from .displays import (
@@ -71,6 +72,7 @@ __all__ = [
     "check_split",
     "clip_dwells",
     "combine_groups",
+    "export_c_physics",
     "find_dwells",
     "find_rate_levels",
     "group_by_rate_level",

@@ -12,6 +12,7 @@ from ..export import export_c
 from ._calibration import Recipe, calibrate
 from ._options import PROGRAM, make_parser
 from ._split import choose_split
+from .c_code import export_c_physics
 from .compensator import INPUTS, STATUS, GyroCompensator
 from .html_report import report_page, rules_text
 from .log import LogError, check_log, declared_units, located, read_log
@@ -76,8 +77,6 @@ def _calibrate(options, tell):
         raise FileExistsError(f"{folder} is a file; --output is the folder to write to.")
     files = [*_FILES.values(), *(_C_FILES if options.c else ())]
     _refuse_existing([folder / name for name in files], options.force)
-    if options.c and options.physics:
-        raise _UsageError("--c: the arcsine law of --physics is not exported as C.")
     _require_matplotlib()
     needed = ("temperature", "output") if options.at_rest else ("temperature", "output", "rate")
     log = _read(options, needed, tell)
@@ -247,16 +246,13 @@ def _write(calibration, options, folder):
     folder.mkdir(parents=True, exist_ok=True)
     (folder / _FILES["report"]).write_text(page, encoding="utf-8")
     joblib.dump(compensator, folder / _FILES["model"])
-    if calibration.recipe.physics:
-        # One of before, which --force lets go, would be another model's.
-        (folder / _FILES["json"]).unlink(missing_ok=True)
-    else:
-        compensator.write_json(folder / _FILES["json"])
+    compensator.write_json(folder / _FILES["json"])
     (folder / _FILES["rules"]).write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         coverage = compensator.min_coverage or None
         path = folder / "compensator"
-        export_c(compensator.estimator, path, std=options.c, min_coverage=coverage)
+        export = export_c_physics if calibration.recipe.physics else export_c
+        export(compensator.estimator, path, std=options.c, min_coverage=coverage)
 
 
 def _title(logs):

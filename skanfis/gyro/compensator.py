@@ -13,6 +13,9 @@ from ..exceptions import OutOfBoundsWarning
 from ..export import export_json
 from ..export.model_json import parse_json
 from ._ask import ask
+from ._frozen import FrozenRules, joined, law_and_rules
+from ._law_json import law_document, read_law
+from .compose import ResidualRegressor
 from .features import ThermalRate, TimeSincePowerOn
 
 __all__ = ["STATUS", "GyroCompensator"]
@@ -127,7 +130,8 @@ class GyroCompensator:
             for start in range(0, len(X), _BLOCK_ROWS)
         ]
         predicted, inside, coverage = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-        refused = np.isnan(predicted)
+        refused = ~np.isfinite(predicted)
+        predicted[refused] = np.nan
         status = (
             STATUS["OUT_OF_RANGE"] * ~inside
             | STATUS["UNCOVERED"] * (~refused & (coverage < self.min_coverage))
@@ -174,15 +178,19 @@ class GyroCompensator:
         Raises
         ------
         ValueError, TypeError
-            If the estimator cannot be written as a model of rules: one with a law of physics.
+            If the estimator is neither an ANFIS behind scalers nor a :class:`ResidualRegressor` of
+            the arcsine law and such.
         OSError
             If the file cannot be written.
         """
+        law, rules = self._parts()
         document = {
             "format": _FORMAT,
             "version": _VERSION,
             **{key: getattr(self, key) for key in _KEYS},
-            "model": json.loads(export_json(getattr(self.estimator, "model", self.estimator))),
+            "law": None if law is None else law_document(law, self.inputs),
+            "columns": [self.inputs[j] for j in rules.positions],
+            "model": json.loads(export_json(rules.model)),
         }
         text = json.dumps(document, indent=1, allow_nan=False) + "\n"
         Path(path).write_text(text, encoding="utf-8", newline="\n")
@@ -217,6 +225,13 @@ class GyroCompensator:
         except (ValueError, RecursionError) as error:
             raise ValueError(f"{path} is no gyro compensator: {error}.") from error
 
+    def _parts(self):
+        """The law, or None, and the rules."""
+        found = getattr(self.estimator, "best_estimator_", self.estimator)
+        if isinstance(found, ResidualRegressor):
+            return law_and_rules(found)
+        return None, FrozenRules.of(found, len(self.inputs))
+
     def _apply_block(self, X):
         with warnings.catch_warnings():
             # The status tells, row by row.
@@ -224,22 +239,6 @@ class GyroCompensator:
             predicted = self.estimator.predict(X)
         inside = ask(self.estimator, "in_bounds", X)
         return predicted, inside, ask(self.estimator, "coverage", X)
-
-
-@dataclass(frozen=True, eq=False)
-class _Rules:
-    """A model of rules that was read from a file, as an estimator that is fitted for good."""
-
-    model: Any
-
-    def predict(self, X):
-        return self.model.predict(X.to_numpy())[:, 0]
-
-    def in_bounds(self, X):
-        return self.model.in_bounds(X.to_numpy())
-
-    def coverage(self, X):
-        return self.model.coverage(X.to_numpy())
 
 
 def features(log, inputs, time_constant):
@@ -265,10 +264,10 @@ def _settings(document):
         raise ValueError(f'its "format" is not "{_FORMAT}"')
     if document.get("version") != _VERSION:
         raise ValueError(f"its version is {document.get('version')!r}, this reads {_VERSION}")
-    if set(document) != {"format", "version", "model", *_KEYS}:
+    if set(document) != {"format", "version", "law", "columns", "model", *_KEYS}:
         raise ValueError(f"its keys are {', '.join(document)}")
     inputs = document["inputs"]
-    if not isinstance(inputs, list) or not inputs or any(name not in INPUTS for name in inputs):
+    if not _are_of(inputs, INPUTS):
         raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
     if document["predicts"] not in ("error", "rate"):
         raise ValueError(f"predicts is {document['predicts']!r}")
@@ -278,8 +277,22 @@ def _settings(document):
             raise ValueError(f"{key} is {value!r}, no finite number")
     if not isinstance(document["output_unit"], str):
         raise ValueError("output_unit is no text")
-    model = parse_json(json.dumps(document["model"]))
-    if model.n_inputs != len(inputs) or model.n_outputs != 1:
+    columns, model = document["columns"], parse_json(json.dumps(document["model"]))
+    if not _are_of(columns, inputs):
+        raise ValueError(f"columns is {columns!r}; they must be of the inputs")
+    if model.n_inputs != len(columns) or model.n_outputs != 1:
         raise ValueError(f"its model has {model.n_inputs} inputs and {model.n_outputs} outputs")
     settings = {key: document[key] for key in _KEYS}
-    return {"estimator": _Rules(model), **settings, "inputs": tuple(inputs)}
+    estimator = FrozenRules(model, np.array([inputs.index(name) for name in columns]))
+    if document["law"] is not None:
+        estimator = joined(read_law(document["law"], inputs), estimator)
+    return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
+
+
+def _are_of(names, known):
+    """Whether it is a list of some of the known names, each of them once."""
+    return (
+        isinstance(names, list)
+        and bool(names)
+        and all(name in known and names.count(name) == 1 for name in names)
+    )

@@ -7,6 +7,7 @@ import sklearn
 from .. import __version__
 from ..export import export_text
 from ._html import Page
+from ._law_text import law_text
 from ._pictures import PICTURES, draw_coverage, draw_memberships, why_no_allan
 from ._results import Results, rms, rules_of
 from ._units import SIGNALS
@@ -197,10 +198,7 @@ def _limits(page, results):
         f"{_POLICIES[calibration.recipe.outside]}. Inside them, rows near which there are hardly "
         f"any data (coverage below {compensator.min_coverage:g}) are flagged too (status 4)."
     )
-    if not calibration.recipe.physics:
-        page.paragraph(
-            "The C code that skanfis.export writes flags the same rows with the same numbers."
-        )
+    page.paragraph("The C code that --c writes flags the same rows with the same numbers.")
     low, high = calibration.X.min(), calibration.X.max()
     page.table(
         ("input", "from", "to", "unit"),
@@ -222,7 +220,7 @@ def _rules(page, results):
         page.paragraph(
             "The rules give what the arcsine law leaves of the rate; the law's prediction is added."
         )
-        page.preformatted(_law_text(estimator.base_), "The arcsine law")
+        page.preformatted(_law_table(calibration), "The arcsine law")
     if (picture := draw_memberships(calibration)) is not None:
         page.figures([picture])
     page.preformatted(rules_text(calibration), "All rules as text")
@@ -248,10 +246,11 @@ def _on_board(compensator):
 
 
 def rules_text(calibration):
-    """The rules as sentences."""
+    """The rules as sentences, after the formula of the law where there is one."""
     estimator = calibration.compensator.estimator
     if calibration.recipe.physics:
-        return export_text(estimator.residual_, output_names=["rate beyond the law"]) + "\n"
+        rules = export_text(estimator.residual_, output_names=["rate beyond the law"])
+        return f"{_formula(calibration)}\nTo this rate is added what the rules give.\n\n{rules}\n"
     return export_text(estimator, output_names=["error"]) + "\n"
 
 
@@ -285,8 +284,17 @@ def _value(line, which):
     return figures(value), f"[{figures(low)}, {figures(high)}]" if known else ""
 
 
-def _law_text(law):
-    lines = [f"at {law.reference_temperature_:.6g} °C; powers of the difference, lowest first"]
+def _formula(calibration):
+    law, recipe = calibration.compensator.estimator.base_, calibration.recipe
+    return law_text(law, recipe.inputs, recipe.output_unit)
+
+
+def _law_table(calibration):
+    law = calibration.compensator.estimator.base_
+    lines = [
+        _formula(calibration),
+        f"at {law.reference_temperature_:.6g} °C; powers of the difference, lowest first",
+    ]
     for name in ("amplitude_", "sagnac_factor_", "bias_"):
         values = ", ".join(f"{value:.8g}" for value in getattr(law, name))
         lines.append(f"{_words(name.rstrip('_'))}: {values}")

@@ -44,7 +44,7 @@ from sklearn.utils.validation import check_is_fitted, check_scalar, validate_dat
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ._columns import check_weights
 
-__all__ = ["OpenLoopArcsineRegressor"]
+__all__ = ["OpenLoopArcsineRegressor", "check_parameters"]
 
 _POLICIES = ("clip", "linear", "nan", "raise")
 
@@ -129,8 +129,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         degC/s); zero unless fitted.
     reference_temperature_ : float
         Temperature of the coefficients.
+    columns_ : list of int
+        Positions in X of output, then of temperature and its rate if used.
     minimum_, maximum_ : ndarray of shape (n_used,)
-        Range of the training data: output, then temperature and its rate if used.
+        Range of the training data in these columns.
     n_iter_ : int
         Evaluations of the law in the fit.
     n_features_in_ : int
@@ -225,11 +227,11 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             If a parameter or column is not what it must be, if there are fewer rows than
             coefficients, or if output or rate never change.
         """
-        self._check_parameters()
+        check_parameters(self)
         X, y = validate_data(self, X, y, dtype=float, y_numeric=True)
         weights = check_weights(sample_weight, len(y))
-        self._columns = self._find_columns()
-        used, y, weights = X[weights > 0][:, self._columns], y[weights > 0], weights[weights > 0]
+        self.columns_ = self._find_columns()
+        used, y, weights = X[weights > 0][:, self.columns_], y[weights > 0], weights[weights > 0]
         log = _standardise(used, y.astype(float), weights)
         shape = _Shape(self._degrees(used), used.shape[1] == 3, self.fit_offset)
         _check_log(log, shape)
@@ -265,7 +267,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             If rows go beyond ``max_phase`` or outside the training data, unless
             ``warn_out_of_bounds=False``.
         """
-        self._check_parameters()
+        check_parameters(self)
         used = self._used(X)
         sine, limit = self._sine(used), np.sin(self.max_phase)
         beyond = np.abs(sine) > limit
@@ -311,23 +313,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         """
         used = self._used(X)
         return ~self._outside(used) & (np.abs(self._sine(used)) <= np.sin(self.max_phase))
-
-    def _check_parameters(self):
-        for name in ("amplitude_degree", "sagnac_degree", "bias_degree"):
-            check_scalar(getattr(self, name), name, (int, np.integer), min_val=0, max_val=5)
-        check_scalar(
-            self.max_phase,
-            "max_phase",
-            (float, int, np.floating),
-            min_val=0.0,
-            max_val=np.pi / 2.0,
-            include_boundaries="neither",
-        )
-        if self.out_of_bounds not in _POLICIES:
-            choices = ", ".join(_POLICIES)
-            raise ValueError(f"out_of_bounds={self.out_of_bounds!r} must be one of {choices}.")
-        if self.reference_temperature is not None and not np.isfinite(self.reference_temperature):
-            raise ValueError(f"reference_temperature={self.reference_temperature} must be finite.")
 
     def _find_columns(self):
         """Positions of output and, if used, of temperature and its rate."""
@@ -397,7 +382,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
     def _used(self, X):
         check_is_fitted(self)
-        return validate_data(self, X, reset=False, dtype=float)[:, self._columns]
+        return validate_data(self, X, reset=False, dtype=float)[:, self.columns_]
 
     def _difference(self, used):
         """The coil's temperature from the reference."""
@@ -436,6 +421,25 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             )
         if messages:
             warnings.warn(" ".join(messages), OutOfBoundsWarning, stacklevel=3)
+
+
+def check_parameters(law):
+    """Raise ValueError where a parameter of an OpenLoopArcsineRegressor is not what it must be."""
+    for name in ("amplitude_degree", "sagnac_degree", "bias_degree"):
+        check_scalar(getattr(law, name), name, (int, np.integer), min_val=0, max_val=5)
+    check_scalar(
+        law.max_phase,
+        "max_phase",
+        (float, int, np.floating),
+        min_val=0.0,
+        max_val=np.pi / 2.0,
+        include_boundaries="neither",
+    )
+    if law.out_of_bounds not in _POLICIES:
+        choices = ", ".join(_POLICIES)
+        raise ValueError(f"out_of_bounds={law.out_of_bounds!r} must be one of {choices}.")
+    if law.reference_temperature is not None and not np.isfinite(law.reference_temperature):
+        raise ValueError(f"reference_temperature={law.reference_temperature} must be finite.")
 
 
 @dataclass(frozen=True)

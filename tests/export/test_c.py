@@ -54,6 +54,7 @@ def expected_outputs(model, X, status, std):
 
 
 @needs_compiler
+@pytest.mark.slow
 @pytest.mark.parametrize("std", ["c99", "c89"])
 @pytest.mark.parametrize(("dtype", "tolerance"), [("double", 1e-12), ("float", 1e-5)])
 def test_every_model_answers_as_predict(dtype, tolerance, std, tmp_path, capsys):

@@ -51,6 +51,7 @@ def answers(estimator, X, **options):
     return y
 
 
+@pytest.mark.slow
 @PRECISIONS
 def test_every_model_answers_as_predict(dtype, tolerance, capsys):
     X = rows(dtype)

@@ -12,8 +12,11 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
+from skanfis.export.c import CCode
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro.command import main
+
+from ..export.c_compiler import COMPILER, evaluate_all
 
 RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=table"]
 UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
@@ -163,18 +166,30 @@ def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
 @pytest.mark.usefixtures("no_report")
 def test_physics_and_policy(tmp_path, log, capsys):
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    (out).mkdir()
-    (out / "compensator.json").write_text("of another model")
     arguments = [path, "--physics", "--terms", "1,2,1,1", "--outside", "nan", "--quiet"]
-    assert main([*arguments, "--output", str(out), "--force"]) == 0
+    assert main([*arguments, "--output", str(out), "--c", "c99"]) == 0
     assert capsys.readouterr().err == ""
-    # There is none of this model, and none may be taken for it.
-    assert not (out / "compensator.json").exists()
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        [*FILES, "compensator.c", "compensator.h"]
+    )
+    rules = (out / "rules.txt").read_text(encoding="utf-8")
+    assert rules.startswith("rate [deg/s] = arcsin((output [deg/s]")
+    assert "rate beyond the law = " in rules
     compensator = joblib.load(out / "compensator.joblib")
     assert compensator.predicts == "rate"
     hot = compensator.apply(log.assign(temperature=log["temperature"] + 100.0))
     assert hot["rate_compensated"].isna().all()
     assert (hot["status"] == 1 + 8).all()
+    read = GyroCompensator.read_json(out / "compensator.json")
+    np.testing.assert_allclose(read.apply(log), compensator.apply(log), rtol=1e-9, atol=1e-12)
+    if COMPILER is not None:
+        header, source = ((out / f"compensator.{end}").read_text() for end in "hc")
+        code = CCode("compensator", header, source, None)
+        hotter = log.assign(temperature=log["temperature"] + 5.0)
+        X, applied = compensator.features(hotter), compensator.apply(hotter)
+        [(y, status)] = evaluate_all([code], X.to_numpy(), tmp_path, "c99", [1])
+        np.testing.assert_array_equal(status, applied["status"])
+        np.testing.assert_allclose(y[:, 0], applied["rate_compensated"], rtol=1e-12, atol=1e-10)
 
 
 @pytest.mark.usefixtures("no_report")
@@ -263,7 +278,6 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--fit-rows", "0"], "must be a whole number, 1 or more"),
         (["--time-constant", "-1"], "must be a positive number"),
         (["--physics", "--inputs", "temperature"], "needs the output"),
-        (["--physics", "--c", "c99"], "not exported as C"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
         (["--device", "a"], "no column for the device"),
     ],

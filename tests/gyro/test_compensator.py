@@ -5,12 +5,19 @@ import warnings
 
 import numpy as np
 import pytest
+from sklearn.compose import make_column_transformer
+from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
+from skanfis.gyro import (
+    GyroCompensator,
+    OpenLoopArcsineRegressor,
+    ResidualRegressor,
+    export_c_physics,
+)
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 FACTOR = -27_000.0  # counts per deg/s
@@ -114,16 +121,115 @@ def test_status_is_that_of_the_exported_c(log):
         assert f"#define GYRO_{name} {bit}" in header
 
 
-def test_physics_predicts_the_rate(log):
+def with_physics(log, **parameters):
+    """Law and rules; the rules on chosen columns, in another order than the inputs."""
     shell = GyroCompensator(None, INPUTS, predicts="rate", scale_factor=FACTOR)
-    law = OpenLoopArcsineRegressor("output", "temperature", warn_out_of_bounds=False)
-    model = ResidualRegressor(law, ANFISRegressor([1, 2, 1, 1], warn_out_of_bounds=False))
-    model.fit(shell.features(log), log["rate"])
-    compensator = GyroCompensator(model, INPUTS, predicts="rate", scale_factor=FACTOR)
-    compensated = compensator.apply(log)
+    law = OpenLoopArcsineRegressor("output", "temperature", **parameters)
+    chosen = make_column_transformer((StandardScaler(), ["output", "time"]))
+    rules = make_pipeline(chosen, ANFISRegressor([1, 2], warn_out_of_bounds=False))
+    model = ResidualRegressor(law, rules).fit(shell.features(log), log["rate"])
+    return GyroCompensator(model, INPUTS, predicts="rate", scale_factor=FACTOR)
+
+
+def test_physics_predicts_the_rate(log):
+    compensated = with_physics(log).apply(log)
     assert (compensated["rate_compensated"] - log["rate"]).std() < 0.02
-    with pytest.raises(TypeError):
-        compensator.write_json("never.json")
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {},
+        {"temperature_rate": "temperature_rate", "amplitude_degree": 3, "fit_offset": True},
+        {"temperature": None, "max_phase": 0.3, "out_of_bounds": "nan"},
+        {"reference_temperature": 20, "max_phase": 0.3, "out_of_bounds": "linear"},
+    ],
+)
+def test_json_of_physics_gives_the_same_compensator(log, parameters, tmp_path):
+    if "temperature" in parameters:
+        log = log.assign(output=-log["output"])
+    compensator = with_physics(log, **parameters)
+    path = tmp_path / "compensator.json"
+    compensator.write_json(path)
+    read = GyroCompensator.read_json(path)
+    shifted = log.assign(temperature=log["temperature"] + 5.0, output=1.5 * log["output"])
+    one, two = compensator.apply(shifted), read.apply(shifted)
+    assert set(one["status"]) > {0}
+    np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-12)
+    read.write_json(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_text() == path.read_text()
+    # What was read can be written as C too.
+    codes = [export_c_physics(part.estimator, name="gyro") for part in (compensator, read)]
+    assert codes[0] == codes[1]
+
+
+def test_a_rate_that_is_not_finite_is_none(log, compensator):
+    class Infinite:
+        def predict(self, X):
+            return np.full(len(X), np.inf)
+
+        def in_bounds(self, X):
+            return np.full(len(X), False)
+
+        def coverage(self, X):
+            return np.zeros(len(X))
+
+    compensated = GyroCompensator(Infinite(), INPUTS).apply(log)
+    assert (compensated["status"] == 1 + 8).all()
+    assert compensated["rate_compensated"].isna().all()
+
+
+def of_law(**changes):
+    return lambda document: document | {"law": document["law"] | changes}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda document: document | {"law": {}}, "its law must be an object with the keys"),
+        (lambda document: document | {"law": []}, "its law must be an object with the keys"),
+        (of_law(more=1), "its law must be an object with the keys"),
+        (of_law(columns=["output", "speed"]), "the law's columns are"),
+        (of_law(columns=["output", "output"]), "the law's columns are"),
+        (of_law(columns=[]), "the law's columns are"),
+        (of_law(columns="output"), "the law's columns are"),
+        (of_law(columns=["output"]), "the law's amplitude must hold 1 finite number"),
+        (of_law(amplitude=[1.0] * 7), "amplitude must hold 1 to 6 finite number"),
+        (of_law(bias=[]), "bias must hold 1 to 6 finite number"),
+        (of_law(sagnac_factor=[float("nan")]), "sagnac_factor must hold"),
+        (of_law(sagnac_factor=["1"]), "sagnac_factor must hold"),
+        (of_law(offset=True), "offset must hold 1 finite number"),
+        (of_law(offset=1e60), "offset must hold 1 finite number"),
+        (of_law(minimum=[0.0]), "minimum must hold 2 finite number"),
+        (of_law(minimum=[1e30, 0.0]), "the law's minimum is above its maximum"),
+        (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),
+        (of_law(max_phase=2.0), "max_phase"),
+        (of_law(max_phase="1"), "max_phase must hold"),
+        (of_law(out_of_bounds="hold"), "out_of_bounds='hold' must be one of"),
+        (of_law(out_of_bounds=[]), "out_of_bounds"),
+    ],
+)
+def test_other_laws_are_refused(log, physics_json, tmp_path, change, message):
+    path = tmp_path / "compensator.json"
+    path.write_text(json.dumps(change(json.loads(physics_json))))
+    with pytest.raises(ValueError, match=message):
+        GyroCompensator.read_json(path)
+
+
+@pytest.fixture(scope="module")
+def physics_json(log, tmp_path_factory):
+    path = tmp_path_factory.mktemp("physics") / "compensator.json"
+    with_physics(log).write_json(path)
+    return path.read_text()
+
+
+def test_other_estimators_are_not_written(log, tmp_path):
+    path = tmp_path / "never.json"
+    for estimator in (LinearRegression(), ResidualRegressor(LinearRegression())):
+        estimator.fit(np.zeros((3, 4)), np.arange(3.0))
+        with pytest.raises(TypeError):
+            GyroCompensator(estimator, INPUTS).write_json(path)
+    assert not path.exists()
 
 
 def test_json_gives_the_same_compensator(log, compensator, tmp_path):
@@ -146,7 +252,11 @@ def test_json_gives_the_same_compensator(log, compensator, tmp_path):
         (lambda document: document | {"version": 2}, "version is 2, this reads 1"),
         (lambda document: document | {"more": 1}, "its keys are"),
         (lambda document: document | {"inputs": ["speed"]}, "inputs is"),
-        (lambda document: document | {"inputs": ["time"]}, "its model has 4 inputs"),
+        (lambda document: document | {"inputs": ["time"]}, "columns is"),
+        (lambda document: document | {"inputs": ["time"] * 4}, "inputs is"),
+        (lambda document: document | {"columns": ["time"]}, "its model has 4 inputs"),
+        (lambda document: document | {"columns": ["time"] * 4}, "columns is"),
+        (lambda document: document | {"columns": 4}, "columns is"),
         (lambda document: document | {"predicts": "phase"}, "predicts is 'phase'"),
         (lambda document: document | {"scale_factor": "1"}, "scale_factor is '1'"),
         (lambda document: document | {"time_constant": True}, "time_constant is True"),

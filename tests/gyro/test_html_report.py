@@ -144,6 +144,7 @@ def test_physics_shows_its_law(has_time):
     text = " ".join(Outline(report_page(calibration, "law.csv")).text)
     law = calibration.compensator.estimator.base_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
+    assert rules_text(calibration).splitlines()[0] in text
     assert "the model goes on linearly" in text
     if has_time:
         assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text

@@ -1,6 +1,7 @@
 """What is seen of a training from outside, and how it is ended."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import sklearn
 from numpy.testing import assert_allclose, assert_array_equal
@@ -167,3 +168,20 @@ class TestInterrupt:
         monkeypatch.setattr(progress.Printer, "note", note)
         with pytest.raises(KeyboardInterrupt):
             ANFISRegressor(n_mfs=3, on_interrupt="stop", verbose=True).fit(X, Y)
+
+
+@needs_callbacks
+@pytest.mark.parametrize("settings", [{"max_iter": 0}, {"early_stopping": True}, {"loss": "huber"}])
+def test_callbacks_are_given_the_data_as_they_were_given(settings):
+    frame = pd.DataFrame(X, columns=["a", "b"])
+
+    class Data(Recorder):
+        def on_fit_task_end(self, estimator, context, *, X, fitted_estimator):
+            self.tasks.append(X is frame)
+            fitted_estimator.predict(X)
+
+    seen = Data()
+    model = ANFISRegressor(n_mfs=2, warn_out_of_bounds=False, **settings)
+    model.set_callbacks(seen).fit(frame, Y, sample_weight=np.arange(len(Y)))
+    assert seen.tasks
+    assert all(seen.tasks)

@@ -111,6 +111,14 @@ class TestImported:
         with pytest.raises(ValueError, match="a model of 1 outputs, but y has 2"):
             ANFISRegressor(partition=known, max_iter=0).fit(X, np.column_stack([y, y]))
 
+    @pytest.mark.parametrize(
+        "settings",
+        [{"premise_features": ["rate"]}, {"consequent_features": ["rate"], "max_iter": 0}],
+    )
+    def test_what_imported_rules_cannot_heed_is_refused(self, data, known, settings):
+        with pytest.raises(ValueError, match="features=.* means nothing"):
+            ANFISRegressor(partition=known, **settings).fit(*data)
+
     def test_a_number_of_terms_contradicts_it(self, data, known):
         with pytest.raises(ValueError, match=r"n_mfs=3 .* for the imported rules"):
             ANFISRegressor(n_mfs=3, partition=known).fit(*data)
@@ -312,6 +320,25 @@ def test_any_clusterer_gives_a_rule_per_cluster(clusterer):
     model = ANFISRegressor(partition=clusterer).fit(X[9:], y[9:])
     assert model.n_rules_ == 3
     assert_allclose(model.predict(X[9:]), y[9:], atol=0.05)
+
+
+def test_a_class_in_place_of_an_object_is_refused(data):
+    with pytest.raises(ValueError, match=r"is a class: give an object of it, KMeans\(\.\.\.\)"):
+        ANFISRegressor(partition=KMeans).fit(*data)
+
+
+@pytest.mark.parametrize("missing", [None, np.nan])
+def test_rows_without_a_group_are_refused(data, missing):
+    groups = [1.0] * 299 + [missing]
+    with pytest.raises(ValueError, match="no value for 1 of 300 rows, first at row 299"):
+        ANFISRegressor(early_stopping=True).fit(*data, groups=groups)
+
+
+def test_groups_may_have_names(data):
+    numbers = np.arange(300) // 50
+    names = np.array(["a", "b", "c", "d", "e", "f"])[numbers]
+    one, other = (ANFISRegressor().fit(*data, groups=g) for g in (numbers, list(names)))
+    assert_array_equal(one.predict(data[0]), other.predict(data[0]))
 
 
 def test_parameters_of_a_clusterer_can_be_searched(data):

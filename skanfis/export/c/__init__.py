@@ -1,17 +1,15 @@
 """A trained model as one C function over constant tables."""
 
 from dataclasses import dataclass
-from numbers import Real
-from pathlib import Path
 
 from .._fold import fold
 from .._numbers import Numbers
 from ._cost import CCost, cost
-from ._dialect import DTYPES, STANDARDS, Dialect
+from ._dialect import Dialect
+from ._files import check_arguments, write_files
 from ._header import BITS, header
 from ._self_test import known_answers, self_test
 from ._source import Source
-from ._text import check_file_name, check_name
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -111,20 +109,7 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
     >>> code.cost.exponentials, code.cost.multiply_adds
     (8, 104)
     """
-    _check_choice("dtype", dtype, DTYPES)
-    _check_choice("std", std, STANDARDS)
-    if min_coverage is not None and not (
-        isinstance(min_coverage, Real) and 0.0 < float(min_coverage) <= 1.0
-    ):
-        raise ValueError(
-            f"min_coverage={min_coverage!r} must be a number above 0 and at most 1, or None."
-        )
-    if name is None and path is None:
-        raise ValueError("name=None takes the name from path, and path is None too: give either.")
-    stem = check_file_name(Path(path).name) if path is not None else None
-    name = check_name(stem if name is None else name)
-    stem = stem or name
-
+    stem, name = check_arguments(path, name, dtype, std, min_coverage)
     model = fold(estimator)
     if not model.rule_rows.any():
         # Rules that come from elsewhere: no data to be near to or far from.
@@ -140,13 +125,5 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
         body.text(f"{stem}.h") + self_test(answers, dialect),
         price,
     )
-    if path is not None:
-        folder = Path(path).parent
-        (folder / f"{stem}.h").write_text(code.header, encoding="ascii", newline="\n")
-        (folder / f"{stem}.c").write_text(code.source, encoding="ascii", newline="\n")
+    write_files(code, path)
     return code
-
-
-def _check_choice(parameter, value, choices):
-    if not isinstance(value, str) or value not in choices:
-        raise ValueError(f"{parameter}={value!r} must be one of {', '.join(choices)}.")

@@ -20,7 +20,7 @@ class Dialect:
     """Turns templates into C.
 
     A number that ends in R becomes a constant of the type, ``$name`` the prefix of identifiers,
-    ``$NAME`` that of macros, ``$real`` the type, ``$EXP`` and ``$LOG`` its functions, ``$MAX`` its
+    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG`` and ``$ASIN`` its functions, ``$MAX`` its
     largest number; further words are given to :meth:`write`.
     """
 
@@ -48,6 +48,7 @@ class Dialect:
             "real": self.real,
             "EXP": f"{self.name.upper()}_EXP",
             "LOG": f"{self.name.upper()}_LOG",
+            "ASIN": f"{self.name.upper()}_ASIN",
             "MAX": "FLT_MAX" if self.real == "float" else "DBL_MAX",
             **words,
         }
@@ -58,7 +59,7 @@ class Dialect:
     def functions(self):
         """Macros for the functions of <math.h>; C89 has them for double alone."""
         lines = []
-        for function in ("exp", "log"):
+        for function in ("exp", "log", "asin"):
             macro = f"#define {self.name.upper()}_{function.upper()}(u)"
             if self.real == "double":
                 lines.append(f"{macro} {function}(u)")

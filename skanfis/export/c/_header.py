@@ -4,11 +4,11 @@ import textwrap
 
 from ._text import comment
 
-__all__ = ["BITS", "header"]
+__all__ = ["BITS", "POLICIES", "header", "header_of"]
 
 BITS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
-_POLICIES = {
+POLICIES = {
     "clip": "is answered as the nearest row in the box",
     "linear": "is answered by value and slope at the nearest row in the box",
     "raise": "gets no output: y stays as it is",
@@ -16,7 +16,7 @@ _POLICIES = {
 }
 
 _CODE = """/*
- * A Takagi-Sugeno-Kang fuzzy model written by skanfis; generated, not to be edited.
+ * $title written by skanfis; generated, not to be edited.
  *
 $facts
  *
@@ -70,14 +70,21 @@ def header(model, numbers, dialect, cost, min_coverage):
     lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
     lines += ["Outputs y:"]
     lines += [f"  [{k}] {comment(name)}" for k, name in enumerate(model.output_names)]
-    policy = f"A row outside this range {_POLICIES[model.out_of_bounds]}."
+    policy = f"A row outside this range {POLICIES[model.out_of_bounds]}."
     lines += ["", policy, "A row that is not finite gets no output either way."]
     if min_coverage is not None:
         lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
+    title = "A Takagi-Sugeno-Kang fuzzy model"
+    return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
+
+
+def header_of(title, lines, dialect, n_inputs, n_outputs):
+    """The header with these lines in its first comment."""
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
         _CODE,
         facts="\n".join(f" * {line}".rstrip() for line in facts),
-        n_inputs=model.n_inputs,
-        n_outputs=model.n_outputs,
+        title=title,
+        n_inputs=n_inputs,
+        n_outputs=n_outputs,
     )

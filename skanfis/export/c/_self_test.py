@@ -5,11 +5,11 @@ from scipy.stats import qmc
 
 from ._text import literals
 
-__all__ = ["known_answers", "self_test"]
+__all__ = ["ROWS", "TOLERANCE", "known_answers", "self_test", "size_of_sum"]
 
-_ROWS = 32
+ROWS = 32
 # As part of the size of what is summed: what the algorithm loses, and no more.
-_TOLERANCE = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}
+TOLERANCE = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}
 
 _CODE = """
 #ifdef $NAME_SELF_TEST
@@ -93,7 +93,7 @@ def known_answers(model, numbers, min_coverage, bits):
     Half of the rows lie in the box, the others up to half its width beyond; the first two are its
     corners. Rows so near to the coverage asked for that rounding decides are left out.
     """
-    points = qmc.Halton(model.n_inputs, scramble=False).random(4 * _ROWS)
+    points = qmc.Halton(model.n_inputs, scramble=False).random(4 * ROWS)
     low, width = numbers.low.astype(float), (numbers.high - numbers.low).astype(float)
     reach = np.where(np.arange(len(points)) % 2, 1.0, 2.0)[:, None]
     X = (low + width * (0.5 + reach * (points - 0.5))).astype(numbers.dtype)
@@ -110,15 +110,15 @@ def known_answers(model, numbers, min_coverage, bits):
     sure = np.full(len(X), True)
     if min_coverage is not None:
         sure = np.abs(coverage - min_coverage) > 1e-3 * min_coverage
-    chosen = np.flatnonzero(sure)[:_ROWS]
+    chosen = np.flatnonzero(sure)[:ROWS]
     policy = "linear" if model.out_of_bounds == "linear" else "clip"
     y = model.with_out_of_bounds(policy).predict(Z[chosen])
     y = np.where((status[chosen] & bits["NO_OUTPUT"]).astype(bool)[:, None], 0.0, y)
-    tolerance = _TOLERANCE[numbers.dtype] * _size(model, Z[chosen], y)
+    tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z[chosen], y)
     return X[chosen], y.astype(numbers.dtype), status[chosen], tolerance.astype(numbers.dtype)
 
 
-def _size(model, X, y):
+def size_of_sum(model, X, y):
     """The size of what is summed for each output: sum_r w_r (|a_r| + sum_j |b_rj (x_j - x0_j)|)."""
     inside = np.clip(X, model.minimum, model.maximum)
     basis = np.ones((len(X), model.coefficients.shape[1]))

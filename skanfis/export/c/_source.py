@@ -15,7 +15,7 @@ import numpy as np
 from ._families import BODIES, HELPERS
 from ._text import literals
 
-__all__ = ["Source", "index_type"]
+__all__ = ["FINITE_INPUT", "Source", "index_type", "rejection"]
 
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
 _MOST_LOOPS = 12
@@ -79,12 +79,15 @@ static int $name_reject($real *y, int status)
 #define $NAME_REJECT(y, status) $name_reject(y, status)
 """
 
-_INPUTS = """
+FINITE_INPUT = """
     for (i = 0; i < $NAME_N_INPUTS; ++i) {
         /* Not (a and b): NaN fails every comparison. */
         if (!(x[i] >= -$MAX && x[i] <= $MAX)) {
             return $NAME_REJECT(y, $NAME_NOT_FINITE);
         }
+"""
+
+_INPUTS = """
         c[i] = x[i];
         if (c[i] < $name_low[i]) {
             c[i] = $name_low[i];
@@ -94,6 +97,11 @@ _INPUTS = """
             status = $NAME_OUT_OF_RANGE;
         }
 """
+
+
+def rejection(policy, std):
+    """Template of the macro REJECT."""
+    return _REJECT_NAN if policy == "nan" and std == "c99" else _REJECT_UNTOUCHED
 
 
 def index_type(values):
@@ -120,15 +128,16 @@ class Source:
     """The functions and tables of a .c file, without its self-test.
 
     ``policy`` is what to do with rows outside the box, ``min_coverage`` the coverage below which a
-    row is uncovered, or None.
+    row is uncovered, or None; ``is_part`` whether the main function is for others in the same file.
     """
 
-    def __init__(self, numbers, dialect, policy, min_coverage):
+    def __init__(self, numbers, dialect, policy, min_coverage, *, is_part=False):
         is_constant = not numbers.n_terms and not numbers.slope_inputs.size
         # The tangent of a constant is the constant.
         self.policy = "clip" if is_constant and policy == "linear" else policy
         self.numbers, self.min_coverage = numbers, min_coverage
         self.dialect = dialect
+        self.linkage = "static " if is_part else ""
         # int has 16 bits at least.
         self.int = "long" if max(numbers.n_rules, numbers.n_terms) > 32767 else "int"
         n_loops = len(numbers.counts or ())
@@ -162,8 +171,11 @@ class Source:
 
     def text(self, include):
         """All of it; ``include`` is the name of the header."""
+        return f'#include "{include}"\n\n#include <float.h>\n#include <math.h>\n\n{self.body()}'
+
+    def body(self):
+        """What follows the lines that include other files."""
         parts = [
-            f'#include "{include}"\n\n#include <float.h>\n#include <math.h>\n',
             self.macros() + "\n",
             self.tables(),
             *self.families(),
@@ -240,8 +252,7 @@ class Source:
                 parts.append(self.write(_CENTRE).lstrip())
         if self.is_linear:
             parts.append(self.tangent())
-        has_nan = self.policy == "nan" and self.dialect.std == "c99"
-        parts.append(self.write(_REJECT_NAN if has_nan else _REJECT_UNTOUCHED).lstrip())
+        parts.append(self.write(rejection(self.policy, self.dialect.std)).lstrip())
         parts.append(self.predict())
         return "\n".join(parts)
 
@@ -250,7 +261,7 @@ class Source:
     def predict(self):
         numbers = self.numbers
         lines = [
-            "int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
+            f"{self.linkage}int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
             "{",
             "    /* Inputs in the box. */",
             f"    $real c[{numbers.n_inputs}], sum[{numbers.n_outputs}];",
@@ -269,6 +280,7 @@ class Source:
             "    int status = $NAME_IN_RANGE;",
             f"    $int {', '.join(self.loop_variables(tangent=False))};",
             "",
+            FINITE_INPUT.strip("\n"),
             _INPUTS.strip("\n"),
         ]
         if self.has_slopes:

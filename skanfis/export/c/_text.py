@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-__all__ = ["check_file_name", "check_name", "comment", "literal", "literals"]
+__all__ = ["LONGEST_NAME", "check_file_name", "check_name", "comment", "literal", "literals"]
 
 # Of C89, C99, C11, C23 and C++: the files may be compiled as any of them.
 _KEYWORDS = """
@@ -18,7 +18,7 @@ _KEYWORDS = """
     xor xor_eq
 """
 # C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.
-_LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
+LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
 _LONGEST_COMMENT = 60
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
 
@@ -59,7 +59,7 @@ def comment(text):
     return safe + ("..." if len(text) > len(shown) else "")
 
 
-def check_name(name):
+def check_name(name, longest=LONGEST_NAME):
     """The name that all identifiers start with, if C can do with it."""
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         reason = "must be a C identifier: a letter, then letters, digits and underscores"
@@ -67,9 +67,9 @@ def check_name(name):
         reason = "must not have two underscores in a row, which C++ keeps for itself"
     elif name.lower() in _KEYWORDS.split():
         reason = "is a keyword of C or C++"
-    elif len(name) > _LONGEST_NAME:
+    elif len(name) > longest:
         reason = (
-            f"has {len(name)} characters; with {_LONGEST_NAME} or fewer, all identifiers differ "
+            f"has {len(name)} characters; with {longest} or fewer, all identifiers differ "
             f"in the 31 that a C compiler must look at"
         )
     else:

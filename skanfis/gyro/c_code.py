@@ -1,0 +1,463 @@
+"""The arcsine law and the rules for what it leaves, as one C function.
+
+The rules are written by ``skanfis.export`` under the name NAME_r as a static function of the same
+file; the law is written here. What is asked of an exported function stays: constant tables, no
+heap, no state, the status word.
+"""
+
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.polynomial import Polynomial
+from scipy.stats import qmc
+
+from ..export._numbers import Numbers
+from ..export.c import CCode
+from ..export.c._cost import cost
+from ..export.c._dialect import Dialect
+from ..export.c._files import check_arguments, write_files
+from ..export.c._header import BITS, POLICIES, header_of
+from ..export.c._self_test import ROWS, TOLERANCE, self_test, size_of_sum
+from ..export.c._source import FINITE_INPUT, Source, index_type, rejection
+from ..export.c._text import LONGEST_NAME, comment, literals
+from ._frozen import FrozenRules, law_and_rules
+from .physics import OpenLoopArcsineRegressor
+
+__all__ = ["export_c_physics"]
+
+_SUFFIX = "_r"
+_SILENT = ("nan", "raise")
+_PAST_PHASE = {
+    "clip": "the phase is held there",
+    "linear": "the law goes on along its tangent",
+    "raise": "there is no output",
+    "nan": "there is no output",
+}
+
+_RULES = """
+/* Of the rules. */
+#define $RULES_N_INPUTS $n_rules_inputs
+#define $RULES_N_OUTPUTS 1
+#define $RULES_IN_RANGE $NAME_IN_RANGE
+#define $RULES_OUT_OF_RANGE $NAME_OUT_OF_RANGE
+#define $RULES_NOT_FINITE $NAME_NOT_FINITE
+#define $RULES_UNCOVERED $NAME_UNCOVERED
+#define $RULES_NO_OUTPUT $NAME_NO_OUTPUT
+
+"""
+
+_POLYNOMIAL = """
+static $real $name_polynomial(const $real *c, int n, $real t)
+{
+    $real sum = c[n - 1];
+    int i;
+    for (i = n - 2; i >= 0; --i) {
+        sum = sum * t + c[i];
+    }
+    return sum;
+}
+
+"""
+
+_PREDICT = """
+int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+{
+    $real z[$n_rules_inputs], left[1], t, amplitude, sagnac, sine, phase, rate;
+    int i, sign = 1, status = $NAME_IN_RANGE;
+
+$finite_input
+    }
+    for (i = 0; i < $n_law; ++i) {
+        const $real v = x[$name_law_input[i]];
+        if (v < $name_law_low[i] || v > $name_law_high[i]) {
+            status = $NAME_OUT_OF_RANGE;
+        }
+    }
+
+    /* Temperature of the coil from the reference, and the coefficients there. */
+    t = $temperature;
+    amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
+    sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
+    sine = x[$output] - $offset;
+    if (sagnac == 0.0R) {
+        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
+    }
+
+    /* The size of the sine, and its sign apart; no amplitude, no phase. */
+    if (sine < 0.0R) {
+        sine = -sine;
+        sign = -sign;
+    }
+    if (amplitude < 0.0R) {
+        amplitude = -amplitude;
+        sign = -sign;
+    }
+    sine = amplitude > 0.0R ? sine / amplitude : $MAX;
+    if (sine > $limit) {
+        status = $NAME_OUT_OF_RANGE;
+        $beyond
+    }$otherwise
+    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
+
+    for (i = 0; i < $n_rules_inputs; ++i) {
+        z[i] = x[$name_rules_input[i]];
+    }
+    status |= $rules_predict(z, left);
+    if (status & $NAME_NO_OUTPUT) {
+        return $NAME_REJECT(y, status);
+    }
+    rate += left[0];
+    /* Not (a and b): NaN fails every comparison. */
+    if (!(rate >= -$MAX && rate <= $MAX)) {
+        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
+    }
+    y[0] = rate;
+    return status;
+}
+"""
+_BEYOND = {
+    "clip": "phase = $max_phase;",
+    "linear": "phase = $max_phase + (sine - $limit) * $slope;",
+}
+_REFUSED = "return $NAME_REJECT(y, status);"
+_WITHIN = "phase = $ASIN(sine);"
+
+
+def export_c_physics(
+    estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1
+):
+    """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
+
+    The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from
+    one row of raw inputs, and a status, as :func:`skanfis.export.export_c` does it for rules alone:
+    constant tables, no heap, no state, no recursion. It takes ``asin`` besides ``exp`` and ``log``.
+
+    Parameters
+    ----------
+    estimator : fitted ResidualRegressor
+        Of an :class:`OpenLoopArcsineRegressor`, and an ANFIS or a Pipeline of scalers, selections
+        of columns and an ANFIS; or a search over such. The inputs of the function are the columns
+        that either part takes, in the order of X; the header names them.
+    path : str or path-like, default=None
+        Where to write, without a suffix: "out/gyro" makes out/gyro.h and out/gyro.c. None writes
+        nothing.
+    name : str, default=None
+        What all identifiers start with, at most 14 letters, digits and underscores. None takes the
+        last part of ``path``.
+    dtype : {"double", "float"}, default="double"
+        Type of inputs, outputs, tables and arithmetic.
+    std : {"c99", "c89"}, default="c99"
+        The oldest standard that a compiler must know.
+    min_coverage : float or None, default=0.1
+        Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
+        leaves that out.
+
+    Returns
+    -------
+    code : CCode
+        The text of both files, and the cost of an evaluation; the one arcsine is not counted.
+
+    Raises
+    ------
+    ValueError
+        If a parameter is none of the above, if the residual model has a step that cannot be folded
+        in, if one part asks for "nan" out of bounds and the other for "raise", or if the numbers
+        go beyond what "float" holds.
+    TypeError
+        If ``estimator`` is no such composition.
+
+    Notes
+    -----
+    The status is that of :func:`skanfis.export.export_c`. ``NAME_OUT_OF_RANGE`` says that an input
+    lies outside the range of either part's training data, or that the phase lies beyond
+    ``max_phase``: where ``estimator.in_bounds`` is False. Either part then follows its own
+    ``out_of_bounds``; where one of them has no answer, there is none. A rate that is not finite is
+    no answer either.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_ofog
+    >>> from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
+    >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
+    >>> law = OpenLoopArcsineRegressor("output", "temperature")
+    >>> model = ResidualRegressor(law, ANFISRegressor(n_mfs=2))
+    >>> model = model.fit(log[["output", "temperature", "time"]], log["rate"])
+    >>> code = export_c_physics(model, name="gyro", dtype="float")
+    >>> "int gyro_predict(const float x[GYRO_N_INPUTS], float y[GYRO_N_OUTPUTS]);" in code.header
+    True
+    """
+    longest = LONGEST_NAME - len(_SUFFIX)
+    stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
+    law, rules = law_and_rules(estimator)
+    policies = {law.out_of_bounds, rules.model.out_of_bounds}
+    if policies >= set(_SILENT):
+        raise ValueError(
+            "One of base and residual has out_of_bounds='nan', the other 'raise': one C function "
+            "leaves y as it is or writes NaN. Set both to one of the two."
+        )
+    if not rules.model.rule_rows.any():
+        min_coverage = None
+    dialect = Dialect(name, dtype, std)
+    numbers = Numbers.of(rules.model, dialect.dtype)
+    body = Source(
+        numbers,
+        Dialect(name + _SUFFIX, dtype, std),
+        rules.model.out_of_bounds,
+        min_coverage,
+        is_part=True,
+    )
+    columns = np.union1d(law.columns_, rules.positions)
+    composition = _Composition(law, rules, columns, dialect.dtype)
+    source = "".join(
+        [
+            f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
+            _write(dialect, _RULES, composition),
+            body.body(),
+            "\n",
+            _law(dialect, composition, policies),
+            self_test(_known_answers(composition, numbers, min_coverage), dialect),
+        ]
+    )
+    price = _cost(cost(numbers, body), composition)
+    code = CCode(name, _header(composition, dialect, price, min_coverage), source, price)
+    write_files(code, path)
+    return code
+
+
+@dataclass(frozen=True, eq=False)
+class _Composition:
+    """Both parts, and what of the law is rounded to the type.
+
+    ``columns`` are the positions in X of the function's inputs.
+    """
+
+    law: Any
+    rules: FrozenRules
+    columns: np.ndarray
+    dtype: np.dtype
+
+    def rounded(self, values):
+        values = np.asarray(values, dtype=float)
+        largest = np.abs(values).max()
+        if not largest <= float(np.finfo(self.dtype).max):
+            raise ValueError(
+                f"Single precision cannot hold {largest:g}, a constant of the arcsine law. Scale "
+                "the output, or export in double precision."
+            )
+        return values.astype(self.dtype)
+
+    @property
+    def law_inputs(self):
+        return np.searchsorted(self.columns, self.law.columns_)
+
+    @property
+    def rules_inputs(self):
+        return np.searchsorted(self.columns, self.rules.positions)
+
+    @property
+    def low(self):
+        return self.rounded(self.law.minimum_)
+
+    @property
+    def high(self):
+        return self.rounded(self.law.maximum_)
+
+    @property
+    def reference(self):
+        return self.rounded(self.law.reference_temperature_)
+
+    def polynomial(self, coefficients):
+        """Coefficients about the reference as it is rounded, of no less than one number."""
+        shift = float(self.reference) - self.law.reference_temperature_
+        moved = np.zeros(coefficients.size)
+        found = Polynomial(coefficients)(Polynomial([shift, 1.0])).coef
+        moved[: found.size] = found
+        return self.rounded(moved)
+
+    @property
+    def polynomials(self):
+        return {
+            "amplitude": self.polynomial(self.law.amplitude_),
+            "sagnac": self.polynomial(self.law.sagnac_factor_),
+            "bias": self.polynomial(self.law.bias_),
+        }
+
+    @property
+    def box(self):
+        """Of every input, within which both parts know it."""
+        low, high = np.full(self.columns.size, -np.inf), np.full(self.columns.size, np.inf)
+        parts = [
+            (self.law_inputs, self.low, self.high),
+            (
+                self.rules_inputs,
+                self.rounded(self.rules.model.minimum),
+                self.rounded(self.rules.model.maximum),
+            ),
+        ]
+        for places, least, most in parts:
+            low[places] = np.maximum(low[places], least)
+            high[places] = np.minimum(high[places], most)
+        return low, high
+
+    @property
+    def names(self):
+        given = getattr(self.law, "feature_names_in_", None)
+        return [f"x{j}" if given is None else given[j] for j in self.columns]
+
+    def table(self, X):
+        """Rows as both parts take them, out of rows of the function's inputs."""
+        whole = np.zeros((len(X), self.law.n_features_in_))
+        whole[:, self.columns] = X
+        names = getattr(self.law, "feature_names_in_", None)
+        return whole if names is None else pd.DataFrame(whole, columns=names)
+
+
+def _write(dialect, template, composition, **words):
+    name = dialect.name + _SUFFIX
+    words |= {"rules": name, "RULES": name.upper(), "n_rules_inputs": composition.rules_inputs.size}
+    return dialect.write(template, **words)
+
+
+def _law(dialect, composition, policies):
+    """Tables and functions of the law."""
+    law, real = composition.law, dialect.real
+    inputs = composition.law_inputs
+    tables = {"law_low": (real, composition.low), "law_high": (real, composition.high)}
+    tables |= {key: (real, values) for key, values in composition.polynomials.items()}
+    for key, places in (("law_input", inputs), ("rules_input", composition.rules_inputs)):
+        tables[key] = (index_type(places), places)
+    parts = ["/* Of the law: where it was fitted, powers of the temperature, columns of x. */\n"]
+    parts += [
+        dialect.write(f"static const {kind} $name_{key}[{values.size}] =\n{literals(values)};\n\n")
+        for key, (kind, values) in tables.items()
+    ]
+    asin = dialect.write("$ASIN(")
+    parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
+    silent = next(iter(policies & set(_SILENT)), None)
+    parts.append(dialect.write(rejection(silent, dialect.std)).lstrip() + "\n")
+    parts.append(dialect.write(_POLYNOMIAL).lstrip())
+
+    number = dialect.number
+    temperature = "0.0R"
+    if inputs.size > 1:
+        lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
+        temperature = f"x[{inputs[1]}]{lag} - {number(composition.reference)}"
+    refuses = law.out_of_bounds in _SILENT
+    template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
+    template = template.replace("$temperature", temperature)
+    template = template.replace("$beyond", _REFUSED if refuses else _BEYOND[law.out_of_bounds])
+    otherwise = f"\n    {_WITHIN}" if refuses else f" else {{\n        {_WITHIN}\n    }}"
+    return "".join(parts) + _write(
+        dialect,
+        template.replace("$otherwise", otherwise).lstrip(),
+        composition,
+        n_law=inputs.size,
+        output=inputs[0],
+        offset=number(law.offset_),
+        limit=number(np.sin(law.max_phase)),
+        max_phase=number(law.max_phase),
+        slope=number(1.0 / np.cos(law.max_phase)),
+        **{f"n_{key}": values.size for key, values in composition.polynomials.items()},
+    )
+
+
+def _header(composition, dialect, price, min_coverage):
+    law, model = composition.law, composition.rules.model
+    lines = [
+        f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
+        f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
+        f"Per evaluation in range: an arcsine, {price.exponentials} exponentials, "
+        f"{price.logarithms} logarithms, {price.multiply_adds} multiply-adds, {price.divisions} "
+        "divisions.",
+        f"Memory: {price.table_bytes} bytes of tables, {price.stack_bytes} of arrays on the stack.",
+        "",
+        "Inputs x, and their range in the training data:",
+    ]
+    box = zip(composition.names, *composition.box, strict=True)
+    lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
+    lines += [
+        "Outputs y:",
+        "  [0] rate, in the unit of the training data",
+        "",
+        f"Beyond a phase of {law.max_phase:g} rad {_PAST_PHASE[law.out_of_bounds]}.",
+        f"Of the rules alone: a row outside their range {POLICIES[model.out_of_bounds]}.",
+        "A row that is not finite gets no output either way, nor does one whose rate is not.",
+    ]
+    if min_coverage is not None:
+        lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
+    title = "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
+    return header_of(title, lines, dialect, composition.columns.size, 1)
+
+
+def _cost(of_rules, composition):
+    sizes = [values.size for values in composition.polynomials.values()]
+    itemsize = composition.dtype.itemsize
+    n_numbers = sum(sizes) + 2 * composition.law_inputs.size
+    n_bytes = itemsize * n_numbers + composition.law_inputs.size + composition.rules_inputs.size
+    return replace(
+        of_rules,
+        multiply_adds=of_rules.multiply_adds + sum(sizes) - len(sizes) + 1,
+        divisions=of_rules.divisions + 2,
+        table_bytes=of_rules.table_bytes + n_bytes,
+        stack_bytes=of_rules.stack_bytes + itemsize * (composition.rules_inputs.size + 1),
+    )
+
+
+def _known_answers(composition, numbers, min_coverage):
+    """Rows, rates, status and tolerance, as for rules alone; some rows lie far up the sine.
+
+    Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
+    """
+    law, rules = composition.law, composition.rules
+    low, high = composition.box
+    points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
+    kind = np.arange(len(points)) % 4
+    reach = np.where(kind % 2, 1.0, 2.0)[:, None]
+    X = low + (high - low) * (0.5 + reach * (points - 0.5))
+    output = composition.law_inputs[0]
+    swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
+    X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
+    X = np.vstack([low, high, X]).astype(composition.dtype)
+    whole = composition.table(X.astype(float))
+    # NaN past the amplitude.
+    phase, coverage = np.abs(law.phase(whole)), rules.coverage(whole)
+    sure = ~(np.abs(phase - law.max_phase) < 1e-3)
+    if min_coverage is not None:
+        sure &= np.abs(coverage - min_coverage) > 1e-3 * min_coverage
+    chosen = np.flatnonzero(sure)[:ROWS]
+    X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= law.max_phase)[chosen]
+    whole = composition.table(X.astype(float))
+
+    def outside(inputs, least, most):
+        return ((X[:, inputs] < least) | (X[:, inputs] > most)).any(axis=1)
+
+    beside = outside(composition.rules_inputs, numbers.low, numbers.high)
+    out = beside | beyond | outside(composition.law_inputs, composition.low, composition.high)
+    silent = beyond & (law.out_of_bounds in _SILENT)
+    silent |= beside & (rules.model.out_of_bounds in _SILENT)
+    of_law = _answering(law).predict(whole)
+    model, rows = _answering(rules.model), np.asarray(whole)[:, rules.positions]
+    of_rules = model.predict(rows)
+    silent |= ~np.isfinite(of_law.astype(composition.dtype))
+    status = BITS["OUT_OF_RANGE"] * out | BITS["NO_OUTPUT"] * silent
+    if min_coverage is not None:
+        status |= BITS["UNCOVERED"] * (~silent & (coverage < min_coverage))
+    y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
+    # What rounding of the sine is magnified by, too.
+    steepest = np.abs(of_law[~silent]).max(initial=0.0)
+    steepest = max(steepest, np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
+    size = size_of_sum(model, rows, of_rules) + steepest
+    tolerance = TOLERANCE[composition.dtype] * size
+    return X, y.astype(composition.dtype), status, tolerance.astype(composition.dtype)
+
+
+def _answering(part):
+    """A part that answers everywhere: by its own policy, or the nearest where that gives none."""
+    policy = "linear" if part.out_of_bounds == "linear" else "clip"
+    if isinstance(part, OpenLoopArcsineRegressor):
+        return copy(part).set_params(out_of_bounds=policy, warn_out_of_bounds=False)
+    return part.with_out_of_bounds(policy)

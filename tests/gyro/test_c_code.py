@@ -1,0 +1,270 @@
+"""Law and rules as C, compiled and run, answer what ResidualRegressor answers."""
+
+from copy import deepcopy
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.compose import make_column_transformer
+from sklearn.linear_model import LinearRegression
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_ofog
+from skanfis.gyro._ask import ask
+from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
+
+from ..export.c_compiler import (
+    SANITIZE,
+    STRICT,
+    UNTOUCHED,
+    evaluate_all,
+    gcc,
+    needs_compiler,
+    run,
+)
+
+pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+
+COUNTS = -27_000.0  # per deg/s
+MIN_COVERAGE = 0.2
+
+
+@pytest.fixture(scope="module")
+def log():
+    log = make_ofog(n_devices=1, n_runs=4, duration=1800, sampling_interval=20, random_state=0)
+    rate = np.gradient(log["temperature"]) / 20.0
+    return log.assign(output=COUNTS * log["output"] + 3e4, thermal_rate=rate)
+
+
+def whole(log):
+    """Both parts on all columns, by name."""
+    law = OpenLoopArcsineRegressor("output", "temperature")
+    X = log[["time", "output", "temperature"]]
+    return ResidualRegressor(law, ANFISRegressor(n_mfs=2)).fit(X, log["rate"]), X
+
+
+def everything(log):
+    """A lag, an offset, high degrees, rules on chosen and scaled columns, three rounds, linear."""
+    law = OpenLoopArcsineRegressor(
+        "output",
+        "temperature",
+        temperature_rate="thermal_rate",
+        amplitude_degree=2,
+        sagnac_degree=2,
+        bias_degree=3,
+        fit_offset=True,
+        reference_temperature=20.1,
+        max_phase=0.9,
+        out_of_bounds="linear",
+    )
+    chosen = make_column_transformer((StandardScaler(), ["time", "thermal_rate"]))
+    rules = make_pipeline(chosen, ANFISRegressor([2, 1], out_of_bounds="linear"))
+    X = log[["unused", "thermal_rate", "temperature", "output", "time"]]
+    return ResidualRegressor(law, rules, n_rounds=3).fit(X, log["rate"]), X
+
+
+def silent(log):
+    model, X = whole(log)
+    model.base_.set_params(out_of_bounds="nan")
+    model.residual_.set_params(out_of_bounds="nan")
+    return model, X
+
+
+def law_raises(log):
+    model, X = whole(log)
+    model.base_.set_params(out_of_bounds="raise", max_phase=0.3)
+    return model, X
+
+
+def rules_raise(log):
+    """Columns by position, no temperature in the law."""
+    law = OpenLoopArcsineRegressor(-1, None)
+    rules = make_pipeline(StandardScaler(), ANFISRegressor([1, 2, 1], out_of_bounds="raise"))
+    X = log[["temperature", "time", "output"]]
+    model = ResidualRegressor(law, rules).fit(X.to_numpy(), log["rate"])
+    return model, X
+
+
+CASES = [whole, everything, silent, law_raises, rules_raise]
+
+
+def around(X, n_rows=10_000):
+    """Rows: some in the box, others half its width beyond, some far up the sine and past it."""
+    rng = np.random.default_rng(0)
+    low, high = X.min().to_numpy(), X.max().to_numpy()
+    reach = rng.choice([1.0, 1.0, 2.0], n_rows)[:, None]
+    rows = low + (high - low) * (0.5 + reach * rng.uniform(-0.5, 0.5, (n_rows, X.shape[1])))
+    output = list(X).index("output")
+    far = rng.random(n_rows) < 0.2
+    rows[far, output] *= rng.uniform(1.0, 10.0, far.sum())
+    return rows
+
+
+def last(estimator):
+    return estimator[-1] if hasattr(estimator, "steps") else estimator
+
+
+def expected(model, X):
+    """Rate where there is an answer, status, policies; from the public methods of both parts."""
+    answering = deepcopy(model)
+    policies = []
+    for part in (answering.base_, last(answering.residual_)):
+        policies.append(part.out_of_bounds)
+        if part.out_of_bounds in ("nan", "raise"):
+            part.set_params(out_of_bounds="clip")
+    rate = answering.predict(X)
+    phase = np.abs(model.base_.phase(X))
+    beyond = ~(phase <= model.base_.max_phase)
+    beside = ~ask(model.residual_, "in_bounds", X)
+    refused = np.zeros(len(rate), dtype=bool)
+    for rows, policy in zip((beyond, beside), policies, strict=True):
+        refused |= rows & (policy in ("nan", "raise"))
+    coverage = model.coverage(X)
+    status = 1 * ~model.in_bounds(X) + 8 * refused + 4 * (~refused & (coverage < MIN_COVERAGE))
+    unsure = (np.abs(coverage - MIN_COVERAGE) < 1e-4) | (
+        np.abs(phase - model.base_.max_phase) < 1e-5
+    )
+    return rate, status, refused, unsure, policies
+
+
+def as_given(model, rows, columns):
+    named = hasattr(model, "feature_names_in_")
+    return pd.DataFrame(rows, columns=columns) if named else rows
+
+
+@needs_compiler
+@pytest.mark.parametrize("std", ["c99", "c89"])
+@pytest.mark.parametrize(("dtype", "tolerance"), [("double", 1e-12), ("float", 1e-5)])
+@pytest.mark.parametrize("make", CASES)
+def test_answers_as_predict(log, make, dtype, tolerance, std, tmp_path):
+    real = np.float32 if dtype == "float" else np.float64
+    model, X = make(log.assign(unused=1.0))
+    code = export_c_physics(model, name="gyro", dtype=dtype, std=std, min_coverage=MIN_COVERAGE)
+    rows = around(X).astype(real)
+    used = [j for j, name in enumerate(X) if name != "unused"]
+    taken = np.ascontiguousarray(rows[:, used])
+    [(y, status)] = evaluate_all([code], taken, tmp_path, std, [1])
+    wanted, bits, refused, unsure, policies = expected(
+        model, as_given(model, rows.astype(float), list(X))
+    )
+    assert (bits == 0).sum() > 100
+    np.testing.assert_array_equal(status[~unsure], bits[~unsure])
+    answered = ~refused & ~unsure
+    off = np.abs(y[:, 0] - wanted)
+    # Full scale in range, and that of the rates which rows far out of range mean.
+    in_range = off[bits == 0].max() / np.abs(log["rate"]).max()
+    everywhere = off[answered].max() / np.abs(wanted[answered]).max()
+    print(f"{make.__name__} {dtype} {std}: {in_range:.1e} in range, {everywhere:.1e} everywhere")
+    assert in_range < tolerance
+    assert everywhere < tolerance
+    silence = y[refused & ~unsure, 0]
+    if {"nan", "raise"} & set(policies):
+        assert silence.size
+    if "nan" in policies and std == "c99":
+        assert np.isnan(silence).all()
+    else:
+        assert (silence == UNTOUCHED).all()
+
+
+@needs_compiler
+def test_no_answer_to_what_is_not_finite_or_has_no_rate(log, tmp_path):
+    model, X = whole(log)
+    rows = np.repeat(X.to_numpy()[:1], 5, axis=0)
+    for row, (column, value) in zip(rows, [(0, np.nan), (1, np.inf), (2, -np.inf)], strict=False):
+        row[column] = value
+    # The temperatures at which K and A are zero.
+    for row, values in zip(rows[3:], (model.base_.sagnac_factor_, model.base_.amplitude_)):
+        row[2] = model.base_.reference_temperature_ - values[0] / values[1]
+    code = export_c_physics(model, name="gyro")
+    [(y, status)] = evaluate_all([code], rows, tmp_path, "c99", [1])
+    assert list(status[:3]) == [2 + 8] * 3
+    assert (y[:3] == UNTOUCHED).all()
+    assert (status[3:] & 1 == 1).all()
+    assert np.isfinite(y).all()
+
+
+@needs_compiler
+def test_files_make_a_program_that_tests_itself(log, tmp_path):
+    model, _ = silent(log)
+    search = GridSearchCV(model, {"n_rounds": [1]}, cv=2)
+    search.best_estimator_ = model
+    code = export_c_physics(search, tmp_path / "gyro-7", name="gyro", dtype="float", std="c89")
+    assert (tmp_path / "gyro-7.c").read_text() == code.source
+    flags = ["-std=c89", *STRICT, *SANITIZE, "-DGYRO_SELF_TEST", "-DGYRO_SELF_TEST_MAIN"]
+    gcc([*flags, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
+    assert run(["./test"], tmp_path).returncode == 0
+    # A wrong coefficient is found out.
+    wrong = code.source.replace("gyro_sagnac[2] =\n{ ", "gyro_sagnac[2] =\n{ 2.0f * ")
+    assert wrong != code.source
+    (tmp_path / "gyro-7.c").write_text(wrong)
+    gcc([*flags, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
+    assert run(["./test"], tmp_path).returncode == 1
+
+
+def test_header_says_what_goes_in(log):
+    model, _ = everything(log.assign(unused=1.0))
+    header = export_c_physics(model, name="gyro").header
+    for text in ("[0] thermal_rate: ", "[1] temperature: ", "[2] output: ", "[3] time: "):
+        assert text in header
+    assert "#define GYRO_N_INPUTS 4" in header
+    assert "Beyond a phase of 0.9 rad the law goes on along its tangent." in header
+    assert "unused" not in header
+
+
+def refused(log, base=None, residual=None):
+    base = OpenLoopArcsineRegressor("output", "temperature") if base is None else base
+    residual = ANFISRegressor(n_mfs=1) if residual is None else residual
+    return ResidualRegressor(base, residual).fit(log[["output", "temperature"]], log["rate"])
+
+
+@pytest.mark.parametrize(
+    ("parts", "error", "message"),
+    [
+        ({"base": LinearRegression()}, TypeError, "base must be an OpenLoopArcsineRegressor"),
+        ({"residual": LinearRegression()}, TypeError, "LinearRegression has no rules"),
+        (
+            {"residual": make_pipeline(PolynomialFeatures(), ANFISRegressor(n_mfs=1))},
+            ValueError,
+            "PolynomialFeatures",
+        ),
+        (
+            {
+                "base": OpenLoopArcsineRegressor("output", "temperature", out_of_bounds="nan"),
+                "residual": ANFISRegressor(n_mfs=1, out_of_bounds="raise"),
+            },
+            ValueError,
+            "Set both to one of the two",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+def test_refuses_what_it_cannot_write(log, parts, error, message):
+    with pytest.raises(error, match=message):
+        export_c_physics(refused(log, **parts), name="gyro")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"name": "gyroscope_number"}, "with 14 or fewer"),
+        ({"name": None}, "give either"),
+        ({"dtype": "half"}, "dtype='half'"),
+        ({"std": "c11"}, "std='c11'"),
+        ({"min_coverage": 2.0}, "min_coverage=2.0"),
+    ],
+)
+def test_refuses_bad_parameters(log, options, message):
+    with pytest.raises(ValueError, match=message):
+        export_c_physics(refused(log), **{"name": "gyro", **options})
+
+
+def test_refuses_what_is_no_composition(log):
+    with pytest.raises(TypeError, match="fitted ResidualRegressor"):
+        export_c_physics(ANFISRegressor(n_mfs=1), name="gyro")
+    model = refused(log)
+    model.base_.amplitude_ = model.base_.amplitude_ * 1e40
+    with pytest.raises(ValueError, match="Single precision cannot hold"):
+        export_c_physics(model, name="gyro", dtype="float")
