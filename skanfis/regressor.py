@@ -55,10 +55,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     partition : {"auto", "grid", "subtractive", "fcm"}, clusterer or model, default="auto"
         Where the rules come from, if ``n_mfs`` is "auto". "grid": a grid grown from the data, one
         term at a time on the input where it pays most. "auto": such a grid, or scattered rules from
-        k-means, whichever promises the smaller error on new rows; see Notes. "subtractive": a rule
-        per cluster of :class:`~skanfis.cluster.SubtractiveClustering`, of radius 0.5 in one input
-        and target and growing with the root of their number. "fcm": a rule per cluster of
-        :class:`~skanfis.cluster.FuzzyCMeans`, as many as promise the smallest error. Any
+        k-means, whichever promises the smaller error on new rows; see Notes. "subtractive" and
+        "fcm": a rule per cluster of :class:`~skanfis.cluster.SubtractiveClustering` or
+        :class:`~skanfis.cluster.FuzzyCMeans`, of such a radius, or as many, as promise the smallest
+        error. Any
         scikit-learn clusterer, such as ``KMeans(n_clusters=5)``: a rule per cluster. Scattered
         rules have terms of their own; clusters are sought in standardised inputs and targets
         together, as is the custom since Chiu's subtractive clustering. A fitted ANFISRegressor, or

@@ -214,7 +214,6 @@ def _limits(page, results):
 
 def _rules(page, results):
     calibration = results.calibration
-    estimator = calibration.compensator.estimator
     page.section("The rules")
     if calibration.recipe.physics:
         page.paragraph(

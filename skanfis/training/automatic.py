@@ -32,7 +32,7 @@ import numpy as np
 from sklearn.cluster import KMeans
 from sklearn.model_selection import GroupKFold
 
-from ..cluster import FuzzyCMeans
+from ..cluster import FuzzyCMeans, SubtractiveClustering
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..partition import clustered_antecedent, grid_antecedent, representative_rows
@@ -45,7 +45,7 @@ from .structure import Structure
 __all__ = ["SEARCHED", "Candidate", "StructureSearch"]
 
 # The partitions whose size the data decide on: which candidates each of them has.
-SEARCHED = ("auto", "grid", "fcm")
+SEARCHED = ("auto", "grid", "subtractive", "fcm")
 
 _MOST_ROWS = 1000
 _MOST_COLUMNS = 256
@@ -54,6 +54,13 @@ _MOST_TERMS = 6
 # After each round, so many inputs stay in the running for a further term.
 _MOST_GROWING = 8
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
+# Of subtractive clustering in one input and target, from few clusters to many.
+_RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
+_IN_WORDS = {
+    "k-means": "{} scattered rules",
+    "fcm": "{} fuzzy clusters",
+    "subtractive": "clusters of radius {}",
+}
 # Pairs of alpha and stiffness from loose to stiff. The first two are for data with little noise.
 _LEVELS = ((1e-12, 0.0), (1e-8, 0.0), (1e-6, 1e-5), (1e-4, 1e-4), (1e-3, 1e-3), (1e-2, 1e-2))
 _FIRST_LEVEL = 1
@@ -66,7 +73,7 @@ _TOLERANCE = 1e-3
 # A larger model must promise to be better by this part ...
 _WORTHWHILE = 0.005
 # ... and by this part over the root of the rows, about the error of the score itself.
-_SCORE_ERROR = 0.3
+_SCORE_ERROR = 0.5
 # Models with more effective parameters than this part of the rows are out of the question.
 _MOST_PARAMETERS = 1 / 3
 # The linear model is the last resort; where it has too many, its ridge grows until it has fewer.
@@ -78,20 +85,18 @@ _AS_GOOD, _MUCH_BETTER = 0.01, 0.03
 
 @dataclass(frozen=True)
 class Candidate:
-    """A structure to be tried: terms per input, or a number of scattered rules."""
+    """A structure to be tried: terms per input, or the clusters of a clustering."""
 
     counts: tuple[int, ...] | None
-    n_clusters: int | None
+    size: float | None  # number of clusters, or the radius that they have
     level: int
-    is_fuzzy: bool = False  # clusters of fuzzy c-means, not of k-means
+    clustering: str | None = None  # "k-means", "subtractive" or "fcm"
 
     def describe(self):
         """In words."""
         if self.counts is not None:
             return f"grid {list(self.counts)}"
-        if self.is_fuzzy:
-            return f"{self.n_clusters} fuzzy clusters"
-        return f"{self.n_clusters} scattered rules"
+        return _IN_WORDS[self.clustering].format(self.size)
 
 
 class StructureSearch:
@@ -143,10 +148,12 @@ class StructureSearch:
 
     def run(self, partition):
         """The best structure found; ``partition`` is one of ``SEARCHED``."""
-        linear = Candidate((1,) * self.rows.X.shape[1], None, _FIRST_LEVEL)
-        best = linear if partition == "fcm" else self._grow_grid(linear)
+        best = Candidate((1,) * self.rows.X.shape[1], None, _FIRST_LEVEL)
+        if partition in ("auto", "grid"):
+            best = self._grow_grid(best)
         if partition != "grid" and self.inputs.size:
-            best = self._better(best, self._grow_clusters(is_fuzzy=partition == "fcm"))
+            clustering = "k-means" if partition == "auto" else partition
+            best = self._better(best, self._grow_clusters(clustering))
         best = self._tune(best)
         return self._structure(best)
 
@@ -175,10 +182,11 @@ class StructureSearch:
             and n_columns <= min(_MOST_COLUMNS, self.n_sample / 2)
         )
 
-    def _grow_clusters(self, is_fuzzy):
-        best, failures = Candidate(None, _RULE_NUMBERS[0], _FIRST_LEVEL, is_fuzzy), 0
-        for n_clusters in _RULE_NUMBERS[1:]:
-            candidate = replace(best, n_clusters=n_clusters)
+    def _grow_clusters(self, clustering):
+        sizes = _RADII if clustering == "subtractive" else _RULE_NUMBERS
+        best, failures = Candidate(None, sizes[0], _FIRST_LEVEL, clustering), 0
+        for size in sizes[1:]:
+            candidate = replace(best, size=size)
             better = self._is_better(candidate, best)
             best = candidate if better else best
             failures = 0 if better else failures + 1
@@ -224,10 +232,7 @@ class StructureSearch:
 
     def _antecedent(self, candidate, rows):
         if candidate.counts is None:
-            if candidate.is_fuzzy:
-                clusterer = FuzzyCMeans(candidate.n_clusters, m="auto", random_state=self.seed)
-            else:
-                clusterer = KMeans(candidate.n_clusters, n_init=3, random_state=self.seed)
+            clusterer = self._clusterer(candidate, rows.y.shape[1])
             return clustered_antecedent(
                 self.families,
                 rows,
@@ -237,6 +242,15 @@ class StructureSearch:
         low, high = self.rows.inputs.box
         return grid_antecedent(self.families, candidate.counts, low, high, self.overlap)
 
+    def _clusterer(self, candidate, n_outputs):
+        if candidate.clustering == "subtractive":
+            # Distances grow with the root of the columns' number.
+            radius = candidate.size * np.sqrt(0.5 * (self.inputs.size + n_outputs))
+            return SubtractiveClustering(radius=radius, max_clusters=_MOST_RULES)
+        if candidate.clustering == "fcm":
+            return FuzzyCMeans(candidate.size, m="auto", random_state=self.seed)
+        return KMeans(candidate.size, n_init=3, random_state=self.seed)
+
     def _score(self, candidate):
         """Root of the final prediction error; infinite where there are too few rows."""
         if candidate not in self.scores:
@@ -244,7 +258,7 @@ class StructureSearch:
         return self.scores[candidate]
 
     def _train_and_score(self, candidate):
-        if candidate.n_clusters is not None and candidate.n_clusters > self.n_sample:
+        if self._is_too_many(candidate, self.n_sample):
             return np.inf
         if self.folds:
             return self._held_out_score(candidate)
@@ -256,6 +270,10 @@ class StructureSearch:
         error = result.evaluation.mean_squared_error
         return np.sqrt(error * (1.0 + k / self.n_final) / (1.0 - k / self.n_sample))
 
+    @staticmethod
+    def _is_too_many(candidate, n_rows):
+        return candidate.clustering in ("k-means", "fcm") and candidate.size > n_rows
+
     def _held_out_score(self, candidate):
         """Root of the mean squared error on groups left out, in the range of the others.
 
@@ -266,8 +284,8 @@ class StructureSearch:
         for training, held_out in self.folds:
             part, rest = self.sample.part(training), self.sample.part(held_out)
             low, high = part.X.min(axis=0), part.X.max(axis=0)
-            rest = rest.part(((low <= rest.X) & (rest.X <= high)).all(axis=1))
-            if candidate.n_clusters is not None and candidate.n_clusters > part.n_rows:
+            rest = rest.part(((low <= rest.X) & (high >= rest.X)).all(axis=1))
+            if self._is_too_many(candidate, part.n_rows):
                 return np.inf
             if rest.n_rows == 0:
                 continue
@@ -294,7 +312,9 @@ class StructureSearch:
 
     def _structure(self, best):
         alpha, stiffness = self._regularisation(best)
-        return Structure(self._antecedent(best, self.rows), alpha, stiffness, self._report())
+        # What a radius finds depends on the number of rows: the very clusters that were scored.
+        rows = self.sample if best.clustering == "subtractive" else self.rows
+        return Structure(self._antecedent(best, rows), alpha, stiffness, self._report())
 
     def _report(self):
         """Every candidate in words and numbers, best first."""

@@ -10,7 +10,6 @@ from sklearn.base import clone
 from sklearn.utils.validation import has_fit_parameter
 
 from .._validation import warn_user
-from ..cluster import SubtractiveClustering
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
@@ -38,8 +37,6 @@ ENOUGH_ROWS = 20_000
 # where the data determine the consequents well; rounding errors grow by 1 / alpha along directions
 # that the data leave open, so more where they do not.
 _ALPHAS = ((2.0, 1e-12), (1.0, 1e-7), (0.0, 1e-4))
-# Of Chiu's radius in one input and target; in more columns rows lie farther apart, as their root.
-_RADIUS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +102,7 @@ class Partition:
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
         elif isinstance(self.n_mfs, str):
-            label = _labeller(self._clusterer(rows), rows.sample_weight is not None)
+            label = _labeller(self.partition, rows.sample_weight is not None)
             antecedent = clustered_antecedent(self.families, rows, label, self.premise_inputs)
         else:
             antecedent = self._grid(rows)
@@ -124,13 +121,6 @@ class Partition:
             f"n_mfs={self.n_mfs!r} asks for a grid, partition={self.partition!r} for {what}: "
             "leave n_mfs at 'auto', or use partition='grid'."
         )
-
-    def _clusterer(self, rows):
-        """The clusterer of a name, made for these rows; any other as it is."""
-        if not isinstance(self.partition, str):
-            return self.partition
-        n_columns = self.premise_inputs.size + rows.y.shape[1]
-        return SubtractiveClustering(radius=_RADIUS * np.sqrt(n_columns / 2))
 
     def _grid(self, rows):
         counts = self._grid_counts(rows)

@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 from sklearn.compose import make_column_transformer
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GridSearchCV
+from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.gyro._ask import ask
 from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
+from skanfis.gyro._ask import ask
 
 from ..export.c_compiler import (
     SANITIZE,
@@ -176,7 +176,8 @@ def test_no_answer_to_what_is_not_finite_or_has_no_rate(log, tmp_path):
     for row, (column, value) in zip(rows, [(0, np.nan), (1, np.inf), (2, -np.inf)], strict=False):
         row[column] = value
     # The temperatures at which K and A are zero.
-    for row, values in zip(rows[3:], (model.base_.sagnac_factor_, model.base_.amplitude_)):
+    polynomials = (model.base_.sagnac_factor_, model.base_.amplitude_)
+    for row, values in zip(rows[3:], polynomials, strict=True):
         row[2] = model.base_.reference_temperature_ - values[0] / values[1]
     code = export_c_physics(model, name="gyro")
     [(y, status)] = evaluate_all([code], rows, tmp_path, "c99", [1])
@@ -188,9 +189,11 @@ def test_no_answer_to_what_is_not_finite_or_has_no_rate(log, tmp_path):
 
 @needs_compiler
 def test_files_make_a_program_that_tests_itself(log, tmp_path):
-    model, _ = silent(log)
-    search = GridSearchCV(model, {"n_rounds": [1]}, cv=2)
-    search.best_estimator_ = model
+    model, X = whole(log)
+    search = GridSearchCV(
+        model, {"residual__n_mfs": [1, 2]}, cv=KFold(2, shuffle=True, random_state=0)
+    )
+    search.fit(X, log["rate"])
     code = export_c_physics(search, tmp_path / "gyro-7", name="gyro", dtype="float", std="c89")
     assert (tmp_path / "gyro-7.c").read_text() == code.source
     flags = ["-std=c89", *STRICT, *SANITIZE, "-DGYRO_SELF_TEST", "-DGYRO_SELF_TEST_MAIN"]

@@ -20,8 +20,8 @@ class Dialect:
     """Turns templates into C.
 
     A number that ends in R becomes a constant of the type, ``$name`` the prefix of identifiers,
-    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG`` and ``$ASIN`` its functions, ``$MAX`` its
-    largest number; further words are given to :meth:`write`.
+    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG`` and ``$ASIN`` its functions,
+    ``$MAX`` its largest number; further words are given to :meth:`write`.
     """
 
     name: str

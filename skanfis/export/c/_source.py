@@ -261,7 +261,8 @@ class Source:
     def predict(self):
         numbers = self.numbers
         lines = [
-            f"{self.linkage}int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
+            f"{self.linkage}int $name_predict("
+            "const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
             "{",
             "    /* Inputs in the box. */",
             f"    $real c[{numbers.n_inputs}], sum[{numbers.n_outputs}];",
