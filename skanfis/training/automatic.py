@@ -90,7 +90,7 @@ class Candidate:
     counts: tuple[int, ...] | None
     size: float | None  # number of clusters, or the radius that they have
     level: int
-    clustering: str | None = None  # "k-means", "subtractive" or "fcm"
+    clustering: str = ""  # "k-means", "subtractive" or "fcm"
 
     def describe(self):
         """In words."""
