@@ -164,18 +164,18 @@ def _merit_by_group(page, results, report):
     parts = report[report["group"] != "all"]
     after = parts.pivot(index="group", columns="figure", values="after")
     before = parts[parts["figure"] == "residual_rms"].set_index("group")["before"]
-    lines = [
-        (
-            str(group),
-            f"{after.at[group, 'rows']:,.0f}",
-            f"{after.at[group, 'rows_refused']:,.0f}",
+    lines = []
+    for group in parts["group"].unique():
+        line = after.loc[group]
+        shown = [
             results.shown(before[group]),
-            results.shown(after.at[group, "residual_rms"]),
-            results.shown(after.at[group, "residual_peak"]),
-            f"{figures(after.at[group, 'reduction_factor'])} ×",
-        )
-        for group in parts["group"].unique()
-    ]
+            results.shown(line["residual_rms"]),
+            results.shown(line["residual_peak"]),
+            f"{figures(line['reduction_factor'])} ×",
+        ]
+        if line["rows"] == line["rows_refused"]:
+            shown = ["–"] * len(shown)  # no row in range, no error of such rows
+        lines.append((str(group), f"{line['rows']:,.0f}", f"{line['rows_refused']:,.0f}", *shown))
     unit = SYMBOL[results.unit]
     errors = (f"RMS before [{unit}]", f"RMS after [{unit}]", f"peak after [{unit}]")
     page.heading(f"By held-out {kind}")

@@ -175,3 +175,16 @@ def test_no_screen_is_asked_for():
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_run_without_a_row_in_range_has_no_error():
+    # Every run at a temperature of its own: the outermost lie beyond what the others have seen.
+    log = make_ofog(
+        n_devices=1, n_runs=6, duration=600.0, max_residual_heat=0.0, rates=[0.0], random_state=3
+    )
+    calibration = calibration_of(log, ("time", "temperature"), max_rules=2)
+    in_range = [calibration.inside[log["run"] == run].any() for run in log["run"].unique()]
+    assert not all(in_range)
+    shown = "".join(Outline(report_page(calibration, "log.csv")).text)
+    assert "–" in shown
+    assert not re.search(r"\bnan\b", shown)
