@@ -15,7 +15,7 @@ To the curvature that a step sees is added what keeps rounding errors from decid
 strengths do not change at all along some directions (two Gaussian terms have four parameters, their
 log ratio has three coefficients), and hardly along others: slope and curvature are both noise
 there, and so would their ratio be. The addition is a small part of the largest curvature, plus the
-curvature with which moving by one must pay: a decrease of the cost by tol/2 of itself. Two fits to
+curvature with which moving by one must pay: a decrease of the cost by 50 tol of itself. Two fits to
 the same data in other units so take the same path (tests/test_invariance.py).
 
 A rejected step costs one pass over the data, an accepted one two (see ``objective``).
@@ -41,7 +41,7 @@ _LENGTH_SLACK = 1.01
 _MOST_NEWTON_STEPS = 50
 # Added to every curvature: this part of the largest, and this times tol times the cost.
 _SMALLEST_CURVATURE = 1e-6
-_WORTH = 1.0
+_WORTH = 100.0
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
 _GRADIENT_FACTOR = 1e-2
 

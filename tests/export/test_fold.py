@@ -109,7 +109,9 @@ def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_ou
 @pytest.mark.parametrize("kind", KINDS)
 def test_scale_of_the_target_is_folded(kind):
     X, y = data(2)
-    inner = make_pipeline(StandardScaler(), regressor(**KINDS[kind], out_of_bounds="linear"))
+    # Not the tangent of triangles, as in CASES: rounding decides on which side of a corner it is.
+    policy = "clip" if kind == "triangles" else "linear"
+    inner = make_pipeline(StandardScaler(), regressor(**KINDS[kind], out_of_bounds=policy))
     target = make_pipeline(MinMaxScaler((-1, 3)), StandardScaler())
     both = TransformedTargetRegressor(inner, transformer=target).fit(X, y)
     assert_same_predictions(both, around(X), 1e4)
