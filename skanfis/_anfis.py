@@ -177,6 +177,7 @@ class _Trainer:
             _solver_options(estimator),
             _ordered_map(estimator.n_jobs if estimator.n_init == 1 else 1),
         )
+        self._counted = None
         self.keeper = Keeper() if estimator.on_interrupt == "stop" else None
         self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
 
@@ -221,7 +222,7 @@ class _Trainer:
             coefficients[:, 0] = solved[:, 0]
             coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
         trained = evaluation.antecedent.change_units(offset, scale)
-        strongest = rule_statistics(rows, evaluation.antecedent).strongest
+        strongest = self._statistics(evaluation).strongest
         return TSKModel(
             antecedent=trained,
             initial_antecedent=antecedent.change_units(offset, scale),
@@ -317,7 +318,13 @@ class _Trainer:
         return self.bridge.task("start", self, learned.structure, result.evaluation)
 
     def _redundant(self, result):
-        return redundant_rules(rule_statistics(self.rows, result.evaluation.antecedent))
+        return redundant_rules(self._statistics(result.evaluation))
+
+    def _statistics(self, evaluation):
+        """How the rules fire at an evaluation; a pass over the rows, for the last one kept."""
+        if self._counted is None or self._counted[0] is not evaluation:
+            self._counted = evaluation, rule_statistics(self.rows, evaluation.antecedent)
+        return self._counted[1]
 
     def _prune(self, learned):
         """The redundant rules, and the training without them where that is asked for."""

@@ -296,7 +296,7 @@ def test_structure_that_is_chosen_by_itself(name):
         *({"n_mfs": 2, "mf": mf} for mf in sorted(set(MEMBERSHIPS) - {"triangular"})),
         # Two triangles have linear shares, whose products with [1, x] span 1, x and x^2 only: the
         # Gram matrix is singular, and the least ridge leaves 4e-3 of rounding. This one does not.
-        {"n_mfs": 2, "mf": "triangular", "alpha": 1e-8},
+        {"n_mfs": 2, "mf": "triangular", "alpha": 1e-10},
         *({"partition": KMEANS, "mf": mf} for mf in sorted(MEMBERSHIPS)),
         *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
     ],

@@ -16,6 +16,7 @@ from sklearn.utils.validation import (
 )
 
 from .. import ANFISRegressor
+from ._ask import ask
 from .physics import OpenLoopArcsineRegressor
 
 __all__ = ["ResidualRegressor"]
@@ -207,9 +208,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
 
     def _answers(self, method, X):
         """What the parts that have ``method`` answer."""
-        return [
-            _ask(part, method, X) for part in self._parts() if hasattr(_last_step(part), method)
-        ]
+        return [ask(part, method, X) for part in self._parts() if hasattr(_last_step(part), method)]
 
     def _weights_by_part(self, base, residual, sample_weight):
         """Keyword arguments of each part's fit."""
@@ -236,13 +235,6 @@ def _check_answered(left):
 
 def _last_step(estimator):
     return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
-
-
-def _ask(estimator, method, X):
-    """Answer of an estimator, or of a Pipeline's last step to what its other steps make of X."""
-    if isinstance(estimator, Pipeline):
-        X = estimator[:-1].transform(X) if len(estimator) > 1 else X
-    return getattr(_last_step(estimator), method)(X)
 
 
 def _weight_argument(estimator, role, sample_weight):

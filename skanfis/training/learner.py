@@ -1,7 +1,7 @@
 """One run of a solver: what it needs beside the data and the start, and what it leaves behind."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -90,7 +90,3 @@ class Learner:
     def premise(rows: Rows, structure: Structure):
         """What moves at a structure, within the box of the data."""
         return Premise.of(structure.antecedent, *rows.inputs.box)
-
-    def one_by_one(self):
-        """The same learner without workers of its own, for runs that are spread over workers."""
-        return replace(self, map_ordered=map)
