@@ -1,4 +1,4 @@
-r"""The THEN parts of the rules, which are linear, and the ridge regression that finds them.
+r"""The THEN parts of the rules, which are linear, and the regression that finds them.
 
 Conventions
 -----------
@@ -15,9 +15,8 @@ per row, because it is done on the Gram matrix,
 
     Phi_local' S Phi_local = T' (Phi' S Phi) T ,
 
-and the ridge acts on the local coefficients: on the value of the rule at its centre and on its
-change over one standard deviation. T is frozen at the start of training, for the objective must be
-one and the same function throughout.
+and the penalty of ``penalty`` acts on the local coefficients. T is frozen at the start of training,
+for the objective must be one and the same function throughout.
 
 Since sum_r w_r = 1, the moments behind a and h are row sums of the Gram matrix itself:
 sum_r' G[(r, i), (r', j)] = sum over rows of s w_r b_i b_j, where b_j is 1 or z_j.
@@ -28,12 +27,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-__all__ = ["LocalBasis", "RidgeFactor", "basis", "rule_masses", "rule_outputs"]
+__all__ = ["LocalBasis", "NormalFactor", "basis", "rule_masses", "rule_outputs"]
 
 # A rule that fires on one spot only has no spread there; in standard deviations of the input.
 _SMALLEST_SPREAD = 0.05
 # A rule with less than this part of the data's weight has no usable moments.
 _SMALLEST_MASS = 1e-12
+# Tenfold shifts of a matrix that has no Cholesky factor: from rounding to the matrix itself.
+_MOST_SHIFTS = 20
 
 
 def basis(Z):
@@ -108,48 +109,46 @@ class LocalBasis:
         return blocks.reshape(coefficients.shape)
 
 
-class RidgeFactor:
-    r"""The Cholesky factor of G + alpha I: the one factorisation behind solution and projector.
+class NormalFactor:
+    r"""The Cholesky factor of G + P: the one factorisation behind solution and projector.
 
     Solving with one factorisation and projecting with another makes the reduced gradient wrong as
-    soon as two rules are alike, which is an everyday case here. Where ``alpha`` is below rounding
-    (p eps max diag G), that much is added in its stead: a singular Gram matrix then has a solution
-    too, and it is of small norm.
+    soon as two rules are alike, which is an everyday case here. ``shift`` times the identity is
+    added, at the level of rounding (p eps max diag G): a singular matrix then has a solution too,
+    and it is of small norm.
     """
 
-    def __init__(self, gram, alpha):
-        diagonal = np.diagonal(gram)
-        floor = gram.shape[0] * np.finfo(float).eps * diagonal.max(initial=0.0)
-        self.alpha = max(alpha, floor, np.finfo(float).tiny)
-        shifted = gram.copy()
-        shifted.flat[:: gram.shape[0] + 1] += self.alpha
+    def __init__(self, matrix):
+        diagonal = np.diagonal(matrix)
+        floor = matrix.shape[0] * np.finfo(float).eps * diagonal.max(initial=0.0)
+        self.shift = max(floor, np.finfo(float).tiny)
+        shifted = matrix.copy()
+        shifted.flat[:: matrix.shape[0] + 1] += self.shift
         self._lower = self._factorise(shifted)
 
     def _factorise(self, shifted):
-        while True:
+        for _ in range(_MOST_SHIFTS):
             lower, info = linalg.lapack.dpotrf(shifted, lower=1, clean=1)
             if info == 0:
                 return lower
             # Rounding has made the sum of a semi-definite matrix and the floor indefinite.
-            shifted.flat[:: shifted.shape[0] + 1] += 9.0 * self.alpha
-            self.alpha *= 10.0
-
-    def gram(self):
-        """G, put together again."""
-        gram = self._lower @ self._lower.T
-        gram.flat[:: gram.shape[0] + 1] -= self.alpha
-        return gram
+            shifted.flat[:: shifted.shape[0] + 1] += 9.0 * self.shift
+            self.shift *= 10.0
+        raise FloatingPointError("The normal equations of the consequents are not finite.")
 
     def solve(self, right_side):
-        """(G + alpha I)^-1 times right_side."""
+        """(G + P)^-1 times right_side."""
         return linalg.cho_solve((self._lower, True), right_side, check_finite=False)
 
     def half_solve(self, right_side):
         """L^-1 times right_side, so that (.)' (.) is the quadratic form of the inverse."""
         return linalg.solve_triangular(self._lower, right_side, lower=True, check_finite=False)
 
-    def effective_parameters(self):
-        """Degrees of freedom, trace of G (G + alpha I)^-1."""
-        n_columns = self._lower.shape[0]
-        inverse_factor, _ = linalg.lapack.dtrtri(self._lower, lower=1)
-        return n_columns - self.alpha * np.sum(inverse_factor**2)
+    def log_determinant(self):
+        """log |G + P|."""
+        return 2.0 * float(np.sum(np.log(np.diagonal(self._lower))))
+
+    def inverse(self):
+        """(G + P)^-1, symmetric."""
+        inverse, _ = linalg.lapack.dpotri(self._lower, lower=1)
+        return np.tril(inverse) + np.tril(inverse, -1).T

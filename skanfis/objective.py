@@ -2,21 +2,32 @@ r"""Training as a separable least-squares problem: cost, gradient and Gauss-Newt
 
 With premise parameters theta, design Phi(theta), weights S of sum W and consequents beta,
 
-    F(theta) = min_beta  1/(2 W) |y - Phi beta|_S^2 + alpha/2 |beta|^2 .
+    F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,    P = lambda Q(theta) + A ,
 
-beta is eliminated (variable projection: Golub and Pereyra 1973). With r the residual and
-D = (d Phi / d theta) beta its sensitivity at fixed beta, the envelope theorem gives the gradient
-exactly, and the Schur complement of the joint Gauss-Newton matrix that of the reduced problem
-(Kaufman 1975):
+where Q gives the disagreement of rules that fire together, A what else pulls on the consequents
+(see ``penalty``). beta is eliminated (variable projection: Golub and Pereyra 1973). With r the
+residual and D = (d Phi / d theta) beta its sensitivity at fixed beta, the envelope theorem gives
+the gradient exactly, and the Schur complement of the joint Gauss-Newton matrix that of the reduced
+problem (Kaufman 1975):
 
-    grad F = -D' S r / W
-    H      = [D' S D - D' S Phi (Phi' S Phi + alpha W I)^-1 Phi' S D] / W .
+    grad F = [- D' S r + lambda/2 dV] / W
+    H      = [D' S D + lambda K - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi + lambda L .
+
+The disagreement is a sum of squares too, of sqrt(w_r) e_r with e_r = f_r - y_hat, for every row
+and rule. Since sum_r w_r e_r = 0, what changes with theta at fixed beta are the w_r alone:
+
+    dV = sum over rows and rules of  s e_r^2 dw_r ,
+    K  = sum over rows and rules of  s (w_r e_r^2 / 4) (d log w_r) (d log w_r)' ,
+    L_(., r) = sum over rows of  s/2 (e_r dw_r - w_r D) b' .
+
+With g_r the derivatives of rule r's own log-strength (those of the terms it has) and N = sum_r w_r
+g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and products with N.
 
 Everything is a block of one Gram matrix and adds over rows. Two passes make one iteration:
 :meth:`SeparableProblem.evaluate` accumulates Phi' S [Phi, r] and gives cost and beta, which is all
-that a rejected step needs; :meth:`SeparableProblem.linearise` accumulates D' S [D, Phi, r] at that
-very beta, so that the gradient is exact. Phi itself is never formed (see ``gram``). A pass holds
-one block of rows per worker, whatever the number of rows.
+that a rejected step needs; :meth:`SeparableProblem.linearise` accumulates the rest at that very
+beta, so that the gradient is exact. Phi itself is never formed (see ``gram``). A pass holds one
+block of rows per worker, whatever the number of rows.
 
 The right side is the residual of *reference* coefficients, those of the last accepted point, not y:
 the cost of a nearly exact fit would otherwise be a small difference of large numbers.
@@ -24,17 +35,19 @@ the cost of a nearly exact fit would otherwise be a small difference of large nu
 Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in ``premise``.
 """
 
+import copy
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from .antecedent import Antecedent
-from .consequent import LocalBasis, RidgeFactor, basis, rule_masses, rule_outputs
+from .consequent import LocalBasis, NormalFactor, basis, rule_masses, rule_outputs
 from .gram import DesignMoments
+from .penalty import CommonLine, Penalty, disagreement_matrix
 from .rows import Rows
 
-__all__ = ["Evaluation", "JointGradient", "Linearisation", "SeparableProblem"]
+__all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "SeparableProblem"]
 
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
 # a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
@@ -59,9 +72,20 @@ class Evaluation:
     antecedent: Antecedent
     cost: float
     coefficients: np.ndarray  # on [1, z], (n_columns, n_outputs)
-    factor: RidgeFactor | None  # None where the coefficients were given, not solved for
     masses: np.ndarray  # part of the weight on which each rule fires
     mean_squared_error: float  # of the standardised target, weighted, summed over outputs
+    normal: "NormalEquations | None"  # None where the coefficients were given, not solved for
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """What the consequents were solved with, in the local basis."""
+
+    gram: np.ndarray  # Phi' S Phi / W
+    disagreement: np.ndarray  # Q
+    penalty: np.ndarray  # P
+    factor: NormalFactor  # of Phi' S Phi / W + P
+    coefficients: np.ndarray  # local, (n_columns, n_outputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +115,8 @@ class SeparableProblem:
         The rule base at the start, which freezes the consequents' local basis.
     order : {0, 1}
         Order of the consequents.
-    alpha : float
-        Ridge on the local coefficients, relative to the mean over rows.
+    penalty : Penalty
+        What the consequents pay beside their errors.
     map_ordered : callable
         ``map``, or what stands in for it to spread chunks over workers; results in order.
     consequent_inputs : ndarray of int, optional
@@ -104,14 +128,14 @@ class SeparableProblem:
         rows: Rows,
         antecedent: Antecedent,
         order: int,
-        alpha: float,
+        penalty: Penalty,
         map_ordered: Callable[[Callable, Iterable], Iterable] = map,
         consequent_inputs: np.ndarray | None = None,
     ):
         self.rows = rows
         self.antecedent = antecedent
         self.order = order
-        self.alpha = alpha
+        self.penalty = penalty
         self.map_ordered = map_ordered
         every_input = np.arange(rows.X.shape[1])
         given = every_input if consequent_inputs is None else consequent_inputs
@@ -127,6 +151,26 @@ class SeparableProblem:
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
         gram, _, _ = self._first_pass(antecedent, no_coefficients)
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
+        self._common_line = CommonLine(self.local)
+
+    def with_penalty(self, penalty):
+        """Return the same problem with another penalty; no pass over the rows."""
+        other = copy.copy(self)
+        other.penalty = penalty
+        return other
+
+    @property
+    def common_line(self):
+        """The line that all rules share, in the coordinates of the local basis."""
+        return self._common_line
+
+    def penalty_matrix(self, disagreement):
+        """P in the local basis, where Q is ``disagreement``."""
+        line, penalty = self._common_line, self.penalty
+        matrix = penalty.agreement * disagreement
+        matrix += penalty.alpha * line.own
+        matrix += penalty.rho * line.slopes
+        return matrix
 
     def _block_rows(self, antecedent):
         values_per_row = (
@@ -182,27 +226,34 @@ class SeparableProblem:
         if reference is None:
             reference = np.zeros((self.n_columns, self.n_outputs))
         gram, slope, square = self._first_pass(antecedent, reference)
-        factor = RidgeFactor(self.local.transform_gram(gram), self.alpha)
+        disagreement = self.local.transform_gram(disagreement_matrix(gram, antecedent.n_rules))
+        penalty = self.penalty_matrix(disagreement)
+        masses = rule_masses(gram, antecedent.n_rules)
+        gram = self.local.transform_gram(gram)
+        factor = NormalFactor(gram + penalty)
+        penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
-        slope = self.local.transform_rows(slope) - factor.alpha * reference_local
+        pull = penalty @ reference_local
+        slope = self.local.transform_rows(slope) - pull
         change = factor.solve(slope)
-        at_reference = square.sum() + factor.alpha * np.sum(reference_local**2)
+        at_reference = square.sum() + np.sum(reference_local * pull)
         cost = 0.5 * (at_reference - np.sum(slope * change))
-        penalty = factor.alpha * np.sum((reference_local + change) ** 2)
+        solved = reference_local + change
         return Evaluation(
             antecedent,
             cost,
             reference + self.local.to_global(change),
-            factor,
-            rule_masses(gram, antecedent.n_rules),
-            max(2.0 * cost - penalty, 0.0),
+            masses,
+            max(2.0 * cost - np.sum(solved * (penalty @ solved)), 0.0),
+            NormalEquations(gram, disagreement, penalty, factor, solved),
         )
 
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
-        antecedent = evaluation.antecedent
+        antecedent, agreement = evaluation.antecedent, self.penalty.agreement
         n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
         by_rule = evaluation.coefficients.reshape(n_rules, self.n_basis, self.n_outputs)
+        own = _own_parameters(antecedent) if agreement else []
 
         def accumulate(part, sums):
             square, slope, *cross = sums
@@ -221,7 +272,38 @@ class SeparableProblem:
                 products = sensitivity[:, None, :] * weighted_basis
                 square += products[:, 0] @ sensitivity.T
                 slope += products[:, 0] @ (target[k] - output)
+                if agreement:
+                    products *= 1.0 - 0.5 * agreement
                 cross[k] += products.reshape(-1, n_rows) @ strengths.T
+                if agreement:
+                    excess = by_rule_k - strengths * output  # w_r e_r
+                    disagree(square, slope, cross[k], excess, strengths, gradients, weighted_basis)
+
+        def disagree(square, slope, cross, excess, strengths, gradients, weighted_basis):
+            """Add the part of V: its dV, K and L."""
+            # w_r e_r^2, where w_r may be next to nothing.
+            squares = excess**2 / np.maximum(strengths, np.finfo(float).tiny)
+            weight, n_rows = weighted_basis[0], excess.shape[1]
+            total = squares.sum(axis=0)
+            every = np.concatenate([g.reshape(-1, n_rows) for g in gradients])
+            mean, change = np.empty((2, n_raw, n_rows))
+            self._chain(gradients, antecedent.sum_over_rules(strengths), mean)  # N
+            self._chain(gradients, antecedent.sum_over_rules(squares), change)
+            change -= mean * total  # e_r^2 dw_r, summed over rules
+            slope -= 0.5 * agreement * (change @ weight)
+            # - (change N' + N change' + total N N') / 4
+            half = (0.25 * agreement * weight) * (change + 0.5 * total * mean)
+            product = half @ mean.T
+            square -= product + product.T
+            weighted_mean = (-0.5 * agreement) * mean[:, None, :] * weighted_basis
+            cross += weighted_mean.reshape(-1, n_rows) @ excess.T
+            cross = cross.reshape(n_raw, self.n_basis, n_rules)
+            for r, rows in enumerate(own):
+                gradient = every[rows]
+                square[np.ix_(rows, rows)] += (
+                    gradient * (0.25 * agreement * weight * squares[r])
+                ) @ gradient.T
+                cross[rows, :, r] += (gradient * (0.5 * agreement * excess[r])) @ weighted_basis.T
 
         shapes = [(n_raw, n_raw), (n_raw,)]
         shapes += [(n_raw * self.n_basis, n_rules)] * self.n_outputs
@@ -229,20 +311,21 @@ class SeparableProblem:
         for one in cross:
             by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
             columns = np.ascontiguousarray(by_column).reshape(self.n_columns, n_raw)
-            half = evaluation.factor.half_solve(self.local.transform_rows(columns))
+            half = evaluation.normal.factor.half_solve(self.local.transform_rows(columns))
             gauss_newton -= half.T @ half
         return Linearisation(-slope, gauss_newton)
 
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
-        antecedent = self.antecedent.with_parameters(parameters)
-        premises, slope, square, masses = self._joint_pass(antecedent, coefficients)
+        antecedent, line = self.antecedent.with_parameters(parameters), self._common_line
+        premises, slope, square, apart, masses = self._joint_pass(antecedent, coefficients)
         local = self.local.to_local(coefficients)
-        cost = 0.5 * (square.sum() + self.alpha * np.sum(local**2))
+        pull = self.penalty.alpha * (line.own @ local) + self.penalty.rho * (line.slopes @ local)
+        cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
         return JointGradient(
-            Evaluation(antecedent, cost, coefficients, None, masses, float(square.sum())),
+            Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None),
             -premises,
-            self.alpha * self._by_global(local) - slope,
+            self._by_global(pull) - slope,
         )
 
     def residuals(self, evaluation):
@@ -258,19 +341,20 @@ class SeparableProblem:
                 yield part, target, weight
 
     def leverage(self, evaluation, part):
-        """h_i = phi_i' (Phi' S Phi + alpha W I)^-1 phi_i of some rows, shape (n_rows,)."""
+        """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,)."""
         Z, _, _ = self.rows.read(part)
         strengths = evaluation.antecedent.strengths(Z)
         design = (strengths[:, None, :] * self._basis(Z)).reshape(self.n_columns, -1)
-        half = evaluation.factor.half_solve(self.local.transform_rows(design))
+        half = evaluation.normal.factor.half_solve(self.local.transform_rows(design))
         return np.sum(half**2, axis=0) / self._weight
 
     def _joint_pass(self, antecedent, coefficients):
-        """D' S r, Phi' S r, r' S r (per output) and each rule's mass, over W."""
+        """Slopes by theta and beta but for A, r' S r and V (per output), each rule's mass; over W."""
+        agreement = self.penalty.agreement
         by_rule = coefficients.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
 
         def accumulate(part, sums):
-            premises, slope, square, masses = sums
+            premises, slope, square, apart, masses = sums
             Z, target, weight = self.rows.read(part)
             basis_rows = self._basis(Z)
             log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
@@ -284,10 +368,20 @@ class SeparableProblem:
                 square[k] += weighted @ residual
                 by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
                 by_term *= weighted
+                if agreement:
+                    excess = by_rule_k - strengths * output
+                    squares = excess**2 / np.maximum(strengths, np.finfo(float).tiny)
+                    total = squares.sum(axis=0)
+                    own = np.ones_like(total) if weight is None else weight
+                    apart[k] += own @ total
+                    slope[:, k] -= agreement * ((excess * own) @ basis_rows.T).ravel()
+                    change = antecedent.sum_over_rules(squares)
+                    change -= antecedent.sum_over_rules(strengths) * total
+                    by_term -= (0.5 * agreement) * own * change
                 premises += self._chain_sum(gradients, by_term)
 
         shapes = [(antecedent.parameters.size,), coefficients.shape]
-        shapes += [(self.n_outputs,), (antecedent.n_rules,)]
+        shapes += [(self.n_outputs,), (self.n_outputs,), (antecedent.n_rules,)]
         return self._sum_over_chunks(accumulate, shapes)
 
     def _by_global(self, local):
@@ -317,3 +411,15 @@ class SeparableProblem:
             target = out[row : row + n_parameters * n_terms].reshape(gradient.shape)
             np.multiply(gradient, by_term[term : term + n_terms], out=target)
             row, term = row + n_parameters * n_terms, term + n_terms
+
+
+def _own_parameters(antecedent):
+    """Of every rule, the positions of its terms' parameters in the vector of all."""
+    of_term: list[np.ndarray] = []
+    start = 0
+    for group in antecedent.groups:
+        rows = start + np.arange(group.theta.size).reshape(group.theta.shape)
+        of_term.extend(rows.T)
+        start += group.theta.size
+    return [np.concatenate([of_term[t] for t in terms if t >= 0] or [np.empty(0, dtype=int)])
+            for terms in antecedent.rule_terms]

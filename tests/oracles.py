@@ -145,73 +145,100 @@ def dense_design(antecedent, parameters, Z, order, inputs=None):
 
 
 class DenseProblem:
-    """F(theta) = min_beta |y - Phi beta|_S^2 / (2 W) + alpha/2 |beta_local|^2, all in one piece."""
+    """F(theta) = min_beta 1/2 [MSE + lambda V + alpha sum |delta_r|^2 + rho |slopes|^2], in one piece.
 
-    def __init__(self, rows, antecedent, order, alpha, consequent_inputs=None):
-        self.antecedent, self.order, self.alpha = antecedent, order, alpha
+    Everything is a sum of squares of :meth:`residuals`, which are written down from the definitions
+    in ``skanfis.penalty``: no row sums of Gram matrices, no projections.
+    """
+
+    def __init__(self, rows, antecedent, order, penalty, consequent_inputs=None):
+        self.antecedent, self.order, self.penalty = antecedent, order, penalty
         self.inputs = consequent_inputs
         self.Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
         self.y = (rows.y - rows.targets.offset) / rows.targets.scale
         weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
         self.weight = weight / weight.sum()
-        self.local = self._local_basis()
+        slopes = self.Z[: len(self.Z) * order]
+        slopes = slopes if consequent_inputs is None else slopes[consequent_inputs]
+        self.basis = np.vstack([np.ones((1, self.y.shape[0])), slopes])
+        self.n_rules = len(strengths(antecedent, antecedent.parameters, self.Z))
+        self.centers = self._centers()
+        # Rules of a common line have its value at their centres, and its slopes.
+        self.line = np.concatenate([self._value_and_slopes(center) for center in self.centers])
 
-    def _local_basis(self):
-        """T, built entry by entry from numpy's weighted moments at the start."""
-        slopes = self.Z[: len(self.Z) * self.order]
-        slopes = slopes if self.inputs is None else slopes[self.inputs]
-        n_basis = 1 + len(slopes)
-        firing = strengths(self.antecedent, self.antecedent.parameters, self.Z)
-        local = np.zeros((len(firing) * n_basis, len(firing) * n_basis))
-        for r, w in enumerate(firing * self.weight):
-            block = np.eye(n_basis)
-            for j in range(1, n_basis):
-                center, spread = 0.0, 1.0
-                if w.sum() > 1e-12:
-                    center = np.average(slopes[j - 1], weights=w)
-                    spread = np.sqrt(np.average((slopes[j - 1] - center) ** 2, weights=w))
-                block[0, j], block[j, j] = -center / max(spread, 0.05), 1 / max(spread, 0.05)
-            local[r * n_basis : (r + 1) * n_basis, r * n_basis : (r + 1) * n_basis] = block
-        return local
+    def _centers(self):
+        """Mean of the consequents' inputs where each rule fires at the start."""
+        firing = strengths(self.antecedent, self.antecedent.parameters, self.Z) * self.weight
+        return np.array(
+            [
+                [np.average(z, weights=w) if w.sum() > 1e-12 else 0.0 for z in self.basis[1:]]
+                for w in firing
+            ]
+        ).reshape(self.n_rules, len(self.basis) - 1)
+
+    def _value_and_slopes(self, center):
+        matrix = np.eye(len(self.basis))
+        matrix[0, 1:] = center
+        return matrix
 
     def design(self, parameters):
         """Phi on [1, z]."""
         return dense_design(self.antecedent, parameters, self.Z, self.order, self.inputs)
 
+    def residual_matrix(self, parameters):
+        """A with residuals A beta - b of one output: rows, rules on rows, deviations, slopes."""
+        w = strengths(self.antecedent, parameters, self.Z)
+        n_basis, n_columns = len(self.basis), self.n_rules * len(self.basis)
+        phi = np.sqrt(self.weight)[:, None] * self.design(parameters)
+        own = np.zeros((self.n_rules, self.y.shape[0], n_columns))
+        for r in range(self.n_rules):
+            own[r, :, r * n_basis : (r + 1) * n_basis] = self.basis.T
+        apart = np.sqrt(w)[:, :, None] * (np.sqrt(self.weight)[:, None] * own - phi)
+        blocks = [self._value_and_slopes(center) for center in self.centers]
+        values = np.zeros((n_columns, n_columns))
+        for r, block in enumerate(blocks):
+            values[r * n_basis : (r + 1) * n_basis, r * n_basis : (r + 1) * n_basis] = block
+        to_line, *_ = np.linalg.lstsq(self.line, values, rcond=None)
+        parts = [
+            phi,
+            np.sqrt(self.penalty.agreement) * apart.reshape(-1, n_columns),
+            np.sqrt(self.penalty.alpha) * (values - self.line @ to_line),
+            np.sqrt(self.penalty.rho) * to_line[1:],
+        ]
+        return np.vstack(parts)
+
+    def right_side(self, n_residuals):
+        """b, (n_residuals, n_outputs)."""
+        target = np.zeros((n_residuals, self.y.shape[1]))
+        target[: len(self.y)] = np.sqrt(self.weight)[:, None] * self.y
+        return target
+
     def coefficients(self, parameters):
-        """beta on [1, z], from the normal equations."""
-        phi = self.design(parameters) @ self.local
-        gram = (phi.T * self.weight) @ phi + self.alpha * np.eye(phi.shape[1])
-        return self.local @ np.linalg.solve(gram, (phi.T * self.weight) @ self.y)
+        """beta on [1, z], from the normal equations of all residuals."""
+        matrix = self.residual_matrix(parameters)
+        return np.linalg.solve(matrix.T @ matrix, matrix.T @ self.right_side(len(matrix)))
+
+    def cost_at(self, parameters, beta):
+        """F at any coefficients, analytic: squares are of complex numbers, not of their sizes."""
+        matrix = self.residual_matrix(parameters)
+        return 0.5 * np.sum((matrix @ beta - self.right_side(len(matrix))) ** 2)
 
     def cost(self, parameters):
-        """F, analytic: squares are of complex numbers, not of their sizes."""
-        beta = self.coefficients(parameters)
-        residual = self.y - self.design(parameters) @ beta
-        local_beta = np.linalg.solve(self.local, beta)
-        return 0.5 * np.sum(self.weight[:, None] * residual**2) + 0.5 * self.alpha * np.sum(
-            local_beta**2
-        )
+        """F."""
+        return self.cost_at(parameters, self.coefficients(parameters))
 
     def gradient(self, parameters):
         """dF / d theta."""
         return complex_step(self.cost, parameters)
 
     def gauss_newton(self, parameters):
-        """Schur complement of J'J, J the Jacobian of all residuals by theta and beta together.
-
-        The residuals are the weighted rows and, below them, those of the ridge.
-        """
+        """Schur complement of J'J, J the Jacobian of all residuals by theta and beta together."""
         beta = self.coefficients(parameters)
-        sensitivity = complex_step(lambda p: self.design(p) @ beta, parameters)
-        root = np.sqrt(self.weight)[:, None]
-        phi = np.vstack(
-            [root * (self.design(parameters) @ self.local), np.sqrt(self.alpha) * np.eye(len(beta))]
-        )
-        orthogonal, _ = np.linalg.qr(phi)
+        by_theta = complex_step(lambda p: self.residual_matrix(p) @ beta, parameters)
+        orthogonal, _ = np.linalg.qr(self.residual_matrix(parameters))
         total = 0.0
         for k in range(self.y.shape[1]):
-            jacobian = np.vstack([root * sensitivity[:, k], np.zeros((len(beta), parameters.size))])
+            jacobian = by_theta[:, k]
             projected = jacobian - orthogonal @ (orthogonal.T @ jacobian)
             total = total + projected.T @ projected
         return total

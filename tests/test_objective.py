@@ -16,11 +16,14 @@ from skanfis import objective, rows
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.rows import Rows
 
 from . import oracles
 
-ALPHA = 1e-4
+# Of the two: the ridge that every problem has, and all that there is at once.
+PLAIN = Penalty(alpha=1e-4)
+FULL = Penalty(agreement=0.3, alpha=1e-3, slope=1e-2)
 
 
 def dead_rule(rng):
@@ -74,30 +77,34 @@ CASES = {
 class Case:
     """A problem, its dense form, and a point away from the start."""
 
-    def __init__(self, antecedent, order, rows, alpha=ALPHA, **settings):
-        self.rows, self.order, self.alpha = rows, order, alpha
-        self.problem = SeparableProblem(rows, antecedent, order, alpha, **settings)
+    def __init__(self, antecedent, order, rows, penalty=PLAIN, **settings):
+        self.rows, self.order, self.penalty = rows, order, penalty
+        self.problem = SeparableProblem(rows, antecedent, order, penalty, **settings)
         consequent_inputs = settings.get("consequent_inputs")
-        self.dense = oracles.DenseProblem(rows, antecedent, order, alpha, consequent_inputs)
+        self.dense = oracles.DenseProblem(rows, antecedent, order, penalty, consequent_inputs)
         g = np.random.default_rng(5)
         self.point = antecedent.parameters + 0.2 * g.normal(size=antecedent.parameters.size)
 
     @classmethod
-    def named(cls, name):
+    def named(cls, name, penalty=PLAIN):
         g = np.random.default_rng(3)
         build, order, n_outputs, weighted, *inputs = CASES[name]
         settings = {"consequent_inputs": np.array(inputs[0])} if inputs else {}
         rows = oracles.bumpy_rows(g, 250, 2, n_outputs, weighted)
-        return cls(build(g), order, rows, **settings)
+        return cls(build(g), order, rows, penalty, **settings)
 
     def at_point(self):
         evaluation = self.problem.evaluate(self.point)
         return evaluation, self.problem.linearise(evaluation)
 
 
-@pytest.fixture(scope="module", params=CASES)
+@pytest.fixture(
+    scope="module",
+    params=[(name, penalty) for name in CASES for penalty in (PLAIN, FULL)],
+    ids=lambda param: f"{param[0]}{', agreeing' if param[1] is FULL else ''}",
+)
 def case(request):
-    return Case.named(request.param)
+    return Case.named(*request.param)
 
 
 def assert_all_close(one, other, rtol):
@@ -173,12 +180,12 @@ def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
     Z = plain.inputs.apply(X.T, np.empty((2, 200)))
     phi = oracles.dense_design(antecedent, antecedent.parameters, Z, 1)
     exact = Rows.standardised(X, phi @ rng.normal(size=(phi.shape[1], 1)))
-    problem = SeparableProblem(exact, antecedent, 1, 1e-14)
+    problem = SeparableProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
     at = antecedent.parameters
     evaluation = problem.evaluate(at)
     evaluation = problem.evaluate(at, evaluation.coefficients)
     assert evaluation.mean_squared_error < 1e-18
-    dense = oracles.DenseProblem(exact, antecedent, 1, 1e-14)
+    dense = oracles.DenseProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
     hessian = oracles.central_difference(dense.gradient, at, 1e-3)
     assert_all_close(problem.linearise(evaluation).gauss_newton, hessian, 1e-5)
 
@@ -187,7 +194,7 @@ def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
 def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
     # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
     g = np.random.default_rng(3)
-    case = Case(duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), alpha)
+    case = Case(duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), Penalty(alpha=alpha))
     point = case.problem.antecedent.parameters  # the two rules are the same still
     linearisation = case.problem.linearise(case.problem.evaluate(point))
     # Rounding grows by 1 / alpha along what the two rules leave open, in the dense problem too.
@@ -198,7 +205,7 @@ def test_two_rules_that_are_alike_learn_as_one_another():
     # Exchanging the two changes nothing, so neither may the gradient tell them apart.
     g = np.random.default_rng(3)
     antecedent, data = duplicated_rule(g), oracles.bumpy_rows(g, 250)
-    problem = SeparableProblem(data, antecedent, 1, 1e-6)
+    problem = SeparableProblem(data, antecedent, 1, Penalty(alpha=1e-6))
     linearisation = problem.linearise(problem.evaluate(antecedent.parameters))
     by_rule = linearisation.gradient.reshape(3, 4, 2)
     assert_all_close(by_rule[:, 1], by_rule[:, 3], 1e-8)
@@ -219,6 +226,7 @@ def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
         case.problem.antecedent,
         case.order,
         case.rows,
+        case.penalty,
         consequent_inputs=case.problem.consequent_inputs,
     )
     assert len(split.problem._chunks) > 10
@@ -272,7 +280,7 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     y = (y - y.mean()) / y.std()
     noise = 1e-9 * rng.normal(size=(400, 1))
     data = Rows.standardised(X, y + noise)
-    problem = SeparableProblem(data, antecedent, 1, 0.0)
+    problem = SeparableProblem(data, antecedent, 1, Penalty())
     blind = problem.evaluate(antecedent.parameters)
     seeing = problem.evaluate(antecedent.parameters, blind.coefficients)
     residual = noise - phi @ np.linalg.lstsq(phi, noise, rcond=None)[0]
@@ -328,7 +336,7 @@ def test_outputs_add_up(rng):
 def test_without_terms_the_cost_is_that_of_a_linear_model(rng):
     data = oracles.bumpy_rows(rng, 200, 2, 1, weighted=True)
     antecedent = GridAntecedent((), counts=())
-    evaluation = SeparableProblem(data, antecedent, 1, 0.0).evaluate(np.empty(0))
+    evaluation = SeparableProblem(data, antecedent, 1, Penalty()).evaluate(np.empty(0))
     phi = np.column_stack([np.ones(200), (data.X - data.X.mean(axis=0)) / data.X.std(axis=0)])
     y = (data.y - data.targets.offset) / data.targets.scale
     root = np.sqrt(data.sample_weight / data.sample_weight.sum())[:, None]
@@ -340,7 +348,7 @@ def test_constant_input_changes_nothing(rng):
     data = oracles.bumpy_rows(rng, 200, 2)
     antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
     padded = Rows.standardised(np.column_stack([data.X, np.full(200, 7.0)]), data.y)
-    one, two = (SeparableProblem(r, antecedent, 1, ALPHA) for r in (data, padded))
+    one, two = (SeparableProblem(r, antecedent, 1, FULL) for r in (data, padded))
     first, second = (p.evaluate(antecedent.parameters) for p in (one, two))
     assert_allclose(second.cost, first.cost, rtol=1e-12)
     coefficients = second.coefficients.reshape(4, 4)

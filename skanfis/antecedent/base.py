@@ -135,8 +135,12 @@ class Antecedent(ABC):
         """Strengths w and term shares nu from log mu, which is overwritten."""
 
     @abstractmethod
+    def sum_over_rules(self, values):
+        """Of every term, the sum of values (n_rules, n_rows) over the rules that contain it."""
+
     def term_sensitivity(self, rule_outputs, output, shares):
         """The derivative of the output by every term's log mu, shape (n_terms, n_rows).
 
         ``rule_outputs`` is w_r f_r, ``output`` its sum over rules, ``shares`` as normalise gave it.
         """
+        return self.sum_over_rules(rule_outputs - shares * output)

@@ -82,9 +82,13 @@ class GridAntecedent(Antecedent):
             strengths = (strengths[:, None, :] * share).reshape(-1, n_rows)
         return strengths, log_mu
 
-    def term_sensitivity(self, rule_outputs, output, shares):
+    def sum_over_rules(self, values):
         if not self.counts:
-            return np.empty((0, rule_outputs.shape[1]))
-        sensitivity = _grid_indicator(self.counts) @ rule_outputs
+            return np.empty((0, values.shape[1]))
+        return _grid_indicator(self.counts) @ values
+
+    def term_sensitivity(self, rule_outputs, output, shares):
+        # A term's share is the sum of its rules' strengths: no need to form those products.
+        sensitivity = self.sum_over_rules(rule_outputs)
         sensitivity -= shares * output
         return sensitivity

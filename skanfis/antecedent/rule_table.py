@@ -47,5 +47,5 @@ class RuleTableAntecedent(Antecedent):
         softmax_in_place(strengths)
         return strengths, strengths
 
-    def term_sensitivity(self, rule_outputs, output, shares):
-        return self._contains.T @ (rule_outputs - shares * output)
+    def sum_over_rules(self, values):
+        return self._contains.T @ values

@@ -42,5 +42,5 @@ class ScatteredAntecedent(Antecedent):
         softmax_in_place(strengths)
         return strengths, strengths
 
-    def term_sensitivity(self, rule_outputs, output, shares):
-        return np.repeat(rule_outputs - shares * output, self.n_premise_inputs, axis=0)
+    def sum_over_rules(self, values):
+        return np.repeat(values, self.n_premise_inputs, axis=0)
