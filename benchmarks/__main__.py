@@ -1,6 +1,7 @@
 """The command line: ``python -m benchmarks --help``."""
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from shlex import join
@@ -14,6 +15,10 @@ ON_REQUEST = (
     "solvers",
     "partitions",
     "structure",
+    "real_sets",
+    "battery",
+    "blow_ups",
+    "small_problems",
     "start",
     "peers",
     "fuzz_fis",
@@ -37,6 +42,25 @@ def parse():
         help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
     )
     parser.add_argument("--details", action="store_true", help="also what explains the figures")
+    many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems")
+    many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
+    many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
+    many.add_argument(
+        "--estimator-params",
+        type=json.loads,
+        default={},
+        metavar="JSON",
+        help="parameters of ANFISRegressor, such as '{\"alpha\": 0.1}'",
+    )
+    many.add_argument(
+        "--quick", action="store_true", help="fit no rivals: cases whose rivals are remembered only"
+    )
+    many.add_argument(
+        "--keep",
+        metavar="NAME",
+        help="keep the results of all cases in .cache/NAME, for benchmarks.compare; else in "
+        ".cache/last",
+    )
     parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name}")
     options = parser.parse_args()
     unknown = [name for name in options.names if name not in ALWAYS + ON_REQUEST]
@@ -50,6 +74,9 @@ def command(options):
     words = ["python", "-m", "benchmarks", *options.names]
     words += ["--campaign", "PATH"] if options.campaign else []
     words += ["--details"] if options.details else []
+    words += [f"--every={options.every}"] if options.every > 1 else []
+    if options.estimator_params:
+        words.append(f"--estimator-params={json.dumps(options.estimator_params)}")
     return join(words)
 
 

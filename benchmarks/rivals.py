@@ -1,0 +1,64 @@
+"""What ANFISRegressor is put beside on many data sets, and how they are made."""
+
+import warnings
+from time import process_time
+
+import numpy as np
+import pandas as pd
+from sklearn.dummy import DummyRegressor
+from sklearn.linear_model import RidgeCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer, PolynomialFeatures, StandardScaler
+
+from . import structure
+
+__all__ = ["BEST_OF", "GLASS_BOXES", "GP_ROWS", "RIVALS", "fitted_rival"]
+
+# The ratios are to the best of these.
+BEST_OF = ("quadratic ridge", "SVR", "Gaussian process")
+# Most rows that the Gaussian process learns from: its cost grows with the cube.
+GP_ROWS = 1500
+
+
+def quadratic_ridge(n_inputs):
+    alphas = np.logspace(-3, 3, 13)
+    return make_pipeline(StandardScaler(), PolynomialFeatures(2), StandardScaler(), RidgeCV(alphas))
+
+
+def explainable_boosting(n_inputs):
+    from interpret.glassbox import ExplainableBoostingRegressor
+
+    return ExplainableBoostingRegressor(random_state=0, n_jobs=1)
+
+
+def cubist(n_inputs):
+    from cubist import Cubist
+
+    # It wants names of columns.
+    named = FunctionTransformer(lambda X: pd.DataFrame(X).add_prefix("x"))
+    return make_pipeline(named, Cubist(random_state=0))
+
+
+RIVALS = {
+    "mean": lambda n_inputs: DummyRegressor(),
+    "quadratic ridge": quadratic_ridge,
+    "SVR": lambda n_inputs: structure.support_vectors(),
+    "Gaussian process": structure.gaussian_process,
+    "GradientBoosting": lambda n_inputs: structure.boosting(),
+    "EBM": explainable_boosting,
+    "cubist": cubist,
+}
+# Models that people read; and the packages they are in.
+GLASS_BOXES = {"EBM": "interpret-core", "cubist": "cubist"}
+
+
+def fitted_rival(name, X, y, gp_rows=GP_ROWS):
+    """A rival, and processor seconds of its fit; the Gaussian process sees a part of many rows."""
+    if name == "Gaussian process" and X.shape[0] > gp_rows:
+        chosen = np.random.default_rng(0).choice(X.shape[0], gp_rows, replace=False)
+        X, y = X[chosen], y[chosen]
+    start = process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model = RIVALS[name](X.shape[1]).fit(X, y)
+    return model, process_time() - start
