@@ -19,24 +19,20 @@ from ._validation import warn_user
 from .antecedent import GridAntecedent
 from .model import TSKModel
 from .naming import default_term_names, given_term_names
-from .partition import count_distinct_inputs, imported_antecedent
+from .penalty import Penalty
 from .rows import Rows
 from .solvers import SOLVERS, SolverResult
+from .structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
 from .training import (
-    ENOUGH_ROWS,
     EarlyStopping,
     Keeper,
     Learned,
     Learner,
-    Partition,
     Printer,
-    Structure,
     hold_out,
     learn_from_starts,
     learn_robustly,
-    learn_with_best_alpha,
     redundant_rules,
-    report_constant,
     rule_statistics,
     watch_all,
     without_rules,
@@ -92,14 +88,14 @@ class Training:
 
     model: TSKModel
     result: SolverResult
-    structure: Structure
+    start: Start
     redundant_rules: list[dict]
     pruning: dict | None = None
     robust_weights: np.ndarray | None = None
     validation_losses: tuple[float, ...] | None = None
 
 
-def train(estimator, data: TrainingData, partition: Partition, bridge=None) -> Training:
+def train(estimator, data: TrainingData, request: StructureRequest, bridge=None) -> Training:
     """Train an estimator.
 
     Parameters
@@ -107,16 +103,16 @@ def train(estimator, data: TrainingData, partition: Partition, bridge=None) -> T
     estimator : object
         Where the parameters are read from.
     data : TrainingData
-    partition : Partition
+    request : StructureRequest
     bridge : CallbackBridge, optional
         To scikit-learn's callbacks.
     """
     # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many. One
     # OpenMP thread for the small clusterings, which more would only slow down.
     with _thread_pools().limit(limits=1):
-        if estimator.max_iter == 0 and isinstance(partition.partition, TSKModel):
-            return _as_given(estimator, data, partition.partition)
-        return _Trainer(estimator, data, partition, bridge).train()
+        if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
+            return _as_given(estimator, data, request.partition)
+        return _Trainer(estimator, data, request, bridge).train()
 
 
 def _as_given(estimator, data, model) -> Training:
@@ -142,8 +138,7 @@ def _as_given(estimator, data, model) -> Training:
     loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
     redundant = redundant_rules(rule_statistics(rows, imported_antecedent(model, rows)))
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
-    structure = Structure(model.antecedent, 0.0, 0.0)
-    return Training(model, result, structure, redundant)
+    return Training(model, result, Start(model.antecedent, Penalty()), redundant)
 
 
 @lru_cache(maxsize=1)
@@ -155,9 +150,9 @@ def _thread_pools():
 class _Trainer:
     """One training: the data, the settings, and who watches."""
 
-    def __init__(self, estimator, data, partition, bridge):
-        self.estimator, self.data, self.partition, self.bridge = estimator, data, partition, bridge
-        self.rng = np.random.default_rng(partition.seed)
+    def __init__(self, estimator, data, request, bridge):
+        self.estimator, self.data, self.request, self.bridge = estimator, data, request, bridge
+        self.rng = np.random.default_rng(request.seed)
         self.training, self.held_out = slice(None), None
         self.rows = data.rows()
         if estimator.early_stopping:
@@ -167,11 +162,11 @@ class _Trainer:
             self.rows, every = data.rows(self.training), self.rows
             held_out = every.part(validation)
             self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
-        self.n_distinct = count_distinct_inputs(self.rows, ENOUGH_ROWS)
+        self.size = SampleSize.of(self.rows)
         self.learner = Learner(
             "lse" if estimator.max_iter == 0 else estimator.solver,
             estimator.order,
-            partition.consequent_inputs,
+            request.consequent_inputs,
             estimator.max_iter,
             estimator.tol,
             _solver_options(estimator),
@@ -195,29 +190,29 @@ class _Trainer:
             else:
                 learned = self._learn(self.rows, self._start(self.rows), None)
             learned, redundant, pruning = self._prune(learned)
-            structure, result = learned.structure, learned.result
+            start, result = learned.start, learned.result
             losses = learned.validation_losses if self.held_out is not None else None
         except KeyboardInterrupt:
             if self.keeper is None or self.keeper.best is None:
                 raise
-            structure, result = self.keeper.end()
+            start, result = self.keeper.end()
             redundant, pruning, losses = self._redundant(result), None, None
-        self._report(structure, result)
-        model = self.freeze(structure, result.evaluation)
+        self._report(start, result)
+        model = self.freeze(start, result.evaluation)
         if weights is not None:
             weights = self.data.spread_over_rows(weights, self.training)
-        return Training(model, result, structure, redundant, pruning, weights, losses)
+        return Training(model, result, start, redundant, pruning, weights, losses)
 
-    def freeze(self, structure, evaluation) -> TSKModel:
+    def freeze(self, start, evaluation) -> TSKModel:
         """The model in the user's units."""
-        rows, antecedent = self.rows, structure.antecedent
+        rows, antecedent = self.rows, start.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         n_rules, n_outputs = antecedent.n_rules, rows.y.shape[1]
         solved = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
         solved[:, 0] += rows.targets.offset
         coefficients = solved
         if self.estimator.order == 1:
-            inputs = self.partition.consequent_inputs
+            inputs = self.request.consequent_inputs
             coefficients = np.zeros((n_rules, 1 + offset.size, n_outputs))
             coefficients[:, 0] = solved[:, 0]
             coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
@@ -232,74 +227,70 @@ class _Trainer:
             minimum=rows.inputs.minimum,
             maximum=rows.inputs.maximum,
             rule_weights=evaluation.masses,
-            rule_rows=self.n_distinct * strongest,
+            rule_rows=self.size.n_distinct_inputs * strongest,
             input_names=self.data.input_names,
             out_of_bounds=self.estimator.out_of_bounds,
-            term_names=structure.term_names,
+            term_names=start.term_names,
             output_names=self.data.output_names,
         )
 
     def _start(self, rows):
-        structure = self.partition.structure(rows, self.n_distinct)
+        start = self.request.start(rows, self.size)
+        if self.estimator.solver != "varpro":
+            # Where the evidence was sought, variable projection has moved the premises already.
+            start = replace(start, displacement=None)
         if self.estimator.term_names is not None:
-            antecedent = structure.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
-            structure = replace(
-                structure,
+            antecedent = start.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
+            start = replace(
+                start,
                 term_names=given_term_names(
                     antecedent, self.data.input_names, self.estimator.term_names
                 ),
             )
         if self.printer is not None:
-            candidates = structure.candidates
+            candidates = start.candidates
             found = f"{len(candidates)} candidates compared, " if candidates else ""
             self.printer.note(
-                f"{found}{structure.antecedent.n_rules} rules, alpha {structure.alpha:g}, "
-                f"stiffness {structure.stiffness:g}"
+                f"{found}{start.antecedent.n_rules} rules, agreement {start.penalty.agreement:.3g}, "
+                f"alpha {start.penalty.alpha:.3g}, stiffness {start.penalty.stiffness:.3g}"
             )
-        return structure
+        return start
 
-    def _learn(self, rows, structure, displacement):
+    def _learn(self, rows, start, displacement):
         """Train on some rows, from several starts unless there is a displacement already."""
-        learner = self.learner
-        several = displacement is None and self.estimator.n_init > 1
+        run = partial(self._run, self.learner, rows, start)
+        if displacement is not None or self.estimator.n_init == 1:
+            return run(displacement, is_alone=True)
+        return learn_from_starts(
+            partial(run, is_alone=False),
+            self.learner.premise(rows, start),
+            start.displacement,
+            self.estimator.n_init,
+            self.rng,
+            self.estimator.n_jobs,
+            self._tell_of_start,
+        )
 
-        def from_starts(structure, displacement):
-            run = partial(self._run, learner, rows, structure)
-            if displacement is not None or not several:
-                return run(displacement, is_alone=True)
-            return learn_from_starts(
-                partial(run, is_alone=False),
-                learner.premise(rows, structure),
-                self.estimator.n_init,
-                self.rng,
-                self.estimator.n_jobs,
-                self._tell_of_start,
-            )
-
-        if self.estimator.alpha == "gcv":
-            return learn_with_best_alpha(from_starts, structure, displacement, self.n_distinct)
-        return from_starts(structure, displacement)
-
-    def _run(self, learner, rows, structure, displacement, is_alone) -> Learned:
+    def _run(self, learner, rows, start, displacement, is_alone) -> Learned:
         """One run of the solver, watched."""
         stopper = None
         if self.held_out is not None:
             stopper = EarlyStopping(
                 self.held_out,
-                self.partition.consequent_inputs,
+                self.request.consequent_inputs,
                 self.estimator.n_iter_no_change,
                 self.estimator.tol,
             )
-        keep = None if self.keeper is None else self.keeper.of(structure)
+        keep = None if self.keeper is None else self.keeper.of(start)
         printer = self.printer if is_alone else None
         bridge = None
         if self.bridge is not None and is_alone:
 
             def bridge(n_iter, evaluation):
-                return self.bridge.task("iteration", self, structure, evaluation)
+                return self.bridge.task("iteration", self, start, evaluation)
 
         watch = watch_all(stopper, keep, printer, bridge)
-        learned = learner.run(rows, structure, displacement, watch)
+        learned = learner.run(rows, start, displacement, watch)
         if stopper is None:
             return learned
         return replace(
@@ -315,7 +306,7 @@ class _Trainer:
             self.printer.note(f"a start: loss {loss:.6g} after {result.n_iter} iterations")
         if self.bridge is None:
             return False
-        return self.bridge.task("start", self, learned.structure, result.evaluation)
+        return self.bridge.task("start", self, learned.start, result.evaluation)
 
     def _redundant(self, result):
         return redundant_rules(self._statistics(result.evaluation))
@@ -334,33 +325,33 @@ class _Trainer:
         rules = [entry["rule"] for entry in redundant]
         trained = learned.result.evaluation.antecedent
         left, terms = without_rules(trained, rules)
-        names = learned.structure.term_names
+        names = learned.start.term_names
         if not names and isinstance(trained, GridAntecedent):
             names = default_term_names(trained)
-        structure = replace(
-            learned.structure,
+        start = replace(
+            learned.start,
             antecedent=left,
             term_names=tuple(names[t] for t in terms) if names else (),
         )
         rows = learned.problem.rows
-        as_it_is = np.zeros(self.learner.premise(rows, structure).size)
-        again = self._learn(rows, structure, as_it_is)
+        as_it_is = np.zeros(self.learner.premise(rows, start).size)
+        again = self._learn(rows, start, as_it_is)
         pruning = {
             "rules": redundant,
             "loss_before": learned.result.evaluation.mean_squared_error,
             "loss_after": again.result.evaluation.mean_squared_error,
         }
-        initial, _ = without_rules(learned.structure.antecedent, rules)
-        again = replace(again, structure=replace(again.structure, antecedent=initial))
+        initial, _ = without_rules(learned.start.antecedent, rules)
+        again = replace(again, start=replace(again.start, antecedent=initial))
         return again, redundant, pruning
 
-    def _report(self, structure, result):
+    def _report(self, start, result):
         estimator = self.estimator
         if result.converged or estimator.max_iter == 0:
             return
         hint = "" if result.status == "interrupted" else "; increase max_iter or tol"
         warn_user(
-            f"solver={estimator.solver!r} with {structure.antecedent.n_rules} rules on "
+            f"solver={estimator.solver!r} with {start.antecedent.n_rules} rules on "
             f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}, tol={estimator.tol:g}: "
             f"{result.message} The model is the best one found{hint}.",
             ConvergenceWarning,

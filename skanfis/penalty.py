@@ -46,6 +46,7 @@ class Penalty:
     agreement: float = 0.0  # lambda
     alpha: float = 0.0  # pull of each rule to the common line
     slope: float | None = None  # rho, on the slopes of the common line; None is alpha
+    stiffness: float = 0.0  # kappa, on the displacements of the premises
 
     @property
     def rho(self):

@@ -23,9 +23,9 @@ from ._validation import check_finite, feature_indices, positive_weights
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
 from .model import OUT_OF_BOUNDS, TSKModel
-from .partition import check_inputs
 from .solvers import SOLVERS
-from .training import CallbackBridge, Partition
+from .structure import StructureRequest, check_inputs
+from .training import CallbackBridge
 
 __all__ = ["ANFISRegressor"]
 
@@ -99,20 +99,22 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     error_goal : float, default=None
         "hybrid" and "gradient" stop at this root mean square error, in standard deviations of the
         target.
-    alpha : {"auto", "gcv"} or float, default="auto"
-        Ridge penalty on the consequents, zero or positive: alpha / 2 times their squared norm is
-        added to half the mean squared error of the standardised target. It acts on each rule's
-        value at its centre and on its change over one standard deviation of the inputs there.
-        "auto" is chosen together with the structure where that is; else it is 1e-12, next to
-        nothing, or 1e-7 where there are fewer than two distinct rows per consequent parameter, or
-        1e-4 where there is less than one: raise it (1e-6 to 1e-2) for noisy data with many rules.
-        "gcv": of the powers of ten from there on, the one of the smallest generalised
-        cross-validation of the linear part, whatever the structure. At zero, a ridge at the level
-        of rounding errors remains.
+    agreement : "auto" or float, default="auto"
+        Weight of the penalty on rules that disagree where they fire together, zero or positive:
+        agreement / 2 times the mean over rows of :math:`\sum_r \bar w_r (f_r - \hat y)^2`, in
+        variances of the target, is added to half its mean squared error. 0 lets rules compensate
+        one another at will, 1 is local learning, where every rule is a model of the rows on which
+        it fires; the more, the more alike the rules. "auto": found by the evidence, see Notes.
+    alpha : "auto" or float, default="auto"
+        Ridge penalty on the consequents, zero or positive, in standard deviations of inputs and
+        target: alpha / 2 times the squares of each rule's departure from the rules' common line, in
+        its value at its own centre and in its slopes, and of the slopes of that line. Of a single
+        rule it is scikit-learn's ``Ridge``. "auto": departures and common line have a weight each,
+        found by the evidence. At zero, a ridge at the level of rounding errors remains.
     stiffness : "auto" or float, default="auto"
         Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
         of their displacements (in spacings of terms and logarithms of widths) is added likewise.
-        "auto" is chosen together with the structure where that is; else it is zero.
+        "auto": found by the evidence.
     n_init : int, default=1
         Number of starts, 1 or more: the partition's own, and others displaced from it at random.
         The model of the smallest leave-one-out error of the linear part is kept.
@@ -174,8 +176,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         Mean squared error of the standardised target, from the start on, in the last run.
     status_ : str
         Why the solver stopped.
-    alpha_, stiffness_ : float
-        The values used.
+    agreement_, alpha_, slope_alpha_, stiffness_ : float
+        The values used; ``slope_alpha_`` is that on the slopes of the rules' common line.
     structures_ : list of dict
         The candidates that were compared where the structure was chosen by itself, best first:
         "structure", "alpha", "stiffness", and "expected_error" on new rows in standard deviations
@@ -257,7 +259,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         "solver": [StrOptions(set(SOLVERS))],
         "step_size": [Interval(Real, 0, None, closed="neither"), None],
         "error_goal": [Interval(Real, 0, None, closed="left"), None],
-        "alpha": [StrOptions({"auto", "gcv"}), Interval(Real, 0, None, closed="left")],
+        "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+        "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
         "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
         "n_init": [Interval(Integral, 1, None, closed="left")],
         "max_iter": [Interval(Integral, 0, None, closed="left")],
@@ -290,6 +293,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         solver="varpro",
         step_size=None,
         error_goal=None,
+        agreement="auto",
         alpha="auto",
         stiffness="auto",
         n_init=1,
@@ -319,6 +323,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.solver = solver
         self.step_size = step_size
         self.error_goal = error_goal
+        self.agreement = agreement
         self.alpha = alpha
         self.stiffness = stiffness
         self.n_init = n_init
@@ -372,15 +377,15 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         """
         context = None
         if hasattr(self, "_skl_callbacks"):
-            is_single_run = self.n_init == 1 and self.loss != "huber" and self.alpha != "gcv"
+            is_single_run = self.n_init == 1 and self.loss != "huber"
             most = max(self.max_iter, 1) if is_single_run and not self.prune else None
             context = self._init_callback_context(max_subtasks=most)
         before = self.__dict__.copy()
         try:
             data = self._check_training_data(X, y, sample_weight, groups)
-            partition = self._partition(data.input_names)
+            request = self._request(data.input_names)
             bridge = None if context is None else self._bridge(context, X, y, sample_weight)
-            training = train(self, data, partition, bridge)
+            training = train(self, data, request, bridge)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
             self.__dict__ = before
@@ -389,8 +394,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.n_iter_ = max(training.result.n_iter, 1)
         self.loss_curve_ = training.result.loss_curve
         self.status_ = training.result.message
-        self.alpha_, self.stiffness_ = training.structure.alpha, training.structure.stiffness
-        self.structures_ = training.structure.candidates
+        penalty = training.start.penalty
+        self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
+        self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
+        self.structures_ = training.start.candidates
         self.redundant_rules_ = training.redundant_rules
         self.pruning_ = training.pruning
         self.robust_weights_ = training.robust_weights
@@ -519,10 +526,16 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         names = getattr(self, "feature_names_in_", None)
         return [f"x{j}" for j in range(self.n_features_in_)] if names is None else list(names)
 
-    def _partition(self, names):
+    def _request(self, names):
         """What training starts from, with all names of columns and families resolved."""
         start, n_mfs = self._imported(names), self.n_mfs
-        alpha, stiffness = self.alpha, self.stiffness
+        weights = {
+            name: float(getattr(self, name))
+            for name in ("agreement", "alpha", "stiffness")
+            if not isinstance(getattr(self, name), str)
+        }
+        if "alpha" in weights:
+            weights["slope"] = weights["alpha"]
         if self.warm_start and hasattr(self, "_start_parameters"):
             changed = [
                 name
@@ -536,8 +549,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 )
             start, n_mfs = self.model_, "auto"
             check_inputs(start, names, "warm_start=True")
-            alpha = self.alpha_ if alpha == "auto" else alpha
-            stiffness = self.stiffness_ if stiffness == "auto" else stiffness
+            before = {
+                "agreement": self.agreement_,
+                "alpha": self.alpha_,
+                "slope": self.slope_alpha_,
+                "stiffness": self.stiffness_,
+            }
+            weights = before | weights
         if self.order == 0 and self.consequent_features is not None:
             raise ValueError(
                 f"consequent_features={self.consequent_features!r} means nothing with order=0, "
@@ -547,15 +565,15 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         # random_state=None stands for one fixed seed: the same data give the same model.
         state = self.random_state
         seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
-        return Partition(
+        return StructureRequest(
             n_mfs=n_mfs,
             partition=start,
             families=membership_families(self.mf, names),
             order=self.order,
             premise_inputs=feature_indices(self.premise_features, names, "premise_features"),
             consequent_inputs=consequent if self.order == 1 else consequent[:0],
-            alpha=alpha,
-            stiffness=stiffness,
+            weights=weights,
+            premises_move=self.solver != "lse" and self.max_iter > 0,
             seed=seed,
             names=names,
         )

@@ -9,7 +9,7 @@ from ..objective import SeparableProblem
 from ..premise import Premise
 from ..rows import Rows
 from ..solvers import SOLVERS, SolverResult
-from .structure import Structure
+from ..structure import Start
 
 __all__ = ["Learned", "Learner"]
 
@@ -18,7 +18,7 @@ __all__ = ["Learned", "Learner"]
 class Learned:
     """The end of a run."""
 
-    structure: Structure
+    start: Start
     problem: SeparableProblem
     premise: Premise
     result: SolverResult
@@ -58,9 +58,10 @@ class Learner:
     options: dict
     map_ordered: Callable = map
 
-    def run(self, rows: Rows, structure: Structure, displacement=None, watch=None) -> Learned:
-        """Train from a structure's start, or from a displacement of it; ``watch`` may end it."""
-        problem, premise = self.problem(rows, structure), self.premise(rows, structure)
+    def run(self, rows: Rows, start: Start, displacement=None, watch=None) -> Learned:
+        """Train from a start, or from a displacement of it; ``watch`` may end it."""
+        problem, premise = self.problem(rows, start), self.premise(rows, start)
+        displacement = start.displacement if displacement is None else displacement
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
         result = SOLVERS[self.solver](
@@ -68,25 +69,25 @@ class Learner:
             premise,
             max_iter=self.max_iter,
             tol=self.tol,
-            stiffness=structure.stiffness,
+            stiffness=start.penalty.stiffness,
             start=displacement,
             on_iteration=watch,
             **self.options,
         )
-        return Learned(structure, problem, premise, result)
+        return Learned(start, problem, premise, result)
 
-    def problem(self, rows: Rows, structure: Structure):
-        """The least-squares problem at a structure."""
+    def problem(self, rows: Rows, start: Start):
+        """The least-squares problem at a start."""
         return SeparableProblem(
             rows,
-            structure.antecedent,
+            start.antecedent,
             self.order,
-            structure.alpha,
+            start.penalty,
             self.map_ordered,
             self.consequent_inputs,
         )
 
     @staticmethod
-    def premise(rows: Rows, structure: Structure):
-        """What moves at a structure, within the box of the data."""
-        return Premise.of(structure.antecedent, *rows.inputs.box)
+    def premise(rows: Rows, start: Start):
+        """What moves at a start, within the box of the data."""
+        return Premise.of(start.antecedent, *rows.inputs.box)

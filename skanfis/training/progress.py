@@ -7,7 +7,7 @@ import numpy as np
 
 from ..objective import Evaluation
 from ..solvers import SolverResult
-from .structure import Structure
+from ..structure import Start
 
 __all__ = ["CallbackBridge", "Keeper", "Printer", "watch_all"]
 
@@ -33,14 +33,14 @@ class Keeper:
 
     def __init__(self):
         self.best: Evaluation | None = None
-        self.structure: Structure | None = None
+        self.start: Start | None = None
         self.losses: list[float] = []
         self.is_ended = False
 
-    def of(self, structure):
-        """A watcher of a run at a structure; where its cost is another one, the old best goes."""
-        if self.structure is not structure:
-            self.structure, self.best, self.losses = structure, None, []
+    def of(self, start):
+        """A watcher of a run from a start; where its cost is another one, the old best goes."""
+        if self.start is not start:
+            self.start, self.best, self.losses = start, None, []
 
         def watch(n_iter, evaluation):
             self.losses.append(evaluation.mean_squared_error)
@@ -51,11 +51,11 @@ class Keeper:
         return watch
 
     def end(self):
-        """The structure and the best point of the run in hand; other threads' runs end."""
+        """The start and the best point of the run in hand; other threads' runs end."""
         self.is_ended = True
         losses = np.array([self.losses[0], *self.losses])
         result = SolverResult(self.best, losses, len(self.losses), "interrupted")
-        return self.structure, result
+        return self.start, result
 
 
 class Printer:

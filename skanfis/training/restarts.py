@@ -1,6 +1,6 @@
 r"""Several starts: the reduced problem has many minima, and no start is the right one for all data.
 
-The first start is the partition's own; every further one is displaced at random, so much in every
+The first start is the structure's own; every further one is displaced at random, so much in every
 direction as steps go without leaving one arrangement of the terms for another (see ``premise`` for
 the units). What is best is the smallest leave-one-out error of the linear part,
 
@@ -21,10 +21,10 @@ _SPREAD = 0.3
 _SMALLEST_FREEDOM = 1e-6
 
 
-def displaced_starts(premise, n_starts, rng):
-    """Displacements of ``n_starts`` starts, the first none, within the premise's box."""
+def displaced_starts(premise, first, n_starts, rng):
+    """Displacements of ``n_starts`` starts, the first as given, within the premise's box."""
     starts = rng.normal(scale=_SPREAD, size=(n_starts, premise.size))
-    starts[0] = 0.0
+    starts[0] = 0.0 if first is None else first
     return np.clip(starts, premise.lower, premise.upper)
 
 
@@ -39,7 +39,7 @@ def leave_one_out_error(problem, evaluation):
     return total / problem.rows.total_weight
 
 
-def learn_from_starts(learn, premise, n_starts, rng, n_jobs, on_start=None):
+def learn_from_starts(learn, premise, first, n_starts, rng, n_jobs, on_start=None):
     """The best of several runs, ``learn(displacement)``, whatever the number of workers.
 
     A single start is the run from it. Workers are threads: the passes over the data release
@@ -47,7 +47,7 @@ def learn_from_starts(learn, premise, n_starts, rng, n_jobs, on_start=None):
     """
     if n_starts == 1 or premise.size == 0:
         return learn(None)
-    starts = displaced_starts(premise, n_starts, rng)
+    starts = displaced_starts(premise, first, n_starts, rng)
     parallel = Parallel(n_jobs=n_jobs, backend="threading", return_as="generator")
     best, smallest = None, np.inf
     for error, learned in parallel(delayed(_with_error)(learn, start) for start in starts):

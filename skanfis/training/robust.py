@@ -53,7 +53,7 @@ def _weighted_median(values, weight):
 def learn_robustly(learn, start, rows, epsilon):
     """Train and reweight until the weights settle.
 
-    ``learn(rows, structure, displacement)`` trains, ``start(rows)`` gives a structure. The first
+    ``learn(rows, start, displacement)`` trains, ``start(rows)`` gives a start. The first
     start and what comes of it have seen the outliers in full: once the weights are settled,
     training starts afresh, from a start that sees no row of less than half its weight, and again
     for as long as that start comes out another one.
@@ -67,10 +67,10 @@ def learn_robustly(learn, start, rows, epsilon):
     learned = learn(rows, start(rows), None)
     learned, weights = _settle(learn, learned, rows, np.ones(rows.n_rows), epsilon)
     for turn in range(_MOST_STARTS):
-        structure = start(_without_outliers(rows, weights))
-        if turn > 0 and _is_same(structure, learned.structure):
+        again = start(_without_outliers(rows, weights))
+        if turn > 0 and _is_same(again, learned.start):
             break
-        learned = learn(_reweighted(rows, weights), structure, None)
+        learned = learn(_reweighted(rows, weights), again, None)
         learned, weights = _settle(learn, learned, rows, weights, epsilon)
     return learned, weights
 
@@ -82,7 +82,7 @@ def _settle(learn, learned, rows, weights, epsilon):
         evaluation = learned.result.evaluation
         weights = huber_weights(learned.problem, evaluation, epsilon, rows.sample_weight)
         reweighted = _reweighted(rows, weights)
-        learned = learn(reweighted, learned.structure, learned.displacement)
+        learned = learn(reweighted, learned.start, learned.displacement)
         if np.mean(np.abs(weights - before)) < _SETTLED:
             break
     return learned, weights
@@ -98,8 +98,6 @@ def _without_outliers(rows, weights):
 
 
 def _is_same(one, other):
-    """Whether two starts are of one size and stiffness."""
-    ends = [
-        (s.antecedent.n_rules, s.antecedent.n_terms, s.alpha, s.stiffness) for s in (one, other)
-    ]
-    return ends[0] == ends[1]
+    """Whether two starts are of one size."""
+    sizes = [(s.antecedent.n_rules, s.antecedent.n_terms) for s in (one, other)]
+    return sizes[0] == sizes[1]

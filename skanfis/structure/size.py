@@ -6,11 +6,8 @@ from numbers import Integral
 
 import numpy as np
 
-from ..rows import Rows, fingerprint
+__all__ = ["GridSize", "term_counts"]
 
-__all__ = ["GridSize", "count_distinct_inputs", "term_counts"]
-
-_READ_ROWS = 4096
 # Of one term, whatever its family: what a limit on memory reckons with.
 _MOST_PREMISE_PARAMETERS = 4
 
@@ -92,14 +89,3 @@ def term_counts(n_mfs, names):
             "terms and takes part in the consequents alone."
         )
     return counts
-
-
-def count_distinct_inputs(rows: Rows, enough):
-    """Number of distinct rows of X, or ``enough`` as soon as there are that many."""
-    seen = np.empty(0)
-    for start in range(0, rows.n_rows, _READ_ROWS):
-        Z, _, _ = rows.read(slice(start, start + _READ_ROWS))
-        seen = np.union1d(seen, fingerprint(Z))
-        if seen.size >= enough:
-            return enough
-    return seen.size

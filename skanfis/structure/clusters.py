@@ -10,51 +10,13 @@ otherwise hardly overlap.
 import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
-from ..rows import Rows, fingerprint
+from ..rows import Rows
+from .sample import representative_rows
 
-__all__ = ["clustered_antecedent", "representative_rows"]
+__all__ = ["clustered_antecedent"]
 
-# More rows than this tell a clustering nothing new.
-_MOST_ROWS = 20_000
 # Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
 _SMALLEST_WIDTH = 0.1
-
-
-def _fingerprints(rows: Rows):
-    """A number for every row of standardised inputs and target."""
-    numbers = np.empty(rows.n_rows)
-    for chunk in rows.chunks(_MOST_ROWS):
-        for part in chunk:
-            numbers[part] = fingerprint(rows.table(part).T)
-    return numbers
-
-
-def representative_rows(rows: Rows, most=_MOST_ROWS):
-    """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
-
-    Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
-    Neither the order of the rows nor whether one is repeated or weighted makes any difference.
-
-    Returns
-    -------
-    table : ndarray of shape (n_distinct, n_inputs + n_outputs)
-    weight : ndarray of shape (n_distinct,)
-    indices : ndarray of shape (n_distinct,)
-        The first row of each.
-    """
-    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
-    numbers = _fingerprints(rows)
-    order = np.argsort(numbers, kind="stable")
-    first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
-    distinct, weight = order[first], np.add.reduceat(weight[order], first)
-    if distinct.size > most:
-        upto = np.cumsum(weight)
-        wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
-        chosen, times = np.unique(np.searchsorted(upto, wanted), return_counts=True)
-        distinct, weight = distinct[chosen], times.astype(float)
-    table = rows.table(distinct)
-    order = np.lexsort(table.T[::-1])
-    return table[order], weight[order], distinct[order]
 
 
 def clustered_antecedent(families, rows: Rows, label, premise_inputs):

@@ -2,17 +2,20 @@
 
 from dataclasses import dataclass, field
 
-from ..antecedent import Antecedent
+import numpy as np
 
-__all__ = ["Structure"]
+from ..antecedent import Antecedent
+from ..penalty import Penalty
+
+__all__ = ["Start"]
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
-    """A rule base in standardised units, and how stiff to be."""
+class Start:
+    """A rule base in standardised units, what its parameters pay, and where they stand already."""
 
     antecedent: Antecedent
-    alpha: float
-    stiffness: float
+    penalty: Penalty
+    displacement: np.ndarray | None = None  # of the premises; None is zero
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules

@@ -1,7 +1,7 @@
 """Where training starts: the partition that was asked for, in standardised units."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,34 +13,25 @@ from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
-from ..partition import (
-    GridSize,
-    clustered_antecedent,
-    count_distinct_inputs,
-    grid_antecedent,
-    imported_antecedent,
-    term_counts,
-)
 from ..rows import Rows
-from .automatic import SEARCHED, StructureSearch
-from .structure import Structure
+from .clusters import clustered_antecedent
+from .grid import grid_antecedent
+from .imported import imported_antecedent
+from .sample import ENOUGH_ROWS, SampleSize
+from .search import SEARCHED, StructureSearch
+from .size import GridSize, term_counts
+from .start import Start
+from .tuning import tuned_start
 
-__all__ = ["ENOUGH_ROWS", "Partition", "report_constant"]
+__all__ = ["StructureRequest", "report_constant"]
 
 # Neighbouring terms of a grid cross at this membership at the start. From the customary 0.5, Jang's
 # sinc gets stuck; elsewhere it makes little difference (benchmarks/start.py).
 _OVERLAP = 0.6
 _MIB = 2**20
-# Distinct rows are counted up to here: more make no difference to any decision.
-ENOUGH_ROWS = 20_000
-# alpha="auto", from so many distinct rows per consequent parameter on: as small as rounding allows
-# where the data determine the consequents well; rounding errors grow by 1 / alpha along directions
-# that the data leave open, so more where they do not.
-_ALPHAS = ((2.0, 1e-12), (1.0, 1e-7), (0.0, 1e-4))
-
 
 @dataclass(frozen=True, eq=False)
-class Partition:
+class StructureRequest:
     """What was asked for.
 
     Parameters
@@ -51,8 +42,11 @@ class Partition:
         One per input.
     order : {0, 1}
     premise_inputs, consequent_inputs : ndarray of int
-    alpha, stiffness : float or str
-        A str leaves it open.
+    weights : dict of str to float
+        The weights of the penalty that are given, by their names in ``evidence.FREE``; the evidence
+        finds the others.
+    premises_move : bool
+        Whether what is trained afterwards moves the premises.
     seed : int
         Of clusterings that have none of their own.
     names : sequence of str
@@ -65,8 +59,8 @@ class Partition:
     order: int
     premise_inputs: np.ndarray
     consequent_inputs: np.ndarray
-    alpha: Any
-    stiffness: Any
+    weights: dict[str, float]
+    premises_move: bool
     seed: int
     names: Sequence[str]
 
@@ -79,11 +73,9 @@ class Partition:
             and self.partition in SEARCHED
         )
 
-    def structure(self, rows: Rows, n_distinct) -> Structure:
+    def start(self, rows: Rows, size: SampleSize) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
-        alpha = None if isinstance(self.alpha, str) else self.alpha
-        stiffness = None if isinstance(self.stiffness, str) else self.stiffness
         if self.is_searched:
             return StructureSearch(
                 rows,
@@ -91,10 +83,8 @@ class Partition:
                 self.order,
                 self.premise_inputs,
                 self.consequent_inputs,
-                n_distinct,
                 self.seed,
-                alpha,
-                stiffness,
+                self.weights,
                 _OVERLAP,
             ).run(self.partition)
         names: tuple[str, ...] = ()
@@ -106,10 +96,16 @@ class Partition:
             antecedent = clustered_antecedent(self.families, rows, label, self.premise_inputs)
         else:
             antecedent = self._grid(rows)
-        rows_each = self._rows_per_parameter(antecedent.n_rules, rows, n_distinct)
-        if alpha is None:
-            alpha = next(value for enough, value in _ALPHAS if rows_each >= enough)
-        return Structure(antecedent, alpha, stiffness or 0.0, term_names=names)
+        self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+        start = tuned_start(
+            antecedent,
+            rows,
+            self.order,
+            self.consequent_inputs,
+            self.weights,
+            self.premises_move,
+        )
+        return replace(start, term_names=names)
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""
@@ -151,21 +147,21 @@ class Partition:
             )
         return counts
 
-    def _rows_per_parameter(self, n_rules, rows, n_distinct):
-        """Distinct rows per consequent parameter; a warning where there is less than one."""
+    def _warn_if_underdetermined(self, n_rules, rows, size):
+        """Warn where there is less than one distinct row per consequent parameter."""
         n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
         n_columns = n_rules * n_basis
-        if n_distinct == ENOUGH_ROWS < 2 * n_columns:
-            n_distinct = count_distinct_inputs(rows, 2 * n_columns)
+        n_distinct = size.n_distinct_inputs
+        if n_distinct == ENOUGH_ROWS < n_columns:
+            n_distinct = SampleSize.of(rows, n_columns).n_distinct_inputs
         if n_columns > n_distinct:
             warn_user(
                 f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
-                f"parameters for {n_distinct} distinct training rows: the model can pass through "
-                "every row and mean nothing between them. Judge it on rows held out, use fewer "
-                "rules, or raise alpha.",
+                f"parameters for {n_distinct} distinct training rows: most of what the model says "
+                "between them is its prior, that rules agree. Judge it on rows held out, or use "
+                "fewer rules.",
                 UnderdeterminedWarning,
             )
-        return n_distinct / n_columns
 
 
 def _labeller(clusterer, weighted):

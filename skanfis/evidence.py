@@ -1,0 +1,197 @@
+r"""The evidence of a model: how probable the data are, with everything that was learnt averaged out.
+
+The cost of ``penalty`` is, in units of the noise's variance sigma^2, minus the logarithm of a
+posterior: y = Phi beta + eps with eps ~ N(0, sigma^2 / s), consequents with the prior precision
+n P / sigma^2, displacements x of the premises with n kappa / sigma^2, where n is the number of rows
+(by weight) and kappa the stiffness. Laplace's method integrates over beta and x, and sigma^2 is put
+at its maximum (MacKay 1992; for the linear part alone this is restricted maximum likelihood):
+
+    -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
+
+    2F = MSE + beta' P beta + kappa |x|^2 ,    M = Phi' S Phi / W + P ,
+
+up to what is the same for all models of the same data; m is the number of outputs, R that of rules,
+H the reduced Gauss-Newton matrix by x. |P|+ leaves out the one direction on which no penalty acts,
+that in which all rules rise alike: it has a flat prior, for which n counts one less; its length in
+beta grows as sqrt(R), for which log R makes good.
+
+The weights tau of the penalty, P = sum_k tau_k P_k, are where the evidence is largest, which is
+where, for each, as much is paid as is determined (Fellner and Schall; Wood and Fasiolo 2017):
+
+    n / sigma^2  beta' tau_k P_k beta = m [ tr(P^- tau_k P_k) - tr(M^-1 tau_k P_k) ] ,
+
+    n / sigma^2  kappa |x|^2 = tr H (H + kappa)^-1 ,    sigma^2 = n 2F / ((n - 1) m) ,
+
+each weight being multiplied by the ratio of the right side to the left. At fixed premises this
+takes no pass over the rows: for any weights, beta is one solve away.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .consequent import NormalFactor
+from .objective import NormalEquations
+from .penalty import CommonLine, Penalty
+
+__all__ = ["FREE", "PRIOR_DISPLACEMENT", "Laplace", "laplace", "reestimated"]
+
+# The weights that the evidence can find.
+FREE = ("agreement", "alpha", "slope", "stiffness")
+# Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
+_SMALLEST = {"agreement": 1e-12, "alpha": 1e-12, "slope": 1e-12, "stiffness": 1e-10}
+_LARGEST = {"agreement": 1.0, "alpha": 1e4, "slope": 1e4, "stiffness": 1e4}
+# The premises' weight has a prior of its own, as if so many displacements of such a size had been
+# seen before: a third of a spacing is what a term is expected to move.
+PRIOR_DISPLACEMENT = 0.3
+_PRIOR_NUMBER = 4.0
+# One step changes a weight by no more than this factor.
+_LARGEST_STEP = 100.0
+# The target of a fit that is exact to rounding has no more digits than this, squared.
+_LEAST_ERROR = 1e-22
+
+
+@dataclass(frozen=True)
+class Laplace:
+    """The posterior at a point: all that the evidence and its derivatives are made of.
+
+    Parameters
+    ----------
+    penalty : Penalty
+    n_rows : float
+        Rows by weight.
+    twice_cost : float
+        2F.
+    n_outputs : int
+    determinants : float
+        log |M| - log |P|+ + log R.
+    by_weight : dict of str to (float, float, float)
+        Of each part of the penalty: what is paid, beta' tau P beta (or kappa |x|^2); its trace in
+        the prior; its trace in the posterior.
+    curvature : ndarray of shape (n_displacements,)
+        Eigenvalues of H.
+    """
+
+    penalty: Penalty
+    n_rows: float
+    twice_cost: float
+    n_outputs: int
+    determinants: float
+    by_weight: dict
+    curvature: np.ndarray
+    n_columns: int
+
+    @property
+    def freedom(self):
+        """Rows by weight times outputs, less what a constant takes."""
+        return max(self.n_rows - 1.0, 0.5) * self.n_outputs
+
+    @property
+    def noise_variance(self):
+        """sigma^2 of the standardised target, the mean over outputs."""
+        return self.n_rows * self.twice_cost / self.freedom
+
+    @property
+    def prior_precision(self):
+        """n kappa / sigma^2, in units of what is expected of it."""
+        ratio = self.n_rows / self.noise_variance * self.penalty.stiffness
+        return ratio * PRIOR_DISPLACEMENT**2
+
+    @property
+    def minus_twice_log(self):
+        """-2 log p, up to a constant of the data."""
+        consequents = self.freedom * np.log(self.twice_cost) + self.n_outputs * self.determinants
+        if self.curvature.size == 0:
+            return consequents
+        expected = self.prior_precision
+        return (
+            consequents
+            + np.sum(np.log1p(self.curvature / self.penalty.stiffness))
+            + _PRIOR_NUMBER * (expected - np.log(expected) - 1.0)
+        )
+
+    @property
+    def n_effective(self):
+        """Effective number of parameters, consequents of one output and premises."""
+        held = sum(after for _, _, after in self.by_weight.values())
+        return self.n_columns + self.curvature.size - held
+
+
+def _weighted(penalty):
+    return {"agreement": penalty.agreement, "alpha": penalty.alpha, "slope": penalty.rho}
+
+
+def laplace(
+    normal: NormalEquations,
+    line: CommonLine,
+    mean_squared_error: float,
+    penalty: Penalty,
+    n_rows: float,
+    n_rules: int,
+    displacement=None,
+    curvature=None,
+):
+    """The posterior at fixed premises, for a penalty of any weights.
+
+    ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own.
+    """
+    parts = {"agreement": normal.disagreement, "alpha": line.own, "slope": line.slopes}
+    weights = _weighted(penalty)
+    matrix = sum(weights[key] * part for key, part in parts.items())
+    factor = NormalFactor(normal.gram + matrix)
+    matrix.flat[:: matrix.shape[0] + 1] += factor.shift
+    # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 those of the evaluation.
+    slope = normal.penalty @ normal.coefficients
+    change = factor.solve(slope - matrix @ normal.coefficients)
+    solved = normal.coefficients + change
+    error = mean_squared_error - 2.0 * np.sum(change * slope) + np.sum(change * (normal.gram @ change))
+    error = max(error, 0.0)
+    # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
+    size = max(np.trace(matrix) / matrix.shape[0], np.finfo(float).tiny)
+    prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
+    inverse, prior_inverse = factor.inverse(), prior.inverse()
+    by_weight = {}
+    for key, part in parts.items():
+        by_weight[key] = (
+            weights[key] * float(np.sum(solved * (part @ solved))),
+            weights[key] * float(np.sum(prior_inverse * part)),
+            weights[key] * float(np.sum(inverse * part)),
+        )
+    curvature = np.empty(0) if curvature is None else curvature
+    stiffness = penalty.stiffness
+    paid = 0.0
+    if curvature.size:
+        paid = stiffness * float(displacement @ displacement)
+        by_weight["stiffness"] = (
+            paid,
+            float(curvature.size),
+            float(np.sum(stiffness / (curvature + stiffness))),
+        )
+    return Laplace(
+        penalty,
+        n_rows,
+        max(error + float(np.sum(solved * (matrix @ solved))) + paid, _LEAST_ERROR),
+        normal.coefficients.shape[1],
+        factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
+        by_weight,
+        curvature,
+        matrix.shape[0],
+    )
+
+
+def reestimated(posterior: Laplace, free):
+    """The penalty after one step of every free weight."""
+    weights = {**_weighted(posterior.penalty), "stiffness": posterior.penalty.stiffness}
+    for key, (paid, before, after) in posterior.by_weight.items():
+        if key not in free or before <= 0.0:
+            continue
+        outputs = 1 if key == "stiffness" else posterior.n_outputs
+        determined = outputs * max(before - after, 0.0)
+        cost = posterior.n_rows / posterior.noise_variance * paid
+        if key == "stiffness":
+            determined += _PRIOR_NUMBER
+            cost += _PRIOR_NUMBER * posterior.prior_precision
+        ratio = (determined + 1e-12) / (cost + 1e-12)
+        ratio = min(max(ratio, 1.0 / _LARGEST_STEP), _LARGEST_STEP)
+        weights[key] = min(max(weights[key] * ratio, _SMALLEST[key]), _LARGEST[key])
+    return replace(posterior.penalty, **weights)

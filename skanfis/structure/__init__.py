@@ -1,0 +1,23 @@
+"""Structure: what decides on the rule base that training starts from, and on nothing else."""
+
+from .clusters import clustered_antecedent
+from .grid import grid_antecedent
+from .imported import check_inputs, imported_antecedent
+from .request import StructureRequest, report_constant
+from .sample import SampleSize, representative_rows
+from .size import GridSize, term_counts
+from .start import Start
+
+__all__ = [
+    "GridSize",
+    "SampleSize",
+    "Start",
+    "StructureRequest",
+    "check_inputs",
+    "clustered_antecedent",
+    "grid_antecedent",
+    "imported_antecedent",
+    "report_constant",
+    "representative_rows",
+    "term_counts",
+]

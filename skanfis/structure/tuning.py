@@ -1,0 +1,177 @@
+r"""The weights of the penalty and the premises in turns, by the evidence.
+
+At fixed weights the premises take a few steps down the cost; at fixed premises the weights take a
+few steps up the evidence, which needs no pass over the data. The premises' step does not see the
+evidence, only its cost: it may trade the one for the other, sharpening the terms until no two rules
+fire on the same row and the disagreement is nought. So what is kept is the turn of the largest
+evidence, and the turns end when it has not risen twice.
+
+The weights come first, at the premises of the start: from weights that are far too small, the first
+steps of the premises would go where no evidence leads back from.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..antecedent import Antecedent
+from ..evidence import FREE, PRIOR_DISPLACEMENT, Laplace, laplace, reestimated
+from ..objective import Evaluation, SeparableProblem
+from ..penalty import Penalty
+from ..premise import Premise
+from ..rows import Rows
+from ..solvers import varpro
+from .sample import effective_weight, search_sample
+from .start import Start
+
+__all__ = ["FIRST_PENALTY", "MOST_ROWS", "Tuned", "scaled", "tune", "tuned_start"]
+
+# The weights are found on at most so many representative rows.
+MOST_ROWS = 1000
+# In the middle of what data of every kind ask for; from there the first steps find their way.
+FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
+_FIRST_STEPS = 8
+_STEPS = 3
+_ITERATIONS = 4
+_MOST_TURNS = 8
+_TOLERANCE = 1e-3
+# Turns without a rise of the evidence, and what counts as one, in -2 log p.
+_PATIENCE = 2
+_RISE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """The end of the turns: the posterior, the point and the weights there."""
+
+    problem: SeparableProblem
+    evaluation: Evaluation
+    displacement: np.ndarray
+    posterior: Laplace
+
+    @property
+    def penalty(self):
+        """The weights found."""
+        return self.posterior.penalty
+
+    @property
+    def score(self):
+        """-2 log p."""
+        return self.posterior.minus_twice_log
+
+
+def tune(
+    problem: SeparableProblem,
+    premise: Premise,
+    free,
+    n_rows: float,
+    turns=_MOST_TURNS,
+    displacement=None,
+) -> Tuned:
+    """Find the free weights, and the premises that go with them.
+
+    Parameters
+    ----------
+    problem : SeparableProblem
+        Its penalty is where the weights start.
+    premise : Premise
+    free : collection of str
+        Weights to be found, of ``evidence.FREE``.
+    n_rows : float
+        Rows by weight.
+    turns : int
+        Most turns of the premises; with 0 they stay where they are.
+    displacement : ndarray of shape (premise.size,), optional
+        Where the premises start; zero if not given.
+    """
+    x = np.zeros(premise.size) if displacement is None else displacement
+    n_rules, penalty = problem.antecedent.n_rules, problem.penalty
+
+    def posterior_at(evaluation, penalty, curvature=None):
+        return laplace(
+            evaluation.normal,
+            problem.common_line,
+            evaluation.mean_squared_error,
+            penalty,
+            n_rows,
+            n_rules,
+            x,
+            curvature,
+        )
+
+    def improved(evaluation, penalty, steps, free, curvature=None):
+        for _ in range(steps):
+            penalty = reestimated(posterior_at(evaluation, penalty, curvature), free)
+        return posterior_at(evaluation, penalty, curvature)
+
+    evaluation = problem.evaluate(premise.parameters(x))
+    consequents = [key for key in free if key != "stiffness"]
+    posterior = improved(evaluation, penalty, _FIRST_STEPS, consequents)
+    penalty = posterior.penalty
+    if premise.size == 0 or turns == 0:
+        return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
+    if "stiffness" in free:
+        stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
+        penalty = replace(penalty, stiffness=stiffness)
+    best, without_rise = None, 0
+    for _ in range(turns):
+        weighted = problem.with_penalty(penalty)
+        result = varpro(
+            weighted,
+            premise,
+            max_iter=_ITERATIONS,
+            tol=_TOLERANCE,
+            stiffness=penalty.stiffness,
+            start=x,
+        )
+        evaluation = result.evaluation
+        x = premise.displacement(evaluation.antecedent.parameters)
+        raw = weighted.linearise(evaluation)
+        _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
+        curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
+        posterior = improved(evaluation, penalty, _STEPS, free, curvature)
+        penalty = posterior.penalty
+        found = Tuned(weighted, evaluation, x, posterior)
+        rises = best is None or found.score < best.score - _RISE
+        without_rise = 0 if rises else without_rise + 1
+        if best is None or found.score < best.score:
+            best = found
+        if without_rise == _PATIENCE:
+            break
+    return replace(best, problem=problem.with_penalty(best.penalty))
+
+
+def tuned_start(
+    antecedent: Antecedent, rows: Rows, order, consequent_inputs, weights, premises_move
+) -> Start:
+    """A start from rules that are given, with the weights that are not given found on the rows.
+
+    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``.
+    """
+    free = [key for key in FREE if key not in weights]
+    penalty = replace(FIRST_PENALTY, **weights)
+    if not premises_move:
+        free = [key for key in free if key != "stiffness"]
+        penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
+    if not free:
+        return Start(antecedent, penalty)
+    sample = search_sample(rows, MOST_ROWS)
+    problem = SeparableProblem(
+        sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
+    )
+    premise = Premise.of(antecedent, sample.inputs.minimum, sample.inputs.maximum)
+    n_sample = effective_weight(sample)
+    tuned = tune(problem, premise, free, n_sample, turns=_MOST_TURNS if premises_move else 0)
+    penalty = scaled(tuned.penalty, free, n_sample / effective_weight(rows))
+    return Start(antecedent, penalty, tuned.displacement)
+
+
+def scaled(penalty: Penalty, free, ratio):
+    """The free weights times a ratio: relative to a mean over rows, they fall with their number."""
+    own = {
+        "agreement": penalty.agreement,
+        "alpha": penalty.alpha,
+        "slope": penalty.rho,
+        "stiffness": penalty.stiffness,
+    }
+    return replace(penalty, **{key: own[key] * ratio for key in free})
