@@ -36,8 +36,6 @@ _GROW_AFTER = [_FALL, _FALL, _FALL, _FALL]
 _SHRINK_AFTER = [_RISE, _FALL, _RISE, _FALL]
 # Gradients below this part of tol times the cost are zero, as in ``varpro``.
 _GRADIENT_FACTOR = 1e-2
-# The relative change of a length that leaves next to nothing of it.
-_NEARLY_NOTHING = -1.0 + np.finfo(float).eps
 
 
 class StepSize:
@@ -67,8 +65,7 @@ class StepSize:
 class NaturalPremise:
     """A premise whose parameters are the numbers that a paper writes: no logarithms.
 
-    With n the natural parameters at displacement x, n(x + s) - n(x) = (dn / dx) v(s), where v_i is
-    s_i, for a shift, or exp(s_i) - 1, for the change of a logarithm: a step of n has a closed form.
+    Displacements and natural parameters n are one to one: a step is taken in n.
     """
 
     def __init__(self, premise):
@@ -78,10 +75,6 @@ class NaturalPremise:
             for group in premise.antecedent.groups
         ]
         self._is_log = np.concatenate(kinds) != "location"
-        zero, one = np.zeros(premise.size), np.ones(premise.size)
-        change = self._natural(one) - self._natural(zero)
-        # v(1) is 1 or e - 1.
-        self._moves_log = np.linalg.solve(self._jacobian(zero), change) > 1.5
 
     def _natural(self, x):
         """n."""
@@ -112,10 +105,10 @@ class NaturalPremise:
 
     def move(self, x, step):
         """The displacement at n + ``step``, or on the edge where that is out of the box."""
-        change = np.linalg.solve(self._jacobian(x), step)
         # What would not be positive, a width or the distance of two terms, goes to its lower bound.
-        logarithm = np.log1p(np.maximum(change, _NEARLY_NOTHING))
-        moved = x + np.where(self._moves_log, logarithm, change)
+        natural = self._natural(x) + step
+        logs = np.log(np.where(self._is_log, np.maximum(natural, np.finfo(float).tiny), 1.0))
+        moved = self.premise.displacement(np.where(self._is_log, logs, natural))
         return np.clip(moved, self.premise.lower, self.premise.upper)
 
 

@@ -7,9 +7,11 @@ times sqrt(d), for the distance from the centre grows as sqrt(d) in d inputs and
 otherwise hardly overlap.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
-from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from ..antecedent import GridAntecedent, RuleTableAntecedent, TermGroup
 from ..rows import Rows
 from .sample import representative_rows
 
@@ -17,6 +19,11 @@ __all__ = ["clustered_antecedent"]
 
 # Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
 _SMALLEST_WIDTH = 0.1
+# Terms that cross above this at the start are one term: training may bring them closer still, and
+# above 0.9 nobody could tell them apart.
+_HIGHEST_CROSSING = 0.8
+_POINTS = 65
+_MOST_TURNS = 4
 
 
 def clustered_antecedent(families, rows: Rows, label, premise_inputs):
@@ -43,23 +50,78 @@ def clustered_antecedent(families, rows: Rows, label, premise_inputs):
         )
     if found.size == 1 or inputs.size == 0:
         return GridAntecedent((), counts=())
-    centers, widths = np.empty((found.size, n_inputs)), np.empty((found.size, n_inputs))
-    for r, cluster in enumerate(found):
-        members, w = table[labels == cluster, :n_inputs], weight[labels == cluster]
-        centers[r] = np.average(members, axis=0, weights=w)
-        widths[r] = np.sqrt(np.average((members - centers[r]) ** 2, axis=0, weights=w))
-    widths = np.maximum(widths, _SMALLEST_WIDTH) * np.sqrt(inputs.size)
-    if len({families[j] for j in inputs}) == 1:
-        family = families[inputs[0]]
-        theta = family.from_center_and_width(centers[:, inputs], widths[:, inputs])
-        return ScatteredAntecedent.build(family, inputs, theta)
-    groups = tuple(
-        TermGroup(
-            families[j],
-            np.full(found.size, j),
-            families[j].from_center_and_width(centers[:, j], widths[:, j]),
-        )
-        for j in inputs
+    members = [labels == cluster for cluster in found]
+    masses = np.array([weight[m].sum() for m in members])
+    centers = np.array([np.average(table[m, :n_inputs], axis=0, weights=weight[m]) for m in members])
+    spreads = np.array(
+        [
+            np.sqrt(np.average((table[m, :n_inputs] - c) ** 2, axis=0, weights=weight[m]))
+            for m, c in zip(members, centers, strict=True)
+        ]
     )
-    first = found.size * np.arange(inputs.size)
-    return RuleTableAntecedent(groups, np.arange(found.size)[:, None] + first)
+    return _with_shared_terms(families, inputs, centers, spreads, masses)
+
+
+def _with_shared_terms(families, inputs, centers, spreads, masses):
+    """Rules over terms that can be told apart: those of an input that cannot are one term.
+
+    With fewer inputs that tell rules apart the terms of the others are narrower, so the number of
+    these is found in turns.
+    """
+    n_telling = inputs.size
+    for _ in range(_MOST_TURNS):
+        widths = np.maximum(spreads, _SMALLEST_WIDTH) * np.sqrt(max(n_telling, 1))
+        shared = {
+            j: _merged(families[j], centers[:, j], widths[:, j], masses) for j in inputs.tolist()
+        }
+        telling = [j for j, (_, _, term_of) in shared.items() if term_of.max() > 0]
+        if len(telling) == n_telling:
+            break
+        n_telling = len(telling)
+    if not telling:
+        return GridAntecedent((), counts=())
+    groups, columns, first = [], [], 0
+    for j in telling:
+        center, width, term_of = shared[j]
+        theta = families[j].from_center_and_width(center, width)
+        groups.append(TermGroup(families[j], np.full(center.size, j), theta))
+        columns.append(first + term_of)
+        first += center.size
+    return RuleTableAntecedent(tuple(groups), np.unique(np.column_stack(columns), axis=0))
+
+
+def _merged(family, centers, widths, masses):
+    """Centres and widths of the terms left on an input, and the term of every rule.
+
+    Neighbours that cross highest are merged first, into a term of their common mean and deviation.
+    """
+    order = np.argsort(centers, kind="stable")
+    terms = [(centers[r], widths[r] ** 2, masses[r], [int(r)]) for r in order]
+    while len(terms) > 1:
+        crossings = [_crossing(family, a, b) for a, b in pairwise(terms)]
+        highest = int(np.argmax(crossings))
+        if crossings[highest] <= _HIGHEST_CROSSING:
+            break
+        terms[highest : highest + 2] = [_joined(*terms[highest : highest + 2])]
+    term_of = np.empty(centers.size, dtype=int)
+    for t, (_, _, _, rules) in enumerate(terms):
+        term_of[rules] = t
+    left = np.array([(center, np.sqrt(variance)) for center, variance, _, _ in terms])
+    return left[:, 0], left[:, 1], term_of
+
+
+def _joined(one, other):
+    mass = one[2] + other[2]
+    parts = one[2] / mass, other[2] / mass
+    center = parts[0] * one[0] + parts[1] * other[0]
+    variance = sum(p * (t[1] + (t[0] - center) ** 2) for p, t in zip(parts, (one, other), strict=True))
+    return center, variance, mass, one[3] + other[3]
+
+
+def _crossing(family, one, other):
+    """The greatest value that both terms have between their centres."""
+    between = np.linspace(one[0], other[0], _POINTS)
+    theta = family.from_center_and_width(
+        np.array([one[0], other[0]]), np.sqrt([one[1], other[1]])
+    )
+    return float(family.value(between, theta).min(axis=0).max())

@@ -36,7 +36,7 @@ from .grid import grid_antecedent
 from .held_out import held_out_loss
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
-from .tuning import FIRST_PENALTY, MOST_ROWS, Tuned, scaled, tune
+from .tuning import FIRST_PENALTY, MOST_ROWS, WORTHWHILE, Tuned, scaled, tune
 
 __all__ = ["SEARCHED", "Candidate", "StructureSearch"]
 
@@ -57,9 +57,6 @@ _IN_WORDS = {
     "subtractive": "clusters of radius {}",
 }
 _MOST_FOLDS = 5
-# What a larger model must gain in -2 log p: less is "not worth more than a bare mention" (Kass and
-# Raftery 1995).
-_WORTHWHILE = 2.0
 # The same where the score is an error: a part of it, and a part over the root of the rows.
 _WORTHWHILE_ERROR = 0.005
 _ERROR_OF_ERROR = 0.5
@@ -72,6 +69,7 @@ class Candidate:
     counts: tuple[int, ...] | None
     size: float | None = None  # number of clusters, or the radius that they have
     clustering: str = ""  # "k-means", "subtractive" or "fcm"
+    is_loose: bool = False  # whether its training begins with the premises (see ``tuning``)
 
     def describe(self):
         """In words."""
@@ -130,6 +128,9 @@ class StructureSearch:
         best = Candidate((1,) * self.rows.X.shape[1])
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
+            loose = replace(best, is_loose=True)
+            if max(best.counts) > 1 and self._is_better(loose, best):
+                best = self._grow_grid(loose)
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
             best = self._better(best, self._grow_clusters(clustering))
@@ -177,7 +178,7 @@ class StructureSearch:
 
     def _is_better(self, candidate, than):
         if not self.folds:
-            return self._score(candidate) < self._score(than) - _WORTHWHILE
+            return self._score(candidate) < self._score(than) - WORTHWHILE
         worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(self.n_sample))
         return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
 
@@ -254,14 +255,16 @@ class StructureSearch:
             rows, antecedent, self.order, self.first, consequent_inputs=self.consequent_inputs
         )
         premise = Premise.of(antecedent, rows.inputs.minimum, rows.inputs.maximum)
-        return tune(problem, premise, self.free, effective_weight(rows))
+        return tune(
+            problem, premise, self.free, effective_weight(rows), is_loose=candidate.is_loose
+        )
 
     def _start(self, best):
         tuned = self._tuned(best)
         n_rows = effective_weight(self.rows)
         penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows)
         return Start(
-            tuned.problem.antecedent, penalty, tuned.displacement, self._report()
+            tuned.problem.antecedent, penalty, tuned.displacement, candidates=self._report()
         )
 
     def _report(self):

@@ -17,5 +17,6 @@ class Start:
     antecedent: Antecedent
     penalty: Penalty
     displacement: np.ndarray | None = None  # of the premises; None is zero
+    is_free: bool = False  # whether terms may become what nobody can read (see ``premise``)
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules

@@ -7,7 +7,10 @@ fire on the same row and the disagreement is nought. So what is kept is the turn
 evidence, and the turns end when it has not risen twice.
 
 The weights come first, at the premises of the start: from weights that are far too small, the first
-steps of the premises would go where no evidence leads back from.
+steps of the premises would go where no evidence leads back from. Data without noise are the other
+case: what the premises of the start leave would be taken for noise. So there is a second way in,
+*loose*, in which the premises come first and the weights are next to nothing; of the two, the
+evidence chooses.
 """
 
 from dataclasses import dataclass, replace
@@ -24,17 +27,23 @@ from ..solvers import varpro
 from .sample import effective_weight, search_sample
 from .start import Start
 
-__all__ = ["FIRST_PENALTY", "MOST_ROWS", "Tuned", "scaled", "tune", "tuned_start"]
+__all__ = ["FIRST_PENALTY", "MOST_ROWS", "WORTHWHILE", "Tuned", "scaled", "tune", "tuned_start"]
 
 # The weights are found on at most so many representative rows.
 MOST_ROWS = 1000
 # In the middle of what data of every kind ask for; from there the first steps find their way.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
+# Loose: what rounding errors need.
+_LOOSE = 1e-12
+_LOOSE_ITERATIONS = 25
 _FIRST_STEPS = 8
 _STEPS = 3
 _ITERATIONS = 4
 _MOST_TURNS = 8
 _TOLERANCE = 1e-3
+# What a larger or freer model must gain in -2 log p: less is "not worth more than a bare mention"
+# (Kass and Raftery 1995).
+WORTHWHILE = 2.0
 # Turns without a rise of the evidence, and what counts as one, in -2 log p.
 _PATIENCE = 2
 _RISE = 0.5
@@ -67,6 +76,7 @@ def tune(
     n_rows: float,
     turns=_MOST_TURNS,
     displacement=None,
+    is_loose=False,
 ) -> Tuned:
     """Find the free weights, and the premises that go with them.
 
@@ -83,6 +93,8 @@ def tune(
         Most turns of the premises; with 0 they stay where they are.
     displacement : ndarray of shape (premise.size,), optional
         Where the premises start; zero if not given.
+    is_loose : bool
+        Whether the premises come before the weights.
     """
     x = np.zeros(premise.size) if displacement is None else displacement
     n_rules, penalty = problem.antecedent.n_rules, problem.penalty
@@ -104,22 +116,25 @@ def tune(
             penalty = reestimated(posterior_at(evaluation, penalty, curvature), free)
         return posterior_at(evaluation, penalty, curvature)
 
+    if is_loose:
+        penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
     evaluation = problem.evaluate(premise.parameters(x))
     consequents = [key for key in free if key != "stiffness"]
-    posterior = improved(evaluation, penalty, _FIRST_STEPS, consequents)
+    posterior = improved(evaluation, penalty, 0 if is_loose else _FIRST_STEPS, consequents)
     penalty = posterior.penalty
     if premise.size == 0 or turns == 0:
         return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
-    if "stiffness" in free:
+    if "stiffness" in free and not is_loose:
         stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
     best, without_rise = None, 0
-    for _ in range(turns):
+    for turn in range(turns):
+        is_first = is_loose and turn == 0
         weighted = problem.with_penalty(penalty)
         result = varpro(
             weighted,
             premise,
-            max_iter=_ITERATIONS,
+            max_iter=_LOOSE_ITERATIONS if is_first else _ITERATIONS,
             tol=_TOLERANCE,
             stiffness=penalty.stiffness,
             start=x,
@@ -129,7 +144,8 @@ def tune(
         raw = weighted.linearise(evaluation)
         _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
-        posterior = improved(evaluation, penalty, _STEPS, free, curvature)
+        steps = _FIRST_STEPS if is_first else _STEPS
+        posterior = improved(evaluation, penalty, steps, free, curvature)
         penalty = posterior.penalty
         found = Tuned(weighted, evaluation, x, posterior)
         rises = best is None or found.score < best.score - _RISE
@@ -159,11 +175,21 @@ def tuned_start(
     problem = SeparableProblem(
         sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
     )
-    premise = Premise.of(antecedent, sample.inputs.minimum, sample.inputs.maximum)
     n_sample = effective_weight(sample)
-    tuned = tune(problem, premise, free, n_sample, turns=_MOST_TURNS if premises_move else 0)
-    penalty = scaled(tuned.penalty, free, n_sample / effective_weight(rows))
-    return Start(antecedent, penalty, tuned.displacement)
+
+    def tuned(is_free):
+        low, high = sample.inputs.minimum, sample.inputs.maximum
+        premise = Premise.of(antecedent, low, high, is_free)
+        turns = _MOST_TURNS if premises_move else 0
+        return tune(problem, premise, free, n_sample, turns, is_loose=is_free)
+
+    best, is_free = tuned(False), False
+    if premises_move and best.displacement.size:
+        loose = tuned(True)
+        if loose.score < best.score - WORTHWHILE:
+            best, is_free = loose, True
+    penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
+    return Start(antecedent, penalty, best.displacement, is_free)
 
 
 def scaled(penalty: Penalty, free, ratio):
