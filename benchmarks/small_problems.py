@@ -1,0 +1,340 @@
+"""Problems that the defaults have failed on, or must not lose.
+
+Replicated tables against the same with the inputs moved by next to nothing; Friedman's first
+function; simulated cold starts, one left out; a function that saturates, with rows outside; the
+gyro-like surface; 200 inputs. Chosen before anything was fitted, and never changed.
+"""
+
+import signal
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from sklearn.datasets import make_friedman1
+from sklearn.model_selection import LeaveOneGroupOut
+
+from skanfis.datasets import make_ofog
+
+from . import gyro
+from .cases import evaluate, fitted
+from .compensation import cold_starts
+from .readable import readability
+from .report import Measure, Results, Row, Table
+
+__all__ = ["cases", "run"]
+
+_N_TEST = 2000
+_JITTER = 1e-9
+_AT_REST = ("time", "temperature")
+_TURNING = ("output", "temperature", "time", "thermal_rate")
+# Seconds after which a fit is given up.
+_PATIENCE = 120
+
+
+@dataclass(frozen=True)
+class Problem:
+    kind: str
+    seed: int
+
+    def __str__(self):
+        return f"{self.kind}, seed {self.seed}"
+
+
+# Tables in which each input comes many times ----------------------------------------------------
+
+
+def levels_21(seed, alpha, options):
+    """21 levels, 100 noisy rows of each."""
+    x = np.repeat(np.linspace(-1, 1, 21), 100)[:, np.newaxis]
+    fresh = np.linspace(-1, 1, 1001)[:, np.newaxis]
+    return replicated(x, fresh, lambda X: np.sin(4 * X[:, 0]) + X[:, 0], seed, alpha, options)
+
+
+def levels_7_9(seed, alpha, options):
+    """A table of 7 by 9 levels, 50 noisy rows of each."""
+    table = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 9)), axis=-1)
+    X = np.repeat(table.reshape(-1, 2), 50, axis=0)
+    fresh = np.random.default_rng(1).uniform(-1, 1, (_N_TEST, 2))
+    return replicated(X, fresh, lambda X: np.sin(3 * X[:, 0]) * X[:, 1], seed, alpha, options)
+
+
+def replicated(X, fresh, truth, seed, alpha, options):
+    """RMSE to the truth, and that over what it is without exact repeats."""
+    rng = np.random.default_rng(seed)
+    y = truth(X) + 0.3 * rng.standard_normal(len(X))
+    found = []
+    for rows in (X, X + _JITTER * rng.standard_normal(X.shape)):
+        model, seconds = fitted(rows, y, options, alpha=alpha)
+        found.append((rms(model.predict(fresh) - truth(fresh)), model.n_rules_, seconds))
+    (error, n_rules, seconds), (without, without_rules, _) = found
+    return {
+        "ratio": error / without,
+        "error": error,
+        "error without": without,
+        "rules": n_rules,
+        "rules without": without_rules,
+        "seconds": seconds,
+    }
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+# Friedman's first function ----------------------------------------------------------------------
+
+
+def friedman(seed, n_rows, n_inputs, options):
+    """Error on fresh rows with noise, of deviation one."""
+    X, y = make_friedman1(n_rows, n_inputs, noise=1.0, random_state=seed)
+    fresh, truth = make_friedman1(_N_TEST, n_inputs, noise=0.0, random_state=1000 + seed)
+    model, seconds = fitted(X, y, options)
+    squares = (model.predict(fresh) - truth) ** 2
+    inside = ((X.min(axis=0) <= fresh) & (fresh <= X.max(axis=0))).all(axis=1)
+    return {
+        "ratio": float(np.sqrt(squares.mean() + 1.0)),
+        "in the box": float(np.sqrt(squares[inside].mean() + 1.0)),
+        "seconds": seconds,
+        **readability(model, X, y),
+    }
+
+
+# Cold starts, one left out ----------------------------------------------------------------------
+
+
+def at_rest(seed):
+    return make_ofog(n_devices=1, n_runs=12, max_residual_heat=0.0, rates=[0.0], random_state=seed)
+
+
+def left_out(seed, make_log, inputs, grouped, options):
+    """RMS of the error in the run left out, over the noise floor; by policy for rows outside."""
+    log = make_log(seed)
+    X, y, run = log[list(inputs)].to_numpy(), log["error"].to_numpy(), log["run"].to_numpy()
+    left = {policy: np.empty(len(y)) for policy in ("default", "clip", "linear")}
+    times, rules = [], []
+    for train, test in LeaveOneGroupOut().split(X, y, run):
+        groups = run[train] if grouped else None
+        model, seconds = fitted(X[train], y[train], options, groups)
+        times.append(seconds)
+        rules.append(model.n_rules_)
+        for policy, errors in left.items():
+            given = {} if policy == "default" else {"out_of_bounds": policy}
+            errors[test] = model.set_params(**given).predict(X[test]) - y[test]
+    floor = rms(log["noise"])
+    return {
+        "ratio": rms(left["default"]) / floor,
+        "clip": rms(left["clip"]) / floor,
+        "linear": rms(left["linear"]) / floor,
+        "rules": float(np.median(rules)),
+        "seconds": float(np.median(times)),
+    }
+
+
+# A function that saturates ----------------------------------------------------------------------
+
+
+def saturating(seed, options):
+    """Trained where it has nearly come to rest, tested up to three times as far.
+
+    RMS error on the rows outside, in deviations of the target.
+    """
+    rng = np.random.default_rng(seed)
+    X, fresh = rng.uniform(-1, 1, (500, 2)), rng.uniform(-3, 3, (_N_TEST, 2))
+
+    def truth(X):
+        return np.tanh(2.5 * X[:, 0]) + 0.5 * np.tanh(2.5 * X[:, 1] + 1.0)
+
+    y = truth(X) + 0.05 * rng.standard_normal(len(X))
+    model, seconds = fitted(X, y, options)
+    beyond = (np.abs(fresh) > 1).any(axis=1)
+    found = {}
+    for policy in ("default", "clip", "linear"):
+        given = {} if policy == "default" else {"out_of_bounds": policy}
+        errors = model.set_params(**given).predict(fresh[beyond]) - truth(fresh[beyond])
+        found[policy] = rms(errors) / y.std()
+    found["ratio"] = found.pop("default")
+    return {**found, "seconds": seconds, "rules": int(model.n_rules_)}
+
+
+# The gyro-like surface --------------------------------------------------------------------------
+
+
+def surface(seed, options):
+    """In the box and on all rows, in deviations of the noise; 1 is perfect."""
+    X, y, fresh, truth = gyro.make_surface(seed)
+    model, seconds = fitted(X, y, options)
+    inside, everywhere = gyro.score(model.predict(fresh), X, fresh, truth)
+    return {
+        "ratio": inside,
+        "all rows": everywhere,
+        "seconds": seconds,
+        **readability(model, X, y),
+    }
+
+
+# Many inputs ------------------------------------------------------------------------------------
+
+
+def wide(seed, n_rows, options, n_inputs=200):
+    """Four inputs matter; error on fresh rows with noise, over the noise."""
+    rng = np.random.default_rng(seed)
+    X, fresh = rng.standard_normal((n_rows, n_inputs)), rng.standard_normal((_N_TEST, n_inputs))
+    noise = 0.3
+
+    def truth(X):
+        return np.sin(2 * X[:, 7]) + X[:, 50] * np.tanh(X[:, 120]) + 0.5 * X[:, 190]
+
+    y = truth(X) + noise * rng.standard_normal(n_rows)
+    with patience(_PATIENCE):
+        model, seconds = fitted(X, y, options)
+    error = np.hypot(rms(model.predict(fresh) - truth(fresh)), noise)
+    return {
+        "ratio": float(error / np.hypot(truth(fresh).std(), noise)),
+        "seconds": seconds,
+        "rules": int(model.n_rules_),
+    }
+
+
+@contextmanager
+def patience(seconds):
+    """TimeoutError after so many seconds, where the system can tell."""
+
+    def give_up(*_):
+        raise TimeoutError(f"no end in {seconds} s")
+
+    if not hasattr(signal, "SIGALRM"):
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+# What is run ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How it is measured, its seeds, what the figure is called, and the most it should be."""
+
+    measure: object
+    seeds: range
+    figure: str
+    bar: float | None = None
+    aim: float | None = None
+    # Or the worst.
+    summary: str = "median"
+    # Further figures to be told, with their bars.
+    further: tuple = ()
+
+
+_FLOOR = "over the noise floor"
+_POLICIES = (("clip", None), ("linear", None))
+_COLD_STARTS = {
+    f"cold starts {name}, one left out{', groups' if grouped else ''}": Kind(
+        partial(left_out, make_log=make_log, inputs=inputs, grouped=grouped),
+        seeds,
+        _FLOOR,
+        5.0,
+        2.5,
+        "worst",
+        _POLICIES,
+    )
+    for name, make_log, inputs, seeds in (
+        ("at rest", at_rest, _AT_REST, range(3)),
+        ("turning", cold_starts, _TURNING, range(10, 12)),
+    )
+    for grouped in (False, True)
+}
+_REPLICATED = {
+    f"{name}, alpha={alpha!r}": Kind(
+        partial(measure, alpha=alpha),
+        range(5),
+        "RMSE to the truth over that without repeats",
+        1.05,
+        None,
+        "worst",
+        (("error", None),),
+    )
+    for name, measure in (("21 levels x 100", levels_21), ("7 x 9 levels x 50", levels_7_9))
+    for alpha in ("auto", "gcv")
+}
+KINDS = {
+    **_REPLICATED,
+    "Friedman 1, 100 x 5": Kind(
+        partial(friedman, n_rows=100, n_inputs=5), range(10), "test RMSE", 1.5, 1.35
+    ),
+    "Friedman 1, 5,000 x 8": Kind(
+        partial(friedman, n_rows=5000, n_inputs=8), range(3), "test RMSE", 1.02
+    ),
+    "gyro-like surface, 2,000 x 3": Kind(
+        surface, range(10), "in the box [σ]", 1.05, None, "median", (("all rows", None),)
+    ),
+    "saturating, rows outside": Kind(
+        saturating, range(5), "RMS outside [sd]", None, None, "median", _POLICIES
+    ),
+    "200 inputs x 1,000 rows": Kind(
+        partial(wide, n_rows=1000),
+        range(2),
+        "error over the target's deviation",
+        None,
+        None,
+        "median",
+        (("seconds", 10.0),),
+    ),
+    "200 inputs x 100 rows": Kind(
+        partial(wide, n_rows=100),
+        range(2),
+        "error over the target's deviation",
+        None,
+        None,
+        "median",
+        (("seconds", None),),
+    ),
+    **_COLD_STARTS,
+}
+
+
+def cases():
+    return [Problem(kind, seed) for kind, of in KINDS.items() for seed in of.seeds]
+
+
+def measure(problem, options):
+    figures = KINDS[problem.kind].measure(seed=problem.seed, options=options)
+    return {"case": str(problem), "kind": problem.kind, **figures}
+
+
+def run(options):
+    found = evaluate("small_problems", measure, cases(), options)
+    rows, lines = [], []
+    for name, kind in KINDS.items():
+        some = [figures for figures in found if figures["kind"] == name]
+        if some:
+            rows.append(row(name, kind, some))
+            lines += [[figures["case"], figures["ratio"], rest(figures)] for figures in some]
+    table = Table("Small problems, one by one", ["case", "figure", "more"], lines)
+    return Results(rows, [table])
+
+
+def row(name, kind, some):
+    summary = {"median": np.median, "worst": np.max}[kind.summary]
+
+    def measured(key, label, *limits):
+        value = float(summary([figures[key] for figures in some]))
+        return Measure(f"{label}, {kind.summary}", value, "", *limits)
+
+    measures = [measured("ratio", kind.figure, kind.bar, kind.aim)]
+    measures += [measured(key, key, bar) for key, bar in kind.further]
+    measures.append(Measure("median fit, CPU", float(np.median([f["seconds"] for f in some])), "s"))
+    return Row(f"{name}; {len(some)} seeds", measures)
+
+
+def rest(figures):
+    """All that is known besides."""
+    left_out = ("case", "kind", "ratio", "number")
+    return ", ".join(f"{key} {value:.3g}" for key, value in figures.items() if key not in left_out)
