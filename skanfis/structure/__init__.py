@@ -1,7 +1,7 @@
 """Structure: what decides on the rule base that training starts from, and on nothing else."""
 
 from .clusters import clustered_antecedent
-from .grid import grid_antecedent
+from .grid import Spacing, grid_antecedent
 from .imported import check_inputs, imported_antecedent
 from .request import StructureRequest, report_constant
 from .sample import SampleSize, representative_rows
@@ -11,6 +11,7 @@ from .start import Start
 __all__ = [
     "GridSize",
     "SampleSize",
+    "Spacing",
     "Start",
     "StructureRequest",
     "check_inputs",

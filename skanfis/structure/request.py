@@ -15,7 +15,7 @@ from ..membership import Membership
 from ..model import TSKModel
 from ..rows import Rows
 from .clusters import clustered_antecedent
-from .grid import grid_antecedent
+from .grid import Spacing, grid_antecedent
 from .imported import imported_antecedent
 from .sample import ENOUGH_ROWS, SampleSize
 from .search import SEARCHED, StructureSearch
@@ -124,8 +124,7 @@ class StructureRequest:
         GridSize(counts, n_basis, rows.y.shape[1]).check_fits(
             self.n_mfs, get_config()["working_memory"] * _MIB, self.names
         )
-        low, high = rows.inputs.box
-        return grid_antecedent(self.families, counts, low, high, _OVERLAP)
+        return grid_antecedent(self.families, counts, Spacing(rows), _OVERLAP)
 
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""

@@ -32,7 +32,7 @@ from ..objective import SeparableProblem
 from ..premise import Premise
 from ..rows import Rows
 from .clusters import clustered_antecedent
-from .grid import grid_antecedent
+from .grid import Spacing, grid_antecedent
 from .held_out import held_out_loss
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
@@ -118,6 +118,7 @@ class StructureSearch:
         self.inputs = premise_inputs[~is_constant[premise_inputs]]
         self.n_basis = 1 + np.count_nonzero(~is_constant[consequent_inputs])
         self.sample = search_sample(rows, MOST_ROWS)
+        self.spacing = Spacing(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.found: dict[Candidate, Tuned | None] = {}
         self.scores: dict[Candidate, float] = {}
@@ -157,6 +158,7 @@ class StructureSearch:
         n_columns = n_rules * self.n_basis
         return (
             max(candidate.counts) <= _MOST_TERMS
+            and all(c == 1 or c <= self.spacing.n_values(j) for j, c in enumerate(candidate.counts))
             and n_rules <= _MOST_RULES
             and n_columns <= min(_MOST_COLUMNS, 2.0 * self.n_sample)
         )
@@ -191,8 +193,7 @@ class StructureSearch:
                 lambda t, w: clusterer.fit(t, sample_weight=w).labels_,
                 self.inputs,
             )
-        low, high = self.rows.inputs.box
-        return grid_antecedent(self.families, candidate.counts, low, high, self.overlap)
+        return grid_antecedent(self.families, candidate.counts, self.spacing, self.overlap)
 
     def _clusterer(self, candidate, n_outputs):
         if candidate.clustering == "subtractive":
