@@ -44,6 +44,7 @@ def parse():
     parser.add_argument("--details", action="store_true", help="also what explains the figures")
     many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
+    many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
     many.add_argument(
         "--estimator-params",
@@ -75,6 +76,7 @@ def command(options):
     words += ["--campaign", "PATH"] if options.campaign else []
     words += ["--details"] if options.details else []
     words += [f"--every={options.every}"] if options.every > 1 else []
+    words += [f"--only={options.only}"] if options.only else []
     if options.estimator_params:
         words.append(f"--estimator-params={json.dumps(options.estimator_params)}")
     return join(words)

@@ -6,6 +6,8 @@ tenth or more, is predicted beyond the training target's range by more than one 
 truth is not. Chosen before anything was fitted, and never changed.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .cases import evaluate, fitted
@@ -25,17 +27,28 @@ _BEYOND = 1.0
 _FIRST_SEED = 1000
 
 
+@dataclass(frozen=True)
+class Fit:
+    """A case, and the terms per input that are asked for."""
+
+    data: Case
+    n_mfs: int | str
+
+    def __str__(self):
+        return f"{self.data}, n_mfs={self.n_mfs!r}"
+
+
 def cases():
-    """A case and n_mfs: 80 of each distribution by default, then those with terms given."""
+    """80 of each distribution by default, then those with terms given."""
     rng = np.random.default_rng(_FIRST_SEED)
     drawn = _draw(rng, _N_DEFAULT, most_inputs=6)
-    by_default = [(Case(_FIRST_SEED + k, *case), "auto") for k, case in enumerate(drawn)]
+    by_default = [Fit(Case(_FIRST_SEED + k, *case), "auto") for k, case in enumerate(drawn)]
     first, given = _FIRST_SEED + _N_DEFAULT, []
     for k, case in enumerate(_draw(rng, _N_GIVEN, most_inputs=4)):
         n_mfs = int(rng.integers(2, 4))
         if k < _N_GRIDS:
             case, n_mfs = (3, 432, 0.1, "normal", case[-1]), 3
-        given.append((Case(first + k, *case), n_mfs))
+        given.append(Fit(Case(first + k, *case), n_mfs))
     # Every N-th case is then a fair part of all.
     return [case for some in (by_default, given) for case in some]
 
@@ -50,10 +63,9 @@ def _draw(rng, n_cases, most_inputs):
     return list(zip(n_inputs, rows, noises, inputs, functions, strict=True))
 
 
-def measure(case, options):
-    case, n_mfs = case
-    data = make_data(case)
-    given = {} if n_mfs == "auto" else {"n_mfs": n_mfs}
+def measure(fit, options):
+    data = make_data(fit.data)
+    given = {} if fit.n_mfs == "auto" else {"n_mfs": fit.n_mfs}
     model, seconds = fitted(data.X, data.y, options, **given)
     prediction, covered = model.predict(data.X_test), model.coverage(data.X_test) >= _COVERED
     inside = data.in_box
@@ -62,9 +74,9 @@ def measure(case, options):
     judged = inside & covered
     level = np.sqrt(np.mean((prediction - data.truth)[inside] ** 2)) / np.std(data.truth)
     return {
-        "case": f"{case}, n_mfs={n_mfs!r}",
-        "inputs": case.inputs,
-        "n_mfs": n_mfs,
+        "case": str(fit),
+        "inputs": fit.data.inputs,
+        "n_mfs": fit.n_mfs,
         "wrong": int(np.sum(wrong & judged)),
         "wrong, not covered": int(np.sum(wrong & inside & ~covered)),
         "furthest": float(excess[judged].max(initial=0.0)),

@@ -39,7 +39,7 @@ def evaluate(name, function, cases, options):
         Of a case and the options; gives a dict of figures with "case", which names the case. It is
         called in other processes.
     cases : iterable
-        Every ``options.every``-th of them is taken.
+        Every ``options.every``-th of those with ``options.only`` in their names is taken.
     options : Namespace
 
     Returns
@@ -48,7 +48,7 @@ def evaluate(name, function, cases, options):
         In the order of the cases. A case that raised is not among them: it is in the file, and is
         told about.
     """
-    chosen = list(cases)[:: options.every]
+    chosen = [case for case in cases if options.only in str(case)][:: options.every]
     tasks = (delayed(_guarded)(function, k, case, options) for k, case in enumerate(chosen))
     start, found = perf_counter(), []
     parallel = Parallel(n_jobs=options.jobs, batch_size=1, return_as="generator_unordered")
@@ -101,6 +101,7 @@ def _write(name, found, wall, options):
         "commit": _commit(),
         "estimator_params": options.estimator_params,
         "every": options.every,
+        "only": options.only,
         "wall": wall,
         "cases": found,
     }

@@ -151,7 +151,19 @@ class SeparableProblem:
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
         gram, _, _ = self._first_pass(antecedent, no_coefficients)
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
-        self._common_line = CommonLine(self.local)
+        self._common_line = CommonLine(self.local, self._extent(antecedent))
+
+    def _extent(self, antecedent):
+        """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
+        farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
+        for chunk in self._chunks:
+            for part in chunk:
+                Z, _, _ = self.rows.read(part)
+                root = np.sqrt(antecedent.strengths(Z))
+                for j, z in enumerate(self._basis(Z)[1:]):
+                    distance = root * np.abs(z - self.local.center[:, j, None])
+                    np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
+        return np.maximum(farthest, 1.0)
 
     def with_penalty(self, penalty):
         """Return the same problem with another penalty; no pass over the rows."""

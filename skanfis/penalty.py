@@ -83,17 +83,18 @@ class CommonLine:
         The unit vector along which all rules rise alike: the null space of the whole penalty.
     """
 
-    def __init__(self, local: LocalBasis):
+    def __init__(self, local: LocalBasis, extent: np.ndarray):
         n_rules, n_basis = local.center.shape[0], local.n_basis
         n_columns = n_rules * n_basis
         # In (value at the centre, slopes) of every rule, the rules of a common line b are A b.
         line = np.zeros((n_rules, n_basis, n_basis))
         line[:, np.arange(n_basis), np.arange(n_basis)] = 1.0
         line[:, 0, 1:] = local.center
+        line[:, np.arange(1, n_basis), np.arange(1, n_basis)] = extent
         orthonormal, triangle = np.linalg.qr(line.reshape(n_columns, n_basis))
         # Local slopes are per spread of the rule; these are per unit of z.
         scale = np.ones((n_rules, n_basis))
-        scale[:, 1:] = 1.0 / local.spread
+        scale[:, 1:] = extent / local.spread
         scale = scale.ravel()
         along = orthonormal * scale[:, None]
         self.own = np.diag(scale**2) - along @ along.T
