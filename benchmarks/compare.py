@@ -14,19 +14,27 @@ from .report import Results, Table, markdown
 __all__ = ["compared"]
 
 # Not what a fit is judged by.
-_LEFT_OUT = ("number", "rows", "inputs")
+_LEFT_OUT = ("number", "rows", "inputs", "n_mfs")
+# Counts, of which it matters in how many cases there are any.
+_COUNTS = ("beyond", "wrong", "wrong, not covered", "false", "alike")
 
 
 def compared(first, second, n_shown=10):
     """Tables of two files' contents."""
     names = [name for name in second["cases"] if name in first["cases"]]
     pairs = [(first["cases"][name], second["cases"][name]) for name in names]
-    failed = [sum("failed" in case for case in cases) for cases in zip(*pairs, strict=True)]
+    failed = [sum("failed" in case for case in cases) for cases in _columns(pairs)]
     pairs = [pair for pair in pairs if not any("failed" in case for case in pair)]
     lines = [["cases in both", len(names), len(names), ""], ["failed", *failed, ""]]
     lines += [_line(key, pairs) for key in _keys(pairs)]
+    lines += [_cases_with(key, pairs) for key in _keys(pairs) if key in _COUNTS]
     head = ["figure", "A", "B", "B / A, geometric mean"]
     return [Table("Mean; ratios by their geometric mean", head, lines), *_changes(pairs, n_shown)]
+
+
+def _columns(pairs):
+    """The cases of each file."""
+    return [[pair[k] for pair in pairs] for k in range(2)]
 
 
 def _keys(pairs):
@@ -43,6 +51,11 @@ def _line(key, pairs):
     both = (a > 0) & (b > 0)
     change = geometric_mean(b[both] / a[both]) if both.any() else ""
     return [key, float(mean(a)), float(mean(b)), change]
+
+
+def _cases_with(key, pairs):
+    counts = [sum(case[key] > 0 for case in cases) for cases in _columns(pairs)]
+    return [f"cases with {key}", *counts, ""]
 
 
 def _changes(pairs, n_shown):
