@@ -148,7 +148,10 @@ class NormalFactor:
         """log |G + P|."""
         return 2.0 * float(np.sum(np.log(np.diagonal(self._lower))))
 
-    def inverse(self):
-        """(G + P)^-1, symmetric."""
+    def traces(self, matrices):
+        """tr (G + P)^-1 A of every symmetric A."""
         inverse, _ = linalg.lapack.dpotri(self._lower, lower=1)
-        return np.tril(inverse) + np.tril(inverse, -1).T
+        # What is above the diagonal is zero: count what is below twice.
+        inverse *= 2.0
+        inverse.flat[:: inverse.shape[0] + 1] *= 0.5
+        return [float(np.vdot(inverse, matrix)) for matrix in matrices]

@@ -149,14 +149,16 @@ def laplace(
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     size = max(np.trace(matrix) / matrix.shape[0], np.finfo(float).tiny)
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
-    inverse, prior_inverse = factor.inverse(), prior.inverse()
-    by_weight = {}
-    for key, part in parts.items():
-        by_weight[key] = (
-            weights[key] * float(np.sum(solved * (part @ solved))),
-            weights[key] * float(np.sum(prior_inverse * part)),
-            weights[key] * float(np.sum(inverse * part)),
+    by_weight = {
+        key: tuple(weights[key] * value for value in values)
+        for key, *values in zip(
+            parts,
+            [float(np.sum(solved * (part @ solved))) for part in parts.values()],
+            prior.traces(parts.values()),
+            factor.traces(parts.values()),
+            strict=True,
         )
+    }
     curvature = np.empty(0) if curvature is None else curvature
     stiffness = penalty.stiffness
     paid = 0.0

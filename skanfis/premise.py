@@ -43,7 +43,8 @@ _HIGHEST_CROSSING = 0.9
 _POWER = 4.0
 # A gap that a step has closed, as part of the range.
 _SMALLEST_GAP = 1e-9
-_BISECTIONS = 30
+# Widths that are looked at for the widest.
+_CHANGES = 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,22 +210,13 @@ def _terms(antecedent):
 
 def _widest(term, raw, spacing):
     """How much a term's widths may grow: the change of their logarithm."""
-    theta = raw[term.positions][:, None]
+    changes = np.linspace(0.0, _LOG_FACTOR, _CHANGES)
     is_width = np.isin(term.positions, term.widths)[:, None]
-    sides = raw[term.location] + np.array([[-0.5], [0.5]]) * spacing
-    at_start = np.array([term.family.value(side[None], theta)[0, 0] for side in sides])
+    theta = raw[term.positions][:, None] + changes * is_width
+    sides = raw[term.location] + np.array([-0.5, 0.5]) * spacing
+    truth = [term.family.value(np.full((_CHANGES, 1), side), theta)[:, 0] for side in sides]
     # A term that is true to one side for good has its flank on the other.
-    sides = sides[at_start < _HIGHEST_CROSSING]
-    if sides.size == 0:
+    flanks = [values for values in truth if values[0] < _HIGHEST_CROSSING]
+    if not flanks:
         return 0.0
-
-    def truest(change):
-        return max(term.family.value(side[None], theta + change * is_width)[0, 0] for side in sides)
-
-    low, high = 0.0, _LOG_FACTOR
-    if truest(high) <= _HIGHEST_CROSSING:
-        return high
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if truest(middle) <= _HIGHEST_CROSSING else (low, middle)
-    return low
+    return changes[np.flatnonzero(np.max(flanks, axis=0) <= _HIGHEST_CROSSING)[-1]]

@@ -7,8 +7,6 @@ times sqrt(d), for the distance from the centre grows as sqrt(d) in d inputs and
 otherwise hardly overlap.
 """
 
-from itertools import pairwise
-
 import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, TermGroup
@@ -97,12 +95,12 @@ def _merged(family, centers, widths, masses):
     """
     order = np.argsort(centers, kind="stable")
     terms = [(centers[r], widths[r] ** 2, masses[r], [int(r)]) for r in order]
-    while len(terms) > 1:
-        crossings = [_crossing(family, a, b) for a, b in pairwise(terms)]
-        highest = int(np.argmax(crossings))
-        if crossings[highest] <= _HIGHEST_CROSSING:
-            break
-        terms[highest : highest + 2] = [_joined(*terms[highest : highest + 2])]
+    crossings = _crossings(family, terms)
+    while len(terms) > 1 and max(crossings) > _HIGHEST_CROSSING:
+        k = int(np.argmax(crossings))
+        terms[k : k + 2] = [_joined(*terms[k : k + 2])]
+        first = max(k - 1, 0)
+        crossings[first : k + 2] = _crossings(family, terms[first : k + 2])
     term_of = np.empty(centers.size, dtype=int)
     for t, (_, _, _, rules) in enumerate(terms):
         term_of[rules] = t
@@ -118,10 +116,10 @@ def _joined(one, other):
     return center, variance, mass, one[3] + other[3]
 
 
-def _crossing(family, one, other):
-    """The greatest value that both terms have between their centres."""
-    between = np.linspace(one[0], other[0], _POINTS)
-    theta = family.from_center_and_width(
-        np.array([one[0], other[0]]), np.sqrt([one[1], other[1]])
-    )
-    return float(family.value(between, theta).min(axis=0).max())
+def _crossings(family, terms):
+    """Of every two neighbours, the greatest value that both have between their centres."""
+    centers = np.array([center for center, _, _, _ in terms])
+    theta = family.from_center_and_width(centers, np.sqrt([variance for _, variance, _, _ in terms]))
+    between = np.linspace(centers[:-1], centers[1:], _POINTS, axis=1)
+    pairs = [family.value(between, theta[:, side]) for side in (slice(-1), slice(1, None))]
+    return list(np.minimum(*pairs).max(axis=1))

@@ -36,7 +36,7 @@ from .grid import Spacing, grid_antecedent
 from .held_out import held_out_loss
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
-from .tuning import FIRST_PENALTY, MOST_ROWS, WORTHWHILE, Tuned, scaled, tune
+from .tuning import FIRST_PENALTY, FIRST_STEPS, MOST_ROWS, WORTHWHILE, Tuned, scaled, tune
 
 __all__ = ["SEARCHED", "Candidate", "StructureSearch"]
 
@@ -48,6 +48,10 @@ _MOST_RULES = 36
 _MOST_TERMS = 6
 # After each round, so many inputs stay in the running for a further term.
 _MOST_GROWING = 8
+# Of those that are tried in a round, so many are trained: the most promising at their start.
+_MOST_TRAINED = 3
+# Turns of weights and premises of a candidate.
+_TURNS = 5
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
@@ -134,18 +138,28 @@ class StructureSearch:
                 best = self._grow_grid(loose)
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
-            best = self._better(best, self._grow_clusters(clustering))
+            clusters = self._best_clusters(clustering)
+            best = best if clusters is None else self._better(best, clusters)
         return self._start(best)
 
     def _grow_grid(self, best):
         inputs = list(self.inputs)
         while True:
             grown = {self._with_one_more(best, j): j for j in inputs}
-            small = sorted(filter(self._is_small, grown), key=self._score)
-            if not small or not self._is_better(small[0], best):
+            small = self._promising(filter(self._is_small, grown))
+            if not small:
                 return best
-            best = small[0]
             inputs = [grown[candidate] for candidate in small[:_MOST_GROWING]]
+            grown_best = min(small[:_MOST_TRAINED], key=self._score)
+            if not self._is_better(grown_best, best):
+                return best
+            best = grown_best
+            self.first = replace(self.first, slope=self._tuned(best).penalty.slope)
+
+    def _promising(self, candidates):
+        """Candidates by their evidence before the premises move, best first."""
+        fits = [c for c in candidates if not self._is_too_many(c, self.sample.n_rows)]
+        return sorted(fits, key=lambda c: self._train(c, self.sample, turns=0, first_steps=2).score)
 
     @staticmethod
     def _with_one_more(candidate, j):
@@ -163,17 +177,10 @@ class StructureSearch:
             and n_columns <= min(_MOST_COLUMNS, 2.0 * self.n_sample)
         )
 
-    def _grow_clusters(self, clustering):
+    def _best_clusters(self, clustering):
         sizes = _RADII if clustering == "subtractive" else _RULE_NUMBERS
-        best, failures = Candidate(None, sizes[0], clustering), 0
-        for size in sizes[1:]:
-            candidate = replace(best, size=size)
-            better = self._is_better(candidate, best)
-            best = candidate if better else best
-            failures = 0 if better else failures + 1
-            if failures == 2:
-                break
-        return best
+        promising = self._promising([Candidate(None, size, clustering) for size in sizes])
+        return min(promising[:_MOST_TRAINED], key=self._score, default=None)
 
     def _better(self, smaller, larger):
         return larger if self._is_better(larger, smaller) else smaller
@@ -249,15 +256,21 @@ class StructureSearch:
             weight += rest.total_weight
         return np.sqrt(total / weight) if weight else np.inf
 
-    def _train(self, candidate, rows):
-        """A short training on some rows."""
+    def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS):
+        """A short training on some rows, from the weights that were best so far."""
         antecedent = self._antecedent(candidate, rows)
         problem = SeparableProblem(
             rows, antecedent, self.order, self.first, consequent_inputs=self.consequent_inputs
         )
         premise = Premise.of(antecedent, rows.inputs.minimum, rows.inputs.maximum)
         return tune(
-            problem, premise, self.free, effective_weight(rows), is_loose=candidate.is_loose
+            problem,
+            premise,
+            self.free,
+            effective_weight(rows),
+            turns,
+            first_steps,
+            is_loose=candidate.is_loose,
         )
 
     def _start(self, best):

@@ -27,7 +27,7 @@ from ..solvers import varpro
 from .sample import effective_weight, search_sample
 from .start import Start
 
-__all__ = ["FIRST_PENALTY", "MOST_ROWS", "WORTHWHILE", "Tuned", "scaled", "tune", "tuned_start"]
+__all__ = ["FIRST_PENALTY", "FIRST_STEPS", "MOST_ROWS", "WORTHWHILE", "Tuned", "scaled", "tune", "tuned_start"]
 
 # The weights are found on at most so many representative rows.
 MOST_ROWS = 1000
@@ -36,7 +36,7 @@ FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Loose: what rounding errors need.
 _LOOSE = 1e-12
 _LOOSE_ITERATIONS = 25
-_FIRST_STEPS = 8
+FIRST_STEPS = 8
 _STEPS = 3
 _ITERATIONS = 4
 _MOST_TURNS = 8
@@ -75,6 +75,7 @@ def tune(
     free,
     n_rows: float,
     turns=_MOST_TURNS,
+    first_steps=FIRST_STEPS,
     displacement=None,
     is_loose=False,
 ) -> Tuned:
@@ -91,6 +92,8 @@ def tune(
         Rows by weight.
     turns : int
         Most turns of the premises; with 0 they stay where they are.
+    first_steps : int
+        Steps of the weights before the premises move.
     displacement : ndarray of shape (premise.size,), optional
         Where the premises start; zero if not given.
     is_loose : bool
@@ -120,7 +123,7 @@ def tune(
         penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
     evaluation = problem.evaluate(premise.parameters(x))
     consequents = [key for key in free if key != "stiffness"]
-    posterior = improved(evaluation, penalty, 0 if is_loose else _FIRST_STEPS, consequents)
+    posterior = improved(evaluation, penalty, 0 if is_loose else first_steps, consequents)
     penalty = posterior.penalty
     if premise.size == 0 or turns == 0:
         return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
@@ -144,7 +147,7 @@ def tune(
         raw = weighted.linearise(evaluation)
         _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
-        steps = _FIRST_STEPS if is_first else _STEPS
+        steps = FIRST_STEPS if is_first else _STEPS
         posterior = improved(evaluation, penalty, steps, free, curvature)
         penalty = posterior.penalty
         found = Tuned(weighted, evaluation, x, posterior)
