@@ -118,9 +118,9 @@ def measure(case, options):
 
 
 def run(options):
-    found = evaluate("battery", measure, cases(), options)
+    found, failed = evaluate("battery", measure, cases(), options)
     if not found:
-        return Results()
+        return Results([Row("random functions", [failed])])
     ratios = np.array([figures["ratio"] for figures in found])
     worse = sum(figures["over mean"] > _WORSE_THAN_MEAN for figures in found)
     beyond = sum(figures["beyond"] > 0 for figures in found)
@@ -145,6 +145,7 @@ def run(options):
                     "in the box, but beyond the target by over a quarter", float(beyond), "", 0
                 ),
                 Measure("terms never true, or alike", float(terms), "", 0),
+                failed,
             ],
         ),
     ]

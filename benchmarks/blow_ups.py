@@ -88,8 +88,8 @@ def measure(fit, options):
 
 
 def run(options):
-    found = evaluate("blow_ups", measure, cases(), options)
-    rows, tables = [], []
+    found, failed = evaluate("blow_ups", measure, cases(), options)
+    rows, tables = [Row("smooth functions", [failed])], []
     for title, given in (("defaults", False), ("n_mfs of 2 or 3", True)):
         some = [figures for figures in found if (figures["n_mfs"] != "auto") == given]
         if some:

@@ -21,6 +21,8 @@ from joblib import Parallel, delayed
 import skanfis
 from skanfis import ANFISRegressor
 
+from .report import Measure
+
 __all__ = ["evaluate", "fitted", "geometric_mean", "kept", "remembered"]
 
 CACHE = Path(os.environ.get("SKANFIS_BENCHMARKS_CACHE", Path(__file__).with_name(".cache")))
@@ -45,8 +47,9 @@ def evaluate(name, function, cases, options):
     Returns
     -------
     found : list of dict
-        In the order of the cases. A case that raised is not among them: it is in the file, and is
-        told about.
+        In the order of the cases. A case that raised is not among them: it is in the file.
+    failed : Measure
+        How many those are.
     """
     chosen = [case for case in cases if options.only in str(case)][:: options.every]
     tasks = (delayed(_guarded)(function, k, case, options) for k, case in enumerate(chosen))
@@ -69,7 +72,8 @@ def evaluate(name, function, cases, options):
         file=sys.stderr,
         flush=True,
     )
-    return [figures for figures in found if _FAILED not in figures]
+    ended = [figures for figures in found if _FAILED not in figures]
+    return ended, Measure("cases that failed", float(len(failed)), "", 0)
 
 
 def _guarded(function, number, case, options):
