@@ -25,10 +25,10 @@ def compared(first, second, n_shown=10):
     pairs = [(first["cases"][name], second["cases"][name]) for name in names]
     failed = [sum("failed" in case for case in cases) for cases in _columns(pairs)]
     pairs = [pair for pair in pairs if not any("failed" in case for case in pair)]
-    lines = [["cases in both", len(names), len(names), ""], ["failed", *failed, ""]]
+    lines = [["cases in both", len(names), len(names), "", ""], ["failed", *failed, "", ""]]
     lines += [_line(key, pairs) for key in _keys(pairs)]
     lines += [_cases_with(key, pairs) for key in _keys(pairs) if key in _COUNTS]
-    head = ["figure", "A", "B", "B / A, geometric mean"]
+    head = ["figure", "A", "B", "B / A, geometric mean", "median"]
     return [Table("Mean; ratios by their geometric mean", head, lines), *_changes(pairs, n_shown)]
 
 
@@ -49,13 +49,14 @@ def _line(key, pairs):
     a, b = np.array([[case[key] for case in pair] for pair in pairs], dtype=float).T
     mean = geometric_mean if key in ("ratio", "over mean") else np.mean
     both = (a > 0) & (b > 0)
-    change = geometric_mean(b[both] / a[both]) if both.any() else ""
-    return [key, float(mean(a)), float(mean(b)), change]
+    change = b[both] / a[both]
+    changes = [geometric_mean(change), float(np.median(change))] if both.any() else ["", ""]
+    return [key, float(mean(a)), float(mean(b)), *changes]
 
 
 def _cases_with(key, pairs):
     counts = [sum(case[key] > 0 for case in cases) for cases in _columns(pairs)]
-    return [f"cases with {key}", *counts, ""]
+    return [f"cases with {key}", *counts, "", ""]
 
 
 def _changes(pairs, n_shown):
