@@ -42,9 +42,9 @@ FREE = ("agreement", "alpha", "slope", "stiffness")
 _SMALLEST = {"agreement": 1e-12, "alpha": 1e-12, "slope": 1e-12, "stiffness": 1e-10}
 _LARGEST = {"agreement": 1.0, "alpha": 1e4, "slope": 1e4, "stiffness": 1e4}
 # The premises' weight has a prior of its own, as if so many displacements of such a size had been
-# seen before: a third of a spacing is what a term is expected to move.
-PRIOR_DISPLACEMENT = 0.3
-_PRIOR_NUMBER = 4.0
+# seen before: a fifth of a spacing is what a term is expected to move.
+PRIOR_DISPLACEMENT = 0.2
+_PRIOR_NUMBER = 100.0
 # One step changes a weight by no more than this factor.
 _LARGEST_STEP = 100.0
 # The target of a fit that is exact to rounding has no more digits than this, squared.

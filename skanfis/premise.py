@@ -30,7 +30,7 @@ from .antecedent import Antecedent
 __all__ = ["Premise"]
 
 # Widths may shrink, and the gaps between terms change, by these factors.
-_LOG_SHRINKAGE = np.log(2.0)
+_LOG_SHRINKAGE = np.log(1.3)
 _LOG_GAP = np.log(4.0)
 # Shapes, and widths of terms that share their place with others, may change by this one.
 _LOG_FACTOR = np.log(4.0)
