@@ -22,6 +22,7 @@ from .naming import default_term_names, given_term_names
 from .partition import count_distinct_inputs, imported_antecedent
 from .rows import Rows
 from .solvers import SOLVERS, SolverResult
+from .support import RuleSupport
 from .training import (
     ENOUGH_ROWS,
     EarlyStopping,
@@ -136,6 +137,7 @@ def _as_given(estimator, data, model) -> Training:
         output_names=data.output_names,
         term_names=names,
         out_of_bounds=estimator.out_of_bounds,
+        max_extrapolation=estimator.max_extrapolation,
     )
     rows = Rows.standardised(data.X, data.y, data.sample_weight)
     residual = (data.y - model.with_out_of_bounds("clip").predict(data.X)) / rows.targets.scale
@@ -232,9 +234,15 @@ class _Trainer:
             minimum=rows.inputs.minimum,
             maximum=rows.inputs.maximum,
             rule_weights=evaluation.masses,
-            rule_rows=self.n_distinct * strongest,
+            rule_rows=rows.n_rows * strongest,
             input_names=self.data.input_names,
             out_of_bounds=self.estimator.out_of_bounds,
+            max_extrapolation=self.estimator.max_extrapolation,
+            support=RuleSupport.of(
+                rows,
+                evaluation.antecedent,
+                1 + int(np.sum(~rows.inputs.is_constant[self.partition.consequent_inputs])),
+            ).change_units(offset, scale),
             term_names=structure.term_names,
             output_names=self.data.output_names,
         )

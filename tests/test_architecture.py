@@ -21,6 +21,7 @@ KERNEL = [
     "objective",
     "premise",
     "naming",
+    "support",
     "model",
     "solvers",
 ]
