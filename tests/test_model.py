@@ -348,7 +348,7 @@ def test_limit_is_checked(limit):
     if limit is None:
         assert frozen.with_out_of_bounds("linear").max_extrapolation == frozen.max_extrapolation
         return
-    with pytest.raises(ValueError, match="max_extrapolation=.* must be a number"):
+    with pytest.raises(ValueError, match=r"max_extrapolation=.* must be a number"):
         frozen.with_out_of_bounds("linear", limit)
 
 

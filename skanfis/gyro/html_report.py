@@ -189,7 +189,9 @@ def _limits(page, results):
     calibration = results.calibration
     compensator, recipe = calibration.compensator, calibration.recipe
     page.section("Where it may be used")
-    policy = policy_in_words(recipe.outside, recipe.max_extrapolation)
+    policy = "no rate is given"
+    if recipe.outside != "nan":
+        policy = policy_in_words(recipe.outside, recipe.max_extrapolation)
     page.paragraph(
         f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
         "Inside them, rows near which there are hardly any data "

@@ -145,7 +145,7 @@ def test_physics_shows_its_law(has_time):
     law = calibration.compensator.estimator.base_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
-    assert "the model goes on linearly" in text
+    assert "along its tangent, for each input up to 0.5 of its standard deviations, and" in text
     if has_time:
         assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
         # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.
