@@ -278,7 +278,7 @@ def test_functions_of_the_library_are_called_as_often_as_reported(case, tmp_path
     cost = export_c(model, tmp_path / "m", min_coverage=1.0).cost
     exponentials, _, roots = counted_calls(tmp_path)
     assert cost.coverage_exponentials == cost.coverage_square_roots
-    assert cost.coverage_square_roots == np.count_nonzero(model.support.share)
+    assert cost.coverage_square_roots == 1 + np.count_nonzero(model.support.share)
     assert 0 < roots <= cost.coverage_square_roots
     assert exponentials == counted[0] + roots or counted != reported
 
@@ -344,7 +344,7 @@ def test_grid_takes_an_exponential_per_term():
     assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3)
     assert cost.divisions == 2
     # Two standard deviations; per rule three entries of a factor, two squares, and five more.
-    known = np.count_nonzero(model.model_.support.share)
+    known = 1 + np.count_nonzero(model.model_.support.share)
     assert cost.coverage_multiply_adds == 2 + known * (3 + 2 + 5)
     assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
 

@@ -31,9 +31,9 @@ class CCost:
     stack_bytes : int
         Arrays on the stack.
     coverage_exponentials, coverage_square_roots, coverage_multiply_adds : int
-        What the judgement of the coverage takes besides, at most: all rules that have data are
-        asked only where there is hardly any coverage; rules whose data lie around the row take
-        neither exponential nor root. Zero with ``min_coverage=None``.
+        What the judgement of the coverage takes besides, at most. Where the strongest rule alone
+        covers the row, which is nearly everywhere amid data, it is one quadratic form, without
+        exponential or root. Zero with ``min_coverage=None``.
 
     Examples
     --------
@@ -78,7 +78,8 @@ def cost(numbers, code):
     multiply_adds += n_shares + n_rules * n_outputs * n_basis
     asked, of_coverage = 0, 0
     if code.judges_coverage:
-        asked = int(np.count_nonzero(numbers.support[:, 0]))
+        # The strongest, then all that have data.
+        asked = 1 + int(np.count_nonzero(numbers.support[:, 0]))
         n_inputs = numbers.n_inputs
         # The factor's triangle, its square, share and strength; and the row in standard deviations.
         of_coverage = n_inputs + asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5)

@@ -93,7 +93,7 @@ def coverage_line(cost):
         yield (
             f"Coverage takes at most {cost.coverage_exponentials} exponentials, "
             f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
-            "multiply-adds more, amid data a small part of them."
+            "multiply-adds more; where the strongest rule covers the row, a small part of them."
         )
 
 

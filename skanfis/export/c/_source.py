@@ -5,8 +5,8 @@ strengths by a softmax that subtracts the largest, consequents weighed by the st
 normalises each input alone and multiplies the shares in nested loops, so that it takes one
 exponential per term, not per rule and input. The continuation "linear" is worked out only for rows
 outside the box: it is the derivative along the way back to the box, carried forward through the
-same loops. Coverage is summed until it is enough, with the rules that have data: a row amid data
-takes few quadratic forms, the first of them mostly.
+same loops. Coverage takes a quadratic form per rule: the strongest rule is asked first, then the
+others, until there is enough.
 """
 
 import re
@@ -288,7 +288,7 @@ class Source:
             if self.is_linear:
                 parts.append(self.write(_CENTRE).lstrip())
         if self.judges_coverage:
-            parts.append(self.write(_NEAR).lstrip())
+            parts += [self.write(_NEAR).lstrip(), self.coverage()]
         if self.is_linear:
             parts.append(self.tangent())
         parts.append(self.write(rejection(self.policy, self.dialect.std)).lstrip())
@@ -315,7 +315,8 @@ class Source:
         if self.is_linear:
             lines.append(f"    $real e[{numbers.n_inputs}];")
         if self.judges_coverage:
-            lines.append(f"    $real u[{numbers.n_inputs}], covered = 0.0R;")
+            lines.append(f"    $real u[{numbers.n_inputs}], top = 0.0R;")
+            lines.append(f"    {self.int} best = 0;")
         if self.measures_distance:
             lines.append("    $real beside = 1.0R;")
         lines += [
@@ -488,12 +489,7 @@ class Source:
     def add_rule(self, strength, change):
         lines = []
         if self.judges_coverage:
-            beside = "beside * " if self.measures_distance else ""
-            lines += [
-                f"if (covered < {self.enough} && $name_support[r][0] > 0.0R) {{",
-                f"    covered += {beside}{strength} * $name_near(u, $name_support[r]);",
-                "}",
-            ]
+            lines += [f"if ({strength} > top) {{", f"    top = {strength};", "    best = r;", "}"]
         return [
             *lines,
             "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
@@ -502,11 +498,6 @@ class Source:
             f"    sum[o] += {strength} * f;",
             "}",
         ]
-
-    @property
-    def enough(self):
-        """The coverage asked for, as a constant."""
-        return self.dialect.number(self.min_coverage)
 
     def measure_distance(self):
         if not self.measures_distance:
@@ -525,10 +516,44 @@ class Source:
     def judge_coverage(self):
         if not self.judges_coverage:
             return []
+        beside = "beside * " if self.measures_distance else ""
+        values = ["u", *self.shares, *(["beside"] if self.measures_distance else [])]
         return [
-            f"    if (covered < {self.enough}) {{",
+            f"    if ({beside}top * $name_near(u, $name_support[best]) < {self.enough}",
+            f"        && $name_coverage({', '.join(values)}) < {self.enough}) {{",
             "        status |= $NAME_UNCOVERED;",
             "    }",
+        ]
+
+    @property
+    def enough(self):
+        """The coverage asked for, as a constant."""
+        return self.dialect.number(self.min_coverage)
+
+    def coverage(self):
+        """The sum over the rules that have data, as far as it takes to be enough."""
+        n_loops = len(self.numbers.counts or ())
+        arguments = [f"const $real *{name}" for name in ("u", *self.shares)]
+        arguments += ["$real beside"] if self.measures_distance else []
+        lines = [
+            "/* The coverage, or a part of it that is enough. */",
+            f"static $real $name_coverage({', '.join(arguments)})",
+            "{",
+            "    $real covered = 0.0R;",
+            f"    $int {', '.join(['r', *(f'i{k}' for k in range(n_loops))])};",
+            "",
+            *self.over_rules(self.add_support, tangent=False),
+            "    return covered;",
+            "}",
+        ]
+        return self.write("\n".join(lines) + "\n")
+
+    def add_support(self, strength, _):
+        beside = "beside * " if self.measures_distance else ""
+        return [
+            f"if (covered < {self.enough} && $name_support[r][0] > 0.0R) {{",
+            f"    covered += {beside}{strength} * $name_near(u, $name_support[r]);",
+            "}",
         ]
 
     # The continuation of "linear".
