@@ -107,7 +107,7 @@ def export_text(
       hours, trained from 0 to 10
         low:  gaussian, center 0, width 4.95
         high: gaussian, center 10, width 4.95
-    Outside these ranges: out_of_bounds='linear', max_extrapolation=0.5.
+    Outside these ranges: out_of_bounds='linear', max_extrapolation=...
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))

@@ -109,7 +109,7 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
     >>> "int sinc_predict(const float x[SINC_N_INPUTS], float y[SINC_N_OUTPUTS]);" in code.header
     True
     >>> code.cost.exponentials, code.cost.multiply_adds
-    (8, 104)
+    (8, 88)
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
     model = fold(estimator)
