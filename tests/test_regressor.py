@@ -378,7 +378,8 @@ def test_out_of_bounds_rows_are_reported(trained):
     message = (
         rf"'time' in 1 of 4 rows .*'temperature' in 2 of 4 rows "
         rf"\(trained on \[{low:.6g}, {high:.6g}\], found \[20, 120\]\); "
-        rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='linear', max_extrapolation={MAX_EXTRAPOLATION}"
+        rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='linear', "
+        rf"max_extrapolation={MAX_EXTRAPOLATION}"
     )
     with pytest.warns(OutOfBoundsWarning, match=message) as caught:
         trained.predict(OUTSIDE)
