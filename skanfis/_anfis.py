@@ -140,7 +140,9 @@ def _as_given(estimator, data, model) -> Training:
         max_extrapolation=estimator.max_extrapolation,
     )
     rows = Rows.standardised(data.X, data.y, data.sample_weight)
-    residual = (data.y - model.with_out_of_bounds("clip").predict(data.X)) / rows.targets.scale
+    # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
+    answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
+    residual = (data.y - answering.predict(data.X)) / rows.targets.scale
     loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
     redundant = redundant_rules(rule_statistics(rows, imported_antecedent(model, rows)))
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
