@@ -23,6 +23,7 @@ from .penalty import Penalty
 from .rows import Rows
 from .solvers import SOLVERS, SolverResult
 from .structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
+from .support import RuleSupport
 from .training import (
     EarlyStopping,
     Keeper,
@@ -132,9 +133,12 @@ def _as_given(estimator, data, model) -> Training:
         output_names=data.output_names,
         term_names=names,
         out_of_bounds=estimator.out_of_bounds,
+        max_extrapolation=estimator.max_extrapolation,
     )
     rows = Rows.standardised(data.X, data.y, data.sample_weight)
-    residual = (data.y - model.with_out_of_bounds("clip").predict(data.X)) / rows.targets.scale
+    # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
+    answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
+    residual = (data.y - answering.predict(data.X)) / rows.targets.scale
     loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
     redundant = redundant_rules(rule_statistics(rows, imported_antecedent(model, rows)))
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
@@ -227,9 +231,15 @@ class _Trainer:
             minimum=rows.inputs.minimum,
             maximum=rows.inputs.maximum,
             rule_weights=evaluation.masses,
-            rule_rows=self.size.n_distinct_inputs * strongest,
+            rule_rows=rows.n_rows * strongest,
             input_names=self.data.input_names,
             out_of_bounds=self.estimator.out_of_bounds,
+            max_extrapolation=self.estimator.max_extrapolation,
+            support=RuleSupport.of(
+                rows,
+                evaluation.antecedent,
+                1 + int(np.sum(~rows.inputs.is_constant[self.request.consequent_inputs])),
+            ).change_units(offset, scale),
             term_names=start.term_names,
             output_names=self.data.output_names,
         )

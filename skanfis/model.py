@@ -9,25 +9,30 @@ training data: a column that lies far from the origin (a time stamp, a raw count
 digits. :attr:`TSKModel.consequents` gives the textbook form p0 + p1 x1 + ... + pd xd.
 
 Outside the box of the training data the model follows a declared policy, by the nearest point c of
-the box: hold its value (clip), or go on along its tangent (linear),
+the box: hold its value (clip), or go on along its tangent (linear) and hold what is reached at a
+distance of L standard deviations h_j of each input in training,
 
-    y(c) + sum_j dy/dx_j(c) (x_j - c_j) .
+    y(c) + sum_j dy/dx_j(c) clip(x_j - c_j, -L h_j, L h_j) .
 
 Strengths are those of the nearest point; they sum to one everywhere, so that no policy ever gives a
 silent zero.
 """
 
 from dataclasses import dataclass, replace
+from numbers import Real
 
 import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .naming import default_term_names
+from .support import RuleSupport
 
-__all__ = ["OUT_OF_BOUNDS", "TSKModel"]
+__all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel"]
 
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
+# How far the tangent is followed by default, in standard deviations of each input.
+MAX_EXTRAPOLATION = 0.5
 
 # Bytes that the intermediate results of one block of rows may take.
 _BLOCK_BYTES = 2**21
@@ -54,9 +59,14 @@ class TSKModel:
     rule_weights : ndarray of shape (n_rules,)
         Part of the training data's weight on which each rule fires; the sum is one.
     rule_rows : ndarray of shape (n_rules,)
-        Number of distinct training rows, by their weight, on which each rule is the strongest.
+        Number of training rows, by their weight, on which each rule is the strongest.
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
+    max_extrapolation : float
+        L of "linear": how far the tangent is followed, in standard deviations (``spread``) of each
+        input beyond its range; zero or positive, or infinite.
+    support : RuleSupport or None
+        Where the training data of every rule lie; None where the model knows of none.
     term_names : tuple of str
         One per term, unique on its input; where not given, see ``naming``.
     output_names : tuple of str
@@ -73,7 +83,9 @@ class TSKModel:
     rule_weights: np.ndarray
     rule_rows: np.ndarray
     input_names: tuple[str, ...]
-    out_of_bounds: str = "clip"
+    out_of_bounds: str = "linear"
+    max_extrapolation: float = MAX_EXTRAPOLATION
+    support: RuleSupport | None = None
     term_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
 
@@ -154,8 +166,8 @@ class TSKModel:
             return self._by_block(X, self._outputs, self.n_outputs)
         if self.out_of_bounds == "raise":
             raise ValueError(self.describe_out_of_bounds(X))
-        if self.out_of_bounds == "linear":
-            return self._by_block(X, self._outputs_linear, self.n_outputs, with_slopes=True)
+        if self.out_of_bounds == "linear" and self.max_extrapolation > 0.0:
+            return self._by_block(X, self._outputs_linear, self.n_outputs, self._n_slopes)
         outputs = self._by_block(X, self._outputs_clipped, self.n_outputs)
         if self.out_of_bounds == "nan":
             outputs[~inside] = np.nan
@@ -171,26 +183,44 @@ class TSKModel:
         def of_block(Z):
             return self._values_and_gradient(self._clip(Z))[1].reshape(n_values, -1)
 
-        by_row = self._by_block(X, of_block, n_values, with_slopes=True)
+        by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
     def coverage(self, X):
         r"""How well the training data cover each row, from 0 (not at all) to 1, (n_rows,).
 
-        sum_r w_r(x) min(1, N_r / P) times exp(-|delta|^2 / 2): N_r is the number of distinct
-        training rows on which rule r is the strongest, P the number of its coefficients, and delta
-        the distance from the box in standard deviations of each input. Zero where only rules
-        without data speak, and falling to zero away from the box.
+        With c the nearest point of the box and delta its distance in standard deviations,
+
+            exp(-|delta|^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2) :
+
+        N_r is the number of distinct training inputs on which rule r is the strongest, P the number
+        of its coefficients, d_r the Mahalanobis distance from the centre of its data, D_r that of
+        the farthest row on which it speaks; see :class:`skanfis.support.RuleSupport`. Near one on
+        the training rows of rules that have enough of them; falling to zero away from the box,
+        where only rules without data speak, and off the rows, in empty corners of the box too. Zero
+        everywhere where the model knows of no data.
         """
-        supported = np.minimum(1.0, self.rule_rows / self.coefficients.shape[1])
+        support = self.support
+        if support is None:
+            return np.zeros(X.shape[0])
 
         def of_block(Z):
             inside = self._clip(Z)
             outside = (Z - inside) / self.spread[:, None]
             near = np.exp(-0.5 * np.sum(outside**2, axis=0))
-            return (supported @ self.antecedent.strengths(inside) * near)[None]
+            by_rule = self.antecedent.strengths(inside)
+            by_rule *= support.by_rule(inside)
+            return (by_rule.sum(axis=0) * near)[None]
 
-        return self._by_block(X, of_block, 1)[:, 0]
+        n_distances = 2 * self.n_rules * (1 + self.n_inputs)
+        return self._by_block(X, of_block, 1, n_distances)[:, 0]
+
+    def way_out(self, X):
+        """How far "linear" goes from the box towards each row, (n_rows, n_inputs).
+
+        The way from the nearest point in the box, held at ``max_extrapolation``.
+        """
+        return self._held(X.T - self._clip(X.T)).T
 
     def describe_out_of_bounds(self, X):
         """Say which inputs leave the box of the training data, in how many rows, and how far."""
@@ -206,20 +236,34 @@ class TSKModel:
                 )
         return "X lies outside the training data: " + "; ".join(parts) + "."
 
-    def with_out_of_bounds(self, policy):
-        """Return the same model with another policy."""
-        if policy == self.out_of_bounds:
+    @property
+    def policy(self):
+        """The policy out of bounds as it is set: "out_of_bounds='clip'"."""
+        text = f"out_of_bounds={self.out_of_bounds!r}"
+        if self.out_of_bounds == "linear":
+            text += f", max_extrapolation={float(self.max_extrapolation)!r}"
+        return text
+
+    def with_out_of_bounds(self, policy, max_extrapolation=None):
+        """Return the same model with another policy; the limit stays where None is given."""
+        limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
+        if policy == self.out_of_bounds and limit == self.max_extrapolation:
             return self
         if policy not in OUT_OF_BOUNDS:
             raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
-        return replace(self, out_of_bounds=policy)
+        if not (isinstance(limit, Real) and float(limit) >= 0.0):
+            raise ValueError(
+                f"max_extrapolation={limit!r} must be a number, zero or positive, or infinite."
+            )
+        return replace(self, out_of_bounds=policy, max_extrapolation=float(limit))
 
-    def _by_block(self, X, of_block, n_columns, with_slopes=False):
-        """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns)."""
+    def _by_block(self, X, of_block, n_columns, n_more=0):
+        """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).
+
+        ``n_more`` is the number of values that it takes per row besides strengths and outputs.
+        """
         n_rows = X.shape[0]
-        values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms
-        if with_slopes:
-            values_per_row += 2 * self.antecedent.parameters.size + self.n_inputs * self.n_outputs
+        values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
         step = max(_BLOCK_BYTES // (8 * values_per_row), 64)
         if n_rows <= step:
             return of_block(np.array(X.T, dtype=float, order="C")).T
@@ -229,8 +273,18 @@ class TSKModel:
             result[start : start + step] = of_block(Z).T
         return result
 
+    @property
+    def _n_slopes(self):
+        """Values per row that slopes take."""
+        return 2 * self.antecedent.parameters.size + self.n_inputs * self.n_outputs
+
     def _clip(self, Z):
         return np.clip(Z, self.minimum[:, None], self.maximum[:, None])
+
+    def _held(self, way):
+        """The way out of the box, as far as the tangent is followed."""
+        reach = (self.max_extrapolation * self.spread)[:, None]
+        return np.clip(way, -reach, reach)
 
     def _strengths(self, Z):
         return self.antecedent.strengths(self._clip(Z))
@@ -245,7 +299,7 @@ class TSKModel:
         """Value and slope of the nearest point in the box."""
         inside = self._clip(Z)
         values, gradient = self._values_and_gradient(inside)
-        return values + np.einsum("ji,joi->oi", Z - inside, gradient)
+        return values + np.einsum("ji,joi->oi", self._held(Z - inside), gradient)
 
     def _values_and_gradient(self, Z):
         """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).

@@ -22,7 +22,7 @@ from ._sklearn import (
 from ._validation import check_finite, feature_indices, positive_weights
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
-from .model import OUT_OF_BOUNDS, TSKModel
+from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
 from .solvers import SOLVERS
 from .structure import StructureRequest, check_inputs
 from .training import CallbackBridge
@@ -136,10 +136,15 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     prune : bool, default=False
         Whether to drop the rules that never fire or repeat another one, and train again without
         them. They are reported in ``redundant_rules_`` in any case.
-    out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
+    out_of_bounds : {"clip", "linear", "nan", "raise"}, default="linear"
         What ``predict`` does with rows outside the range of the training data, input by input:
-        "clip" holds the value at the edge; "linear" goes on along the tangent there; "nan"
-        returns NaN; "raise" raises ValueError. It may be changed by ``set_params`` after training.
+        "clip" holds the value at the edge; "linear" goes on along the tangent there, as far as
+        ``max_extrapolation`` says, and holds the value reached; "nan" returns NaN; "raise" raises
+        ValueError. It may be changed by ``set_params`` after training.
+    max_extrapolation : float, default=0.5
+        How far "linear" follows the tangent beyond the range of an input, in standard deviations of
+        that input in the training data: zero or positive; 0 is "clip", ``math.inf`` the tangent
+        without end. It may be changed by ``set_params`` after training.
     warn_out_of_bounds : bool, default=True
         Whether ``predict`` warns of such rows.
     on_interrupt : {"raise", "stop"}, default="raise"
@@ -271,6 +276,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         "warm_start": ["boolean"],
         "prune": ["boolean"],
         "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS))],
+        "max_extrapolation": [Interval(Real, 0, np.inf, closed="both")],
         "warn_out_of_bounds": ["boolean"],
         "on_interrupt": [StrOptions({"raise", "stop"})],
         "verbose": ["verbose"],
@@ -304,7 +310,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         n_iter_no_change=10,
         warm_start=False,
         prune=False,
-        out_of_bounds="clip",
+        out_of_bounds="linear",
+        max_extrapolation=MAX_EXTRAPOLATION,
         warn_out_of_bounds=True,
         on_interrupt="raise",
         verbose=False,
@@ -335,6 +342,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.warm_start = warm_start
         self.prune = prune
         self.out_of_bounds = out_of_bounds
+        self.max_extrapolation = max_extrapolation
         self.warn_out_of_bounds = warn_out_of_bounds
         self.on_interrupt = on_interrupt
         self.verbose = verbose
@@ -430,13 +438,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             If rows lie outside the training data, unless ``warn_out_of_bounds=False``.
         """
         X = self._check_inputs(X)
-        model = self.model_.with_out_of_bounds(self.out_of_bounds)
+        model = self.model_.with_out_of_bounds(self.out_of_bounds, self.max_extrapolation)
         inside = model.in_bounds(X)
         outputs = model.predict(X, inside)
         if self.warn_out_of_bounds and not inside.all():
             message = model.describe_out_of_bounds(X)
             warnings.warn(
-                f"{message} Policy: out_of_bounds={model.out_of_bounds!r}.",
+                f"{message} Policy: {model.policy}.",
                 OutOfBoundsWarning,
                 stacklevel=2,
             )
@@ -460,9 +468,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         """Tell how well the training data cover each row.
 
         The sum over rules of strength times support, where a rule's support is the number of
-        distinct training rows on which it is the strongest over the number of its coefficients, at
-        most one; times exp(-delta^2 / 2) with delta the distance from the training range in
-        standard deviations.
+        distinct training inputs on which it is the strongest over the number of its coefficients,
+        at most one, and falls with the distance from the rows on which it speaks, in the measure of
+        their covariance; times exp(-delta^2 / 2) with delta the distance from the training range in
+        standard deviations. Training rows of rules that have enough of them are near one; an empty
+        corner of the range is near zero.
 
         Parameters
         ----------

@@ -17,6 +17,7 @@ from skanfis.antecedent import (
 )
 from skanfis.membership import Bell, Gaussian
 from skanfis.rows import Rows
+from skanfis.support import RuleSupport
 
 # With a complex step there is no difference to lose digits in: any tiny step is exact to rounding.
 STEP = 1e-30
@@ -293,3 +294,39 @@ def random_table(rng, n_rules=5, inputs=3):
     table = rng.integers(0, 3, (n_rules, inputs)) + 3 * np.arange(inputs)
     table[0, -1] = table[1, 0] = -1
     return RuleTableAntecedent(tuple(groups), table)
+
+
+def random_support(rng, n_rules, n_inputs):
+    """Support of rules in standardised units; rule 1 has none where there are more than two."""
+    share = rng.uniform(0.3, 1.0, n_rules)
+    if n_rules > 2:
+        share[1] = 0.0
+    factor = np.tril(rng.normal(size=(n_rules, n_inputs, n_inputs))) + 2.0 * np.eye(n_inputs)
+    centers = rng.normal(size=(n_rules, n_inputs))
+    return RuleSupport(share, centers, factor, rng.uniform(0.5, 2.0, n_rules))
+
+
+def textbook_coverage(model, X):
+    """exp(-|delta|^2 / 2) sum_r w_r share_r exp(-max(0, d_r - D_r)^2 / 2), row by row."""
+    found = []
+    for row in X:
+        nearest = np.minimum(np.maximum(row, model.minimum), model.maximum)
+        total = 0.0
+        for r, strength in enumerate(model.strengths(nearest[None])[0]):
+            support = model.support
+            factor = support.factor[r]
+            precision = factor.T @ factor
+            away = nearest - support.center[r]
+            beyond = max(0.0, np.sqrt(away @ precision @ away) - support.radius[r])
+            total += strength * support.share[r] * np.exp(-0.5 * beyond**2)
+        found.append(total * np.exp(-0.5 * np.sum(((row - nearest) / model.spread) ** 2)))
+    return np.array(found)
+
+
+def held_tangent(model, X, limit):
+    """Value of the nearest row in the box and slopes times the way, held at ``limit`` spreads."""
+    nearest = np.clip(X, model.minimum, model.maximum)
+    reach = limit * model.spread
+    way = np.minimum(np.maximum(X - nearest, -reach), reach)
+    ahead = np.einsum("ij,ijo->io", way, model.gradient(nearest))
+    return model.with_out_of_bounds("clip").predict(nearest) + ahead

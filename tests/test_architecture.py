@@ -21,6 +21,7 @@ KERNEL = [
     "objective",
     "premise",
     "naming",
+    "support",
     "model",
     "solvers",
 ]
@@ -46,7 +47,16 @@ TABLE = {
     ),
     "inspection": (["model", "naming", "_validation", "export"], [*PLOTTING, "pandas"]),
     "export": (
-        [PUBLIC, "exceptions", "membership", "antecedent", "naming", "model", "_validation"],
+        [
+            PUBLIC,
+            "exceptions",
+            "membership",
+            "antecedent",
+            "naming",
+            "support",
+            "model",
+            "_validation",
+        ],
         [*NUMERIC, "sklearn", "pandas", "onnx", "skl2onnx"],
     ),
     "_notebook": (["inspection"], []),

@@ -14,6 +14,7 @@ from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import OUT_OF_BOUNDS, TSKModel
+from skanfis.support import RuleSupport
 
 from . import oracles
 
@@ -55,6 +56,8 @@ def build(antecedent, n_outputs=1, order=1, seed=0, **changes):
         "rule_weights": g.dirichlet(np.ones(antecedent.n_rules)),
         "rule_rows": 12.0 * g.dirichlet(np.ones(antecedent.n_rules)),
         "input_names": NAMES,
+        "out_of_bounds": "clip",
+        "support": oracles.random_support(g, antecedent.n_rules, 3),
     }
     return TSKModel(**(settings | changes))
 
@@ -306,14 +309,54 @@ def test_gradient_is_that_of_the_textbook_formula(frozen, rng):
 
 
 @ALL
-def test_linear_is_the_tangent_of_the_nearest_row(frozen, rng):
-    frozen = frozen.with_out_of_bounds("linear")
+@pytest.mark.parametrize("limit", [0.0, 0.3, 2.0, np.inf])
+def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rng, limit):
+    frozen = frozen.with_out_of_bounds("linear", limit)
     X = around(frozen, rng, 500)
     nearest = X.clip(frozen.minimum, frozen.maximum)
-    ahead = np.einsum("ij,ijo->io", X - nearest, frozen.gradient(nearest))
+    way, reach = X - nearest, limit * frozen.spread
+    way = np.where(way > reach, reach, np.where(way < -reach, -reach, way))
+    assert_array_equal(frozen.way_out(X), way)
+    ahead = np.einsum("ij,ijo->io", way, frozen.gradient(nearest))
     expected = naive(frozen, nearest) + ahead
     assert_allclose(frozen.predict(X), expected, rtol=1e-10, atol=1e-10)
     assert_allclose(frozen.gradient(X), frozen.gradient(nearest), rtol=1e-12)
+
+
+@ALL
+def test_a_limit_of_zero_is_clip_and_the_end_of_the_tangent_is_continuous(frozen, rng):
+    X = around(frozen, rng)
+    clipped = frozen.with_out_of_bounds("clip").predict(X)
+    assert_array_equal(frozen.with_out_of_bounds("linear", 0.0).predict(X), clipped)
+    frozen = frozen.with_out_of_bounds("linear", 0.7)
+    at = inside(frozen, rng, 10)
+    for j in range(3):
+        end = at.copy()
+        end[:, j] = frozen.maximum[j] + 0.7 * frozen.spread[j]
+        ends = []
+        for step in (-1e-9, 1e-9, 5.0):
+            beyond = end.copy()
+            beyond[:, j] += step
+            ends.append(frozen.predict(beyond))
+        assert_allclose(ends[0], ends[1], atol=1e-7)
+        assert_allclose(ends[1], ends[2], rtol=1e-12)
+
+
+@pytest.mark.parametrize("limit", [-0.1, np.nan, "far", None])
+def test_limit_is_checked(limit):
+    frozen = build(grid())
+    if limit is None:
+        assert frozen.with_out_of_bounds("linear").max_extrapolation == frozen.max_extrapolation
+        return
+    with pytest.raises(ValueError, match=r"max_extrapolation=.* must be a number"):
+        frozen.with_out_of_bounds("linear", limit)
+
+
+def test_policy_as_it_is_set():
+    frozen = build(grid())
+    assert frozen.policy == "out_of_bounds='clip'"
+    far = frozen.with_out_of_bounds("linear", 2)
+    assert far.policy == "out_of_bounds='linear', max_extrapolation=2.0"
 
 
 def test_raise_names_the_columns_and_the_numbers(rng):
@@ -344,21 +387,25 @@ def test_rows_known_to_be_inside_are_not_looked_at_again(rng):
 
 
 @ALL
-def test_coverage_is_the_support_of_the_rules_that_fire(frozen, rng):
-    X = around(frozen, rng)
-    per_rule = frozen.coefficients.shape[1]
-    support = [min(1.0, n / per_rule) for n in frozen.rule_rows]
-    beyond = np.maximum(frozen.minimum - X, 0.0) + np.maximum(X - frozen.maximum, 0.0)
-    near = np.exp(-0.5 * np.sum((beyond / frozen.spread) ** 2, axis=1))
-    assert_allclose(
-        frozen.coverage(X), frozen.strengths(X) @ support * near, rtol=1e-11, atol=1e-300
-    )
+def test_coverage_is_the_formula(frozen, rng):
+    X = around(frozen, rng, 60)
+    expected = oracles.textbook_coverage(frozen, X)
+    assert_allclose(frozen.coverage(X), expected, rtol=1e-9, atol=1e-300)
+    assert 0.0 < expected.max() < 1.0
 
 
 @ALL
-def test_coverage_is_one_where_every_rule_has_data(frozen, rng):
-    fed = replace(frozen, rule_rows=np.full(frozen.n_rules, 10.0))
+def test_coverage_is_one_where_every_rule_has_data_near(frozen, rng):
+    support = replace(
+        frozen.support, share=np.ones(frozen.n_rules), radius=np.full(frozen.n_rules, 1e3)
+    )
+    fed = replace(frozen, support=support)
     assert_allclose(fed.coverage(inside(fed, rng)), 1.0, rtol=1e-12)
+
+
+def test_without_knowledge_of_data_there_is_no_coverage(rng):
+    frozen = build(grid(), support=None)
+    assert_array_equal(frozen.coverage(around(frozen, rng)), 0.0)
 
 
 @ALL
@@ -377,7 +424,8 @@ def test_coverage_falls_to_nothing_away_from_the_box(frozen, rng):
 def test_coverage_is_zero_where_only_a_rule_without_data_speaks():
     theta = Gaussian.start(np.array([-1.5, 1.5]), np.array([0.5, 0.5]), 0.5)
     one_input = GridAntecedent.build([Gaussian], [0], [theta])
-    frozen = build(one_input, rule_rows=np.array([100.0, 0.0]))
+    wide = RuleSupport(np.array([1.0, 0.0]), np.zeros((2, 3)), np.zeros((2, 3, 3)), np.ones(2))
+    frozen = build(one_input, support=wide)
     rows = np.array([[-2.0, 0.0, 0.0], [1.5, 0.0, 0.0]])
     assert_allclose(frozen.coverage(rows), [1.0, 0.0], atol=1e-9)
 

@@ -1,6 +1,7 @@
 """ANFISRegressor as a user meets it: what it learns, what it says, and the tools it works with."""
 
 import io
+import math
 import pickle
 import threading
 import warnings
@@ -25,6 +26,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor, objective, rows
 from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.membership import MEMBERSHIPS
+from skanfis.model import MAX_EXTRAPOLATION
 from skanfis.rows import Rows
 from skanfis.solvers import SOLVERS
 
@@ -376,7 +378,8 @@ def test_out_of_bounds_rows_are_reported(trained):
     message = (
         rf"'time' in 1 of 4 rows .*'temperature' in 2 of 4 rows "
         rf"\(trained on \[{low:.6g}, {high:.6g}\], found \[20, 120\]\); "
-        rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='clip'"
+        rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='linear', "
+        rf"max_extrapolation={MAX_EXTRAPOLATION}"
     )
     with pytest.warns(OutOfBoundsWarning, match=message) as caught:
         trained.predict(OUTSIDE)
@@ -423,7 +426,7 @@ def test_clip_holds_the_value_at_the_edge(trained):
 
 
 def test_linear_goes_on_along_the_tangent_of_the_edge(trained):
-    model = with_policy(trained, "linear")
+    model = with_policy(trained, "linear").set_params(max_extrapolation=math.inf)
     nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1).to_numpy()
     slope = model.model_.gradient(nearest)[:, :, 0]
     expected = trained.model_.predict(nearest)[:, 0]
@@ -673,6 +676,13 @@ def test_policy_may_be_changed_after_training(trained):
     for policy in ("linear", "nan", "clip"):
         found = model.set_params(out_of_bounds=policy).predict(OUTSIDE)
         assert_array_equal(found, with_policy(trained, policy).predict(OUTSIDE))
+    model.set_params(out_of_bounds="linear")
+    for limit in (0.0, 0.2, math.inf):
+        found = model.set_params(max_extrapolation=limit).predict(OUTSIDE)
+        expected = oracles.held_tangent(trained.model_, OUTSIDE.to_numpy(), limit)
+        assert_allclose(found, expected[:, 0], rtol=1e-10)
+    with pytest.raises(ValueError, match="max_extrapolation=-1 must be a number"):
+        model.set_params(max_extrapolation=-1).predict(OUTSIDE)
 
 
 def test_representations_show_what_was_changed():

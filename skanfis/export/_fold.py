@@ -238,7 +238,8 @@ def _model_of(label, estimator):
             f"estimator must be or end in an ANFIS estimator; {_describe(label, estimator)} has no "
             "rules."
         )
-    return model.with_out_of_bounds(getattr(estimator, "out_of_bounds", model.out_of_bounds))
+    policy = getattr(estimator, "out_of_bounds", model.out_of_bounds)
+    return model.with_out_of_bounds(policy, getattr(estimator, "max_extrapolation", None))
 
 
 def _describe(label, step):
@@ -334,6 +335,7 @@ def _with_raw_inputs(model, columns, order, names):
         spread=(scale * model.spread)[order],
         minimum=_edges(columns, model.minimum, -1.0)[order],
         maximum=_edges(columns, model.maximum, 1.0)[order],
+        support=_with_raw_support(model.support, offset, scale, order),
         input_names=tuple(map(str, names)),
     )
     if model.term_names == default_term_names(model.antecedent):
@@ -353,6 +355,10 @@ def _with_raw_terms(antecedent, offset, scale, order):
     moved = antecedent.change_units(offset, scale)
     groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
     return replace(moved, groups=groups)
+
+
+def _with_raw_support(support, offset, scale, order):
+    return None if support is None else support.change_units(offset, scale).reordered(order)
 
 
 def _with_raw_target(model, label, transformer):

@@ -76,8 +76,12 @@ class Numbers:
     coefficients : ndarray of shape (n_rules, n_outputs, 1 + n_slopes)
     slope_inputs : ndarray of int of shape (n_slopes,)
         The inputs that take part in the consequents.
-    support : ndarray of shape (n_rules,) or None
-        Of each rule in coverage; None where it is one for all.
+    reach : ndarray of shape (n_inputs,) or None
+        How far the tangent is followed; None where it is without end.
+    support : ndarray of shape (n_rules, 2 + n_inputs + n_inputs (n_inputs + 1) / 2) or None
+        Of each rule in coverage: its share, its radius, its centre, and its factor row by row up to
+        the diagonal, for inputs about the reference in standard deviations. None where the model
+        knows of no data.
     """
 
     dtype: np.dtype
@@ -93,6 +97,7 @@ class Numbers:
     offset: np.ndarray
     coefficients: np.ndarray
     slope_inputs: np.ndarray
+    reach: np.ndarray | None
     support: np.ndarray | None
 
     @classmethod
@@ -114,7 +119,6 @@ class Numbers:
             rule_terms = np.where(antecedent.rule_terms < 0, model.antecedent.n_terms, 0)
             rule_terms += np.maximum(antecedent.rule_terms, 0)
         offset, coefficients, slope_inputs = _consequents(model, reference)
-        support = np.minimum(1.0, model.rule_rows / model.coefficients.shape[1])
         return cls(
             dtype=dtype,
             low=low,
@@ -129,7 +133,8 @@ class Numbers:
             offset=_rounded(offset, dtype, "a typical output"),
             coefficients=_rounded(coefficients, dtype, "a consequent"),
             slope_inputs=slope_inputs,
-            support=None if (support == 1.0).all() else support.astype(dtype),
+            reach=_reach(model, dtype),
+            support=None if model.support is None else _support(model, reference),
         )
 
     @property
@@ -152,6 +157,27 @@ class Numbers:
     def block_starts(self):
         """Where the terms of each input of a grid start."""
         return np.cumsum([0, *(self.counts or ())])[:-1]
+
+
+def _reach(model, dtype):
+    """How far the tangent is followed in a type, or None; its ends stand for what is beyond."""
+    if np.isinf(model.max_extrapolation):
+        return None
+    limits = np.finfo(dtype)
+    reach = model.max_extrapolation * model.spread
+    held = np.minimum(reach, float(limits.max)).astype(dtype)
+    return np.where(held < limits.tiny, dtype.type(0.0), held)
+
+
+def _support(model, reference):
+    """What coverage takes of each rule, about the reference as it is rounded."""
+    support, dtype = model.support, reference.dtype
+    center = (support.center - reference.astype(float)) / model.spread
+    rows, columns = np.tril_indices(model.n_inputs)
+    factor = (support.factor * model.spread)[:, rows, columns]
+    table = np.column_stack([support.share, support.radius, center, factor])
+    table[support.share == 0.0] = 0.0
+    return _rounded(table, dtype, "where the training data of a rule lie")
 
 
 def _rounded(values, dtype, what):

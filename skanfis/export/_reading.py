@@ -13,6 +13,7 @@ __all__ = [
     "conditions",
     "consequents_about",
     "knows_data",
+    "policy_in_words",
     "premise_text",
     "renamed",
     "round_reference",
@@ -24,6 +25,21 @@ SORT_BY = ("weight", "rows", "rule")
 def knows_data(model):
     """Whether the model remembers training data; one read from a .fis file has none."""
     return bool(np.any(model.rule_rows))
+
+
+def policy_in_words(policy, max_extrapolation):
+    """What is answered outside the range of the training data, as a clause."""
+    if policy in ("nan", "raise"):
+        return "there is no value"
+    if policy == "clip" or max_extrapolation == 0.0:
+        return "the value at the edge is held"
+    tangent = "the model goes on along its tangent"
+    if np.isinf(max_extrapolation):
+        return tangent
+    return (
+        f"{tangent}, for each input up to {max_extrapolation:g} of its standard deviations, and "
+        "holds the value reached there"
+    )
 
 
 def conditions(model):

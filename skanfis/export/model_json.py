@@ -7,7 +7,8 @@
         "version": 1,
         "inputs": [{"name": "x0", "minimum": ..., "maximum": ..., "reference": ..., "spread": ...}],
         "outputs": ["y"],
-        "out_of_bounds": "clip",
+        "out_of_bounds": "linear",
+        "max_extrapolation": 0.5,
         "rule_base": "grid",
         "terms": [
             {
@@ -20,16 +21,19 @@
             }
         ],
         "rules": [{"terms": [0, 3], "weight": ..., "rows": ..., "consequents": [[...]]}],
+        "support": [{"share": 1.0, "radius": ..., "center": [...], "factor": [...]}],
     }
 
 Numbers are written so that the same double comes back; widths stay the logarithms that the model
 holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
-terms are positions in "terms", -1 for an input that it does not look at.
+terms are positions in "terms", -1 for an input that it does not look at. "max_extrapolation" is
+null where the tangent has no end. "support" has an entry per rule, its factor row by row up to the
+diagonal; it is null where the model knows of no data.
 """
 
 import json
 from itertools import groupby
-from math import prod
+from math import inf, isinf, prod
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +47,7 @@ from ..antecedent import (
 )
 from ..membership import MEMBERSHIPS
 from ..model import OUT_OF_BOUNDS, TSKModel
+from ..support import RuleSupport
 from ._fold import fold
 from ._limits import LARGEST_NUMBER, check_size, read_bytes
 
@@ -56,7 +61,18 @@ _KINDS: dict[type[Antecedent], str] = {
     ScatteredAntecedent: "scattered",
     RuleTableAntecedent: "table",
 }
-_FILE = ["format", "version", "inputs", "outputs", "out_of_bounds", "rule_base", "terms", "rules"]
+_FILE = [
+    "format",
+    "version",
+    "inputs",
+    "outputs",
+    "out_of_bounds",
+    "max_extrapolation",
+    "rule_base",
+    "terms",
+    "rules",
+    "support",
+]
 _INPUT = ["name", "minimum", "maximum", "reference", "spread"]
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 _SHOWN = 60
@@ -94,6 +110,7 @@ def export_json(estimator):
     ['{', '  "format": "skanfis-model",', '  "version": 1,']
     """
     model = fold(estimator)
+    limit = model.max_extrapolation
     box = (model.minimum, model.maximum, model.reference, model.spread)
     inputs = [
         {"name": name, "minimum": low, "maximum": high, "reference": reference, "spread": spread}
@@ -125,9 +142,11 @@ def export_json(estimator):
             "inputs": inputs,
             "outputs": list(model.output_names),
             "out_of_bounds": model.out_of_bounds,
+            "max_extrapolation": None if isinf(limit) else limit,
             "rule_base": _KINDS[type(model.antecedent)],
             "terms": terms,
             "rules": rules,
+            "support": None if model.support is None else _support_items(model.support),
         }
     )
 
@@ -215,11 +234,16 @@ def parse_json(text):
     """The model that a JSON text describes; ValueError where it is none."""
     document = json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition)
     _check_version(document)
-    _, _, inputs, outputs, policy, kind, terms, rules = _members(document, _FILE, "the file")
+    _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
+        document, _FILE, "the file"
+    )
     input_names, box = _inputs(_list(inputs, "inputs"))
     outputs = [_text(name, "outputs") for name in _list(outputs, "outputs")]
     if policy not in OUT_OF_BOUNDS:
         raise ValueError(f"out_of_bounds is {_shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
+    limit = inf if limit is None else _number(limit, "max_extrapolation")
+    if limit < 0.0:
+        raise ValueError("max_extrapolation must not be negative.")
     n_rules = len(_list(rules, "rules"))
     check_size(n_rules, len(_list(terms, "terms", 0)), len(inputs), len(outputs))
     groups, initial_groups, term_names = _read_terms(terms, len(inputs))
@@ -236,6 +260,8 @@ def parse_json(text):
         rule_rows=rows,
         input_names=input_names,
         out_of_bounds=policy,
+        max_extrapolation=limit,
+        support=None if support is None else _support(support, n_rules, len(inputs)),
         term_names=term_names,
         output_names=tuple(outputs),
     )
@@ -307,8 +333,8 @@ def _inputs(inputs):
         where = f"inputs[{j}]"
         name, *numbers = _members(item, _INPUT, where)
         low, high, reference, spread = (_number(number, where) for number in numbers)
-        if low > high or spread < 0.0:
-            raise ValueError(f"{where}: minimum is above maximum, or spread is negative.")
+        if low > high or spread <= 0.0:
+            raise ValueError(f"{where}: minimum is above maximum, or spread is not positive.")
         names.append(_text(name, where))
         box.append([low, high, reference, spread])
     return tuple(names), np.array(box).T.copy()
@@ -388,6 +414,48 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
         np.array(rows),
         coefficients,
     )
+
+
+def _support_items(support):
+    """An entry per rule."""
+    rows, columns = np.tril_indices(support.center.shape[1])
+    return [
+        {"share": share, "radius": radius, "center": center, "factor": factor}
+        for share, radius, center, factor in zip(
+            support.share.tolist(),
+            support.radius.tolist(),
+            support.center.tolist(),
+            support.factor[:, rows, columns].tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _support(items, n_rules, n_inputs):
+    """The support of the rules, out of an entry for each."""
+    n_factor = n_inputs * (n_inputs + 1) // 2
+    shares, radii, centers, factors = [], [], [], []
+    if len(_list(items, "support")) != n_rules:
+        raise ValueError(f"support has {len(items)} entries; the model has {n_rules} rules.")
+    for r, item in enumerate(items):
+        where = f"support[{r}]"
+        *numbers, middle, triangle = _members(item, ["share", "radius", "center", "factor"], where)
+        share, radius = (_number(number, where) for number in numbers)
+        if not 0.0 <= share <= 1.0 or radius < 0.0:
+            raise ValueError(f'"share" of {where} must be from 0 to 1, "radius" not negative.')
+        if len(_list(middle, where)) != n_inputs or len(_list(triangle, where)) != n_factor:
+            raise ValueError(
+                f'"center" and "factor" of {where} must be lists of {n_inputs} and {n_factor} '
+                "numbers."
+            )
+        shares.append(share)
+        radii.append(radius)
+        centers.append([_number(number, where) for number in middle])
+        factors.append([_number(number, where) for number in triangle])
+    # Asked for now that the file has shown to be as large.
+    factor = np.zeros((n_rules, n_inputs, n_inputs))
+    factor[:, *np.tril_indices(n_inputs)] = factors
+    return RuleSupport(np.array(shares), np.array(centers), factor, np.array(radii))
 
 
 def _rule_base(kind, groups, table):

@@ -26,8 +26,8 @@ def register_onnx_converter():
 
     After one call, ``skl2onnx.to_onnx`` and ``skl2onnx.convert_sklearn`` know the estimator. Inputs
     of type double give a graph in double precision, all others one in single precision. The policy
-    ``out_of_bounds`` becomes part of the graph; "raise" cannot, and is refused with a ValueError. A
-    row with an infinite number or none gives NaN.
+    ``out_of_bounds`` becomes part of the graph, with ``max_extrapolation``; "raise" cannot, and is
+    refused with a ValueError. A row with an infinite number or none gives NaN.
 
     Returns
     -------
@@ -85,7 +85,9 @@ def _convert(scope, node, container):
             f"{_OLDEST_OPSET} or newer."
         )
     estimator, given = node.raw_operator, node.inputs[0]
-    model = estimator.model_.with_out_of_bounds(estimator.out_of_bounds)
+    model = estimator.model_.with_out_of_bounds(
+        estimator.out_of_bounds, estimator.max_extrapolation
+    )
     if model.out_of_bounds == "raise":
         raise ValueError(
             "out_of_bounds='raise' has no counterpart in ONNX, where no value makes a graph fail: "
@@ -111,7 +113,11 @@ class _Formula:
         inside = x.at_least(numbers.low).at_most(numbers.high)
         # Zero, unless an input is infinite or not a number: then NaN, also for a held input.
         not_finite = (x - x).sum(keep=True)
-        way_out = x - inside if self.policy == "linear" else None
+        way_out = None
+        if self.policy == "linear":
+            way_out = x - inside
+            if numbers.reach is not None:
+                way_out = way_out.at_least(-numbers.reach).at_most(numbers.reach)
         strengths, changes = self._strengths(inside, way_out)
         by_rule = self._consequents(inside - numbers.reference)
         summed = self._weigh(strengths, by_rule)

@@ -42,8 +42,8 @@ def rules_table(estimator, *, about="origin", sort_by="rule", max_rules=None, mi
         One row per rule, labelled by its number, with two levels of columns. ``"if"``: the term on
         each input that rules look at, missing where the rule does not. ``"data"``: "weight", the
         part of the weight of the training data on which the rule fires, and "rows", the number of
-        distinct training rows on which it is the strongest. ``"then y"``, for each output by its
-        name: the "constant", and the slope by each input.
+        training rows, by their weight, on which it is the strongest. ``"then y"``, for each output
+        by its name: the "constant", and the slope by each input.
 
     Raises
     ------
@@ -167,7 +167,8 @@ def explain(estimator, X, *, min_strength=0.0):
 
         A row outside the training range is explained at the nearest point in it. With
         ``out_of_bounds="linear"``, a line "beyond x" for each input that is outside has the way to
-        the row: its "value" is the slope there, its "contribution" the slope times the distance.
+        the row: its "value" is the slope there, its "contribution" the slope times the distance, or
+        times ``max_extrapolation`` standard deviations where that is less.
         With "nan" the values and contributions of such rows are missing.
 
     Raises
@@ -205,7 +206,7 @@ def explain(estimator, X, *, min_strength=0.0):
         values[~inside] = np.nan
     lines = [_rule_lines(model, strengths, values, min_strength)]
     if model.out_of_bounds == "linear" and not inside.all():
-        lines.append(_lines_beyond(model, rows - nearest, model.gradient(nearest)))
+        lines.append(_lines_beyond(model, model.way_out(rows), model.gradient(nearest)))
     table = pd.concat(lines).sort_values(["row", "output", "place"], kind="stable")
     table["output"] = np.array(model.output_names, dtype=object)[table["output"]]
     table["rule"] = table["rule"].astype("Int64")

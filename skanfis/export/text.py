@@ -55,7 +55,7 @@ def export_text(
         of ``consequents_``.
     sort_by : {"weight", "rows", "rule"}, default="weight"
         "weight": rules that fire on more of the training data come first; "rows": by the number of
-        distinct rows on which they are the strongest; "rule": as they are numbered.
+        rows on which they are the strongest; "rule": as they are numbered.
     max_rules : int, default=None
         Write no more rules than this; None is all. A last line says what was left out.
     min_weight : float, default=0.0
@@ -73,8 +73,8 @@ def export_text(
     -------
     text : str
         Rules by their number, from 0, as in ``rules_`` and ``consequents_``; with the part of the
-        weight of the training data on which each fires, and the number of distinct training rows on
-        which it is the strongest; these two are left out where a model that was read from a file
+        weight of the training data on which each fires, and the number of training rows on which it
+        is the strongest; these two are left out where a model that was read from a file
         knows of no data.
 
     Raises
@@ -107,7 +107,7 @@ def export_text(
       hours, trained from 0 to 10
         low:  gaussian, center 0, width 4.95
         high: gaussian, center 10, width 4.95
-    Outside these ranges: out_of_bounds='clip'.
+    Outside these ranges: out_of_bounds='linear', max_extrapolation=...
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))
@@ -221,5 +221,5 @@ def _legend(model, precision):
         lines += [
             f"    {term['name'] + ':':<{width + 1}} {term_text(term, precision)}" for term in terms
         ]
-    lines.append(f"Outside these ranges: out_of_bounds={model.out_of_bounds!r}.")
+    lines.append(f"Outside these ranges: {model.policy}.")
     return "\n".join(lines)

@@ -24,4 +24,5 @@ TRUSTED_TYPES = [
     "skanfis.membership.sigmoid.SigmoidProduct",
     "skanfis.model.TSKModel",
     "skanfis.regressor.ANFISRegressor",
+    "skanfis.support.RuleSupport",
 ]

@@ -20,7 +20,10 @@ from .compose import ResidualRegressor
 from .metrics import scale_factor
 from .physics import OpenLoopArcsineRegressor
 
-__all__ = ["Calibration", "Recipe", "calibrate"]
+__all__ = ["MAX_EXTRAPOLATION", "Calibration", "Recipe", "calibrate"]
+
+# That of the estimator.
+MAX_EXTRAPOLATION = ANFISRegressor().max_extrapolation
 
 # For comparing structures; what neighbours in time say twice is left out.
 _SEARCH_ROWS = 6_000
@@ -40,7 +43,8 @@ class Recipe:
     output_unit: str = "deg/s"
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
-    outside: str = "clip"
+    outside: str = "linear"
+    max_extrapolation: float = MAX_EXTRAPOLATION
     time_constant: float = 30.0
     min_coverage: float = 0.1
     max_rules: int = 36
@@ -129,6 +133,7 @@ def make_estimator(recipe, choice):
     anfis = ANFISRegressor(
         "auto" if terms is None else list(terms),
         out_of_bounds=recipe.outside,
+        max_extrapolation=recipe.max_extrapolation,
         warn_out_of_bounds=False,
         n_jobs=recipe.n_jobs,
     )

@@ -4,6 +4,7 @@ import argparse
 import math
 from pathlib import Path
 
+from ._calibration import MAX_EXTRAPOLATION
 from ._split import KINDS
 from ._units import units_of
 from .compensator import INPUTS
@@ -119,9 +120,18 @@ def make_parser():
     model.add_argument(
         "--outside",
         choices=("clip", "linear", "nan"),
-        default="clip",
+        default="linear",
         help="policy for rows outside the range of the calibration, which are flagged in any case: "
-        "hold the edge value (clip, default), go on linearly, or give no rate (nan)",
+        "hold the edge value (clip), go on along the tangent for a limited way (linear, default), "
+        "or give no rate (nan)",
+    )
+    model.add_argument(
+        "--max-extrapolation",
+        type=_extent,
+        default=MAX_EXTRAPOLATION,
+        metavar="SD",
+        help="how far the rules follow the tangent beyond the range of an input, in its standard "
+        f"deviations; inf for without end ({MAX_EXTRAPOLATION:g})",
     )
     model.add_argument(
         "--min-coverage",
@@ -193,6 +203,10 @@ def _terms(text):
 
 def _positive(text):
     return _number(text, float, lambda value: 0 < value < math.inf, "a positive number")
+
+
+def _extent(text):
+    return _number(text, float, lambda value: value >= 0, "a number, zero or positive, or inf")
 
 
 def _count(text):

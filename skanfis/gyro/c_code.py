@@ -19,7 +19,7 @@ from ..export.c import CCode
 from ..export.c._cost import cost
 from ..export.c._dialect import Dialect
 from ..export.c._files import check_arguments, write_files
-from ..export.c._header import BITS, POLICIES, header_of
+from ..export.c._header import BITS, coverage_line, header_of, policy_line
 from ..export.c._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c._source import FINITE_INPUT, Source, index_type, rejection
 from ..export.c._text import LONGEST_NAME, comment, literals
@@ -133,7 +133,8 @@ def export_c_physics(
 
     The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from
     one row of raw inputs, and a status, as :func:`skanfis.export.export_c` does it for rules alone:
-    constant tables, no heap, no state, no recursion. It takes ``asin`` besides ``exp`` and ``log``.
+    constant tables, no heap, no state, no recursion. It takes ``asin`` besides ``exp``,
+    ``log`` and, for the coverage, ``sqrt``.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def export_c_physics(
             "One of base and residual has out_of_bounds='nan', the other 'raise': one C function "
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
-    if not rules.model.rule_rows.any():
+    if rules.model.support is None:
         min_coverage = None
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(rules.model, dialect.dtype)
@@ -373,6 +374,7 @@ def _header(composition, dialect, price, min_coverage):
         f"Per evaluation in range: an arcsine, {price.exponentials} exponentials, "
         f"{price.logarithms} logarithms, {price.multiply_adds} multiply-adds, {price.divisions} "
         "divisions.",
+        *coverage_line(price),
         f"Memory: {price.table_bytes} bytes of tables, {price.stack_bytes} of arrays on the stack.",
         "",
         "Inputs x, and their range in the training data:",
@@ -384,7 +386,7 @@ def _header(composition, dialect, price, min_coverage):
         "  [0] rate, in the unit of the training data",
         "",
         f"Beyond a phase of {law.max_phase:g} rad {_PAST_PHASE[law.out_of_bounds]}.",
-        f"Of the rules alone: a row outside their range {POLICIES[model.out_of_bounds]}.",
+        policy_line(model, "Of the rules alone: outside their range"),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
     if min_coverage is not None:

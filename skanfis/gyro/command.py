@@ -97,6 +97,7 @@ def _calibrate(options, tell):
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
+        max_extrapolation=options.max_extrapolation,
         time_constant=options.time_constant,
         min_coverage=options.min_coverage,
         max_rules=options.max_rules,

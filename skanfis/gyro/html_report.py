@@ -6,6 +6,7 @@ import sklearn
 
 from .. import __version__
 from ..export import export_text
+from ..export._reading import policy_in_words
 from ._html import Page
 from ._law_text import law_text
 from ._pictures import PICTURES, draw_coverage, draw_memberships, why_no_allan
@@ -19,11 +20,6 @@ __all__ = ["report_page", "rules_text"]
 _COUNTS = ("rows", "rows_refused", "rows_outside")
 _MOST_GROUPS = 40
 _UNITS = {"time": "s", "temperature": "°C", "temperature_rate": "°C/s"}
-_POLICIES = {
-    "clip": "the value at the edge is held",
-    "linear": "the model goes on linearly",
-    "nan": "no rate is given",
-}
 _SIGNS = (("degC", "°C"), ("deg", "°"), ("sqrt(h)", "√h"))
 
 
@@ -191,12 +187,15 @@ def _pictures(page, results):
 
 def _limits(page, results):
     calibration = results.calibration
-    compensator = calibration.compensator
+    compensator, recipe = calibration.compensator, calibration.recipe
     page.section("Where it may be used")
+    policy = "no rate is given"
+    if recipe.outside != "nan":
+        policy = policy_in_words(recipe.outside, recipe.max_extrapolation)
     page.paragraph(
-        f"Outside the ranges below, input by input, a row is flagged (status 1) and "
-        f"{_POLICIES[calibration.recipe.outside]}. Inside them, rows near which there are hardly "
-        f"any data (coverage below {compensator.min_coverage:g}) are flagged too (status 4)."
+        f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
+        "Inside them, rows near which there are hardly any data "
+        f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4)."
     )
     page.paragraph("The C code that --c writes flags the same rows with the same numbers.")
     low, high = calibration.X.min(), calibration.X.max()

@@ -96,7 +96,7 @@ def terms_text(model, rule, inputs):
 
 def coverage_if_known(model, rows):
     """How well the training data cover each row; 1 where the model knows of no data."""
-    return model.coverage(rows) if knows_data(model) else np.ones(len(rows))
+    return np.ones(len(rows)) if model.support is None else model.coverage(rows)
 
 
 def held_row(model, held):

@@ -231,5 +231,5 @@ class RuleContributionDisplay:
             self.grid, 0.0, 1.0, where=~covered, color="0.93", transform=across, zorder=0
         )
         seen = np.vstack([self.baseline + self.contributions, total])[:, covered]
-        margin = 0.1 * np.ptp(seen)
-        self.ax_.set_ylim(seen.min() - margin, seen.max() + margin)
+        if margin := 0.1 * np.ptp(seen):
+            self.ax_.set_ylim(seen.min() - margin, seen.max() + margin)

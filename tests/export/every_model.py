@@ -50,12 +50,14 @@ PARTITIONS = {
 def generate():
     """All combinations; the policies out of bounds go round among them."""
     policies = ("linear", "clip", "linear", "nan", "linear", "raise")
+    limits = (np.inf, 0.5, 0.6, 0.5, 0.2, 0.5)
     combinations = product(MEMBERSHIPS.items(), PARTITIONS.items(), (0, 1), (1, 3))
     for i, ((name, family), (kind, make), order, n_outputs) in enumerate(combinations):
-        policy = policies[i % len(policies)]
+        policy, limit = policies[i % len(policies)], limits[i % len(limits)]
         antecedent = make(np.random.default_rng(i), family)
-        label = f"{name}, {kind}, order {order}, {n_outputs} outputs, {policy}"
-        yield Case(label, name, kind, build(antecedent, order, n_outputs, out_of_bounds=policy))
+        label = f"{name}, {kind}, order {order}, {n_outputs} outputs, {policy} {limit}"
+        model = build(antecedent, order, n_outputs, out_of_bounds=policy, max_extrapolation=limit)
+        yield Case(label, name, kind, model)
 
 
 CASES = tuple(generate())

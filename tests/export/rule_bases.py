@@ -52,6 +52,8 @@ def build(antecedent, order=1, n_outputs=1, **changes):
         "rule_weights": weights,
         "rule_rows": rows,
         "input_names": NAMES,
+        "out_of_bounds": "clip",
+        "support": oracles.random_support(g, n_rules, 3).change_units(OFFSET, SCALE),
     }
     return TSKModel(**(settings | changes))
 

@@ -249,7 +249,7 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
         by_kind.setdefault(letter, {})[name] = int(size[1], 16) if len(size) > 1 else 0
     # Undefined: the functions of the library. No "d", "b", "c": nothing that could be written to.
     suffix = "f" if dtype == "float" else ""
-    assert set(by_kind["U"]) <= {f"exp{suffix}", f"log{suffix}"}
+    assert set(by_kind["U"]) <= {f"{name}{suffix}" for name in ("exp", "log", "sqrt")}
     assert set(by_kind) <= {"U", "T", "t", "r"}
     assert list(by_kind["T"]) == ["m_predict"]
     tables = {name: size for name, size in by_kind["r"].items() if name.startswith("m_")}
@@ -264,44 +264,61 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 @needs_compiler
 @pytest.mark.parametrize("case", CASES[::13], ids=lambda case: case.label)
 def test_functions_of_the_library_are_called_as_often_as_reported(case, tmp_path):
-    code = export_c(case.model.with_out_of_bounds("clip"), tmp_path / "m")
-    (tmp_path / "count.c").write_text(
-        """
-#include <stdio.h>
-#include <math.h>
-static int exponentials, logarithms;
-static double counted_exp(double u) { ++exponentials; return exp(u); }
-static double counted_log(double u) { ++logarithms; return log(u); }
-#define exp counted_exp
-#define log counted_log
-#include "m.c"
-int main(void)
-{
-    double x[M_N_INPUTS], y[M_N_OUTPUTS];
-    int i, k, most_exp = 0, most_log = 0;
-    for (k = 0; k < 100; ++k) {
-        for (i = 0; i < M_N_INPUTS; ++i) {
-            x[i] = m_low[i] + (m_high[i] - m_low[i]) * 0.01 * ((k * (7 + 6 * i)) % 100 + 0.5);
-        }
-        exponentials = logarithms = 0;
-        m_predict(x, y);
-        most_exp = exponentials > most_exp ? exponentials : most_exp;
-        most_log = logarithms > most_log ? logarithms : most_log;
-    }
-    printf("%d %d", most_exp, most_log);
-    return 0;
-}
-""",
-        encoding="ascii",
-    )
-    gcc(["-std=c99", "count.c", "-o", "count", "-lm"], tmp_path)
-    counted = [int(word) for word in run(["./count"], tmp_path).stdout.split()]
+    model = case.model.with_out_of_bounds("clip")
+    code = export_c(model, tmp_path / "m", min_coverage=None)
+    assert counted_calls(tmp_path)[2] == 0
+    counted = counted_calls(tmp_path)[:2]
     reported = [code.cost.exponentials, code.cost.logarithms]
     if any(name in case.label for name in ("triang", "trapez", "_shaped")):
         # No term needs its exponential where mu is exactly zero or one.
         assert all(c <= r for c, r in zip(counted, reported, strict=True))
     else:
         assert counted == reported
+    # Coverage that cannot be reached asks every rule that has data.
+    cost = export_c(model, tmp_path / "m", min_coverage=1.0).cost
+    exponentials, _, roots = counted_calls(tmp_path)
+    assert cost.coverage_exponentials == cost.coverage_square_roots
+    assert cost.coverage_square_roots == 1 + np.count_nonzero(model.support.share)
+    assert 0 < roots <= cost.coverage_square_roots
+    assert exponentials == counted[0] + roots or counted != reported
+
+
+def counted_calls(folder):
+    """The most calls of exp, log and sqrt by m_predict over rows in the box."""
+    (folder / "count.c").write_text(
+        """
+#include <stdio.h>
+#include <math.h>
+static int exponentials, logarithms, roots;
+static double counted_exp(double u) { ++exponentials; return exp(u); }
+static double counted_log(double u) { ++logarithms; return log(u); }
+static double counted_sqrt(double u) { ++roots; return sqrt(u); }
+#define sqrt counted_sqrt
+#define exp counted_exp
+#define log counted_log
+#include "m.c"
+int main(void)
+{
+    double x[M_N_INPUTS], y[M_N_OUTPUTS];
+    int i, k, most_exp = 0, most_log = 0, most_roots = 0;
+    for (k = 0; k < 100; ++k) {
+        for (i = 0; i < M_N_INPUTS; ++i) {
+            x[i] = m_low[i] + (m_high[i] - m_low[i]) * 0.01 * ((k * (7 + 6 * i)) % 100 + 0.5);
+        }
+        exponentials = logarithms = roots = 0;
+        m_predict(x, y);
+        most_exp = exponentials > most_exp ? exponentials : most_exp;
+        most_log = logarithms > most_log ? logarithms : most_log;
+        most_roots = roots > most_roots ? roots : most_roots;
+    }
+    printf("%d %d %d", most_exp, most_log, most_roots);
+    return 0;
+}
+""",
+        encoding="ascii",
+    )
+    gcc(["-std=c99", "count.c", "-o", "count", "-lm"], folder)
+    return [int(word) for word in run(["./count"], folder).stdout.split()]
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
@@ -323,9 +340,13 @@ def test_grid_takes_an_exponential_per_term():
     cost = export_c(model, name="m").cost
     assert cost.exponentials == 12
     assert cost.logarithms == 0
-    # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value, support.
-    assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3) + 36 * (model.model_.rule_rows < 3).any()
+    # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value.
+    assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3)
     assert cost.divisions == 2
+    # Two standard deviations; per rule three entries of a factor, two squares, and five more.
+    known = 1 + np.count_nonzero(model.model_.support.share)
+    assert cost.coverage_multiply_adds == 2 + known * (3 + 2 + 5)
+    assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
 
 
 @needs_compiler
@@ -455,9 +476,43 @@ def test_example_runs(capsys):
     assert "self-test: passed" in capsys.readouterr().out
 
 
+def test_limit_of_zero_is_clip_and_the_header_says_the_limit():
+    model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
+    for limit, words in [
+        (0.0, "Outside this range the value at the edge is held."),
+        (0.25, "up to 0.25 of its standard deviations, and holds the"),
+        (np.inf, "Outside this range the model goes on along its tangent."),
+    ]:
+        code = export_c(model.with_out_of_bounds("linear", limit), name="m")
+        assert words in " ".join(code.header.replace("*", "").split())
+        assert ("m_tangent" in code.source) is (limit > 0.0)
+        assert ("m_reach" in code.source) is (limit == 0.25)
+
+
+@needs_compiler
+@pytest.mark.parametrize("dtype", ["double", "float"])
+@pytest.mark.parametrize("min_coverage", [0.05, 0.5, 0.95])
+def test_rows_on_a_thin_diagonal_are_covered_and_its_corners_are_not(dtype, min_coverage, tmp_path):
+    g = np.random.default_rng(0)
+    along = g.uniform(-1.0, 1.0, 600)
+    X = np.column_stack([along, along + 0.02 * g.normal(size=600)]) * [1e3, 1e-3] + [5e5, 0.0]
+    estimator = ANFISRegressor(n_mfs=[3, 1]).fit(X, np.sin(3.0 * along))
+    Z = around(X, np.float32 if dtype == "float" else np.float64)
+    Z = np.vstack([Z, X.astype(Z.dtype)])
+    code = export_c(estimator, name="m", dtype=dtype, min_coverage=min_coverage)
+    _, status = answers_of(code, Z, tmp_path)
+    coverage = estimator.coverage(Z.astype(float))
+    sure = np.abs(coverage - min_coverage) > 1e-3
+    uncovered = (status & BITS["UNCOVERED"]) > 0
+    np.testing.assert_array_equal(uncovered[sure], (coverage < min_coverage)[sure])
+    # Where rules share a row, one with little say may have it beyond its own.
+    assert uncovered[-600:].mean() < (0.2 if min_coverage > 0.9 else 1e-9)
+    assert uncovered[:-600].mean() > 0.3
+
+
 def test_rules_that_have_seen_no_data_are_not_called_uncovered():
     model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
-    unseen = replace(model, rule_rows=np.zeros(model.n_rules))
+    unseen = replace(model, support=None)
     assert "support" not in export_c(unseen, name="m").source
     assert "|= M_UNCOVERED" not in export_c(unseen, name="m").source
     assert "|= M_UNCOVERED" in export_c(model, name="m").source

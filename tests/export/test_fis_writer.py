@@ -133,8 +133,9 @@ def test_range_of_the_output_holds_it(model):
 
 @pytest.mark.parametrize("policy", OUT_OF_BOUNDS)
 def test_says_the_policy_that_the_format_cannot(policy):
-    text = export_fis(replace(A_GRID, out_of_bounds=policy))
+    text = export_fis(replace(A_GRID, out_of_bounds=policy, max_extrapolation=0.25))
     assert (f"out_of_bounds={policy!r}" in text) is (policy != "clip")
+    assert ("max_extrapolation=0.25" in text) is (policy == "linear")
     assert parse_fis(text).out_of_bounds == "clip"
 
 

@@ -117,7 +117,9 @@ def test_scale_of_the_target_is_folded(kind):
     assert_same_predictions(both, around(X), 1e4)
     only_target = make_pipeline(
         MaxAbsScaler(),
-        TransformedTargetRegressor(regressor(**KINDS[kind]), transformer=RobustScaler()),
+        TransformedTargetRegressor(
+            regressor(**KINDS[kind], out_of_bounds=policy), transformer=RobustScaler()
+        ),
     ).fit(X, y[:, 0])
     assert_same_predictions(only_target, around(X), 10.0)
     neither = TransformedTargetRegressor(inner).fit(X, y)
@@ -250,8 +252,9 @@ def test_scattered_terms_are_named_by_where_they_stand_in_raw_units():
 def test_policy_is_the_one_set_last():
     X, y = data()
     pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(X, y)
-    pipe.set_params(anfisregressor__out_of_bounds="linear")
-    assert fold(pipe).out_of_bounds == "linear"
+    pipe.set_params(anfisregressor__out_of_bounds="nan", anfisregressor__max_extrapolation=2)
+    assert fold(pipe).out_of_bounds == "nan"
+    assert fold(pipe).max_extrapolation == 2.0
 
 
 def test_a_model_is_its_own_folding():

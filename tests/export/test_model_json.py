@@ -14,6 +14,7 @@ from skanfis.export import export_json, read_json, write_json
 from skanfis.export.model_json import parse_json
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import OUT_OF_BOUNDS, TSKModel
+from skanfis.support import RuleSupport
 
 from .. import oracles
 from .rule_bases import MODELS, build, rows_of
@@ -40,6 +41,9 @@ def assert_same(read, model):
             for group, read_group in zip(ours.groups, theirs.groups, strict=True):
                 assert read_group.family is group.family
                 assert_array_equal(read_group.inputs, group.inputs)
+        elif field.name == "support" and ours is not None:
+            for part in fields(RuleSupport):
+                assert_array_equal(getattr(theirs, part.name), getattr(ours, part.name))
         else:
             assert_array_equal(theirs, ours)
 
@@ -50,6 +54,7 @@ def test_comes_back_to_the_last_bit(model):
     assert_same(read, model)
     rows = rows_of(model, 1.3)
     assert_array_equal(read.predict(rows), model.predict(rows))
+    assert_array_equal(read.coverage(rows), model.coverage(rows))
 
 
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
@@ -61,6 +66,19 @@ def test_every_family_comes_back(family, rng):
 @pytest.mark.parametrize("policy", OUT_OF_BOUNDS)
 def test_policy_comes_back(policy):
     assert parse_json(export_json(replace(A_GRID, out_of_bounds=policy))).out_of_bounds == policy
+
+
+@pytest.mark.parametrize("limit", [0.0, 0.1, 3.0, np.inf])
+def test_limit_of_the_tangent_comes_back(limit):
+    model = A_GRID.with_out_of_bounds("linear", limit)
+    assert parse_json(export_json(model)).max_extrapolation == limit
+
+
+def test_a_model_that_knows_of_no_data_stays_one():
+    model = replace(A_GRID, support=None)
+    read = parse_json(export_json(model))
+    assert read.support is None
+    assert_array_equal(read.coverage(rows_of(model, 1.0)), 0.0)
 
 
 def test_names_of_all_kinds_come_back():
@@ -85,8 +103,9 @@ def test_a_person_can_read_it():
     assert re.search(
         r'^    \{"name": "low", "input": 0, "function": "gaussian", "center": ', text, re.M
     )
-    # One line per input, output, term and rule; eight keys, the ends of four lists, two braces.
-    assert text.count("\n") == 3 + 2 + 7 + 12 + 8 + 4 + 2
+    # One line per input, output, term, rule and its support; ten keys, the ends of five lists, two
+    # braces.
+    assert text.count("\n") == 3 + 2 + 7 + 12 + 12 + 10 + 5 + 2
 
 
 def test_later_version_says_so():
@@ -121,7 +140,19 @@ REFUSED = [
     (_set("inputs", {}), "inputs: .* is not a list"),
     (_set("inputs", 0, []), r"inputs\[0\] is \[\], not an object"),
     (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),
-    (_set("inputs", 0, "spread", -1), r"inputs\[0\]: .* spread is negative"),
+    (_set("inputs", 0, "spread", -1), r"inputs\[0\]: .* spread is not positive"),
+    (_set("inputs", 0, "spread", 0), r"inputs\[0\]: .* spread is not positive"),
+    (_set("max_extrapolation", -1), "max_extrapolation must not be negative"),
+    (_set("max_extrapolation", "inf"), "max_extrapolation: 'inf' is not a number"),
+    (lambda d: d.pop("max_extrapolation"), "the file has no 'max_extrapolation'"),
+    (_set("support", []), "support: .* is not a list of 1 or more"),
+    (lambda d: d["support"].pop(), "support has 11 entries; the model has 12 rules"),
+    (_set("support", 2, "share", 1.5), r'"share" of support\[2\] must be from 0 to 1'),
+    (_set("support", 2, "radius", -0.1), r'support\[2\] must be from 0 to 1, "radius" not neg'),
+    (_set("support", 0, "center", [0.0]), "must be lists of 3 and 6 numbers"),
+    (_set("support", 0, "factor", [0.0] * 9), "must be lists of 3 and 6 numbers"),
+    (_set("support", 0, "factor", ["0"] * 6), "'0' is not a number"),
+    (_set("support", 0, "more", 1), r"support\[0\] has the unknown key"),
     (_set("inputs", 0, "name", None), "None is not a name"),
     (_set("inputs", 0, "reference", "0"), "'0' is not a number"),
     (_set("inputs", 0, "reference", 1e60), "not a number of size up to 1e"),

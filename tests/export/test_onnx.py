@@ -34,7 +34,11 @@ def _converter():
 
 def holding(model):
     """A fitted regressor with this model in it."""
-    estimator = ANFISRegressor(out_of_bounds=model.out_of_bounds, warn_out_of_bounds=False)
+    estimator = ANFISRegressor(
+        out_of_bounds=model.out_of_bounds,
+        max_extrapolation=model.max_extrapolation,
+        warn_out_of_bounds=False,
+    )
     g = np.random.default_rng(0)
     y = g.normal(size=(20, model.n_outputs))
     estimator.set_params(n_mfs=1).fit(g.normal(size=(20, model.n_inputs)), y.squeeze())
@@ -141,10 +145,14 @@ def test_policy_is_that_of_the_estimator_at_conversion():
     X, y = surface()
     estimator = ANFISRegressor(n_mfs=2, warn_out_of_bounds=False).fit(X, y)
     Z = X.max(axis=0, keepdims=True) * 1.5
+    estimator.set_params(out_of_bounds="clip")
     held = answers(estimator, Z)
     estimator.set_params(out_of_bounds="linear")
-    assert abs(answers(estimator, Z)[0, 0] - held[0, 0]) > 0.1
-    np.testing.assert_allclose(answers(estimator, Z)[:, 0], estimator.predict(Z))
+    for limit in (0.0, 0.3, np.inf):
+        estimator.set_params(max_extrapolation=limit)
+        way = abs(answers(estimator, Z)[0, 0] - held[0, 0])
+        assert (way > 0.02) == (limit > 0.0)
+        np.testing.assert_allclose(answers(estimator, Z)[:, 0], estimator.predict(Z))
 
 
 def test_whole_numbers_are_taken():

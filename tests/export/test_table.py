@@ -101,7 +101,7 @@ def test_a_pipeline_is_told_in_raw_units():
 @pytest.mark.parametrize("min_strength", [0.0, 0.1])
 @ALL
 def test_contributions_add_up_to_the_prediction(model, policy, min_strength):
-    model = model.with_out_of_bounds(policy)
+    model = model.with_out_of_bounds(policy, 0.5)
     rows = np.vstack([rows_of(model, 1.0, 10), rows_of(model, 2.0, 30)])
     inside = model.in_bounds(rows)
     assert 0 < inside.sum() < len(rows)
@@ -139,7 +139,7 @@ def test_rules_come_by_falling_strength_and_the_weak_in_one_line():
 
 
 def test_the_way_beyond_the_box_is_told_by_input():
-    model = A_GRID.with_out_of_bounds("linear")
+    model = A_GRID.with_out_of_bounds("linear", np.inf)
     row = (model.minimum + model.maximum) / 2
     row[0], row[2] = model.maximum[0] + 100.0, model.minimum[2] - 0.001
     table = explain(model, row[None])
@@ -150,6 +150,9 @@ def test_the_way_beyond_the_box_is_told_by_input():
         slope = model.gradient(nearest[None])[0, j, 0]
         assert beyond.loc[f"beyond {name}", "value"] == pytest.approx(slope, rel=1e-12)
         assert beyond.loc[f"beyond {name}", "contribution"] == pytest.approx(distance * slope)
+    held = explain(model.with_out_of_bounds("linear", 0.01), row[None]).set_index("if")
+    of_time = held.loc["beyond time"]
+    assert of_time["contribution"] == pytest.approx(of_time["value"] * 0.01 * model.spread[0])
 
 
 def test_raise_raises_as_predict_does():

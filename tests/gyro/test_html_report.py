@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro._calibration import Recipe, calibrate
+from skanfis.gyro._calibration import MAX_EXTRAPOLATION, Recipe, calibrate
 from skanfis.gyro._html import Page
 from skanfis.gyro._split import choose_split
 from skanfis.gyro.html_report import report_page, rules_text
@@ -145,7 +145,7 @@ def test_physics_shows_its_law(has_time):
     law = calibration.compensator.estimator.base_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
-    assert "the model goes on linearly" in text
+    assert f"along its tangent, for each input up to {MAX_EXTRAPOLATION:g} of its standard" in text
     if has_time:
         assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
         # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.

@@ -43,6 +43,7 @@ def test_a_model_without_data_is_not_said_to_lack_them():
         A_GRID,
         rule_weights=np.full(12, 1 / 12),
         rule_rows=np.zeros(12),
+        support=None,
         reference=np.zeros(3),
     )
     surface = ResponseSurfaceDisplay.from_estimator(model, grid_resolution=5)

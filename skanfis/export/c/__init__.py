@@ -48,8 +48,8 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
 
     The function ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row
     of raw inputs and returns a status. It uses constant tables and the functions ``exp`` and
-    ``log`` alone: no heap, no state, no recursion, loops of fixed length. Scalers of a pipeline are
-    folded in.
+    ``log``, and for the coverage ``sqrt``: no heap, no state, no recursion, loops of bounded
+    length. Scalers of a pipeline are folded in.
 
     Parameters
     ----------
@@ -70,8 +70,9 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
         processors; it does without ``expf``.
     min_coverage : float or None, default=0.1
         Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
-        leaves that out of status and code. It is left out too where the rules have never seen data,
-        as those read from a .fis file.
+        leaves that out of status, code and tables, most of which it may take: the support of a rule
+        is 2 + n + n (n + 1) / 2 numbers for n inputs. It is left out too where the rules have never
+        seen data, as those read from a .fis file.
 
     Returns
     -------
@@ -89,9 +90,10 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
     The status is a sum of bits: ``NAME_OUT_OF_RANGE`` (1), ``NAME_NOT_FINITE`` (2),
     ``NAME_UNCOVERED`` (4), ``NAME_NO_OUTPUT`` (8); zero says that all is well. A row outside the
     range of the training data is answered by ``out_of_bounds`` of the estimator. "clip" and
-    "linear" give an answer. "raise" leaves y as it is, so that a controller which keeps y holds its
-    last value. "nan" writes NaN, or in C89, which has none, leaves y as it is. A row that is not
-    finite gets no answer under any policy.
+    "linear" give an answer, the latter within ``max_extrapolation`` of the estimator. "raise"
+    leaves y as it is, so that a controller which keeps y holds its last value. "nan" writes NaN, or
+    in C89, which has none, leaves y as it is. A row that is not finite gets no answer under any
+    policy.
 
     With the macro ``NAME_SELF_TEST`` defined, ``int NAME_self_test(void)`` compares the function
     with what Python predicts, and returns zero if all is well; with ``NAME_SELF_TEST_MAIN`` too,
@@ -107,11 +109,11 @@ def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_
     >>> "int sinc_predict(const float x[SINC_N_INPUTS], float y[SINC_N_OUTPUTS]);" in code.header
     True
     >>> code.cost.exponentials, code.cost.multiply_adds
-    (8, 104)
+    (8, 88)
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
     model = fold(estimator)
-    if not model.rule_rows.any():
+    if model.support is None:
         # Rules that come from elsewhere: no data to be near to or far from.
         min_coverage = None
     dialect = Dialect(name, dtype, std)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ._families import BODIES
 from ._source import index_type
 
@@ -18,7 +20,7 @@ class CCost:
     Parameters
     ----------
     exponentials : int
-        Calls of ``exp``, at most.
+        Calls of ``exp``, at most, coverage aside.
     logarithms : int
         Calls of ``log``, at most; zero for Gaussians.
     multiply_adds : int
@@ -28,6 +30,10 @@ class CCost:
         Constant tables, which may lie in read-only memory.
     stack_bytes : int
         Arrays on the stack.
+    coverage_exponentials, coverage_square_roots, coverage_multiply_adds : int
+        What the judgement of the coverage takes besides, at most. Where the strongest rule alone
+        covers the row, which is nearly everywhere amid data, it is one quadratic form, without
+        exponential or root. Zero with ``min_coverage=None``.
 
     Examples
     --------
@@ -45,6 +51,9 @@ class CCost:
     divisions: int
     table_bytes: int
     stack_bytes: int
+    coverage_exponentials: int = 0
+    coverage_square_roots: int = 0
+    coverage_multiply_adds: int = 0
 
 
 def cost(numbers, code):
@@ -67,19 +76,33 @@ def cost(numbers, code):
         multiply_adds += n_products
     exponentials += n_shares
     multiply_adds += n_shares + n_rules * n_outputs * n_basis
-    multiply_adds += n_rules * code.weighs_support
+    asked, of_coverage = 0, 0
+    if code.judges_coverage:
+        # The strongest, then all that have data.
+        asked = 1 + int(np.count_nonzero(numbers.support[:, 0]))
+        n_inputs = numbers.n_inputs
+        # The factor's triangle, its square, share and strength; and the row in standard deviations.
+        of_coverage = n_inputs + asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5)
     return CCost(
-        exponentials, logarithms, multiply_adds, divisions, table_bytes(numbers, code), stack(code)
+        exponentials,
+        logarithms,
+        multiply_adds,
+        divisions,
+        table_bytes(numbers, code),
+        stack(code),
+        asked,
+        asked,
+        of_coverage,
     )
 
 
 def table_bytes(numbers, code):
     """Of all constant tables, with the widths of types that nearly every machine has."""
     real = [numbers.low, numbers.high, numbers.offset, numbers.coefficients]
-    real += [numbers.reference] if code.has_slopes else []
+    real += [numbers.reference] if code.has_slopes or code.judges_coverage else []
     real += [terms.constants for terms in numbers.terms]
-    real += [numbers.inverse_spread] if code.measures_distance else []
-    real += [numbers.support] if code.weighs_support else []
+    real += [numbers.inverse_spread, numbers.support] if code.judges_coverage else []
+    real += [numbers.reach] if code.has_limit else []
     positions = [numbers.term_inputs] if numbers.n_terms else []
     positions += [] if numbers.rule_terms is None else [numbers.rule_terms]
     positions += [numbers.slope_inputs] if code.selects_slopes else []
@@ -91,7 +114,8 @@ def table_bytes(numbers, code):
 def stack(code):
     """Of the arrays of the main function, and of the one that it may call."""
     numbers = code.numbers
-    n_values = numbers.n_inputs * (1 + code.has_slopes) + numbers.n_outputs
+    n_arrays = 1 + code.has_slopes + code.judges_coverage
+    n_values = numbers.n_inputs * n_arrays + numbers.n_outputs
     n_values += code.n_logarithms if code.has_shares else 0
     n_values += 0 if code.is_grid else numbers.n_rules
     if code.is_linear:

@@ -20,8 +20,8 @@ class Dialect:
     """Turns templates into C.
 
     A number that ends in R becomes a constant of the type, ``$name`` the prefix of identifiers,
-    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG`` and ``$ASIN`` its functions,
-    ``$MAX`` its largest number; further words are given to :meth:`write`.
+    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG``, ``$SQRT`` and ``$ASIN`` its
+    functions, ``$MAX`` its largest number; further words are given to :meth:`write`.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Dialect:
             "real": self.real,
             "EXP": f"{self.name.upper()}_EXP",
             "LOG": f"{self.name.upper()}_LOG",
+            "SQRT": f"{self.name.upper()}_SQRT",
             "ASIN": f"{self.name.upper()}_ASIN",
             "MAX": "FLT_MAX" if self.real == "float" else "DBL_MAX",
             **words,
@@ -59,7 +60,7 @@ class Dialect:
     def functions(self):
         """Macros for the functions of <math.h>; C89 has them for double alone."""
         lines = []
-        for function in ("exp", "log", "asin"):
+        for function in ("exp", "log", "sqrt", "asin"):
             macro = f"#define {self.name.upper()}_{function.upper()}(u)"
             if self.real == "double":
                 lines.append(f"{macro} {function}(u)")

@@ -2,17 +2,16 @@
 
 import textwrap
 
+from .._reading import policy_in_words
 from ._text import comment
 
-__all__ = ["BITS", "POLICIES", "header", "header_of"]
+__all__ = ["BITS", "coverage_line", "header", "header_of", "policy_line"]
 
 BITS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
-POLICIES = {
-    "clip": "is answered as the nearest row in the box",
-    "linear": "is answered by value and slope at the nearest row in the box",
-    "raise": "gets no output: y stays as it is",
-    "nan": "gets no output: y becomes NaN, or stays as it is where C has no NaN",
+_SILENT = {
+    "raise": "there is no output: y stays as it is",
+    "nan": "there is no output: y becomes NaN, or stays as it is where C has no NaN",
 }
 
 _CODE = """/*
@@ -62,6 +61,7 @@ def header(model, numbers, dialect, cost, min_coverage):
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         f"Per evaluation in range: {cost.exponentials} exponentials, {cost.logarithms} logarithms, "
         f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions.",
+        *coverage_line(cost),
         f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack.",
         "",
         "Inputs x, and their range in the training data:",
@@ -70,12 +70,31 @@ def header(model, numbers, dialect, cost, min_coverage):
     lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
     lines += ["Outputs y:"]
     lines += [f"  [{k}] {comment(name)}" for k, name in enumerate(model.output_names)]
-    policy = f"A row outside this range {POLICIES[model.out_of_bounds]}."
-    lines += ["", policy, "A row that is not finite gets no output either way."]
+    lines += [
+        "",
+        policy_line(model, "Outside this range"),
+        "A row that is not finite gets no output either way.",
+    ]
     if min_coverage is not None:
         lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
     return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
+
+
+def policy_line(model, where):
+    """What is answered out of bounds."""
+    words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+    return f"{where} {_SILENT.get(model.out_of_bounds, words)}."
+
+
+def coverage_line(cost):
+    """What the coverage takes besides, where it is judged."""
+    if cost.coverage_multiply_adds:
+        yield (
+            f"Coverage takes at most {cost.coverage_exponentials} exponentials, "
+            f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
+            "multiply-adds more; where the strongest rule covers the row, a small part of them."
+        )
 
 
 def header_of(title, lines, dialect, n_inputs, n_outputs):

@@ -5,7 +5,8 @@ strengths by a softmax that subtracts the largest, consequents weighed by the st
 normalises each input alone and multiplies the shares in nested loops, so that it takes one
 exponential per term, not per rule and input. The continuation "linear" is worked out only for rows
 outside the box: it is the derivative along the way back to the box, carried forward through the
-same loops.
+same loops. Coverage takes a quadratic form per rule: the strongest rule is asked first, then the
+others, until there is enough.
 """
 
 import re
@@ -55,6 +56,36 @@ static void $name_centre($real *s, const $real *share, $int n)
         s[i] -= mean;
     }
 }
+"""
+
+_NEAR = """
+/* Of a rule in coverage: its share, falling with the distance from where its data lie. */
+static $real $name_near(const $real *u, const $real *p)
+{
+    const $real *centre = p + 2, *factor = p + 2 + $NAME_N_INPUTS;
+    $real square = 0.0R, beyond;
+    int i, k;
+    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+        $real t = 0.0R;
+        for (k = 0; k <= i; ++k) {
+            t += *factor++ * (u[k] - centre[k]);
+        }
+        square += t * t;
+    }
+    if (square <= p[1] * p[1]) {
+        return p[0];
+    }
+    beyond = $SQRT(square) - p[1];
+    return p[0] * $EXP(-0.5R * beyond * beyond);
+}
+"""
+
+_LIMIT = """
+            if (e[i] > $name_reach[i]) {
+                e[i] = $name_reach[i];
+            } else if (e[i] < -$name_reach[i]) {
+                e[i] = -$name_reach[i];
+            }
 """
 
 _REJECT_UNTOUCHED = """
@@ -127,14 +158,16 @@ def _at(array, start):
 class Source:
     """The functions and tables of a .c file, without its self-test.
 
-    ``policy`` is what to do with rows outside the box, ``min_coverage`` the coverage below which a
-    row is uncovered, or None; ``is_part`` whether the main function is for others in the same file.
+    ``policy`` is that of the model for rows outside the box, ``min_coverage`` the coverage below
+    which a row is uncovered, or None; ``is_part`` whether the main function is for others in the
+    same file.
     """
 
     def __init__(self, numbers, dialect, policy, min_coverage, *, is_part=False):
         is_constant = not numbers.n_terms and not numbers.slope_inputs.size
-        # The tangent of a constant is the constant.
-        self.policy = "clip" if is_constant and policy == "linear" else policy
+        # The tangent of a constant is the constant; one of no length is its start.
+        is_held = is_constant or (numbers.reach is not None and not numbers.reach.any())
+        self.policy = "clip" if is_held and policy == "linear" else policy
         self.numbers, self.min_coverage = numbers, min_coverage
         self.dialect = dialect
         self.linkage = "static " if is_part else ""
@@ -160,14 +193,14 @@ class Source:
         return self.min_coverage is not None and self.policy in ("clip", "linear")
 
     @property
-    def weighs_support(self):
-        """Whether coverage differs from rule to rule."""
-        return self.min_coverage is not None and self.numbers.support is not None
+    def judges_coverage(self):
+        """Whether rows can be uncovered."""
+        return self.min_coverage is not None
 
     @property
-    def judges_coverage(self):
-        """Whether any row that gets an answer can be uncovered."""
-        return self.measures_distance or self.weighs_support
+    def has_limit(self):
+        """Whether the tangent ends."""
+        return self.is_linear and self.numbers.reach is not None
 
     def text(self, include):
         """All of it; ``include`` is the name of the header."""
@@ -196,10 +229,13 @@ class Source:
     def tables(self):
         numbers, real = self.numbers, self.dialect.real
         tables = [self.table(real, "low", numbers.low), self.table(real, "high", numbers.high)]
-        if self.has_slopes:
+        if self.has_slopes or self.judges_coverage:
             tables.append(self.table(real, "reference", numbers.reference))
-        if self.measures_distance:
+        if self.judges_coverage:
             tables.append(self.table(real, "inverse_spread", numbers.inverse_spread))
+        if self.has_limit:
+            tables.append("/* How far the tangent is followed. */")
+            tables.append(self.table(real, "reach", numbers.reach))
         for k, terms in enumerate(numbers.terms):
             tables.append(self.table(real, f"terms{k}", terms.constants))
         if numbers.n_terms:
@@ -208,7 +244,8 @@ class Source:
             tables.append(self.index_table("rule_terms", numbers.rule_terms))
         if self.selects_slopes:
             tables.append(self.index_table("slope_input", numbers.slope_inputs))
-        if self.weighs_support:
+        if self.judges_coverage:
+            tables.append("/* Of each rule: share, radius, centre, rows of the factor. */")
             tables.append(self.table(real, "support", numbers.support))
         tables.append(self.table(real, "offset", numbers.offset))
         tables.append("/* Of each rule and output: a value, then a slope per input. */")
@@ -250,6 +287,8 @@ class Source:
             parts.append(self.write(_NORMALISE).lstrip())
             if self.is_linear:
                 parts.append(self.write(_CENTRE).lstrip())
+        if self.judges_coverage:
+            parts += [self.write(_NEAR).lstrip(), self.coverage()]
         if self.is_linear:
             parts.append(self.tangent())
         parts.append(self.write(rejection(self.policy, self.dialect.std)).lstrip())
@@ -276,7 +315,10 @@ class Source:
         if self.is_linear:
             lines.append(f"    $real e[{numbers.n_inputs}];")
         if self.judges_coverage:
-            lines.append(f"    $real covered = {'0.0R' if self.weighs_support else '1.0R'};")
+            lines.append(f"    $real u[{numbers.n_inputs}], top = 0.0R;")
+            lines.append(f"    {self.int} best = 0;")
+        if self.measures_distance:
+            lines.append("    $real beside = 1.0R;")
         lines += [
             "    int status = $NAME_IN_RANGE;",
             f"    $int {', '.join(self.loop_variables(tangent=False))};",
@@ -286,8 +328,8 @@ class Source:
         ]
         if self.has_slopes:
             lines.append("        z[i] = c[i] - $name_reference[i];")
-        if self.is_linear:
-            lines.append("        e[i] = x[i] - c[i];")
+        if self.judges_coverage:
+            lines.append("        u[i] = (c[i] - $name_reference[i]) * $name_inverse_spread[i];")
         lines.append("    }")
         if self.policy in ("nan", "raise"):
             lines += [
@@ -295,7 +337,7 @@ class Source:
                 "        return $NAME_REJECT(y, status);",
                 "    }",
             ]
-        lines += [*self.strengths("l", "w", ""), ""]
+        lines += [*self.strengths("l", "w", ""), "", *self.measure_distance()]
         lines += [
             "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
             "        sum[o] = 0.0R;",
@@ -306,6 +348,10 @@ class Source:
             values = [*self.places, "e", *self.shares]
             lines += [
                 "    if (status != $NAME_IN_RANGE) {",
+                "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
+                "            e[i] = x[i] - c[i];",
+                *([_LIMIT.strip("\n")] if self.has_limit else []),
+                "        }",
                 f"        $name_tangent({', '.join([*values, 'sum'])});",
                 "    }",
             ]
@@ -442,8 +488,8 @@ class Source:
 
     def add_rule(self, strength, change):
         lines = []
-        if self.weighs_support:
-            lines.append(f"covered += {strength} * $name_support[r];")
+        if self.judges_coverage:
+            lines += [f"if ({strength} > top) {{", f"    top = {strength};", "    best = r;", "}"]
         return [
             *lines,
             "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
@@ -453,26 +499,61 @@ class Source:
             "}",
         ]
 
+    def measure_distance(self):
+        if not self.measures_distance:
+            return []
+        return [
+            "    if (status != $NAME_IN_RANGE) {",
+            "        $real distance = 0.0R;",
+            "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
+            "            const $real d = (x[i] - c[i]) * $name_inverse_spread[i];",
+            "            distance += d * d;",
+            "        }",
+            "        beside = $EXP(-0.5R * distance);",
+            "    }",
+        ]
+
     def judge_coverage(self):
         if not self.judges_coverage:
             return []
-        lines = []
-        if self.measures_distance:
-            lines += [
-                "    if (status != $NAME_IN_RANGE) {",
-                "        $real distance = 0.0R;",
-                "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
-                "            const $real d = (x[i] - c[i]) * $name_inverse_spread[i];",
-                "            distance += d * d;",
-                "        }",
-                "        covered *= $EXP(-0.5R * distance);",
-                "    }",
-            ]
+        beside = "beside * " if self.measures_distance else ""
+        values = ["u", *self.shares, *(["beside"] if self.measures_distance else [])]
         return [
-            *lines,
-            f"    if (covered < {self.dialect.number(self.min_coverage)}) {{",
+            f"    if ({beside}top * $name_near(u, $name_support[best]) < {self.enough}",
+            f"        && $name_coverage({', '.join(values)}) < {self.enough}) {{",
             "        status |= $NAME_UNCOVERED;",
             "    }",
+        ]
+
+    @property
+    def enough(self):
+        """The coverage asked for, as a constant."""
+        return self.dialect.number(self.min_coverage)
+
+    def coverage(self):
+        """The sum over the rules that have data, as far as it takes to be enough."""
+        n_loops = len(self.numbers.counts or ())
+        arguments = [f"const $real *{name}" for name in ("u", *self.shares)]
+        arguments += ["$real beside"] if self.measures_distance else []
+        lines = [
+            "/* The coverage, or a part of it that is enough. */",
+            f"static $real $name_coverage({', '.join(arguments)})",
+            "{",
+            "    $real covered = 0.0R;",
+            f"    $int {', '.join(['r', *(f'i{k}' for k in range(n_loops))])};",
+            "",
+            *self.over_rules(self.add_support, tangent=False),
+            "    return covered;",
+            "}",
+        ]
+        return self.write("\n".join(lines) + "\n")
+
+    def add_support(self, strength, _):
+        beside = "beside * " if self.measures_distance else ""
+        return [
+            f"if (covered < {self.enough} && $name_support[r][0] > 0.0R) {{",
+            f"    covered += {beside}{strength} * $name_near(u, $name_support[r]);",
+            "}",
         ]
 
     # The continuation of "linear".

@@ -270,6 +270,7 @@ def _model(inputs, outputs, antecedents, consequents):
         rule_weights=np.full(n_rules, 1.0 / n_rules),
         rule_rows=np.zeros(n_rules),
         input_names=_distinct(variable.name for variable in inputs),
+        out_of_bounds="clip",
         term_names=term_names,
         output_names=_distinct(variable.name for variable in outputs),
     )

@@ -68,7 +68,8 @@ def export_fis(estimator):
     -----
     The file holds the model within the box of the training data, which is the Range of its inputs.
     What lies outside, the format cannot say: MATLAB and fuzzylite compute on, Octave refuses. Clamp
-    the inputs to the Range to have ``out_of_bounds="clip"``.
+    the inputs to the Range to have ``out_of_bounds="clip"``; a tangent
+    (``max_extrapolation``) has no counterpart there, nor has coverage.
 
     Examples
     --------
@@ -231,7 +232,7 @@ def _comments(model, input_names, output_names):
     yield f"% Sugeno system of {model.n_rules} rules, written by skanfis."
     yield "% It holds within the Range of its inputs: clamp them to it."
     if model.out_of_bounds != "clip":
-        yield f"% In skanfis, beyond it: out_of_bounds={model.out_of_bounds!r}."
+        yield f"% In skanfis, beyond it: {model.policy}."
     for kind, names, given in (
         ("Input", input_names, model.input_names),
         ("Output", output_names, model.output_names),

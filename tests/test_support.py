@@ -1,0 +1,239 @@
+"""Where the data of every rule lie, against the definitions, and what coverage makes of it."""
+
+from contextlib import nullcontext
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis import ANFISRegressor, support
+from skanfis.exceptions import ConstantInputWarning
+from skanfis.rows import Rows
+from skanfis.support import RuleSupport
+
+from . import oracles
+
+
+def brute_force(rows, antecedent, n_coefficients):
+    """Share, centre, covariance and radius of every rule; one rule and one row at a time."""
+    Z = (rows.X - rows.inputs.offset) / rows.inputs.scale
+    weight = np.ones(len(Z)) if rows.sample_weight is None else rows.sample_weight
+    strengths = antecedent.strengths(np.ascontiguousarray(Z.T))
+    strongest = strengths.argmax(axis=0)
+    found = []
+    for r in range(antecedent.n_rules):
+        own = {tuple(row) for row, best in zip(Z, strongest, strict=True) if best == r}
+        if not own:
+            found.append(None)
+            continue
+        part = strengths[r] * weight
+        center = np.average(Z, axis=0, weights=part)
+        covariance = np.cov(Z.T, aweights=part, ddof=0).reshape(Z.shape[1], -1)
+        precision = np.linalg.inv(covariance + 0.01 * np.eye(Z.shape[1]))
+        speaks = strengths[r] >= 0.5 * strengths.max(axis=0)
+        radius = max(
+            np.sqrt((z - center) @ precision @ (z - center))
+            for z, is_own in zip(Z, speaks, strict=True)
+            if is_own
+        )
+        found.append((min(1.0, len(own) / n_coefficients), center, precision, radius))
+    return found
+
+
+def table(rng, n_rows=400):
+    """Clustered, repeated and correlated rows in the units of no one."""
+    X = rng.normal(size=(n_rows, 3)) @ [[1.0, 0.9, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 1.0]]
+    X[::7] = X[0]
+    X[1::9] = np.round(X[1::9])
+    return X * [1e3, 1e-4, 1.0] + [1e6, 0.0, -3.0]
+
+
+ANTECEDENTS = {
+    "grid": lambda rng: oracles.random_grid(rng, [oracles.Gaussian] * 3, (2, 3, 2)),
+    "scattered": lambda rng: oracles.random_scattered(rng, oracles.Gaussian, 5, (0, 2)),
+    "rule table": oracles.random_table,
+}
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("n_coefficients", [1, 4, 40])
+@pytest.mark.parametrize("kind", ANTECEDENTS)
+def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng, monkeypatch):
+    X = table(rng)
+    weight = rng.uniform(0.1, 3.0, len(X)) if weighted else None
+    rows = Rows.standardised(X, X[:, :1], weight)
+    antecedent = ANTECEDENTS[kind](rng)
+    monkeypatch.setattr(support, "_BLOCK_BYTES", 1)  # 64 rows
+    found = RuleSupport.of(rows, antecedent, n_coefficients)
+    assert_array_equal(found.factor, np.tril(found.factor))
+    for r, expected in enumerate(brute_force(rows, antecedent, n_coefficients)):
+        if expected is None:
+            assert found.share[r] == found.radius[r] == 0.0
+            continue
+        share, center, precision, radius = expected
+        assert found.share[r] == share
+        assert_allclose(found.center[r], center, atol=1e-12)
+        assert_allclose(found.factor[r].T @ found.factor[r], precision, rtol=1e-8, atol=1e-8)
+        assert_allclose(found.radius[r], radius, rtol=1e-9)
+
+
+def test_whole_weights_are_repeated_rows(rng):
+    X, weight = table(rng), rng.integers(1, 5, 400)
+    antecedent = ANTECEDENTS["grid"](rng)
+    weighted = RuleSupport.of(Rows.standardised(X, X[:, :1], weight.astype(float)), antecedent, 30)
+    again = np.repeat(X, weight, axis=0)
+    repeated = RuleSupport.of(Rows.standardised(again, again[:, :1]), antecedent, 30)
+    for part in fields(RuleSupport):
+        one, other = getattr(weighted, part.name), getattr(repeated, part.name)
+        assert_allclose(one, other, rtol=1e-8, atol=1e-8)
+
+
+def test_units_change_as_inputs_do(rng):
+    found = oracles.random_support(rng, 4, 3)
+    offset, scale = np.array([1e6, 0.0, -3.0]), np.array([1e3, 1e-6, 2.0])
+    Z = rng.normal(size=(3, 50))
+    moved = found.change_units(offset, scale)
+    X = offset[:, None] + scale[:, None] * Z
+    assert_allclose(moved.by_rule(X), found.by_rule(Z), rtol=1e-6)
+
+
+@pytest.mark.parametrize("order", [[2, 0, 1], [1, 0, 2], [0, 1, 2]])
+def test_order_of_the_inputs(order, rng):
+    found, Z = oracles.random_support(rng, 4, 3), rng.normal(size=(3, 50))
+    moved = found.reordered(np.array(order))
+    assert_allclose(moved.by_rule(Z[order]), found.by_rule(Z), rtol=1e-9)
+    assert_array_equal(moved.factor, np.tril(moved.factor))
+
+
+def test_counting_holds_no_more_than_it_must(rng):
+    counter = support._DistinctInputs(3, 5)
+    for _ in range(200):
+        counter.add(rng.normal(size=(2, 64)), rng.integers(0, 2, 64))
+        assert counter._numbers.size <= 3 * 5
+    assert_array_equal(counter.counts, [5, 5, 0])
+    few = support._DistinctInputs(1, 5)
+    for _ in range(20):
+        few.add(np.array([[1.0, 2.0, 1.0]]), np.zeros(3, dtype=int))
+    assert_array_equal(few.counts, [2])
+
+
+# ----------------------------------------------------------------------------------------- coverage
+
+
+def inputs_of(kind, rng, n_rows=1500):
+    normal = rng.normal(size=(n_rows, 3))
+    return {
+        "uniform": rng.uniform(size=(n_rows, 3)),
+        "normal": normal,
+        "correlated": normal @ [[1.0, 0.9, 0.5], [0.0, 0.2, 0.5], [0.0, 0.0, 0.5]],
+        "clusters": normal * 0.3 + rng.choice([-2.0, 0.0, 3.0], (n_rows, 1)),
+        "lognormal": np.exp(0.7 * normal),
+    }[kind]
+
+
+@pytest.mark.parametrize("kind", ["uniform", "normal", "correlated", "clusters", "lognormal"])
+@pytest.mark.parametrize("n_rules", [1, 5])
+def test_training_rows_of_rules_that_have_enough_are_covered(kind, n_rules, rng):
+    X = inputs_of(kind, rng)
+    y = np.sin(X[:, 0]) + X[:, 1]
+    partition = {"n_mfs": 1} if n_rules == 1 else {"n_mfs": [n_rules, 1, 1]}
+    model = ANFISRegressor(**partition, solver="lse").fit(X, y).model_
+    if (model.support.share < 1.0).any():
+        # What rules with too few rows say is not covered; they have their part, and no more.
+        lacking = model.strengths(X) @ (1.0 - model.support.share)
+        assert (model.coverage(X) >= 0.85 * (1.0 - lacking)).all()
+        return
+    coverage = model.coverage(X)
+    # Rules with less than half of the strongest one's say may reach beyond their own rows.
+    assert coverage.min() > 0.8
+    assert np.median(coverage) > 0.98
+    if n_rules == 1:
+        assert_array_equal(coverage, 1.0)
+
+
+def thin_diagonal(rng, n_rows=500):
+    along = rng.uniform(-1.0, 1.0, n_rows)
+    return np.column_stack([along, along + 0.01 * rng.normal(size=n_rows)]) * [1e3, 1e-3] + [5e5, 0]
+
+
+@pytest.mark.parametrize("n_mfs", [1, 2])
+def test_a_corner_that_no_row_is_near_is_not_covered(n_mfs, rng):
+    X = thin_diagonal(rng)
+    model = ANFISRegressor(n_mfs=n_mfs).fit(X, X[:, 0])
+    low, high = X.min(axis=0), X.max(axis=0)
+    corners = np.array([[low[0], high[1]], [high[0], low[1]]])
+    assert model.in_bounds(corners).all()
+    assert model.coverage(corners).max() < 1e-6
+    if n_mfs == 1:
+        assert_array_equal(model.coverage(X), 1.0)
+
+
+def test_beside_a_thin_manifold_there_is_some_thickness(rng):
+    # No noise at all: without thickness the rounding of a coordinate would be beyond any distance.
+    along = rng.uniform(-1.0, 1.0, 300)
+    X = np.column_stack([along, along])
+    model = ANFISRegressor(n_mfs=1).fit(X, along)
+    beside = np.array([[0.0, 0.01], [0.0, 0.03]])
+    assert model.coverage(beside).min() > 0.95
+
+
+def test_inputs_that_repeat_are_counted_once(rng):
+    # Three places, a hundred rows each, and three coefficients; then two places.
+    places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    X = np.repeat(places, 100, axis=0)
+    y = X @ [1.0, 2.0] + 0.1 * rng.normal(size=300)
+    model = ANFISRegressor(n_mfs=1).fit(X, y)
+    assert_array_equal(model.coverage(places), 1.0)
+    with pytest.warns():
+        two = ANFISRegressor(n_mfs=1).fit(X[:200], y[:200])
+    assert_allclose(two.model_.support.share, 1.0)  # the second column never changes: P is 2
+    with pytest.warns():
+        one = ANFISRegressor(n_mfs=1).fit(np.array([[0.0, 0.0], [1.0, 1e-3]]), y[:2])
+    assert_allclose(one.model_.support.share, 2.0 / 3.0)
+
+
+def test_slopes_that_rules_may_not_have_are_not_counted(rng):
+    X = rng.normal(size=(3, 5))
+    X = np.vstack([X, X[:1]])
+    y = X[:, 0]
+    shares = {}
+    for name, settings in {
+        "all": {},
+        "two": {"consequent_features": [0, 1]},
+        "none": {"order": 0},
+    }.items():
+        with pytest.warns() if name == "all" else nullcontext():
+            shares[name] = ANFISRegressor(n_mfs=1, **settings).fit(X, y).model_.support.share[0]
+    assert shares == {"all": pytest.approx(0.5), "two": 1.0, "none": 1.0}
+
+
+def test_constant_inputs_do_not_count_as_coefficients(rng):
+    X = np.column_stack([rng.normal(size=(4, 3)), np.full(4, 7.0)])[[0, 1, 2, 3, 3]]
+    with pytest.warns(ConstantInputWarning):
+        model = ANFISRegressor(n_mfs=1).fit(X, X[:, 0]).model_
+    assert_allclose(model.support.share, 1.0)
+
+
+def test_coverage_does_not_depend_on_units_or_the_order_of_inputs(rng):
+    X = inputs_of("clusters", rng)
+    y = np.sin(X[:, 0]) + X[:, 1] * X[:, 2]
+    grid = rng.uniform(X.min(axis=0) - 1.0, X.max(axis=0) + 1.0, (500, 3))
+    settings = {"solver": "lse", "alpha": 1e-6}
+    plain = ANFISRegressor(n_mfs=[3, 2, 2], **settings).fit(X, y).coverage(grid)
+    factors, offset = np.array([1e6, 1e-6, 3.0]), np.array([1e4, -1e-4, 0.0])
+    scaled = ANFISRegressor(n_mfs=[3, 2, 2], **settings).fit(X * factors + offset, y)
+    assert_allclose(scaled.coverage(grid * factors + offset), plain, atol=1e-7)
+    order = [2, 0, 1]
+    turned = ANFISRegressor(n_mfs=[2, 3, 2], **settings).fit(X[:, order], y)
+    assert_allclose(turned.coverage(grid[:, order]), plain, atol=1e-7)
+
+
+def test_coverage_of_weights_is_that_of_repeats(rng):
+    X = inputs_of("clusters", rng, 300)
+    y, weight = np.sin(X[:, 0]), rng.integers(1, 4, 300)
+    settings = {"n_mfs": [3, 1, 2], "solver": "lse", "alpha": 1e-6}
+    weighted = ANFISRegressor(**settings).fit(X, y, weight)
+    repeated = ANFISRegressor(**settings).fit(np.repeat(X, weight, axis=0), np.repeat(y, weight))
+    grid = rng.uniform(X.min(axis=0) - 1.0, X.max(axis=0) + 1.0, (500, 3))
+    assert_allclose(weighted.coverage(grid), repeated.coverage(grid), atol=1e-7)
