@@ -9,6 +9,7 @@ from ..export import export_text
 from ._html import Page
 from ._law_text import law_text
 from ._pictures import PICTURES, draw_coverage, draw_memberships, why_no_allan
+from ._reading import readability_of
 from ._results import Results, rms, rules_of
 from ._units import SIGNALS
 from .displays._style import PER_UNIT, SYMBOL, figures
@@ -24,6 +25,14 @@ _POLICIES = {
     "linear": "the model goes on linearly",
     "nan": "no rate is given",
 }
+_FIGURES_OF_READING = {
+    "strongest_alone": "strongest rule alone, off the model, RMS [sd]",
+    "disagreement": "disagreement of the rules, RMS [sd]",
+    "greatest_sum": "greatest sum of the sizes of contributions [ranges]",
+    "rules_beyond": "rules whose value at their own center lies far beyond the range",
+    "least_truth": "truth of the least true term",
+    "greatest_crossing": "highest crossing of neighbouring terms",
+}
 _SIGNS = (("degC", "°C"), ("deg", "°"), ("sqrt(h)", "√h"))
 
 
@@ -37,6 +46,7 @@ def report_page(calibration, title):
     _pictures(page, results)
     _limits(page, results)
     _rules(page, results)
+    _reading(page, results)
     _data(page, results)
     page.footer(
         f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
@@ -224,6 +234,27 @@ def _rules(page, results):
         page.figures([picture])
     page.preformatted(rules_text(calibration), "All rules as text")
     page.preformatted(_on_board(calibration.compensator), "What to compute on board")
+
+
+def _reading(page, results):
+    found = readability_of(results.calibration)
+    page.section("Can the rules be read?")
+    page.paragraph(
+        "The model is the mean of its rules by their strengths. Whether each rule holds by itself "
+        "is measured on the rows of the log; standard deviation (sd) and range are those of what "
+        'the rules were taught. The page "What to believe of a rule" of the documentation of '
+        "skanfis says more."
+    )
+    for sentence in found.findings:
+        page.paragraph(sentence, kind="warn")
+    if not found.findings:
+        page.paragraph("Nothing measured here speaks against reading the rules one by one.")
+    lines = [
+        (_FIGURES_OF_READING[name], figures(value), found.limits.get(name, "none"))
+        for name, value in found.summary.items()
+        if np.isfinite(value)
+    ]
+    page.table(("figure", "value", "limit"), [(*line[:2], str(line[2])) for line in lines])
 
 
 def _on_board(compensator):
