@@ -250,11 +250,15 @@ def _reading(page, results):
     if not found.findings:
         page.paragraph("Nothing measured here speaks against reading the rules one by one.")
     lines = [
-        (_FIGURES_OF_READING[name], figures(value), found.limits.get(name, "none"))
+        (
+            _FIGURES_OF_READING[name],
+            f"{value:.3g}" if name == "rules_beyond" else figures(value),
+            f"{found.limits[name]:g}" if name in found.limits else "–",
+        )
         for name, value in found.summary.items()
         if np.isfinite(value)
     ]
-    page.table(("figure", "value", "limit"), [(*line[:2], str(line[2])) for line in lines])
+    page.table(("figure", "value", "limit"), lines)
 
 
 def _on_board(compensator):
