@@ -105,8 +105,7 @@ def readability(estimator, X, y=None, *, sample_weight=None):
 def _source(estimator, X, y, sample_weight):
     """The model, and the rows, checked as they are read."""
     model, reader = fold_with_reader(estimator)
-    X = X if hasattr(X, "__len__") else np.asarray(X)
-    n_rows = len(X)
+    n_rows = X.shape[0] if hasattr(X, "shape") else len(X)
     take = getattr(X, "iloc", X)
 
     def read(part):
@@ -335,10 +334,13 @@ class ReadabilityDisplay:
             axes.set_ylim(
                 min(seen.min(), found.low[k]) - margin, max(seen.max(), found.high[k]) + margin
             )
-        axes.set(xlabel=f"{name}: all rules", ylabel=f"{name}: strongest rule alone")
+        axes.set(
+            xlabel=f"{name}: all rules (grey: range of the target)",
+            ylabel=f"{name}: strongest rule alone",
+        )
         axes.spines[["top", "right"]].set_visible(False)
         axes.set_title(
-            f"strongest rule alone: off by {error:.3g} sd of the target; grey: its range",
+            f"strongest rule alone: off by {error:.3g} sd of the target",
             fontsize="medium",
             loc="left",
             color=_RED if error > GREATEST_ALONE else "black",

@@ -61,6 +61,40 @@ class Readability:
     measures : Measures
         The figures as arrays.
 
+    Attributes
+    ----------
+    terms : DataFrame
+        One row per term, from the lowest to the highest of each input, labelled by its number; of
+        terms that are the very same, the first. Columns: "input"; "term", its name;
+        "greatest_truth", its greatest membership on a row; "crossing", the greatest value of the
+        smaller of its membership and the next one's between the two locations, missing for the
+        last. Both are from 0 to 1.
+    rules : DataFrame
+        One row per rule, labelled by its number, and output. Columns: "if", the rule's terms;
+        "output"; "weight", the part of the rows' weight on which it fires; "rows", the weight of
+        the rows on which it is the strongest; "alone", the RMS difference between its value and the
+        model on these, missing where there are none, and "disagreement", the same over all rows by
+        its strength, both in standard deviations of the target; "value", what it says at its own
+        center, in the target's units; "in_range", whether that lies in the range of the target;
+        "beyond", how far beyond it lies, in ranges. The last three are missing where a rule fires
+        on no row.
+    outputs : DataFrame
+        One row per output, of all rules together. Columns: "strongest_alone", the RMS difference
+        between the strongest rule of each row and the model, and "disagreement", that of a rule
+        drawn by its strength, in standard deviations of the target; "greatest_sum", the greatest
+        sum over the rules of the sizes of strength times value about the target's mean, in ranges
+        of the target; "rules_beyond", the number of rules whose value at their own center lies
+        beyond the target's range by more than a quarter of it.
+    summary : Series
+        The worst of each column of ``outputs``, and "least_truth" and "greatest_crossing" of the
+        terms, missing where there are no terms, or no two on an input.
+    findings : list of str
+        What is not fit to be read, in sentences; an empty list if all is well.
+    line : str
+        The summary in one line.
+    limits : dict
+        By entry of ``summary`` the least truth that passes, and the most of all else.
+
     See Also
     --------
     skanfis.inspection.readability : Measures a fitted estimator on rows.
@@ -97,16 +131,7 @@ class Readability:
 
     @property
     def terms(self):
-        """The terms, from the lowest to the highest of each input.
-
-        Returns
-        -------
-        table : DataFrame
-            One row per term, labelled by its number; of terms that are the very same, the first.
-            Columns: "input"; "term", its name; "greatest_truth", its greatest membership on a row,
-            from 0 to 1; "crossing", the greatest value of the smaller of its membership and the
-            next one's between the two locations, from 0 to 1, missing for the last.
-        """
+        """The terms; see the class."""
         import pandas as pd
 
         own = own_terms(self.model.antecedent)
@@ -123,19 +148,7 @@ class Readability:
 
     @property
     def rules(self):
-        """The rules, by their number, with a row for each output.
-
-        Returns
-        -------
-        table : DataFrame
-            Columns: "if", the rule's terms; "output"; "weight", the part of the rows' weight on
-            which it fires; "rows", the weight of the rows on which it is the strongest; "alone",
-            the RMS difference between its value and the model on these, missing where there are
-            none, and "disagreement", the same over all rows by its strength, both in standard
-            deviations of the target; "value", what it says at its own center, in the target's
-            units; "in_range", whether that lies in the range of the target; "beyond", how far
-            beyond it lies, in ranges. A rule that fires on no row has no value.
-        """
+        """The rules; see the class."""
         import pandas as pd
 
         from ..export._reading import conditions, premise_text
@@ -164,18 +177,7 @@ class Readability:
 
     @property
     def outputs(self):
-        """What holds of all rules together, for each output.
-
-        Returns
-        -------
-        table : DataFrame
-            One row per output. Columns: "strongest_alone", the RMS difference between the strongest
-            rule of each row and the model, and "disagreement", that of a rule drawn by its
-            strength, in standard deviations of the target; "greatest_sum", the greatest sum over
-            the rules of the sizes of strength times value about the target's mean, in ranges of the
-            target; "rules_beyond", the number of rules whose value at their own center lies beyond
-            the target's range by more than a quarter of it.
-        """
+        """What holds of all rules together; see the class."""
         import pandas as pd
 
         found = self.measures
@@ -191,27 +193,14 @@ class Readability:
 
     @property
     def summary(self):
-        """The worst of each figure, over terms and outputs.
-
-        Returns
-        -------
-        summary : Series
-            "strongest_alone", "disagreement", "greatest_sum" and "rules_beyond" as in
-            :attr:`outputs`; "least_truth", the smallest greatest truth of a term, and
-            "greatest_crossing", missing where there are no terms, or no two on an input.
-        """
+        """The worst of each figure, over terms and outputs."""
         import pandas as pd
 
         return pd.Series(self._summary(), name="readability")
 
     @property
     def findings(self):
-        """What is not fit to be read, in sentences; an empty list if all is well.
-
-        Returns
-        -------
-        findings : list of str
-        """
+        """What is not fit to be read, in sentences; an empty list if all is well."""
         found, model = self.measures, self.model
         own = own_terms(model.antecedent)
         sentences = _on_truth(model, own, found.truth, "on any row")
@@ -224,12 +213,7 @@ class Readability:
 
     @property
     def line(self):
-        """The summary as one line of text.
-
-        Returns
-        -------
-        line : str
-        """
+        """The summary as one line of text."""
         found = self._summary()
         parts = [
             f"strongest rule alone {_figure(found['strongest_alone'])} sd off the model",
