@@ -19,6 +19,10 @@ templates_path = ["_templates"]
 default_role = "literal"
 
 autosummary_generate = True
+# A class and a function whose names differ by a capital only would be one file on some systems.
+autosummary_filename_map = {
+    "skanfis.inspection.readability": "skanfis.inspection.readability_function"
+}
 # The tables of methods come from the template of autosummary.
 numpydoc_show_class_members = False
 

@@ -17,9 +17,11 @@ from skanfis.export import explain, export_text, rules_table
 from skanfis.inspection import (
     LossCurveDisplay,
     MembershipDisplay,
+    ReadabilityDisplay,
     ResponseSurfaceDisplay,
     RuleActivationDisplay,
     RuleContributionDisplay,
+    readability,
 )
 
 # %%
@@ -86,6 +88,17 @@ MembershipDisplay.from_estimator(model, X)
 warming = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], stiffness=0.1))
 warming.fit(data[["temperature", "temperature_rate", "rate"]], error)
 RuleActivationDisplay.from_estimator(warming)
+
+# %%
+# Can the rules be read one by one?
+# ---------------------------------
+#
+# How true each term becomes on the rows, and what the strongest rule of each row says alone over
+# what all say together: where rules cancel one another, points lie far off the diagonal.
+# :doc:`/reading_rules` says what to believe of a rule.
+
+print(readability(model, X, error))
+ReadabilityDisplay.from_estimator(model, X, error)
 
 # %%
 # Response

@@ -3,6 +3,7 @@
 __all__ = [
     "ConstantInputWarning",
     "OutOfBoundsWarning",
+    "ReadabilityWarning",
     "SplitLeakWarning",
     "UnderdeterminedWarning",
 ]
@@ -14,6 +15,10 @@ class ConstantInputWarning(UserWarning):
 
 class OutOfBoundsWarning(UserWarning):
     """Rows asked for lie outside the box of the training data."""
+
+
+class ReadabilityWarning(UserWarning):
+    """The rules of a model are not fit to be read one by one."""
 
 
 class SplitLeakWarning(UserWarning):

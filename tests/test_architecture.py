@@ -45,7 +45,11 @@ TABLE = {
         [*KERNEL, "_sklearn", "_validation", "_notebook", "partition", "training", "_anfis"],
         LEARNING,
     ),
-    "inspection": (["model", "naming", "_validation", "export"], [*PLOTTING, "pandas"]),
+    "readable": (["exceptions", "model", "_validation", "export"], [*NUMERIC, "pandas"]),
+    "inspection": (
+        ["model", "naming", "_validation", "export", "readable"],
+        [*PLOTTING, "pandas"],
+    ),
     "export": (
         [
             PUBLIC,

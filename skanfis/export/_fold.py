@@ -30,7 +30,7 @@ from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
 
-__all__ = ["fold", "fold_with_rows", "last_step"]
+__all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
 
 _INVERSE = {
     operator.sub: operator.add,
@@ -81,6 +81,15 @@ def fold_with_rows(estimator, X):
     """
     folding = _Folding(estimator)
     return folding.model, folding.rows(X)
+
+
+def fold_with_reader(estimator):
+    """:func:`fold`, and a function from a table that ``estimator`` takes to the model's inputs.
+
+    For tables that are read in parts; each comes out as :func:`fold_with_rows` gives it.
+    """
+    folding = _Folding(estimator)
+    return folding.model, folding.rows
 
 
 def last_step(estimator):

@@ -10,6 +10,7 @@ from ..export._reading import policy_in_words
 from ._html import Page
 from ._law_text import law_text
 from ._pictures import PICTURES, draw_coverage, draw_memberships, why_no_allan
+from ._reading import readability_of
 from ._results import Results, rms, rules_of
 from ._units import SIGNALS
 from .displays._style import PER_UNIT, SYMBOL, figures
@@ -20,6 +21,14 @@ __all__ = ["report_page", "rules_text"]
 _COUNTS = ("rows", "rows_refused", "rows_outside")
 _MOST_GROUPS = 40
 _UNITS = {"time": "s", "temperature": "°C", "temperature_rate": "°C/s"}
+_FIGURES_OF_READING = {
+    "strongest_alone": "strongest rule alone, off the model, RMS [sd]",
+    "disagreement": "disagreement of the rules, RMS [sd]",
+    "greatest_sum": "greatest sum of the sizes of contributions [ranges]",
+    "rules_beyond": "rules whose value at their own center lies far beyond the range",
+    "least_truth": "truth of the least true term",
+    "greatest_crossing": "highest crossing of neighbouring terms",
+}
 _SIGNS = (("degC", "°C"), ("deg", "°"), ("sqrt(h)", "√h"))
 
 
@@ -33,6 +42,7 @@ def report_page(calibration, title):
     _pictures(page, results)
     _limits(page, results)
     _rules(page, results)
+    _reading(page, results)
     _data(page, results)
     page.footer(
         f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
@@ -223,6 +233,31 @@ def _rules(page, results):
         page.figures([picture])
     page.preformatted(rules_text(calibration), "All rules as text")
     page.preformatted(_on_board(calibration.compensator), "What to compute on board")
+
+
+def _reading(page, results):
+    found = readability_of(results.calibration)
+    page.section("Can the rules be read?")
+    page.paragraph(
+        "The model is the mean of its rules by their strengths. Whether each rule holds by itself "
+        "is measured on the rows of the log; standard deviation (sd) and range are those of what "
+        'the rules were taught. The page "What to believe of a rule" of the documentation of '
+        "skanfis says more."
+    )
+    for sentence in found.findings:
+        page.paragraph(sentence, kind="warn")
+    if not found.findings:
+        page.paragraph("Nothing measured here speaks against reading the rules one by one.")
+    lines = [
+        (
+            _FIGURES_OF_READING[name],
+            f"{value:.3g}" if name == "rules_beyond" else figures(value),
+            f"{found.limits[name]:g}" if name in found.limits else "–",
+        )
+        for name, value in found.summary.items()
+        if np.isfinite(value)
+    ]
+    page.table(("figure", "value", "limit"), lines)
 
 
 def _on_board(compensator):

@@ -1,10 +1,11 @@
 """The rules at a glance, as HTML for notebooks: one piece, no script, nothing loaded."""
 
+from dataclasses import replace
 from html import escape
 
 import numpy as np
 
-from ..export._fold import fold
+from ..export._fold import fold, last_step
 from ..export._reading import (
     check_count,
     choose_rules,
@@ -13,6 +14,8 @@ from ..export._reading import (
     round_reference,
 )
 from ..export.text import consequent_text, range_text, term_text
+from ..model import TSKModel
+from ..readable import findings_without_rows
 from ._common import premises
 
 __all__ = ["rules_html"]
@@ -40,7 +43,9 @@ def rules_html(estimator, *, max_rules=10, precision=4):
     -------
     html : str
         One ``<div>``, with names escaped, without script or anything to load. A fitted
-        ANFISRegressor shows it by itself in notebooks.
+        ANFISRegressor shows it by itself in notebooks. Below the rules stands what speaks against
+        reading them one by one: what the estimator's ``readability_`` says, where it has one, or
+        what can be said without rows. :func:`readability` says more.
 
     Examples
     --------
@@ -68,7 +73,20 @@ def rules_html(estimator, *, max_rules=10, precision=4):
             weight = max(1.0 - float(model.rule_weights[chosen].sum()), 0.0)
             left_out += f" with {100.0 * weight:.3g} % of the weight"
         parts.append(f"<div>{left_out}</div>")
+    parts.append(_how_to_read(estimator, model))
     return "".join([*parts, "</div>"])
+
+
+def _how_to_read(estimator, model):
+    """What the fit found of its rules on its rows; else what can be said without rows."""
+    found = None
+    if not isinstance(estimator, TSKModel):
+        found = getattr(last_step(estimator), "readability_", None)
+    if found is None:
+        return "".join(f"<div>{escape(line)}</div>" for line in findings_without_rows(model))
+    # What was found has no units, and terms and rules keep their order when scalers are folded in:
+    # with the names of the whole, the sentences speak of its columns.
+    return replace(found, model=model).html()
 
 
 def _count(number_of, what):

@@ -14,7 +14,9 @@ from skanfis.datasets import make_ofog
 from skanfis.gyro._calibration import MAX_EXTRAPOLATION, Recipe, calibrate
 from skanfis.gyro._html import Page
 from skanfis.gyro._split import choose_split
+from skanfis.gyro.displays._style import figures
 from skanfis.gyro.html_report import report_page, rules_text
+from skanfis.inspection import readability
 
 VOID = {"meta", "img", "br"}
 
@@ -122,6 +124,23 @@ def test_rules_and_what_to_compute_on_board(page, calibration):
     assert rules_text(calibration).splitlines()[0] in text
     assert "temperature_rate += (1 - exp(-h / 30))" in text
     assert "rate = output / 1 - error(time, temperature, temperature_rate, output);" in text
+
+
+@pytest.mark.parametrize("physics", [False, True])
+def test_says_whether_the_rules_can_be_read(physics):
+    log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
+    calibration = calibration_of(log, ("temperature", "output"), terms=(2, 2), physics=physics)
+    estimator = calibration.compensator.estimator
+    # What the rules were taught, by hand.
+    taught = calibration.before - calibration.rate
+    if physics:
+        taught = calibration.rate - estimator.base_.predict(calibration.X)
+    found = readability(getattr(estimator, "residual_", estimator), calibration.X, taught)
+    text = "".join(Outline(report_page(calibration, "log.csv")).text)
+    section = text[text.index("Can the rules be read?") :]
+    for sentence in found.findings or ["Nothing measured here speaks against"]:
+        assert sentence in section
+    assert f"[sd]{figures(found.summary['strongest_alone'])}0.5" in section.replace("\n", "")
 
 
 def test_a_gyro_at_rest_has_no_scale_factor_pictures():

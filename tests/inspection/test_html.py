@@ -5,9 +5,14 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
+import pandas as pd
 import pytest
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
+from skanfis import ANFISRegressor
 from skanfis.inspection import rules_html
+from skanfis.readable import readability_of_rows
 
 from .drawing import A_GRID, ALL
 
@@ -90,3 +95,39 @@ def test_nothing_is_loaded():
 def test_parameters_are_checked(settings, message):
     with pytest.raises(ValueError, match=message):
         rules_html(A_GRID, **settings)
+
+
+def text_of(estimator):
+    return "".join(Page(rules_html(estimator, max_rules=100)).texts)
+
+
+def test_without_rows_it_says_what_can_be_said():
+    # All terms of the time a hundred times as wide: neighbours cross near one.
+    time, *others = A_GRID.antecedent.groups
+    theta = time.theta + np.log(100.0) * (np.arange(len(time.theta)) > 0)[:, None]
+    wide = replace(
+        A_GRID, antecedent=replace(A_GRID.antecedent, groups=(replace(time, theta=theta), *others))
+    )
+    sentence = "'low' and 'high' of 'time' (1)"
+    assert sentence in text_of(wide)
+    assert sentence not in text_of(A_GRID)
+    assert "strongest" not in text_of(wide)
+
+
+def test_what_the_fit_found_is_told_in_the_names_of_the_whole():
+    X = pd.DataFrame(
+        {"kelvin": np.linspace(250.0, 330.0, 60), "rate": np.tile([1.0, 2.0, 4.0], 20)}
+    )
+    y = 1e3 + np.sin(X["kelvin"] / 20.0)
+    pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[3, 2], solver="lse")).fit(X, y)
+    without = text_of(pipe)
+    assert "trongest rule alone" not in without
+    Z, anfis = pipe[0].transform(X), pipe[-1]
+    found = readability_of_rows(anfis.model_, Z, y.to_numpy()[:, None])
+    never = replace(found.measures, truth=np.full(5, 0.25))
+    anfis.readability_ = replace(found, measures=never)
+    text = text_of(pipe)
+    assert f"Strongest rule alone {found.measures.alone[0]:.3g} sd off the model" in text
+    assert "'low' of 'kelvin' (0.25)" in text
+    assert "'low' of 'x0' (0.25)" in text_of(anfis)
+    assert anfis._repr_html_().endswith(rules_html(anfis))

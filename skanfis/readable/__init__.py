@@ -1,0 +1,34 @@
+"""Whether the rules of a model can be read one by one: measured on rows, judged by limits."""
+
+from .measures import Measures, Source, measure
+from .report import (
+    GREATEST_ALONE,
+    GREATEST_BEYOND,
+    GREATEST_CROSSING,
+    GREATEST_SUM,
+    LEAST_TRUTH,
+    Readability,
+    findings_without_rows,
+    readability_of_rows,
+    warn_if_unreadable,
+)
+from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
+
+__all__ = [
+    "GREATEST_ALONE",
+    "GREATEST_BEYOND",
+    "GREATEST_CROSSING",
+    "GREATEST_SUM",
+    "LEAST_TRUTH",
+    "Measures",
+    "Readability",
+    "Source",
+    "crossings",
+    "distinct_terms",
+    "findings_without_rows",
+    "greatest_truth_in_box",
+    "measure",
+    "own_terms",
+    "readability_of_rows",
+    "warn_if_unreadable",
+]

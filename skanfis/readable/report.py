@@ -1,0 +1,415 @@
+"""What the measures say to a reader: tables, a line, and sentences on what cannot be read."""
+
+from dataclasses import dataclass
+from html import escape
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+
+from .._validation import warn_user
+from ..exceptions import ReadabilityWarning
+from ..model import TSKModel
+from .measures import Measures, Source, measure
+from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
+
+__all__ = [
+    "GREATEST_ALONE",
+    "GREATEST_BEYOND",
+    "GREATEST_CROSSING",
+    "GREATEST_SUM",
+    "LEAST_TRUTH",
+    "Readability",
+    "findings_without_rows",
+    "readability_of_rows",
+    "warn_if_unreadable",
+]
+
+# A term that is never truer than this is, on every row, more false than true: its name describes
+# no row.
+LEAST_TRUTH = 0.5
+# Neighbours that cross above this are both all but true at one place: no reader can say which of
+# the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
+GREATEST_CROSSING = 0.9
+# In standard deviations of the target. Whoever reads the strongest rule alone is then as wrong as a
+# model that explains three quarters of the variance; beyond, the rule says too little of the model.
+GREATEST_ALONE = 0.5
+# In ranges of the target. Rules whose values lie in the target's range reach one at most. At two,
+# at least half of what the rules say on some row is there to cancel the rest.
+GREATEST_SUM = 2.0
+# In ranges of the target. A rule may say a little more than was ever seen, for its neighbours take
+# part everywhere; a quarter of the range beyond is no mean of anything that was.
+GREATEST_BEYOND = 0.25
+
+# A sentence names so many terms, pairs or rules; beyond, it counts them.
+_MOST_NAMED = 5
+# Lines of the notebook's table of rules.
+_MOST_LINES = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Readability:
+    """Whether the rules of a model can be read one by one, and what speaks against it.
+
+    :func:`skanfis.inspection.readability` makes it; in a notebook it shows itself. The page "What
+    to believe of a rule" of the documentation says what the figures mean.
+
+    Parameters
+    ----------
+    model : TSKModel
+        The model that was measured.
+    measures : Measures
+        The figures as arrays.
+
+    Attributes
+    ----------
+    terms : DataFrame
+        One row per term, from the lowest to the highest of each input, labelled by its number; of
+        terms that are the very same, the first. Columns: "input"; "term", its name;
+        "greatest_truth", its greatest membership on a row; "crossing", the greatest value of the
+        smaller of its membership and the next one's between the two locations, missing for the
+        last. Both are from 0 to 1.
+    rules : DataFrame
+        One row per rule, labelled by its number, and output. Columns: "if", the rule's terms;
+        "output"; "weight", the part of the rows' weight on which it fires; "rows", the weight of
+        the rows on which it is the strongest; "alone", the RMS difference between its value and the
+        model on these, missing where there are none, and "disagreement", the same over all rows by
+        its strength, both in standard deviations of the target; "value", what it says at its own
+        center, in the target's units; "in_range", whether that lies in the range of the target;
+        "beyond", how far beyond it lies, in ranges. The last three are missing where a rule fires
+        on no row.
+    outputs : DataFrame
+        One row per output, of all rules together. Columns: "strongest_alone", the RMS difference
+        between the strongest rule of each row and the model, and "disagreement", that of a rule
+        drawn by its strength, in standard deviations of the target; "greatest_sum", the greatest
+        sum over the rules of the sizes of strength times value about the target's mean, in ranges
+        of the target; "rules_beyond", the number of rules whose value at their own center lies
+        beyond the target's range by more than a quarter of it.
+    summary : Series
+        The worst of each column of ``outputs``, and "least_truth" and "greatest_crossing" of the
+        terms, missing where there are no terms, or no two on an input.
+    findings : list of str
+        What is not fit to be read, in sentences; an empty list if all is well.
+    line : str
+        The summary in one line.
+    limits : dict
+        By entry of ``summary`` the least truth that passes, and the most of all else.
+
+    See Also
+    --------
+    skanfis.inspection.readability : Measures a fitted estimator on rows.
+    skanfis.inspection.ReadabilityDisplay : The same as a picture.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import readability
+    >>> X, y = make_jang_sinc()
+    >>> found = readability(ANFISRegressor(n_mfs=[3, 1], solver="lse").fit(X, y), X, y)
+    >>> found.terms[["input", "term"]]
+         input    term
+    term
+    0       x0     low
+    1       x0  medium
+    2       x0    high
+    >>> isinstance(found.findings, list)
+    True
+    """
+
+    model: TSKModel
+    measures: Measures
+
+    #: By entry of :attr:`summary`: the least truth that passes, the most of all else.
+    limits: ClassVar[dict] = {
+        "strongest_alone": GREATEST_ALONE,
+        "greatest_sum": GREATEST_SUM,
+        "rules_beyond": 0,
+        "least_truth": LEAST_TRUTH,
+        "greatest_crossing": GREATEST_CROSSING,
+    }
+
+    @property
+    def terms(self):
+        """The terms; see the class."""
+        import pandas as pd
+
+        own = own_terms(self.model.antecedent)
+        inputs, names = _inputs_of_terms(self.model), self.model.term_names
+        return pd.DataFrame(
+            {
+                "input": [self.model.input_names[inputs[t]] for t in own],
+                "term": [names[t] for t in own],
+                "greatest_truth": self.measures.truth[own],
+                "crossing": crossings(self.model.antecedent)[own],
+            },
+            index=pd.Index(own, name="term", dtype=int),
+        )
+
+    @property
+    def rules(self):
+        """The rules; see the class."""
+        import pandas as pd
+
+        from ..export._reading import conditions, premise_text
+
+        found, model = self.measures, self.model
+        texts = [premise_text(model, rule) for rule in conditions(model)]
+        tables = []
+        for k, output in enumerate(model.output_names):
+            beyond = pd.Series(found.rule_beyond[:, k])
+            table = pd.DataFrame(
+                {
+                    "if": texts,
+                    "output": output,
+                    "weight": found.rule_weights,
+                    "rows": found.rule_rows,
+                    "alone": found.rule_alone[:, k],
+                    "disagreement": found.rule_disagreement[:, k],
+                    "value": found.mean[k] + found.deviation[k] * found.rule_values[:, k],
+                    "in_range": (beyond == 0.0).astype("boolean").mask(beyond.isna()),
+                    "beyond": beyond,
+                },
+                index=pd.RangeIndex(model.n_rules, name="rule"),
+            )
+            tables.append(table)
+        return pd.concat(tables).sort_index(kind="stable")
+
+    @property
+    def outputs(self):
+        """What holds of all rules together; see the class."""
+        import pandas as pd
+
+        found = self.measures
+        return pd.DataFrame(
+            {
+                "strongest_alone": found.alone,
+                "disagreement": found.disagreement,
+                "greatest_sum": found.greatest_sum,
+                "rules_beyond": (found.rule_beyond > GREATEST_BEYOND).sum(axis=0),
+            },
+            index=pd.Index(self.model.output_names, name="output"),
+        )
+
+    @property
+    def summary(self):
+        """The worst of each figure, over terms and outputs."""
+        import pandas as pd
+
+        return pd.Series(self._summary(), name="readability")
+
+    @property
+    def findings(self):
+        """What is not fit to be read, in sentences; an empty list if all is well."""
+        found, model = self.measures, self.model
+        own = own_terms(model.antecedent)
+        sentences = _on_truth(model, own, found.truth, "on any row")
+        sentences += _on_crossings(model)
+        for k, name in enumerate(model.output_names):
+            of_output = f" of {name!r}" if model.n_outputs > 1 else ""
+            sentences += _on_compensation(found, k, of_output)
+            sentences += _on_values(found.rule_beyond[:, k], of_output)
+        return sentences
+
+    @property
+    def line(self):
+        """The summary as one line of text."""
+        found = self._summary()
+        parts = [
+            f"strongest rule alone {_figure(found['strongest_alone'])} sd off the model",
+            f"disagreement {_figure(found['disagreement'])} sd",
+            f"greatest sum {_figure(found['greatest_sum'])} ranges",
+        ]
+        if np.isfinite(found["least_truth"]):
+            parts.append(f"least true term {_figure(found['least_truth'])}")
+        if np.isfinite(found["greatest_crossing"]):
+            parts.append(f"highest crossing {_figure(found['greatest_crossing'])}")
+        return "; ".join(parts)
+
+    def __repr__(self):
+        return f"<Readability of {self.model!r}: {self.line}>"
+
+    def __str__(self):
+        return "\n".join([_capital(self.line) + ".", *(self.findings or [_ALL_IS_WELL])])
+
+    def _repr_html_(self):
+        rules = self.rules.sort_values("weight", ascending=False, kind="stable")
+        tables = [self.terms, rules.head(_MOST_LINES)]
+        left_out = len(rules) - _MOST_LINES
+        more = f"<div>and {left_out} more lines</div>" if left_out > 0 else ""
+        return (
+            '<div style="font-family:sans-serif;font-size:90%;margin:0.5em 0">'
+            + self.html()
+            + "".join(_table(table) for table in tables)
+            + f"{more}</div>"
+        )
+
+    def html(self):
+        """The summary and the findings as HTML.
+
+        Returns
+        -------
+        html : str
+            A ``<div>`` for each, with names escaped.
+        """
+        lines = [_capital(self.line) + ".", *(self.findings or [_ALL_IS_WELL])]
+        return "".join(f"<div>{escape(line)}</div>" for line in lines)
+
+    def _summary(self):
+        found = self.measures
+        own = own_terms(self.model.antecedent)
+        heights = crossings(self.model.antecedent)
+        heights = heights[np.isfinite(heights)]
+        return {
+            "strongest_alone": float(found.alone.max()),
+            "disagreement": float(found.disagreement.max()),
+            "greatest_sum": float(found.greatest_sum.max()),
+            "rules_beyond": int((found.rule_beyond > GREATEST_BEYOND).sum(axis=0).max()),
+            "least_truth": float(found.truth[own].min()) if own.size else np.nan,
+            "greatest_crossing": float(heights.max()) if heights.size else np.nan,
+        }
+
+
+_ALL_IS_WELL = "Nothing measured here speaks against reading the rules one by one."
+
+
+def readability_of_rows(model, X, y=None, sample_weight=None):
+    """Measure a model on rows that have been checked.
+
+    Parameters
+    ----------
+    model : TSKModel
+    X : ndarray of shape (n_rows, model.n_inputs)
+        Finite; may be memory-mapped.
+    y : ndarray of shape (n_rows, model.n_outputs), default=None
+        The target, for its mean, deviation and range; None takes those of the predictions.
+    sample_weight : ndarray of shape (n_rows,), default=None
+        Zero or positive, one of them positive.
+
+    Returns
+    -------
+    readability : Readability
+        After one pass over X, or two where there is no y.
+    """
+    source = Source(X.shape[0], lambda part: X[part], y, sample_weight)
+    return Readability(model, measure(model, source))
+
+
+def warn_if_unreadable(readability):
+    """Issue a ReadabilityWarning with the findings, if there are any.
+
+    Parameters
+    ----------
+    readability : Readability
+    """
+    findings = readability.findings
+    if findings:
+        warn_user(
+            f"The rules are not fit to be read one by one. {' '.join(findings)} "
+            "skanfis.inspection.readability has the tables.",
+            ReadabilityWarning,
+        )
+
+
+def findings_without_rows(model):
+    """What can be found without rows: terms that cross, or are true nowhere in the range.
+
+    Parameters
+    ----------
+    model : TSKModel
+
+    Returns
+    -------
+    findings : list of str
+    """
+    own = own_terms(model.antecedent)
+    truth = greatest_truth_in_box(model)
+    return _on_truth(model, own, truth, "in the range of training") + _on_crossings(model)
+
+
+def _on_truth(model, own, truth, where):
+    never = [t for t in own if truth[t] < LEAST_TRUTH]
+    if not never:
+        return []
+    what = "a term is" if len(never) == 1 else f"{len(never)} of {len(own)} terms are"
+    named = _named([f"{_term(model, t)} ({_figure(truth[t])})" for t in never])
+    return [f"{_capital(what)} never truer than {LEAST_TRUTH} {where}: {named}."]
+
+
+def _on_crossings(model):
+    heights = crossings(model.antecedent)
+    too_high, n_pairs = [], 0
+    for own in distinct_terms(model.antecedent).values():
+        n_pairs += len(own) - 1
+        for t, following in pairwise(own):
+            if heights[t] > GREATEST_CROSSING:
+                both = f"{model.term_names[t]!r} and {_term(model, following)}"
+                too_high.append(f"{both} ({_figure(heights[t])})")
+    if not too_high:
+        return []
+    many = len(too_high) > 1
+    what = f"{len(too_high)} of {n_pairs} pairs of neighbouring terms" if many else "Two terms"
+    return [
+        f"{what} can hardly be told apart, for they cross above {GREATEST_CROSSING}: "
+        f"{_named(too_high)}."
+    ]
+
+
+def _on_compensation(found, k, of_output):
+    sentences = []
+    if found.alone[k] > GREATEST_ALONE:
+        sentences.append(
+            f"No rule{of_output} can be read without the others: the strongest alone misses the "
+            f"model by {_figure(found.alone[k])} standard deviations of the target (limit "
+            f"{GREATEST_ALONE})."
+        )
+    if found.greatest_sum[k] > GREATEST_SUM:
+        sentences.append(
+            f"The rules{of_output} cancel one another: on one row their contributions add up, in "
+            f"size, to {_figure(found.greatest_sum[k])} ranges of the target (limit "
+            f"{GREATEST_SUM:g})."
+        )
+    return sentences
+
+
+def _on_values(beyond, of_output):
+    rules = np.flatnonzero(beyond > GREATEST_BEYOND)
+    if not rules.size:
+        return []
+    rules = rules[np.argsort(-beyond[rules], kind="stable")]
+    what = "A rule says where it fires"
+    if rules.size > 1:
+        what = f"{rules.size} of {beyond.size} rules say where they fire"
+    named = _named([f"rule {r} (by {_figure(beyond[r])} ranges)" for r in rules])
+    return [
+        f"{what}{of_output} what the target never was, beyond its range by more than "
+        f"{GREATEST_BEYOND:g} of it: {named}."
+    ]
+
+
+def _named(parts):
+    if len(parts) <= _MOST_NAMED:
+        return ", ".join(parts)
+    return f"{', '.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
+
+
+def _term(model, t):
+    return f"{model.term_names[t]!r} of {model.input_names[_inputs_of_terms(model)[t]]!r}"
+
+
+def _inputs_of_terms(model):
+    groups = model.antecedent.groups
+    return np.concatenate([group.inputs for group in groups] or [np.empty(0, dtype=int)])
+
+
+def _figure(value):
+    """Three digits, and no exponent where a person would write none."""
+    return f"{float(f'{value:.3g}'):.10g}"
+
+
+def _capital(text):
+    return text[:1].upper() + text[1:]
+
+
+def _table(table):
+    return f"<div>{table.to_html(float_format=_figure, na_rep='', border=0)}</div>"
