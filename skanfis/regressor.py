@@ -23,6 +23,7 @@ from ._validation import check_finite, feature_indices, positive_weights
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
 from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
+from .readable import readability_of_rows
 from .solvers import SOLVERS
 from .structure import StructureRequest, check_inputs
 from .training import CallbackBridge
@@ -411,6 +412,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.robust_weights_ = training.robust_weights
         losses = training.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
+        self.readability_ = readability_of_rows(
+            self.model_, data.X, data.y, data.sample_weight
+        )
         self._start_parameters = self._those_of_the_start()
         if bridge is not None:
             bridge.end(self.model_)

@@ -134,7 +134,7 @@ class StructureSearch:
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
             loose = replace(best, is_loose=True)
-            if max(best.counts) > 1 and self._is_better(loose, best):
+            if max(best.counts) > 1 and self._tuned(best).is_beaten_loosely(self._tuned(loose)):
                 best = self._grow_grid(loose)
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition

@@ -9,8 +9,8 @@ evidence, and the turns end when it has not risen twice.
 The weights come first, at the premises of the start: from weights that are far too small, the first
 steps of the premises would go where no evidence leads back from. Data without noise are the other
 case: what the premises of the start leave would be taken for noise. So there is a second way in,
-*loose*, in which the premises come first and the weights are next to nothing; of the two, the
-evidence chooses.
+*loose*, in which the premises come first and the weights are next to nothing. It is taken where the
+evidence is for it and half of the noise is gone.
 """
 
 from dataclasses import dataclass, replace
@@ -36,6 +36,9 @@ FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Loose: what rounding errors need.
 _LOOSE = 1e-12
 _LOOSE_ITERATIONS = 25
+# Of the noise's variance, what a loose training must bring it down to: rules that compensate one
+# another are the price, and not to be paid for less.
+_LESS_NOISE = 0.5
 FIRST_STEPS = 8
 _STEPS = 3
 _ITERATIONS = 4
@@ -67,6 +70,11 @@ class Tuned:
     def score(self):
         """-2 log p."""
         return self.posterior.minus_twice_log
+
+    def is_beaten_loosely(self, loose):
+        """Whether a loose training has found what this one took for noise."""
+        noise, other = self.posterior.noise_variance, loose.posterior.noise_variance
+        return other < _LESS_NOISE * noise and loose.score < self.score - WORTHWHILE
 
 
 def tune(
@@ -189,7 +197,7 @@ def tuned_start(
     best, is_free = tuned(False), False
     if premises_move and best.displacement.size:
         loose = tuned(True)
-        if loose.score < best.score - WORTHWHILE:
+        if best.is_beaten_loosely(loose):
             best, is_free = loose, True
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
     return Start(antecedent, penalty, best.displacement, is_free)
