@@ -15,7 +15,8 @@ from scipy.linalg import blas
 from skanfis import objective
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
-from skanfis.partition import grid_antecedent
+from skanfis.penalty import Penalty
+from skanfis.structure import grid_antecedent
 from skanfis.rows import Rows
 
 from .fresh import alone
@@ -38,7 +39,7 @@ def make_problem():
     rows = Rows.standardised(X, y)
     low, high = ((edge - rows.inputs.offset) / rows.inputs.scale for edge in (X.min(0), X.max(0)))
     antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], low, high, overlap=0.6)
-    return SeparableProblem(rows, antecedent, order=1, alpha=1e-12)
+    return SeparableProblem(rows, antecedent, order=1, penalty=Penalty(alpha=1e-12))
 
 
 def bare_products(problem):

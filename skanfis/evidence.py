@@ -138,6 +138,8 @@ def laplace(
     parts = {"agreement": normal.disagreement, "alpha": line.own, "slope": line.slopes}
     weights = _weighted(penalty)
     matrix = sum(weights[key] * part for key, part in parts.items())
+    # Of one constant there is no penalty at all: any size will do.
+    size = np.trace(matrix) / matrix.shape[0] or 1.0
     factor = NormalFactor(normal.gram + matrix)
     matrix.flat[:: matrix.shape[0] + 1] += factor.shift
     # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 those of the evaluation.
@@ -147,7 +149,6 @@ def laplace(
     error = mean_squared_error - 2.0 * np.sum(change * slope) + np.sum(change * (normal.gram @ change))
     error = max(error, 0.0)
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
-    size = max(np.trace(matrix) / matrix.shape[0], np.finfo(float).tiny)
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
     by_weight = {
         key: tuple(weights[key] * value for value in values)

@@ -164,8 +164,10 @@ class DenseProblem:
         self.basis = np.vstack([np.ones((1, self.y.shape[0])), slopes])
         self.n_rules = len(strengths(antecedent, antecedent.parameters, self.Z))
         self.centers = self._centers()
+        self.extent = self._extent()
         # Rules of a common line have its value at their centres, and its slopes.
-        self.line = np.concatenate([self._value_and_slopes(center) for center in self.centers])
+        self.blocks = [self._value_and_slopes(r) for r in range(self.n_rules)]
+        self.line = np.concatenate(self.blocks)
 
     def _centers(self):
         """Mean of the consequents' inputs where each rule fires at the start."""
@@ -177,9 +179,19 @@ class DenseProblem:
             ]
         ).reshape(self.n_rules, len(self.basis) - 1)
 
-    def _value_and_slopes(self, center):
-        matrix = np.eye(len(self.basis))
-        matrix[0, 1:] = center
+    def _extent(self):
+        """How far from its centre each rule stands for the rows at the start, at least one."""
+        firing = strengths(self.antecedent, self.antecedent.parameters, self.Z)
+        extent = np.ones_like(self.centers)
+        for r, j in np.ndindex(*extent.shape):
+            for w, z in zip(firing[r], self.basis[1 + j], strict=True):
+                extent[r, j] = max(extent[r, j], np.sqrt(w) * abs(z - self.centers[r, j]))
+        return extent
+
+    def _value_and_slopes(self, r):
+        """From a line's coefficients on [1, z]: its value where rule r is, its rise over r's extent."""
+        matrix = np.diag([1.0, *self.extent[r]])
+        matrix[0, 1:] = self.centers[r]
         return matrix
 
     def design(self, parameters):
@@ -195,9 +207,8 @@ class DenseProblem:
         for r in range(self.n_rules):
             own[r, :, r * n_basis : (r + 1) * n_basis] = self.basis.T
         apart = np.sqrt(w)[:, :, None] * (np.sqrt(self.weight)[:, None] * own - phi)
-        blocks = [self._value_and_slopes(center) for center in self.centers]
         values = np.zeros((n_columns, n_columns))
-        for r, block in enumerate(blocks):
+        for r, block in enumerate(self.blocks):
             values[r * n_basis : (r + 1) * n_basis, r * n_basis : (r + 1) * n_basis] = block
         to_line, *_ = np.linalg.lstsq(self.line, values, rcond=None)
         parts = [
@@ -261,6 +272,17 @@ def box(rows):
     """Standardised minimum and maximum of the inputs."""
     edges = np.stack([rows.inputs.minimum, rows.inputs.maximum])
     return (edges - rows.inputs.offset) / rows.inputs.scale
+
+
+def even_grid(families, counts, low, high, overlap):
+    """A grid of evenly spaced terms from end to end; neighbours cross at ``overlap``."""
+    thetas = []
+    for j, (family, count) in enumerate(zip(families, counts, strict=True)):
+        spacing = (high[j] - low[j]) / (count - 1)
+        thetas.append(
+            family.start(np.linspace(low[j], high[j], count), np.full(count, spacing), overlap)
+        )
+    return GridAntecedent.build(list(families), list(range(len(counts))), thetas)
 
 
 def random_grid(rng, families, counts, inputs=None):

@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from skanfis import ANFISRegressor
 from skanfis._anfis import _ordered_map
 from skanfis.exceptions import UnderdeterminedWarning
-from skanfis.training.start import _labeller
+from skanfis.structure.request import _labeller
 
 
 def data(n_rows=120, n_inputs=2):

@@ -178,7 +178,7 @@ def test_module_keeps_to_its_layer(module):
         ("skanfis.solvers.__init__", "from ..partition import grid"),
         ("skanfis.model", "import pandas"),
         ("skanfis.model", "def f():\n    from sklearn.base import clone"),
-        ("skanfis.partition.grid", "from .._anfis import fit"),
+        ("skanfis.structure.grid", "from .._anfis import fit"),
         ("skanfis.datasets._jang", "from ..membership import Bell"),
         ("skanfis.regressor", "import pandas as pd"),
         ("skanfis.regressor", "from sklearn.utils._param_validation import Interval"),
@@ -202,7 +202,7 @@ def test_checker_finds(module, source):
     [
         ("skanfis.membership", "import numpy as np\nfrom abc import ABC"),
         ("skanfis.solvers.varpro", "from ..objective import Evaluation\nfrom .result import X"),
-        ("skanfis.partition.grid", "from ..antecedent import GridAntecedent"),
+        ("skanfis.structure.grid", "from ..antecedent import GridAntecedent"),
         ("skanfis.regressor", "from sklearn import __version__"),
         ("skanfis._sklearn", "from sklearn.utils._param_validation import Interval"),
         ("skanfis.gyro.report", "from skanfis import ANFISRegressor"),

@@ -22,7 +22,7 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_jang_three_input, make_mackey_glass
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.membership import MEMBERSHIPS
-from skanfis.partition import clustered
+from skanfis.structure import clustered
 from skanfis.solvers import SOLVERS
 
 TOLERANCE = 1e-6

@@ -25,6 +25,7 @@ import numpy as np
 from sklearn.cluster import KMeans
 from sklearn.model_selection import GroupKFold
 
+from ..antecedent import GridAntecedent
 from ..cluster import FuzzyCMeans, SubtractiveClustering
 from ..evidence import FREE
 from ..membership import Membership
@@ -124,6 +125,7 @@ class StructureSearch:
         self.sample = search_sample(rows, MOST_ROWS)
         self.spacing = Spacing(self.sample)
         self.n_sample = effective_weight(self.sample)
+        self.parent: Tuned | None = None  # of the grids that are tried
         self.found: dict[Candidate, Tuned | None] = {}
         self.scores: dict[Candidate, float] = {}
         self.folds = _folds(self.sample.groups)
@@ -136,6 +138,7 @@ class StructureSearch:
             loose = replace(best, is_loose=True)
             if max(best.counts) > 1 and self._tuned(best).is_beaten_loosely(self._tuned(loose)):
                 best = self._grow_grid(loose)
+        self.parent = None
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
             clusters = self._best_clusters(clustering)
@@ -146,6 +149,7 @@ class StructureSearch:
         inputs = list(self.inputs)
         while True:
             grown = {self._with_one_more(best, j): j for j in inputs}
+            self.parent = self._tuned(best)
             small = self._promising(filter(self._is_small, grown))
             if not small:
                 return best
@@ -270,8 +274,25 @@ class StructureSearch:
             effective_weight(rows),
             turns,
             first_steps,
+            self._inherited(antecedent, premise),
             is_loose=candidate.is_loose,
         )
+
+    def _inherited(self, antecedent, premise):
+        """Displacements at which a grid has its parent's terms, where it has as many of them."""
+        if self.parent is None or not isinstance(antecedent, GridAntecedent):
+            return None
+        before = self.parent.evaluation.antecedent
+        theta = [group.theta.copy() for group in antecedent.groups]
+        for group, own in zip(antecedent.groups, theta, strict=True):
+            for j in np.unique(group.inputs):
+                mine = group.inputs == j
+                for other in before.groups:
+                    its = other.inputs == j
+                    if other.family is group.family and its.sum() == mine.sum():
+                        own[:, mine] = other.theta[:, its]
+        raw = np.concatenate([own.ravel() for own in theta] or [np.empty(0)])
+        return np.clip(premise.displacement(raw), premise.lower, premise.upper)
 
     def _start(self, best):
         tuned = self._tuned(best)

@@ -13,7 +13,7 @@ from skanfis.membership.flanked import (
     TwoSidedGaussian,
     ZShaped,
 )
-from skanfis.partition import grid_antecedent
+from skanfis.structure import grid_antecedent
 
 from .. import oracles
 

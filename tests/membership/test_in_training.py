@@ -8,6 +8,7 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.membership import MEMBERSHIPS
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 from skanfis.rows import Rows
 
@@ -25,7 +26,7 @@ BUILD = {
 def test_gradient_of_the_cost_by_the_displacements(family, kind):
     rng = np.random.default_rng(3)
     antecedent, rows = BUILD[kind](rng, family), oracles.bumpy_rows(rng, 250, weighted=True)
-    problem = SeparableProblem(rows, antecedent, 1, 1e-4)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-4))
     premise = Premise.of(antecedent, *oracles.box(rows))
     x = rng.uniform(0.2 * premise.lower, 0.2 * premise.upper)
 
@@ -51,7 +52,7 @@ def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
     mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 3, -1)
     assert mu.max(axis=1).min() > 0.01
-    problem = SeparableProblem(rows, antecedent, 1, 1e-4)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-4))
     dense = oracles.DenseProblem(rows, antecedent, 1, 1e-4)
     point = antecedent.parameters
     linearisation = problem.linearise(problem.evaluate(point))

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 from skanfis.rows import Rows
 from skanfis.solvers import SOLVERS, SolverResult
@@ -26,7 +27,7 @@ every_iterative_solver = pytest.mark.parametrize("name", ITERATIVE)
 
 
 def solve(name, rows, premise, alpha=1e-8, order=1, **settings):
-    problem = SeparableProblem(rows, premise.antecedent, order, alpha)
+    problem = SeparableProblem(rows, premise.antecedent, order, Penalty(alpha=alpha))
     return SOLVERS[name](problem, premise, **({"max_iter": 15, "tol": 1e-6} | settings))
 
 
@@ -100,7 +101,7 @@ def test_loss_curve_begins_at_the_start(name, rng):
     rows, premise = noisy()
     for start in (None, 0.1 * rng.normal(size=premise.size)):
         result = solve(name, rows, premise, start=start)
-        problem = SeparableProblem(rows, premise.antecedent, 1, 1e-8)
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
         there = problem.evaluate(
             premise.parameters(np.zeros(premise.size) if start is None else start)
         )
@@ -245,7 +246,7 @@ def test_workers_do_not_matter(name, monkeypatch):
     rows, premise = noisy()
     results = []
     for map_ordered in (map, lambda function, items: [function(item) for item in items]):
-        problem = SeparableProblem(rows, premise.antecedent, 1, 1e-8, map_ordered)
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8), map_ordered)
         results.append(SOLVERS[name](problem, premise, max_iter=5, tol=1e-6))
     assert_array_equal(results[0].loss_curve, results[1].loss_curve)
 

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 from skanfis.solvers.gradient import gradient
 
@@ -84,7 +85,7 @@ class TestJointGradient:
 
 def problem_of(kind="grid", seed=0, alpha=1e-4, order=1):
     rows, premise, *_ = planted(kind, seed, displaced=0.5, noise=0.1)
-    return SeparableProblem(rows, premise.antecedent, order, alpha), premise
+    return SeparableProblem(rows, premise.antecedent, order, Penalty(alpha=alpha)), premise
 
 
 @pytest.mark.parametrize("kind", ["one input", "grid", "bells", "scattered"])
@@ -143,7 +144,7 @@ def test_given_time_it_comes_near_the_optimum():
     rows = oracles.bumpy_rows(np.random.default_rng(0), n_inputs=1)
     _, premise, *_ = planted("one input", 0)
     premise = Premise.of(premise.antecedent, *oracles.box(rows))
-    problem = SeparableProblem(rows, premise.antecedent, 0, 1e-6)
+    problem = SeparableProblem(rows, premise.antecedent, 0, Penalty(alpha=1e-6))
     result = gradient(problem, premise, max_iter=600, tol=0.0)
     assert result.loss_curve.min() < 0.8 * result.loss_curve[0]
     assert result.status == "epochs"

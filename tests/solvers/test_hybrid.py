@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.objective import SeparableProblem
-from skanfis.partition import grid_antecedent
+from skanfis.penalty import Penalty
+from skanfis.structure import grid_antecedent
 from skanfis.premise import Premise
 from skanfis.rows import Rows, Scale
 from skanfis.solvers.hybrid import NaturalPremise, StepSize, hybrid
@@ -100,7 +101,7 @@ def two_bells(rows, alpha=0.0):
     low, high = oracles.box(rows)
     n_inputs = low.size
     antecedent = grid_antecedent([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
-    return SeparableProblem(rows, antecedent, 1, alpha), Premise.of(antecedent, low, high)
+    return SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha)), Premise.of(antecedent, low, high)
 
 
 class TestAgainstTheTranscription:
@@ -278,7 +279,7 @@ class TestNaturalPremise:
 class TestEnd:
     def problem(self, **settings):
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1, **settings)
-        return SeparableProblem(rows, premise.antecedent, 1, 1e-8), premise
+        return SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8)), premise
 
     def test_error_goal_ends_it(self):
         problem, premise = self.problem()
@@ -296,7 +297,7 @@ class TestEnd:
         # Two outputs that are one: the root mean square error is that of either.
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
         twice = Rows.standardised(rows.X, np.hstack([rows.y, rows.y]))
-        one, two = (SeparableProblem(some, premise.antecedent, 1, 1e-8) for some in (rows, twice))
+        one, two = (SeparableProblem(some, premise.antecedent, 1, Penalty(alpha=1e-8)) for some in (rows, twice))
         goal = np.sqrt(hybrid(one, premise, max_iter=10, tol=0.0).loss_curve.min()) * (1 + 1e-9)
         results = [hybrid(p, premise, max_iter=10, tol=0.0, error_goal=goal) for p in (one, two)]
         assert results[0].status == results[1].status == "error_goal"
@@ -323,7 +324,7 @@ class TestEnd:
 
     def test_length_of_a_step_is_the_step_size(self):
         rows, premise, *_ = planted("scattered", 0, displaced=0.5, noise=0.1)
-        problem = SeparableProblem(rows, premise.antecedent, 1, 1e-8)
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
         at = [premise.antecedent]
         hybrid(
             problem,
@@ -343,7 +344,7 @@ def test_gaussians_have_natural_parameters_too():
     rows = oracles.bumpy_rows(np.random.default_rng(0))
     low, high = oracles.box(rows)
     antecedent = grid_antecedent([Gaussian] * 2, [2, 3], low, high, 0.6)
-    problem = SeparableProblem(rows, antecedent, 1, 1e-4)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-4))
     seen = []
     hybrid(
         problem,

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 from skanfis.rows import Rows
 from skanfis.solvers.lbfgs import lbfgs
@@ -18,7 +19,7 @@ from .test_varpro import Recording, planted, start_of
 
 def problem_of(kind, seed=1, alpha=1e-4, **settings):
     rows, premise, *_ = planted(kind, seed, displaced=0.3, noise=0.1, **settings)
-    return SeparableProblem(rows, premise.antecedent, 1, alpha), premise
+    return SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha)), premise
 
 
 @pytest.mark.parametrize(
@@ -84,7 +85,7 @@ class TestStatus:
         X = rng.normal(size=(50, 2))
         rows = Rows.standardised(X, np.full((50, 1), 3.0))
         premise = Premise.of(start_of("grid", rows), *oracles.box(rows))
-        problem = SeparableProblem(rows, premise.antecedent, 1, 1e-8)
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
         result = lbfgs(problem, premise, max_iter=10, tol=1e-6)
         self.check(result, "gradient")
         assert result.n_iter == 0

@@ -5,6 +5,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.linear_model import Ridge
 
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 from skanfis.solvers.lse import lse
 
@@ -21,7 +22,7 @@ def test_ridge(rng, kind, weighted, order, alpha):
     antecedent = start_of(kind, rows)
     dense = oracles.DenseProblem(rows, antecedent, order, alpha)
     premise = Premise.of(antecedent, *oracles.box(rows))
-    result = lse(SeparableProblem(rows, antecedent, order, alpha), premise, max_iter=1, tol=0.0)
+    result = lse(SeparableProblem(rows, antecedent, order, Penalty(alpha=alpha)), premise, max_iter=1, tol=0.0)
     # Relative to the mean over rows; centred targets need no intercept.
     ridge = Ridge(alpha=alpha, fit_intercept=False, solver="cholesky")
     design = dense.design(antecedent.parameters) @ dense.local
@@ -34,7 +35,7 @@ def test_nothing_moves(rng):
     rows = oracles.bumpy_rows(rng)
     antecedent = start_of("grid", rows)
     premise = Premise.of(antecedent, *oracles.box(rows))
-    problem = SeparableProblem(rows, antecedent, 1, 1e-6)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-6))
     result = lse(problem, premise, max_iter=50, tol=1e-6, stiffness=1.0)
     assert result.n_iter == 1
     assert result.converged

@@ -10,7 +10,8 @@ from scipy import optimize
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
-from skanfis.partition import grid_antecedent
+from skanfis.penalty import Penalty
+from skanfis.structure import grid_antecedent
 from skanfis.premise import Premise
 from skanfis.rows import Rows
 from skanfis.solvers.result import MESSAGES
@@ -301,7 +302,7 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
 
 
 def solve(rows, premise, alpha=1e-8, **settings):
-    problem = SeparableProblem(rows, premise.antecedent, 1, alpha)
+    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha))
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
 
 

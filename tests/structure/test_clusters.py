@@ -8,8 +8,8 @@ from sklearn.cluster import KMeans
 from skanfis import ANFISRegressor
 from skanfis.antecedent import RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
-from skanfis.partition import clustered_antecedent
-from skanfis.partition.clustered import representative_rows
+from skanfis.structure import clustered_antecedent
+from skanfis.structure.clustered import representative_rows
 from skanfis.rows import Rows
 
 

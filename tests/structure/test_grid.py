@@ -11,7 +11,7 @@ from skanfis.membership import (
     SigmoidDifference,
     SigmoidProduct,
 )
-from skanfis.partition import grid_antecedent
+from skanfis.structure import grid_antecedent
 
 LOW, HIGH = np.array([-1.0, 100.0, 0.0]), np.array([3.0, 102.5, 0.0])
 

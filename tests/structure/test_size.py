@@ -8,7 +8,7 @@ import pytest
 from sklearn import config_context
 
 from skanfis import ANFISRegressor
-from skanfis.partition import (
+from skanfis.structure import (
     GridSize,
     count_distinct_inputs,
     structure,
