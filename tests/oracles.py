@@ -146,7 +146,7 @@ def dense_design(antecedent, parameters, Z, order, inputs=None):
 
 
 class DenseProblem:
-    """F(theta) = min_beta 1/2 [MSE + lambda V + alpha sum |delta_r|^2 + rho |slopes|^2], in one piece.
+    """min_beta 1/2 [MSE + lambda V + alpha sum |delta_r|^2 + rho |slopes|^2], in one piece.
 
     Everything is a sum of squares of :meth:`residuals`, which are written down from the definitions
     in ``skanfis.penalty``: no row sums of Gram matrices, no projections.
@@ -189,7 +189,7 @@ class DenseProblem:
         return extent
 
     def _value_and_slopes(self, r):
-        """From a line's coefficients on [1, z]: its value where rule r is, its rise over r's extent."""
+        """Of coefficients on [1, z]: the value at rule r's center, the rise over its extent."""
         matrix = np.diag([1.0, *self.extent[r]])
         matrix[0, 1:] = self.centers[r]
         return matrix

@@ -1,0 +1,522 @@
+"""The evidence against integrals: sums over grids, the normal distribution's own, quadrature."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import integrate, optimize, special, stats
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.evidence import PRIOR_DISPLACEMENT, laplace, reestimated
+from skanfis.membership import Gaussian
+from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
+from skanfis.premise import Premise
+from skanfis.rows import Rows
+
+from . import oracles
+
+ONE_RULE = GridAntecedent((), counts=())
+CONSEQUENTS = ("agreement", "alpha", "slope")
+FIRST = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2)
+PENALTIES = [
+    Penalty(agreement=0.1, alpha=0.01, slope=0.3),
+    Penalty(agreement=1e-3, alpha=2e-3, slope=1e-2),
+    Penalty(agreement=0.0, alpha=1.0, slope=1e-4),
+    Penalty(agreement=1.0, alpha=1e-5),
+]
+
+
+def rules(rng, n_rules):
+    return oracles.random_grid(rng, [Gaussian], [n_rules]) if n_rules > 1 else ONE_RULE
+
+
+def posterior(rows, antecedent, order, penalty, at=FIRST, n_rows=None):
+    """The posterior at the start, from an evaluation at weights of its own."""
+    problem = SeparableProblem(rows, antecedent, order, at)
+    evaluation = problem.evaluate(antecedent.parameters)
+    return laplace(
+        evaluation.normal,
+        problem.common_line,
+        evaluation.mean_squared_error,
+        penalty,
+        rows.total_weight if n_rows is None else n_rows,
+        antecedent.n_rules,
+    )
+
+
+def in_full(found):
+    """-2 log p but for (n - 1) log 2 pi per output, with what depends on n alone put back."""
+    n, freedom = found.n_rows, found.freedom
+    left_out = freedom * (1.0 + np.log(n / freedom)) + found.n_outputs * np.log(n)
+    return found.minus_twice_log + left_out
+
+
+class Dense:
+    """A problem written out: design, penalty and rows."""
+
+    def __init__(self, rows, antecedent, order, penalty):
+        problem = oracles.DenseProblem(rows, antecedent, order, penalty)
+        matrix = problem.residual_matrix(antecedent.parameters)
+        self.y, self.n = problem.y, rows.total_weight
+        self.weight = self.n * problem.weight
+        self.phi = problem.design(antecedent.parameters)
+        self.roots = matrix[len(self.y) :]
+        self.penalty = self.roots.T @ self.roots
+        # All rules rise by one.
+        self.height = np.zeros(matrix.shape[1])
+        self.height[:: matrix.shape[1] // antecedent.n_rules] = 1.0
+
+    def at_its_noise(self, minus_twice_log):
+        """The least over sigma^2, and where."""
+        found = optimize.minimize_scalar(
+            lambda log_variance: minus_twice_log(np.exp(log_variance)),
+            bounds=(-15.0, 5.0),
+            method="bounded",
+            options={"xatol": 1e-7},
+        )
+        return found.fun, np.exp(found.x)
+
+    def by_the_normal_distribution(self, variance):
+        """Of y alone: N(height, V) with a flat prior of the height, the consequents summed out."""
+        prior = np.linalg.pinv(self.penalty, rcond=1e-11, hermitian=True) / self.n
+        spread = variance * (np.diag(1.0 / self.weight) + self.phi @ prior @ self.phi.T)
+        one = np.ones(len(self.y))
+        precise = np.linalg.solve(spread, one)
+        total = 0.0
+        for y in self.y.T:
+            height = precise @ y / (precise @ one)
+            # Over the height, the density is its value at the best one times a normal integral.
+            total -= 2.0 * stats.multivariate_normal.logpdf(y, np.full(len(y), height), spread)
+            total += np.log(precise @ one / (2.0 * np.pi))
+            total -= (len(y) - 1.0) * np.log(2.0 * np.pi)
+        return total
+
+    def by_summing(self, variance, n_steps=21):
+        """The same of one output, by the trapezoidal rule over all consequents, one by one."""
+        y, half = self.y[:, 0], 0.5 / variance
+
+        def logarithm(beta):
+            """Log of what is integrated, by residuals: (..., n_columns)."""
+            squares = np.sum(self.weight * (y - beta @ self.phi.T) ** 2, axis=-1)
+            return -half * (squares + self.n * np.sum((beta @ self.roots.T) ** 2, axis=-1))
+
+        def of_prior(rest):
+            """The same of the prior alone, where the first rule's height is zero."""
+            beta = np.concatenate([np.zeros((*rest.shape[:-1], 1)), rest], axis=-1)
+            return -half * self.n * np.sum((beta @ self.roots.T) ** 2, axis=-1)
+
+        log_posterior = log_integral(logarithm, self.phi.shape[1], n_steps)
+        log_prior = log_integral(of_prior, self.phi.shape[1] - 1, n_steps)
+        return -2.0 * (log_posterior - log_prior) + y.size * np.log(variance) + np.log(2.0 * np.pi)
+
+
+def log_integral(logarithm, n_variables, n_steps):
+    """Log of the integral of exp(logarithm) over all of its variables, by nothing but its values.
+
+    Variables are stretched and sheared to where its quadratic form, found by differences, is round.
+    """
+    if n_variables == 0:
+        return float(logarithm(np.zeros(0)))
+    origin, unit = np.zeros(n_variables), np.eye(n_variables)
+    at_origin = logarithm(origin)
+    ahead, back = logarithm(unit), logarithm(-unit)
+    both = logarithm(unit[:, None] + unit)
+    curvature = ahead[:, None] + ahead - both - at_origin
+    curvature[np.diag_indices(n_variables)] = 2.0 * at_origin - ahead - back
+    mode = np.linalg.solve(curvature, 0.5 * (ahead - back))
+    axes = np.linalg.inv(np.linalg.cholesky(curvature))
+    steps = np.linspace(-7.0, 7.0, n_steps)
+    points = np.stack(np.meshgrid(*[steps] * n_variables, indexing="ij"), axis=-1)
+    values = logarithm(mode + points.reshape(-1, n_variables) @ axes)
+    cell = n_variables * np.log(steps[1] - steps[0]) + np.linalg.slogdet(axes)[1]
+    return float(special.logsumexp(values)) + cell
+
+
+class TestAtGivenPremises:
+    @pytest.mark.parametrize("n_rules", [1, 2, 3])
+    @pytest.mark.parametrize("order", [0, 1])
+    @pytest.mark.parametrize("n_outputs", [1, 2])
+    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, n_rules, n_outputs):
+        # To the last constant, so that rule bases of any size and order can be compared.
+        g = np.random.default_rng(n_rules)
+        rows = oracles.bumpy_rows(g, 14, 1, n_outputs)
+        antecedent = rules(g, n_rules)
+        for penalty in PENALTIES:
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+            assert_allclose(in_full(found), expected, atol=1e-7)
+            assert_allclose(found.noise_variance, variance, rtol=1e-5)
+
+    @pytest.mark.parametrize(
+        ("n_rules", "order", "n_rows"), [(1, 0, 9), (1, 1, 8), (2, 0, 12), (3, 0, 20), (2, 1, 10)]
+    )
+    def test_it_is_the_integral_over_all_consequents(self, n_rules, order, n_rows):
+        g = np.random.default_rng(n_rules)
+        rows, antecedent = oracles.bumpy_rows(g, n_rows, 1), rules(g, n_rules)
+        for penalty in PENALTIES[:2]:
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            assert_allclose(dense.phi @ dense.height, 1.0, rtol=1e-12)
+            assert_allclose(dense.roots @ dense.height, 0.0, atol=1e-12)
+            steps = 15 if n_rules * (order + 1) == 4 else 41
+            expected, variance = dense.at_its_noise(partial(dense.by_summing, n_steps=steps))
+            assert_allclose(in_full(found), expected, atol=1e-6)
+            assert_allclose(found.noise_variance, variance, rtol=1e-4)
+
+    @pytest.mark.parametrize("n_outputs", [1, 2])
+    def test_whole_weights_are_repeated_rows(self, n_outputs):
+        g = np.random.default_rng(5)
+        X, times = oracles.bumpy_rows(g, 30, 2, n_outputs), g.integers(1, 5, 30)
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+        weighted = Rows.standardised(X.X, X.y, times.astype(float))
+        repeated = Rows.standardised(np.repeat(X.X, times, axis=0), np.repeat(X.y, times, axis=0))
+        for penalty in PENALTIES:
+            one, other = (posterior(r, antecedent, 1, penalty) for r in (weighted, repeated))
+            assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-9)
+            assert_allclose(one.n_effective, other.n_effective, rtol=1e-9)
+            assert_allclose(one.noise_variance, other.noise_variance, rtol=1e-9)
+
+    def test_weights_of_the_evaluation_do_not_matter(self):
+        # The normal equations of any weights give the posterior at all others.
+        g = np.random.default_rng(2)
+        rows = oracles.bumpy_rows(g, 60, 2, 2)
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 3])
+        for penalty in PENALTIES:
+            own = posterior(rows, antecedent, 1, penalty, at=penalty)
+            for at in PENALTIES:
+                found = posterior(rows, antecedent, 1, penalty, at=at)
+                assert_allclose(found.minus_twice_log, own.minus_twice_log, atol=1e-6)
+                assert_allclose(found.n_effective, own.n_effective, rtol=1e-6)
+
+    @pytest.mark.parametrize("factor", [1e-6, -1e6])
+    def test_units_do_not_matter(self, factor):
+        g = np.random.default_rng(2)
+        rows, antecedent = oracles.bumpy_rows(g, 60, 2), oracles.random_grid(g, [Gaussian], [3])
+        moved = Rows.standardised(rows.X, 7.0 + factor * rows.y)
+        one, other = (posterior(r, antecedent, 1, PENALTIES[0]) for r in (rows, moved))
+        assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-8)
+
+    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self):
+        g = np.random.default_rng(4)
+        rows, antecedent = oracles.bumpy_rows(g, 40, 2, 1, True), rules(g, 3)
+        for penalty in PENALTIES:
+            dense = Dense(rows, antecedent, 1, penalty)
+            weighted = dense.phi.T * (dense.weight / dense.n)
+            matrix = weighted @ dense.phi + dense.penalty
+            hat = dense.phi @ np.linalg.solve(matrix, weighted)
+            found = posterior(rows, antecedent, 1, penalty)
+            assert_allclose(found.n_effective, np.trace(hat), rtol=1e-7)
+
+
+class TestLimits:
+    def alike(self, n_rules):
+        theta = Gaussian.from_center_and_width(np.zeros((n_rules, 1)), np.ones((n_rules, 1)))
+        return ScatteredAntecedent.build(Gaussian, np.arange(1), theta)
+
+    @pytest.mark.parametrize("order", [0, 1])
+    @pytest.mark.parametrize("n_rules", [2, 5])
+    def test_rules_that_are_the_same_are_one_rule(self, order, n_rules):
+        # Their differences change no prediction: neither learnt nor paid for, at any weights.
+        rows = oracles.bumpy_rows(np.random.default_rng(0), 40, 1, 2)
+        for penalty in PENALTIES[:2]:
+            one = posterior(rows, ONE_RULE, order, penalty)
+            many = posterior(rows, self.alike(n_rules), order, penalty)
+            assert_allclose(many.minus_twice_log, one.minus_twice_log, atol=1e-7)
+            assert_allclose(many.n_effective, one.n_effective, rtol=1e-8)
+
+    @pytest.mark.parametrize("key", ["agreement", "alpha"])
+    def test_rules_that_must_agree_are_one_rule(self, key):
+        g = np.random.default_rng(1)
+        rows, antecedent = oracles.bumpy_rows(g, 60, 1), rules(g, 3)
+        gaps = []
+        for size in (1e2, 1e4, 1e6):
+            penalty = replace(Penalty(agreement=1e-3, alpha=1e-3, slope=0.02), **{key: size})
+            one = posterior(rows, ONE_RULE, 1, penalty)
+            gaps.append(
+                posterior(rows, antecedent, 1, penalty).minus_twice_log - one.minus_twice_log
+            )
+        # Its departure is in proportion to what there is left to disagree, until rounding.
+        assert_allclose(gaps[0], 100.0 * gaps[1], rtol=0.05)
+        assert_allclose(gaps[2], 0.0, atol=1e-4)
+
+    def test_of_a_line_and_a_constant_the_data_decide(self):
+        # Slopes that must vanish leave a constant; data on a line ask for the line.
+        g = np.random.default_rng(1)
+        x = g.normal(size=(50, 1))
+        for signal, wins in ((0.0, False), (1.0, True)):
+            rows = Rows.standardised(x, signal * x + g.normal(size=(50, 1)))
+            constant = posterior(rows, ONE_RULE, 0, FIRST)
+            flat = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e7))
+            line = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e-2))
+            assert_allclose(flat.minus_twice_log, constant.minus_twice_log, atol=1e-4)
+            assert bool(line.minus_twice_log < constant.minus_twice_log) is wins
+
+
+def at_fixed_premises(seed):
+    """The posterior as a function of the penalty, of problems of many kinds."""
+    g = np.random.default_rng(seed)
+    rows = oracles.bumpy_rows(g, [30, 100, 300][seed % 3], 2, 1 + seed % 2, seed % 5 == 0)
+    if seed % 4:
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2 + seed % 2])
+    else:
+        antecedent = oracles.random_scattered(g, Gaussian, 5, [0, 1])
+    problem = SeparableProblem(rows, antecedent, 0 if seed % 7 == 0 else 1, FIRST)
+    evaluation = problem.evaluate(antecedent.parameters)
+
+    def at(penalty, **premises):
+        return laplace(
+            evaluation.normal,
+            problem.common_line,
+            evaluation.mean_squared_error,
+            penalty,
+            rows.total_weight,
+            antecedent.n_rules,
+            **premises,
+        )
+
+    return at, Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
+
+
+def slope_of(function, penalty, key, step=1e-3):
+    """Derivative by the logarithm of a weight."""
+    penalty = replace(penalty, slope=penalty.rho)
+    ends = [
+        function(replace(penalty, **{key: getattr(penalty, key) * np.exp(side * step)}))
+        for side in (1.0, -1.0)
+    ]
+    return (ends[0] - ends[1]) / (2.0 * step)
+
+
+class TestReestimated:
+    @pytest.mark.parametrize("seed", range(12))
+    def test_no_step_lowers_the_evidence_and_the_last_is_stationary(self, seed):
+        at, penalty = at_fixed_premises(seed)
+        before = at(penalty).minus_twice_log
+        for _ in range(200):
+            penalty = reestimated(at(penalty), CONSEQUENTS)
+            after = at(penalty).minus_twice_log
+            assert after < before + 1e-6
+            before = after
+        for key in CONSEQUENTS:
+            slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
+            # At an edge the evidence may rise still, but not by anything.
+            assert abs(slope) < 1e-3
+
+    @pytest.mark.parametrize("key", CONSEQUENTS)
+    @pytest.mark.parametrize("seed", [1, 2, 8])
+    def test_step_is_up_the_evidence_and_by_its_derivative(self, seed, key):
+        # d(-2 log p) / d log tau is what is paid less what is determined: their ratio is the step.
+        at, penalty = at_fixed_premises(seed)
+        penalty = replace(penalty, slope=penalty.rho)
+        now = at(penalty)
+        stepped = reestimated(now, [key])
+        ratio = getattr(stepped, key) / getattr(penalty, key)
+        paid, prior, posterior_trace = now.by_weight[key]
+        cost = now.n_rows / now.noise_variance * paid
+        determined = now.n_outputs * (prior - posterior_trace)
+        slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
+        assert_allclose(cost - determined, slope, rtol=1e-4, atol=1e-5)
+        assert_allclose(ratio, np.clip(determined / cost, 0.01, 100.0), rtol=1e-6)
+        assert replace(stepped, **{key: getattr(penalty, key)}) == penalty
+
+    def test_it_is_where_the_evidence_is_largest(self):
+        at, penalty = at_fixed_premises(14)
+        for _ in range(300):
+            penalty = reestimated(at(penalty), CONSEQUENTS)
+        found = at(penalty).minus_twice_log
+
+        def function(logs):
+            return at(Penalty(*np.exp(np.clip(logs, -27.0, 9.0)))).minus_twice_log
+
+        start = np.log([penalty.agreement, penalty.alpha, penalty.rho])
+        around = optimize.minimize(
+            function, start + 0.5, method="Nelder-Mead", options={"maxiter": 2000}
+        )
+        assert found <= around.fun + 1e-3
+
+    def test_known_noise_and_slope_are_found(self):
+        # One rule with many inputs: the noise's variance, and the variance that slopes have.
+        g = np.random.default_rng(0)
+        X, slopes = g.normal(size=(2000, 100)), 0.1 * g.normal(size=100)
+        y = X @ slopes + g.normal(size=2000)
+        rows, penalty = Rows.standardised(X, y[:, None]), FIRST
+        problem = SeparableProblem(rows, ONE_RULE, 1, penalty)
+        evaluation = problem.evaluate(np.empty(0))
+        for _ in range(30):
+            error = evaluation.mean_squared_error
+            found = laplace(evaluation.normal, problem.common_line, error, penalty, 2000.0, 1)
+            penalty = reestimated(found, ["slope"])
+        noise = found.noise_variance * y.var()
+        assert_allclose(noise, 1.0, rtol=0.05)
+        # n rho / sigma^2 is the precision of the slopes, where inputs have a deviation of one.
+        assert_allclose(noise / (2000 * penalty.rho), slopes.var(), rtol=0.15)
+
+
+STEPS = np.array([-0.01, 0.0, 0.01])
+
+
+class OneWidth:
+    """A grid whose premises move along one displacement, the width of a term."""
+
+    def __init__(self, n_rows, noise=0.3):
+        g = np.random.default_rng(0)
+        X = g.uniform(-1.0, 1.0, (n_rows, 1))
+        y = np.sin(3.0 * X) + 0.4 * X**2 + noise * g.normal(size=X.shape)
+        self.rows = Rows.standardised(X, y)
+        low, high = oracles.box(self.rows)
+        self.antecedent = oracles.even_grid([Gaussian], [3], low, high, 0.6)
+        self.premise = Premise.of(self.antecedent, low, high)
+        self.unit = np.zeros(self.premise.size)
+        self.unit[4] = 1.0  # the middle term's width
+
+    def laplace(self, penalty):
+        """By the module: with the curvature of Gauss and Newton, and with the cost's own."""
+        problem = SeparableProblem(self.rows, self.antecedent, 1, penalty)
+
+        def cost(x):
+            evaluation = problem.evaluate(self.premise.parameters(x * self.unit))
+            return evaluation.cost + 0.5 * penalty.stiffness * x**2
+
+        x = optimize.minimize_scalar(cost, bounds=(-1, 1), options={"xatol": 1e-9}).x
+        evaluation = problem.evaluate(self.premise.parameters(x * self.unit))
+        raw = problem.linearise(evaluation)
+        _, hessian = self.premise.pull_back(x * self.unit, raw.gradient, raw.gauss_newton)
+        costs = [problem.evaluate(self.premise.parameters((x + h) * self.unit)).cost for h in STEPS]
+        for curvature in (hessian[4, 4], np.diff(costs, 2)[0] / STEPS[-1] ** 2):
+            yield laplace(
+                evaluation.normal,
+                problem.common_line,
+                evaluation.mean_squared_error,
+                penalty,
+                self.rows.total_weight,
+                self.antecedent.n_rules,
+                np.array([x]),
+                np.array([curvature]),
+            )
+
+    def by_quadrature(self, penalty, variance):
+        """The integral over the displacement of what is left of the consequents'."""
+        dense = oracles.DenseProblem(self.rows, self.antecedent, 1, penalty)
+        n = self.rows.total_weight
+
+        def minus_log(x):
+            parameters = self.premise.parameters(x * self.unit)
+            matrix = dense.residual_matrix(parameters)
+            roots = matrix[self.rows.n_rows :]
+            penalised = np.linalg.eigvalsh(roots.T @ roots)[1:]
+            determinants = np.linalg.slogdet(matrix.T @ matrix)[1] - np.sum(np.log(penalised))
+            paid = 2.0 * dense.cost(parameters) + penalty.stiffness * x**2
+            return 0.5 * (n * paid / variance + determinants + np.log(self.antecedent.n_rules))
+
+        x = np.linspace(-2.0, 2.0, 801)
+        values = np.array([minus_log(one) for one in x])
+        height = values.min()
+        integral = integrate.simpson(np.exp(height - values), x=x)
+        prior = 0.5 * np.log(n * penalty.stiffness / (2.0 * np.pi * variance))
+        return 2.0 * (height - np.log(integral) - prior) + (n - 1.0) * np.log(variance) + np.log(n)
+
+
+class TestPremises:
+    def prior_of_weight(self, found):
+        """As a hundred displacements seen before would do."""
+        expected = found.n_rows * found.penalty.stiffness / found.noise_variance
+        expected *= PRIOR_DISPLACEMENT**2
+        return 100.0 * (expected - np.log(expected) - 1.0)
+
+    def test_a_displacement_is_integrated_over(self):
+        case, errors, sizes = OneWidth(1500), [], []
+        for stiffness in (1e-4, 1e-2, 1.0):
+            penalty = Penalty(agreement=0.05, alpha=0.01, slope=0.01, stiffness=stiffness)
+            found = list(case.laplace(penalty))
+            own = np.array([in_full(one) - self.prior_of_weight(one) for one in found])
+            sizes.append(np.log1p(found[1].curvature[0] / stiffness))
+            errors.append(own - case.by_quadrature(penalty, found[0].noise_variance))
+        rough, exact = np.array(errors).T
+        assert max(sizes) > 5.0
+        assert_allclose(exact, 0.0, atol=0.05)
+        # That of Gauss and Newton leaves out what residuals and disagreement bring.
+        assert_allclose(rough, 0.0, atol=1.0)
+
+    @pytest.mark.parametrize("seed", [1, 2, 8])
+    def test_weight_is_reestimated_where_its_own_evidence_is_largest(self, seed):
+        # The noise is held where the prior of the weight is concerned.
+        at, penalty = at_fixed_premises(seed)
+        g = np.random.default_rng(seed)
+        premises = {
+            "displacement": 0.2 * g.normal(size=6),
+            "curvature": 10.0 ** g.uniform(-4.0, 0.0, 6),
+        }
+        penalty = replace(penalty, stiffness=1e-3)
+        for _ in range(100):
+            penalty = reestimated(at(penalty, **premises), ["stiffness"])
+        found = at(penalty, **premises)
+
+        def own(p):
+            there = at(p, **premises)
+            return there.minus_twice_log - self.prior_of_weight(there)
+
+        slope = slope_of(own, penalty, "stiffness")
+        assert_allclose(slope + 100.0 * (found.prior_precision - 1.0), 0.0, atol=1e-4)
+        assert 0.5 < found.prior_precision < 2.0
+
+    def test_effective_parameters_are_those_that_move(self):
+        at, penalty = at_fixed_premises(1)
+        curvature = np.array([1.0, 1e-3, 0.0])
+        penalty = replace(penalty, stiffness=1e-3)
+        there = at(penalty, displacement=np.zeros(3), curvature=curvature)
+        gain = there.n_effective - at(penalty).n_effective
+        assert_allclose(gain, 1.0 / 1.001 + 0.5, rtol=1e-12)
+
+
+def surface(n_rows, noise, seed=0):
+    g = np.random.default_rng(seed)
+    X = g.uniform(-1.0, 1.0, (n_rows, 2))
+    return X, np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + noise * g.normal(size=n_rows)
+
+
+def effective_parameters(model, X, y):
+    """Trace of the hat matrix of the consequents where the fit ended."""
+    rows = Rows.standardised(X, y[:, None])
+    antecedent = model.model_.antecedent.change_units(
+        -rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale
+    )
+    penalty = Penalty(model.agreement_, model.alpha_, model.slope_alpha_)
+    return posterior(rows, antecedent, 1, penalty).n_effective
+
+
+class TestWholeFits:
+    def test_the_noisier_the_fewer_parameters(self):
+        counts = []
+        for noise in (0.03, 0.3, 3.0):
+            X, y = surface(300, noise)
+            counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
+        assert (np.diff(counts) < -1.0).all()
+
+    def test_the_more_rows_the_more_parameters(self):
+        counts = []
+        for n_rows in (50, 200, 1000):
+            X, y = surface(n_rows, 0.3)
+            counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
+        assert (np.diff(counts) > 0.5).all()
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_the_noisier_the_fewer_rules(self, seed):
+        counts = [
+            ANFISRegressor().fit(*surface(200, noise, seed)).n_rules_ for noise in (0.3, 2.0, 5.0)
+        ]
+        assert counts[0] > counts[1] >= counts[2]
+
+    def test_repeated_rows_and_whole_weights_are_the_same_fit(self):
+        X, y = surface(80, 0.2)
+        times = np.random.default_rng(1).integers(1, 4, 80)
+        weighted = ANFISRegressor(n_mfs=2).fit(X, y, sample_weight=times)
+        repeated = ANFISRegressor(n_mfs=2).fit(np.repeat(X, times, axis=0), np.repeat(y, times))
+        for name in ("agreement_", "alpha_", "slope_alpha_", "stiffness_"):
+            assert_allclose(getattr(weighted, name), getattr(repeated, name), rtol=1e-3)
+        # Turns end by tolerances: rounding has a say in the digits beyond.
+        assert_allclose(weighted.predict(X), repeated.predict(X), rtol=0, atol=1e-4)
