@@ -34,7 +34,7 @@ from .consequent import NormalFactor
 from .objective import NormalEquations
 from .penalty import CommonLine, Penalty
 
-__all__ = ["FREE", "PRIOR_DISPLACEMENT", "Laplace", "laplace", "reestimated"]
+__all__ = ["FREE", "PRIOR_DISPLACEMENT", "Laplace", "laplace", "least_weights", "reestimated"]
 
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
@@ -182,8 +182,21 @@ def laplace(
     )
 
 
-def reestimated(posterior: Laplace, free):
-    """The penalty after one step of every free weight."""
+def least_weights(posterior: Laplace, n_rules):
+    """Weights below which the prior expects what no rule that can be read does.
+
+    A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
+    from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the target's
+    own variance, one.
+    """
+    noise = posterior.noise_variance / posterior.n_rows
+    if n_rules == 1:
+        return {}
+    return {"agreement": posterior.n_columns * noise, "alpha": noise}
+
+
+def reestimated(posterior: Laplace, free, least=None):
+    """The penalty after one step of every free weight, none below ``least``."""
     weights = {**_weighted(posterior.penalty), "stiffness": posterior.penalty.stiffness}
     for key, (paid, before, after) in posterior.by_weight.items():
         if key not in free or before <= 0.0:
@@ -196,5 +209,6 @@ def reestimated(posterior: Laplace, free):
             cost += _PRIOR_NUMBER * posterior.prior_precision
         ratio = (determined + 1e-12) / (cost + 1e-12)
         ratio = min(max(ratio, 1.0 / _LARGEST_STEP), _LARGEST_STEP)
-        weights[key] = min(max(weights[key] * ratio, _SMALLEST[key]), _LARGEST[key])
+        smallest = max(_SMALLEST[key], 0.0 if least is None else least.get(key, 0.0))
+        weights[key] = min(max(weights[key] * ratio, smallest), _LARGEST[key])
     return replace(posterior.penalty, **weights)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..evidence import FREE, PRIOR_DISPLACEMENT, Laplace, laplace, reestimated
+from ..evidence import FREE, PRIOR_DISPLACEMENT, Laplace, laplace, least_weights, reestimated
 from ..objective import Evaluation, SeparableProblem
 from ..penalty import Penalty
 from ..premise import Premise
@@ -86,6 +86,7 @@ def tune(
     first_steps=FIRST_STEPS,
     displacement=None,
     is_loose=False,
+    is_free=False,
 ) -> Tuned:
     """Find the free weights, and the premises that go with them.
 
@@ -106,6 +107,8 @@ def tune(
         Where the premises start; zero if not given.
     is_loose : bool
         Whether the premises come before the weights.
+    is_free : bool
+        Whether rules may compensate one another beyond all reading.
     """
     x = np.zeros(premise.size) if displacement is None else displacement
     n_rules, penalty = problem.antecedent.n_rules, problem.penalty
@@ -124,7 +127,9 @@ def tune(
 
     def improved(evaluation, penalty, steps, free, curvature=None):
         for _ in range(steps):
-            penalty = reestimated(posterior_at(evaluation, penalty, curvature), free)
+            posterior = posterior_at(evaluation, penalty, curvature)
+            least = None if is_free else least_weights(posterior, n_rules)
+            penalty = reestimated(posterior, free, least)
         return posterior_at(evaluation, penalty, curvature)
 
     if is_loose:
@@ -192,7 +197,7 @@ def tuned_start(
         low, high = sample.inputs.minimum, sample.inputs.maximum
         premise = Premise.of(antecedent, low, high, is_free)
         turns = _MOST_TURNS if premises_move else 0
-        return tune(problem, premise, free, n_sample, turns, is_loose=is_free)
+        return tune(problem, premise, free, n_sample, turns, is_loose=is_free, is_free=is_free)
 
     best, is_free = tuned(False), False
     if premises_move and best.displacement.size:
