@@ -43,6 +43,8 @@ _HIGHEST_CROSSING = 0.9
 _POWER = 4.0
 # A gap that a step has closed, as part of the range.
 _SMALLEST_GAP = 1e-9
+# Displacements this near to an edge of the box are on it.
+_ON_EDGE = 1e-9
 # Widths that are looked at for the widest.
 _CHANGES = 128
 
@@ -172,6 +174,9 @@ class Premise:
             gaps = row.gaps_of(parameters[row.locations])
             x[row.locations] = row.basis.T @ (np.log(gaps) - row.log_gaps)
             x[row.widths] -= (_log_spacing(gaps) - row.log_spacing)[row.terms]
+        # What stands on an edge stays there whatever rounding says: it is what does not move.
+        for edge in (self.lower, self.upper):
+            x = np.where(np.abs(x - edge) < _ON_EDGE, edge, x)
         return x
 
     def pull_back(self, displacement, gradient, gauss_newton):
