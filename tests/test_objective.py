@@ -211,12 +211,26 @@ def test_two_rules_that_are_alike_learn_as_one_another():
     assert_all_close(by_rule[:, 1], by_rule[:, 3], 1e-8)
 
 
-def test_dead_rule_has_no_gradient():
-    case = Case.named("dead rule")
-    evaluation, linearisation = case.at_point()
+@pytest.mark.parametrize("penalty", [PLAIN, FULL])
+def test_dead_rule_has_no_gradient(penalty):
+    evaluation, linearisation = Case.named("dead rule", penalty).at_point()
     assert_array_equal(linearisation.gradient.reshape(2, 4, 2)[:, 1], 0.0)
-    assert_array_equal(evaluation.coefficients.reshape(4, 3)[1], 0.0)
     assert evaluation.masses[1] == 0.0
+
+
+def test_dead_rule_lies_on_the_line_of_the_others():
+    # With a center at zero and an extent of one: what is left to minimise is its own departure.
+    case = Case.named("dead rule", Penalty(agreement=0.1, alpha=1e-3, slope=0.0))
+    evaluation, _ = case.at_point()
+    dense, found = case.dense, evaluation.coefficients.reshape(4, 3)
+    assert_array_equal(dense.blocks[1], np.eye(3))
+    others = [0, 2, 3]
+    line, *_ = np.linalg.lstsq(
+        np.concatenate([dense.blocks[r] for r in others]),
+        np.concatenate([dense.blocks[r] @ found[r] for r in others]),
+        rcond=None,
+    )
+    assert_allclose(found[1], line, rtol=1e-9)
 
 
 def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
