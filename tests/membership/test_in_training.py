@@ -26,7 +26,7 @@ BUILD = {
 def test_gradient_of_the_cost_by_the_displacements(family, kind):
     rng = np.random.default_rng(3)
     antecedent, rows = BUILD[kind](rng, family), oracles.bumpy_rows(rng, 250, weighted=True)
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-4))
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(agreement=0.1, alpha=1e-4))
     premise = Premise.of(antecedent, *oracles.box(rows))
     x = rng.uniform(0.2 * premise.lower, 0.2 * premise.upper)
 
@@ -52,8 +52,9 @@ def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
     mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 3, -1)
     assert mu.max(axis=1).min() > 0.01
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-4))
-    dense = oracles.DenseProblem(rows, antecedent, 1, 1e-4)
+    penalty = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
     point = antecedent.parameters
     linearisation = problem.linearise(problem.evaluate(point))
     for found, expected in (
@@ -61,7 +62,7 @@ def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
         (linearisation.gauss_newton, dense.gauss_newton(point)),
     ):
         # The floor of families with a foot is 1e-10, next to memberships of 0.01 or more.
-        assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+        assert_allclose(found, expected, rtol=0, atol=3e-7 * np.abs(expected).max())
 
 
 @FAMILIES
@@ -74,13 +75,15 @@ def test_every_family_learns_a_smooth_surface(family, rng):
     model = ANFISRegressor(n_mfs=3, mf=family.name).fit(X, y)
     error = np.sqrt(np.mean((model.predict(unseen) - surface(unseen)) ** 2))
     # A linear model: 0.5; the noise: 0.1; 27 coefficients from 600 rows cannot do better than 0.02.
-    assert error < 0.04
+    assert error < 0.05
     assert {term["function"] for term in model.memberships_} == {family.name}
 
 
 @FAMILIES
 def test_every_family_improves_on_its_start_on_jangs_sinc(family):
     X, y = make_jang_sinc()
-    model = ANFISRegressor(n_mfs=3, mf=family.name).fit(X, y)
-    assert model.loss_curve_[-1] < 0.8 * model.loss_curve_[0]
-    assert np.sqrt(np.mean((model.predict(X) - y) ** 2)) < 0.1
+    model = ANFISRegressor(n_mfs=4, mf=family.name).fit(X, y)
+    start = ANFISRegressor(n_mfs=4, mf=family.name, solver="lse").fit(X, y)
+    # Premises and weights have been found before the last run begins.
+    assert model.loss_curve_[-1] < 0.2 * start.loss_curve_[-1]
+    assert np.sqrt(np.mean((model.predict(X) - y) ** 2)) < 0.06

@@ -26,8 +26,9 @@ every_solver = pytest.mark.parametrize("name", SOLVERS)
 every_iterative_solver = pytest.mark.parametrize("name", ITERATIVE)
 
 
-def solve(name, rows, premise, alpha=1e-8, order=1, **settings):
-    problem = SeparableProblem(rows, premise.antecedent, order, Penalty(alpha=alpha))
+def solve(name, rows, premise, alpha=1e-8, order=1, agreement=0.0, **settings):
+    penalty = Penalty(agreement=agreement, alpha=alpha)
+    problem = SeparableProblem(rows, premise.antecedent, order, penalty)
     return SOLVERS[name](problem, premise, **({"max_iter": 15, "tol": 1e-6} | settings))
 
 
@@ -67,9 +68,10 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
 @every_solver
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("n_outputs", [1, 2])
-def test_result_is_what_it_says(name, kind, n_outputs):
+@pytest.mark.parametrize("agreement", [0.0, 0.2])
+def test_result_is_what_it_says(name, kind, n_outputs, agreement):
     rows, premise = noisy(kind, n_outputs=n_outputs)
-    result = solve(name, rows, premise)
+    result = solve(name, rows, premise, agreement=agreement)
     assert isinstance(result, SolverResult)
     assert result.message == MESSAGES[result.status]
     assert result.loss_curve.shape == (result.n_iter + 1,)
@@ -86,6 +88,22 @@ def test_best_point_is_returned(name, kind):
     assert_allclose(result.evaluation.mean_squared_error, result.loss_curve.min(), rtol=1e-9)
     if name not in RESTLESS:
         assert (np.diff(result.loss_curve) <= 0.0).all()
+
+
+@every_iterative_solver
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("agreement", [0.05, 1.0])
+def test_cost_falls_where_rules_must_agree(name, kind, agreement):
+    rows, premise = noisy(kind)
+    settings = {"step_size": 1e-3} if name in RESTLESS else {}
+    result = solve(name, rows, premise, alpha=1e-3, agreement=agreement, **settings)
+    penalty = Penalty(agreement=agreement, alpha=1e-3)
+    dense = oracles.DenseProblem(rows, premise.antecedent, 1, penalty)
+    start = dense.cost(premise.antecedent.parameters)
+    evaluation = result.evaluation
+    end = dense.cost_at(evaluation.antecedent.parameters, evaluation.coefficients)
+    assert_allclose(evaluation.cost, end, rtol=1e-9)
+    assert end < start
 
 
 @every_iterative_solver

@@ -10,13 +10,17 @@ from skanfis.premise import Premise
 from skanfis.solvers.gradient import gradient
 
 from .. import oracles
-from ..test_objective import ALPHA, CASES, Case
+from ..test_objective import CASES, FULL, PLAIN, Case
 from .test_varpro import planted
 
 
-@pytest.fixture(scope="module", params=CASES)
+@pytest.fixture(
+    scope="module",
+    params=[(name, penalty) for name in CASES for penalty in (PLAIN, FULL)],
+    ids=lambda param: f"{param[0]}{', agreeing' if param[1] is FULL else ''}",
+)
 def case(request):
-    return Case.named(request.param)
+    return Case.named(*request.param)
 
 
 def any_coefficients(case):
@@ -24,39 +28,29 @@ def any_coefficients(case):
     return np.random.default_rng(8).normal(size=shape)
 
 
-def dense_cost(case, parameters, coefficients):
-    """The cost at given coefficients on [1, z], analytic in both."""
-    dense = case.dense
-    residual = dense.y - dense.design(parameters) @ coefficients
-    local = np.linalg.solve(dense.local, coefficients)
-    squares = np.sum(dense.weight[:, None] * residual**2)
-    return 0.5 * squares + 0.5 * dense.alpha * np.sum(local**2)
-
-
 class TestJointGradient:
     def test_cost(self, case):
         coefficients = any_coefficients(case)
         joint = case.problem.joint(case.point, coefficients)
-        expected = dense_cost(case, case.point, coefficients)
+        expected = case.dense.cost_at(case.point, coefficients)
         assert_allclose(joint.evaluation.cost, expected, rtol=1e-12)
-        without_ridge = 2.0 * expected - ALPHA * np.sum(
-            np.linalg.solve(case.dense.local, coefficients) ** 2
-        )
-        assert_allclose(joint.evaluation.mean_squared_error, without_ridge, rtol=1e-9)
+        residual = case.dense.y - case.dense.design(case.point) @ coefficients
+        error = np.sum(case.dense.weight[:, None] * residual**2)
+        assert_allclose(joint.evaluation.mean_squared_error, error, rtol=1e-11)
         assert joint.evaluation.coefficients is coefficients
         assert_array_equal(joint.evaluation.antecedent.parameters, case.point)
 
     def test_gradient_by_premises(self, case):
         coefficients = any_coefficients(case)
         found = case.problem.joint(case.point, coefficients).premises
-        expected = oracles.complex_step(lambda p: dense_cost(case, p, coefficients), case.point)
+        expected = oracles.complex_step(lambda p: case.dense.cost_at(p, coefficients), case.point)
         assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
     def test_gradient_by_coefficients(self, case):
         coefficients = any_coefficients(case)
         found = case.problem.joint(case.point, coefficients).coefficients
         expected = oracles.complex_step(
-            lambda flat: dense_cost(case, case.point, flat.reshape(coefficients.shape)),
+            lambda flat: case.dense.cost_at(case.point, flat.reshape(coefficients.shape)),
             coefficients.ravel(),
         )
         expected = expected.reshape(coefficients.shape)
@@ -83,9 +77,12 @@ class TestJointGradient:
         assert_allclose(found.coefficients, expected.coefficients, rtol=1e-10, atol=1e-14)
 
 
-def problem_of(kind="grid", seed=0, alpha=1e-4, order=1):
+AGREEING = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+
+
+def problem_of(kind="grid", seed=0, penalty=AGREEING, order=1):
     rows, premise, *_ = planted(kind, seed, displaced=0.5, noise=0.1)
-    return SeparableProblem(rows, premise.antecedent, order, Penalty(alpha=alpha)), premise
+    return SeparableProblem(rows, premise.antecedent, order, penalty), premise
 
 
 @pytest.mark.parametrize("kind", ["one input", "grid", "bells", "scattered"])
@@ -107,7 +104,7 @@ def test_short_steps_only_go_down(kind, order):
 def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
     problem, premise = problem_of("bells")
     rows, antecedent = problem.rows, premise.antecedent
-    dense = oracles.DenseProblem(rows, antecedent, 1, problem.alpha)
+    dense = oracles.DenseProblem(rows, antecedent, 1, problem.penalty)
     (group,) = antecedent.groups
     solved = problem.evaluate(antecedent.parameters).coefficients
     numbers = group.family.natural(group.theta)
@@ -117,9 +114,7 @@ def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
         center, width, slope = variables[: numbers.size].reshape(numbers.shape)
         parameters = np.concatenate([center, np.log(width), np.log(slope)])
         beta = variables[numbers.size :].reshape(solved.shape)
-        residual = dense.y - dense.design(parameters) @ beta
-        local = np.linalg.solve(dense.local, beta)
-        return 0.5 * (dense.weight @ residual**2)[0] + 0.5 * dense.alpha * np.sum(local**2)
+        return dense.cost_at(parameters, beta)
 
     slope = oracles.complex_step(cost, start)
     expected = start - 0.01 * slope / np.linalg.norm(slope)

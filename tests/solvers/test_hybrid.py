@@ -11,7 +11,6 @@ from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.structure import grid_antecedent
 from skanfis.premise import Premise
 from skanfis.rows import Rows, Scale
 from skanfis.solvers.hybrid import NaturalPremise, StepSize, hybrid
@@ -100,8 +99,9 @@ def two_bells(rows, alpha=0.0):
     """The problem and the premise of Jang's examples; neighbours cross at one half."""
     low, high = oracles.box(rows)
     n_inputs = low.size
-    antecedent = grid_antecedent([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
-    return SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha)), Premise.of(antecedent, low, high)
+    antecedent = oracles.even_grid([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha))
+    return problem, Premise.of(antecedent, low, high, is_free=True)
 
 
 class TestAgainstTheTranscription:
@@ -209,8 +209,13 @@ def premise_of(kind):
     if kind not in MEMBERSHIPS:
         return planted(kind, 0)[1]
     low, high = -np.ones(2), np.ones(2)
-    antecedent = grid_antecedent([MEMBERSHIPS[kind]] * 2, [3, 2], low, high, 0.6)
+    antecedent = oracles.even_grid([MEMBERSHIPS[kind]] * 2, [3, 2], low, high, 0.6)
     return Premise.of(antecedent, low, high)
+
+
+def without_edges(premise):
+    """The same in a box that nothing leaves."""
+    return replace(premise, lower=np.full(premise.size, -20.0), upper=np.full(premise.size, 20.0))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -221,7 +226,7 @@ class TestNaturalPremise:
         return np.concatenate([g.family.natural(g.theta).ravel() for g in antecedent.groups])
 
     def test_move_adds_to_the_numbers(self, kind, rng):
-        premise = premise_of(kind)
+        premise = without_edges(premise_of(kind))
         natural = NaturalPremise(premise)
         x = 0.2 * rng.normal(size=premise.size)
         for size in (1e-6, 0.01, 0.1):
@@ -230,7 +235,7 @@ class TestNaturalPremise:
             assert_allclose(moved, self.numbers(premise, x) + step, rtol=1e-12, atol=1e-13)
 
     def test_slope_is_the_derivative_by_the_numbers(self, kind, rng):
-        premise = premise_of(kind)
+        premise = without_edges(premise_of(kind))
         natural = NaturalPremise(premise)
         x, weights = 0.2 * rng.normal(size=premise.size), rng.normal(size=premise.size)
         stiffness = 0.3
@@ -297,7 +302,10 @@ class TestEnd:
         # Two outputs that are one: the root mean square error is that of either.
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
         twice = Rows.standardised(rows.X, np.hstack([rows.y, rows.y]))
-        one, two = (SeparableProblem(some, premise.antecedent, 1, Penalty(alpha=1e-8)) for some in (rows, twice))
+        one, two = (
+            SeparableProblem(some, premise.antecedent, 1, Penalty(alpha=1e-8))
+            for some in (rows, twice)
+        )
         goal = np.sqrt(hybrid(one, premise, max_iter=10, tol=0.0).loss_curve.min()) * (1 + 1e-9)
         results = [hybrid(p, premise, max_iter=10, tol=0.0, error_goal=goal) for p in (one, two)]
         assert results[0].status == results[1].status == "error_goal"
@@ -343,8 +351,9 @@ def test_gaussians_have_natural_parameters_too():
     # One step along the complex-step gradient by (c, sigma) themselves.
     rows = oracles.bumpy_rows(np.random.default_rng(0))
     low, high = oracles.box(rows)
-    antecedent = grid_antecedent([Gaussian] * 2, [2, 3], low, high, 0.6)
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-4))
+    antecedent = oracles.even_grid([Gaussian] * 2, [2, 3], low, high, 0.6)
+    penalty = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
     seen = []
     hybrid(
         problem,
@@ -355,7 +364,7 @@ def test_gaussians_have_natural_parameters_too():
     )
     (group,) = antecedent.groups
     start = group.family.natural(group.theta)
-    dense = oracles.DenseProblem(rows, antecedent, 1, problem.alpha)
+    dense = oracles.DenseProblem(rows, antecedent, 1, problem.penalty)
 
     def cost(flat):
         center, sigma = flat.reshape(start.shape)

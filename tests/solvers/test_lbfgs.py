@@ -17,9 +17,10 @@ from .. import oracles
 from .test_varpro import Recording, planted, start_of
 
 
-def problem_of(kind, seed=1, alpha=1e-4, **settings):
+def problem_of(kind, seed=1, alpha=1e-4, agreement=0.0, **settings):
     rows, premise, *_ = planted(kind, seed, displaced=0.3, noise=0.1, **settings)
-    return SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha)), premise
+    penalty = Penalty(agreement=agreement, alpha=alpha)
+    return SeparableProblem(rows, premise.antecedent, 1, penalty), premise
 
 
 @pytest.mark.parametrize(
@@ -32,10 +33,11 @@ def problem_of(kind, seed=1, alpha=1e-4, **settings):
         ("scattered", 1, 1e-3),
     ],
 )
-def test_optimum_of_variable_projection_is_reached(kind, n_outputs, stiffness):
-    problem, premise = problem_of(kind, n_outputs=n_outputs)
+@pytest.mark.parametrize("agreement", [0.0, 0.1])
+def test_optimum_of_variable_projection_is_reached(kind, n_outputs, stiffness, agreement):
+    problem, premise = problem_of(kind, n_outputs=n_outputs, agreement=agreement)
     at = [], []
-    settings = {"max_iter": 1000, "tol": 1e-5, "stiffness": stiffness}
+    settings = {"max_iter": 3000, "tol": 1e-6, "stiffness": stiffness}
     reduced, joint = (
         solver(problem, Recording(premise, noted), **settings)
         for solver, noted in zip((varpro, lbfgs), at, strict=True)

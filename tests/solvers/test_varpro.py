@@ -11,7 +11,6 @@ from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.structure import grid_antecedent
 from skanfis.premise import Premise
 from skanfis.rows import Rows
 from skanfis.solvers.result import MESSAGES
@@ -284,7 +283,7 @@ def start_of(kind, rows):
         "bells": ([Bell, Bell], [2, 2]),
         "two families": ([Bell, Gaussian], [2, 2]),
     }[kind]
-    return grid_antecedent(families, counts, low, high, 0.6)
+    return oracles.even_grid(families, counts, low, high, 0.6)
 
 
 def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
@@ -301,8 +300,9 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     return Rows.standardised(rows.X, y), premise, truth, beta
 
 
-def solve(rows, premise, alpha=1e-8, **settings):
-    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha))
+def solve(rows, premise, alpha=1e-8, agreement=0.0, **settings):
+    penalty = Penalty(agreement=agreement, alpha=alpha)
+    problem = SeparableProblem(rows, premise.antecedent, 1, penalty)
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
 
 
@@ -322,19 +322,20 @@ class TestOnRuleBases:
         assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
 
     @pytest.mark.parametrize("kind", ["grid", "two families", "scattered"])
-    def test_result_is_stationary(self, kind):
+    @pytest.mark.parametrize("agreement", [0.0, 0.1])
+    def test_result_is_stationary(self, kind, agreement):
         # By the dense gradient, pulled back by finite differences: nothing of the solver's own.
         rows, premise, *_ = planted(kind, 0, displaced=0.5, noise=0.1, n_outputs=2)
         at = []
         recording = Recording(premise, at)
-        problem, result = solve(rows, recording, tol=1e-9, max_iter=1000)
+        problem, result = solve(rows, recording, agreement=agreement, tol=1e-9, max_iter=1000)
         assert result.status in {"cost", "gradient", "step"}
         x = next(
             x
             for x in reversed(at)
             if np.array_equal(premise.parameters(x), result.evaluation.antecedent.parameters)
         )
-        dense = oracles.DenseProblem(rows, premise.antecedent, 1, problem.alpha)
+        dense = oracles.DenseProblem(rows, premise.antecedent, 1, problem.penalty)
 
         def projected(x):
             jacobian = oracles.central_difference(premise.parameters, x, 1e-2)
