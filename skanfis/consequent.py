@@ -35,6 +35,10 @@ _SMALLEST_SPREAD = 0.05
 _SMALLEST_MASS = 1e-12
 # Tenfold shifts of a matrix that has no Cholesky factor: from rounding to the matrix itself.
 _MOST_SHIFTS = 20
+# Up to this many columns a trace is exact; beyond, an inverse would cost more than all else, and so
+# many random signs give it to about 1 %.
+_MOST_EXACT = 512
+_PROBES = 32
 
 
 def basis(Z):
@@ -149,9 +153,14 @@ class NormalFactor:
         return 2.0 * float(np.sum(np.log(np.diagonal(self._lower))))
 
     def traces(self, matrices):
-        """tr (G + P)^-1 A of every symmetric A."""
+        """tr (G + P)^-1 A of every symmetric A; of large ones an estimate (Hutchinson 1990)."""
+        n = self._lower.shape[0]
+        if n > _MOST_EXACT:
+            signs = np.random.default_rng(n).choice([-1.0, 1.0], size=(n, _PROBES))
+            solved = self.solve(signs)
+            return [float(np.vdot(solved, matrix @ signs)) / _PROBES for matrix in matrices]
         inverse, _ = linalg.lapack.dpotri(self._lower, lower=1)
         # What is above the diagonal is zero: count what is below twice.
         inverse *= 2.0
-        inverse.flat[:: inverse.shape[0] + 1] *= 0.5
+        inverse.flat[:: n + 1] *= 0.5
         return [float(np.vdot(inverse, matrix)) for matrix in matrices]

@@ -146,7 +146,9 @@ def laplace(
     slope = normal.penalty @ normal.coefficients
     change = factor.solve(slope - matrix @ normal.coefficients)
     solved = normal.coefficients + change
-    error = mean_squared_error - 2.0 * np.sum(change * slope) + np.sum(change * (normal.gram @ change))
+    error = (
+        mean_squared_error - 2.0 * np.sum(change * slope) + np.sum(change * (normal.gram @ change))
+    )
     error = max(error, 0.0)
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))

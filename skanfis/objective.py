@@ -433,5 +433,7 @@ def _own_parameters(antecedent):
         rows = start + np.arange(group.theta.size).reshape(group.theta.shape)
         of_term.extend(rows.T)
         start += group.theta.size
-    return [np.concatenate([of_term[t] for t in terms if t >= 0] or [np.empty(0, dtype=int)])
-            for terms in antecedent.rule_terms]
+    return [
+        np.concatenate([of_term[t] for t in terms if t >= 0] or [np.empty(0, dtype=int)])
+        for terms in antecedent.rule_terms
+    ]

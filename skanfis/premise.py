@@ -22,6 +22,7 @@ Shape parameters are logarithms, and move as these.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -34,6 +35,8 @@ _LOG_SHRINKAGE = np.log(1.3)
 _LOG_GAP = np.log(4.0)
 # Shapes, and widths of terms that share their place with others, may change by this one.
 _LOG_FACTOR = np.log(4.0)
+# A shape that makes the top of an ordered term flat, and so truer next to a neighbour, by this.
+_LOG_FLATTER = np.log(1.5)
 # Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
 # more than half true at the edge. Where they are free, by the second.
 _BEYOND, _FREE_BEYOND = 0.25, 1.0
@@ -141,8 +144,10 @@ class Premise:
                 if is_free:
                     continue
                 lower[row.widths] = -_LOG_SHRINKAGE
+                upper[np.concatenate([term.shapes for term in own])] = _LOG_FLATTER
                 widest = [
-                    _widest(term, raw, np.exp(s)) for term, s in zip(own, row.log_spacing, strict=True)
+                    _widest(term, raw, np.exp(s))
+                    for term, s in zip(own, row.log_spacing, strict=True)
                 ]
                 upper[row.widths] = np.array(widest)[row.terms]
                 continue
@@ -198,6 +203,7 @@ class _Term:
     positions: np.ndarray
     location: int
     widths: np.ndarray
+    shapes: np.ndarray
 
 
 def _terms(antecedent):
@@ -208,20 +214,32 @@ def _terms(antecedent):
         positions = start + np.arange(group.theta.size).reshape(group.theta.shape)
         for own, j in zip(positions.T, group.inputs, strict=True):
             location = own[kinds == "location"][0]
-            terms.append(_Term(group.family, int(j), own, location, own[kinds == "log_width"]))
+            widths, shapes = own[kinds == "log_width"], own[kinds == "log_shape"]
+            terms.append(_Term(group.family, int(j), own, location, widths, shapes))
         start += group.theta.size
     return terms
 
 
 def _widest(term, raw, spacing):
-    """How much a term's widths may grow: the change of their logarithm."""
-    changes = np.linspace(0.0, _LOG_FACTOR, _CHANGES)
-    is_width = np.isin(term.positions, term.widths)[:, None]
-    theta = raw[term.positions][:, None] + changes * is_width
+    """How much a term's widths may grow, the rest of it anywhere: the change of their logarithm."""
+    growth = np.linspace(0.0, _LOG_FACTOR, _CHANGES)
     sides = raw[term.location] + np.array([-0.5, 0.5]) * spacing
-    truth = [term.family.value(np.full((_CHANGES, 1), side), theta)[:, 0] for side in sides]
+    # A steep flank beside a large width is truer than both at their largest: all are tried.
+    ranges = [
+        (growth, np.full(_CHANGES, -_LOG_SHRINKAGE))
+        if position in term.widths
+        else np.full((2, _CHANGES), [[_LOG_FLATTER], [-_LOG_FACTOR]])
+        for position in term.positions
+        if position != term.location
+    ]
+    truth = np.zeros((2, _CHANGES))
+    for changes in product(*ranges):
+        # A family's location is its first parameter.
+        theta = raw[term.positions][:, None] + np.vstack([np.zeros(_CHANGES), *changes])
+        logs = [term.family.log_value(np.full((_CHANGES, 1), x), theta)[:, 0] for x in sides]
+        truth = np.maximum(truth, np.exp(logs))
     # A term that is true to one side for good has its flank on the other.
     flanks = [values for values in truth if values[0] < _HIGHEST_CROSSING]
     if not flanks:
         return 0.0
-    return changes[np.flatnonzero(np.max(flanks, axis=0) <= _HIGHEST_CROSSING)[-1]]
+    return growth[np.flatnonzero(np.max(flanks, axis=0) <= _HIGHEST_CROSSING)[-1]]

@@ -412,9 +412,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.robust_weights_ = training.robust_weights
         losses = training.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
-        self.readability_ = readability_of_rows(
-            self.model_, data.X, data.y, data.sample_weight
-        )
+        self.readability_ = readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
         self._start_parameters = self._those_of_the_start()
         if bridge is not None:
             bridge.end(self.model_)

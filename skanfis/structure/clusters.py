@@ -50,7 +50,9 @@ def clustered_antecedent(families, rows: Rows, label, premise_inputs):
         return GridAntecedent((), counts=())
     members = [labels == cluster for cluster in found]
     masses = np.array([weight[m].sum() for m in members])
-    centers = np.array([np.average(table[m, :n_inputs], axis=0, weights=weight[m]) for m in members])
+    centers = np.array(
+        [np.average(table[m, :n_inputs], axis=0, weights=weight[m]) for m in members]
+    )
     spreads = np.array(
         [
             np.sqrt(np.average((table[m, :n_inputs] - c) ** 2, axis=0, weights=weight[m]))
@@ -112,14 +114,18 @@ def _joined(one, other):
     mass = one[2] + other[2]
     parts = one[2] / mass, other[2] / mass
     center = parts[0] * one[0] + parts[1] * other[0]
-    variance = sum(p * (t[1] + (t[0] - center) ** 2) for p, t in zip(parts, (one, other), strict=True))
+    variance = sum(
+        p * (t[1] + (t[0] - center) ** 2) for p, t in zip(parts, (one, other), strict=True)
+    )
     return center, variance, mass, one[3] + other[3]
 
 
 def _crossings(family, terms):
     """Of every two neighbours, the greatest value that both have between their centres."""
     centers = np.array([center for center, _, _, _ in terms])
-    theta = family.from_center_and_width(centers, np.sqrt([variance for _, variance, _, _ in terms]))
+    theta = family.from_center_and_width(
+        centers, np.sqrt([variance for _, variance, _, _ in terms])
+    )
     between = np.linspace(centers[:-1], centers[1:], _POINTS, axis=1)
     pairs = [family.value(between, theta[:, side]) for side in (slice(-1), slice(1, None))]
     return list(np.minimum(*pairs).max(axis=1))

@@ -30,6 +30,7 @@ __all__ = ["StructureRequest", "report_constant"]
 _OVERLAP = 0.6
 _MIB = 2**20
 
+
 @dataclass(frozen=True, eq=False)
 class StructureRequest:
     """What was asked for.

@@ -27,7 +27,16 @@ from ..solvers import varpro
 from .sample import effective_weight, search_sample
 from .start import Start
 
-__all__ = ["FIRST_PENALTY", "FIRST_STEPS", "MOST_ROWS", "WORTHWHILE", "Tuned", "scaled", "tune", "tuned_start"]
+__all__ = [
+    "FIRST_PENALTY",
+    "FIRST_STEPS",
+    "MOST_ROWS",
+    "WORTHWHILE",
+    "Tuned",
+    "scaled",
+    "tune",
+    "tuned_start",
+]
 
 # The weights are found on at most so many representative rows.
 MOST_ROWS = 1000
@@ -40,6 +49,11 @@ _LOOSE_ITERATIONS = 25
 # another are the price, and not to be paid for less.
 _LESS_NOISE = 0.5
 FIRST_STEPS = 8
+# Beyond so many consequent parameters every step costs seconds, and there are fewer.
+_MOST_COLUMNS = 512
+_FEW_STEPS, _FEW_TURNS = 3, 2
+# Part of the rows that effective parameters may be.
+_MOST_EFFECTIVE = 0.5
 _STEPS = 3
 _ITERATIONS = 4
 _MOST_TURNS = 8
@@ -70,6 +84,18 @@ class Tuned:
     def score(self):
         """-2 log p."""
         return self.posterior.minus_twice_log
+
+    @property
+    def expected_error(self):
+        """Mean squared error to be expected on new rows, of the standardised target.
+
+        Akaike's final prediction error, MSE (1 + k / n) / (1 - k / n), with the effective number of
+        parameters k of a penalised model; infinite where that is more than half of the rows.
+        """
+        share = self.posterior.n_effective / self.posterior.n_rows
+        if share > _MOST_EFFECTIVE:
+            return np.inf
+        return self.evaluation.mean_squared_error * (1.0 + share) / (1.0 - share)
 
     def is_beaten_loosely(self, loose):
         """Whether a loose training has found what this one took for noise."""
@@ -111,6 +137,9 @@ def tune(
         Whether rules may compensate one another beyond all reading.
     """
     x = np.zeros(premise.size) if displacement is None else displacement
+    steps_a_turn = _STEPS
+    if problem.n_columns > _MOST_COLUMNS:
+        first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
     n_rules, penalty = problem.antecedent.n_rules, problem.penalty
 
     def posterior_at(evaluation, penalty, curvature=None):
@@ -160,7 +189,7 @@ def tune(
         raw = weighted.linearise(evaluation)
         _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
-        steps = FIRST_STEPS if is_first else _STEPS
+        steps = FIRST_STEPS if is_first else steps_a_turn
         posterior = improved(evaluation, penalty, steps, free, curvature)
         penalty = posterior.penalty
         found = Tuned(weighted, evaluation, x, posterior)
@@ -200,7 +229,7 @@ def tuned_start(
         return tune(problem, premise, free, n_sample, turns, is_loose=is_free, is_free=is_free)
 
     best, is_free = tuned(False), False
-    if premises_move and best.displacement.size:
+    if premises_move and problem.n_columns <= _MOST_COLUMNS and best.displacement.size:
         loose = tuned(True)
         if best.is_beaten_loosely(loose):
             best, is_free = loose, True
