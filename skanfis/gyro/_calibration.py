@@ -17,6 +17,7 @@ from ._structure import grow_terms, held_out_rms
 from ._units import SIGNALS
 from .compensator import GyroCompensator, features
 from .compose import ResidualRegressor
+from .log import LogError
 from .metrics import scale_factor
 from .physics import OpenLoopArcsineRegressor
 
@@ -92,6 +93,12 @@ def calibrate(log, split, recipe, tell):
     chosen, tried, baselines = _search(X, target, error, split, recipe, rng, tell)
     make = partial(make_estimator, recipe, chosen)
     predicted, inside = _held_out(make, X, target, split, recipe, rng, tell)
+    if not (inside & np.isfinite(predicted)).any():
+        raise LogError(
+            f"the compensator could not be checked: every row lies outside the range of the rows "
+            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
+            "overlap in temperature, rate and time."
+        )
     rows = _some(np.arange(len(X)), recipe.fit_rows, X, rng)
     tell(f"fitting to {rows.size:,} rows")
     with warnings.catch_warnings(record=True) as caught:
