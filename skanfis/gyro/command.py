@@ -17,7 +17,15 @@ from ._staging import Staging
 from .c_code import export_c_physics
 from .compensator import INPUTS, STATUS, GyroCompensator
 from .html_report import report_page, rules_text
-from .log import LogError, check_log, declared_units, located, read_log
+from .log import (
+    LogError,
+    check_at_rest,
+    check_log,
+    declared_units,
+    line_of,
+    located,
+    read_log,
+)
 
 __all__ = ["main"]
 
@@ -99,7 +107,7 @@ def _calibrate(options, tell):
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder))
-    tell("done")
+    tell("done, but see the warnings" if calibration.cautions else "done")
     return DONE
 
 
@@ -107,6 +115,7 @@ def _calibration(options, units, tell):
     needed = ("temperature", "output") if options.at_rest else ("temperature", "output", "rate")
     log = _read(options, needed, tell)
     if options.at_rest:
+        _located(lambda: check_at_rest(log, declared_units(units).get("output", "deg/s")), options)
         log = log.assign(rate=0.0)
     inputs = tuple(options.inputs or _default_inputs(log, options.at_rest))
     if options.physics and "output" not in inputs:
@@ -132,7 +141,7 @@ def _calibration(options, units, tell):
     split = choose_split(log, options.groups, uses_output="output" in inputs)
     tell(f"inputs: {', '.join(inputs)}")
     tell(f"check: {split.sentence}")
-    return calibrate(log, split, recipe, tell)
+    return calibrate(log, split, recipe, tell, _name_row(log, options))
 
 
 def _apply(options, tell):
@@ -194,13 +203,32 @@ def _read(options, require, tell):
 
 def _check(log, options, **requirements):
     """As :func:`check_log`, with errors in the words of the file."""
+    units = _pairs(options.units, "--units")
+    _located(lambda: check_log(log, units=units, **requirements), options)
+
+
+def _located(check, options):
+    """Do a check, with errors in the words of the file."""
     try:
-        check_log(log, units=_pairs(options.units, "--units"), **requirements)
+        check()
     except LogError as error:
-        is_whole_file = len(options.logs) == 1 and options.device is None
-        path = options.logs[0] if is_whole_file else None
         columns = _pairs(options.columns, "--columns")
-        raise located(error, columns, path, options.separator) from error
+        raise located(error, columns, _only_file(options), options.separator) from error
+
+
+def _only_file(options):
+    """The file whose rows are those of the log; None where there is no such file."""
+    return options.logs[0] if len(options.logs) == 1 and options.device is None else None
+
+
+def _name_row(log, options):
+    """A function that says where a row of the log is found."""
+    path = _only_file(options)
+    if path is not None:
+        return lambda row: f"{path}, line {line_of(path, row, options.separator)}"
+    if "run" in log:
+        return lambda row: f"row {row}, in run {log['run'].iloc[row]}"
+    return "row {}".format
 
 
 def _of_device(log, device):
@@ -319,6 +347,7 @@ def _summary(calibration, folder):
     lines += [
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
+        *(f"WARNING        {sentence}" for sentence in calibration.cautions),
     ]
     return lines
 

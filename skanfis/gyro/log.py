@@ -32,6 +32,11 @@ _FASTEST_CHANGE = 100.0  # degC/min over a whole run: no chamber does that
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
 _LONGEST_FIELD = 2**31 - 1
+# At rest, the earth's rate included.
+_LARGEST_AT_REST = 0.1  # deg/s, with the noise of a rate table's encoder
+_WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
+# Noise in 20 times its usual step is none; glitches are rare.
+_JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _FOLLOWS = 0.9  # correlation of output with rate below which one of them is something else
 
@@ -233,6 +238,40 @@ def check_log(log, *, inputs=("temperature", "output"), units=None, min_temperat
     return log
 
 
+def check_at_rest(log, unit):
+    """Refuse a log of a gyro that has turned; ``unit`` is that of the output.
+
+    A raw signal, whose scale is not known, is told by its jumps alone, those of a rate table.
+    """
+    if "rate" in log:
+        rate = log["rate"].to_numpy()
+        row = int(np.argmax(np.abs(rate)))
+        if abs(rate[row]) > _LARGEST_AT_REST:
+            raise LogError(f"{rate[row]:.4g} deg/s: the gyro was not at rest.", "rate", row)
+    output = log["output"].to_numpy()
+    if unit not in SIGNALS:
+        low, high = np.quantile(output, [0.01, 0.99])
+        if high - low > _WIDEST_AT_REST:
+            raise LogError(
+                f"spans {low:.4g} to {high:.4g} deg/s: no bias does, the gyro was not at rest.",
+                "output",
+            )
+    steps = np.abs(np.diff(output))
+    if "run" in log:
+        run = log["run"].to_numpy()
+        steps = steps[run[1:] == run[:-1]]
+    if not steps.any():
+        return
+    usual = max(np.median(steps), steps[steps > 0.0].min())
+    jumps = np.count_nonzero(steps > _JUMP * usual)
+    if jumps > max(_FEWEST_JUMPS, _RARE * steps.size):
+        raise LogError(
+            f"jumps {jumps} times by more than {_JUMP:g} times its usual step: the gyro was not at "
+            "rest, or moved from level to level.",
+            "output",
+        )
+
+
 def _checked(given, what, allowed):
     """``given`` itself; ValueError where a key is not allowed."""
     for key in given:
@@ -394,7 +433,7 @@ def _no_number(text, path, names, separator, decimal, error):
 
 def _located(path, names, error, separator):
     """An error of one part and row as one of the file's column and line."""
-    place = "" if error.row is None else f", line {_line(path, error.row, separator)}"
+    place = "" if error.row is None else f", line {line_of(path, error.row, separator)}"
     part = "" if names[error.column] == error.column else f" ({error.column})"
     column = f", column {names[error.column]!r}{part}"
     return LogError(f"{path}{place}{column}: {error.reason}")
@@ -413,7 +452,7 @@ def located(error, columns, path=None, separator=","):
     return LogError(error.reason, names[error.column], error.row)
 
 
-def _line(path, row, separator):
+def line_of(path, row, separator):
     """Line of the file, from 1, on which a row starts."""
     lines = (line for line, _ in _records(path, separator))
     return next(islice(lines, row + 1, None), row + 2)

@@ -493,3 +493,33 @@ def test_short_runs_are_reported(tmp_path, log, n_rows):
     arguments = [path, "--terms", "1,2", "--inputs", "temperature", "output", "--quiet"]
     arguments += ["--min-temperature-span", "0.1", "--groups", "run"]
     assert main([*arguments, "--output", str(tmp_path / "out")]) == 0
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_compensation_that_makes_it_worse_says_so(tmp_path, log, capsys):
+    path = write_log(tmp_path / "log.csv", log)
+    arguments = ["--inputs", "time", "--groups", "run", "--output", str(tmp_path / "out")]
+    assert main([path, *arguments]) == 0
+    out, err = capsys.readouterr()
+    assert "WARNING        the compensation makes held-out rows in range worse, from 1." in out
+    assert err.endswith("done, but see the warnings\n")
+
+
+def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
+    spoilt = log.copy()
+    spoilt.loc[100, "output"] += 140.0
+    path, out = write_log(tmp_path / "log.csv", spoilt), tmp_path / "out"
+    arguments = ["--terms", "2,2,2,2", "--output", str(out), "--quiet"]
+    assert main([path, *arguments]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith(f"WARNING        {path}, line 102: the output of")
+    # In the headline: before the first section.
+    assert page.index("line 102") < page.index("<section>")
+
+
+def test_a_log_that_moves_is_not_at_rest(tmp_path, log, capsys):
+    path = write_log(tmp_path / "log.csv", log, ["time", "temperature", "output", "run"])
+    arguments = ["--at-rest", "--output", str(tmp_path / "out"), "--quiet"]
+    assert main([path, *arguments]) == 3
+    assert "the gyro was not at rest" in capsys.readouterr().err

@@ -6,6 +6,7 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, check_log, read_log
+from skanfis.gyro.log import check_at_rest
 
 CALLED_T = {"columns": {"temperature": "T"}}
 MEASURED = ["time", "temperature", "output", "rate", "run"]
@@ -256,6 +257,25 @@ def test_a_gyro_at_rest_has_a_bias_to_learn(log):
     check_log(at_rest, inputs=("temperature",))
     with pytest.raises(LogError, match="leave output out"):
         check_log(at_rest, inputs=("temperature", "output"))
+
+
+def test_a_log_at_rest_is_told_from_one_that_moves(log):
+    at_rest = make_ofog(n_devices=1, n_runs=3, rates=[0.0], profile="ramps", random_state=0)
+    check_at_rest(at_rest, "deg/s")
+    check_at_rest(at_rest.assign(output=3e4 * at_rest["output"]).round(0), "counts")
+    check_at_rest(at_rest.assign(output=0.5, rate=0.0042), "deg/s")
+    with pytest.raises(LogError, match="deg/s: the gyro was not at rest") as caught:
+        check_at_rest(log, "deg/s")
+    assert caught.value.column == "rate"
+    assert caught.value.row == log["rate"].abs().idxmax()
+    unknown = log.drop(columns="rate")
+    with pytest.raises(LogError, match=r"spans -\d+\S* to \d+\S* deg/s: no bias does"):
+        check_at_rest(unknown, "deg/s")
+    levels = unknown.assign(output=np.random.default_rng(0).normal(size=len(log)))
+    check_at_rest(levels, "counts")
+    levels["output"] += 300.0 * (np.arange(len(log)) // 10 % 3)
+    with pytest.raises(LogError, match=r"jumps \d+ times by more than 20 times its usual step"):
+        check_at_rest(levels, "counts")
 
 
 def test_a_log_that_is_not_learnt_from_may_be_short_and_narrow(log):
