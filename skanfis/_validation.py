@@ -7,9 +7,17 @@ from numbers import Integral
 import numpy as np
 from sklearn import get_config
 
-__all__ = ["check_finite", "feature_indices", "positive_weights", "warn_user"]
+__all__ = [
+    "bearable_weights",
+    "check_finite",
+    "feature_indices",
+    "positive_weights",
+    "warn_user",
+]
 
 _READ_ROWS = 65_536
+# Exponent of two up to which weights are taken as they are.
+_FAR = 400
 
 
 def check_finite(values, what, names):
@@ -92,6 +100,12 @@ def positive_weights(sample_weight, n_rows):
             "are needed."
         )
     return None if n_kept == n_rows else keep
+
+
+def bearable_weights(sample_weight):
+    """Weights by a power of two where their sum would overflow, or their digits be lost."""
+    exponent = int(np.frexp(np.max(sample_weight, initial=0.0))[1])
+    return np.ldexp(sample_weight, -exponent) if abs(exponent) > _FAR else sample_weight
 
 
 def warn_user(message, category):

@@ -19,7 +19,7 @@ from ._sklearn import (
     check_sample_weight,
     fit_context,
 )
-from ._validation import check_finite, feature_indices, positive_weights
+from ._validation import bearable_weights, check_finite, feature_indices, positive_weights
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
 from .model import OUT_OF_BOUNDS, TSKModel
@@ -631,6 +631,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         keep = None
         if sample_weight is not None:
             sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+            sample_weight = bearable_weights(sample_weight)
             keep = positive_weights(sample_weight, X.shape[0])
         if keep is not None:
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
