@@ -39,11 +39,12 @@ endef
 # than four where their number is left open: each pays for its imports.
 pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: help demo test lint format test-floors wheel test-wheel docs benchmarks clean
+.PHONY: help demo test fuzz lint format test-floors wheel test-wheel docs benchmarks clean
 
 help:
 	@echo "make demo         run the gyro example and save its pictures in figures/"
 	@echo "make test         all tests and docstring examples, newest dependencies"
+	@echo "make fuzz         the properties alone, on fifty times as much that is drawn anew"
 	@echo "make lint         style, format, types"
 	@echo "make format       put style and format right where a tool can"
 	@echo "make test-floors  all tests at the oldest dependencies that pyproject.toml allows"
@@ -79,6 +80,9 @@ demo: $(DEMO)/.installed
 
 test: $(DEV)/.installed
 	$(call pytest,$(DEV))
+
+fuzz: $(DEV)/.installed
+	$(call pytest,$(DEV)) tests/properties --hypothesis-profile fuzz --hypothesis-show-statistics
 
 lint: $(DEV)/.installed
 	$(DEV)/bin/ruff check

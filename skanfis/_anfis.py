@@ -20,7 +20,7 @@ from .antecedent import GridAntecedent
 from .model import TSKModel
 from .naming import default_term_names, given_term_names
 from .penalty import Penalty
-from .rows import Rows
+from .rows import Rows, check_scales
 from .solvers import SOLVERS, SolverResult
 from .structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
 from .support import RuleSupport
@@ -70,7 +70,9 @@ class TrainingData:
         """Some of the rows, on scales of their own."""
         weight = None if self.sample_weight is None else self.sample_weight[indices]
         groups = None if self.groups is None else self.groups[indices]
-        return Rows.standardised(self.X[indices], self.y[indices], weight, groups)
+        rows = Rows.standardised(self.X[indices], self.y[indices], weight, groups)
+        check_scales(rows.inputs, rows.targets, self.input_names, self.output_names)
+        return rows
 
     def spread_over_rows(self, values, indices):
         """Values of some rows as values of all rows given, NaN elsewhere."""

@@ -2,14 +2,154 @@
 
 import sys
 import warnings
+from collections import Counter
+from contextlib import contextmanager
 from numbers import Integral
 
 import numpy as np
 from sklearn import get_config
 
-__all__ = ["check_finite", "feature_indices", "positive_weights", "warn_user"]
+__all__ = [
+    "bearable_weights",
+    "check_finite",
+    "feature_indices",
+    "group_numbers",
+    "named_refusals",
+    "positive_weights",
+    "refuse_lazy",
+    "warn_user",
+]
 
 _READ_ROWS = 65_536
+# Exponent of two up to which weights are taken as they are.
+_FAR = 400
+
+
+@contextmanager
+def named_refusals(**tables):
+    """Let scikit-learn check tables, given by what they are: X=..., y=...
+
+    What it and NumPy refuse without the column's name, or take for numbers that it is not, is
+    refused by name: columns of text, times, or two of one name, sparse and lazy frames.
+    """
+    refuse_lazy(**tables)
+    for what, table in tables.items():
+        _check_kind(table, what)
+    try:
+        yield
+    except (TypeError, ValueError) as error:
+        for what, table in tables.items():
+            _name_what_is_no_number(table, what, error)
+        raise
+
+
+def refuse_lazy(**tables):
+    """Raise TypeError where one of the tables, given by what they are, has no values yet."""
+    for what, table in tables.items():
+        if type(table).__name__ == "LazyFrame":
+            raise TypeError(
+                f"{what} is a lazy frame, which has no values yet: give {what}.collect()."
+            )
+
+
+def _check_kind(table, what):
+    names, dtypes = getattr(table, "columns", None), getattr(table, "dtypes", None)
+    if names is None or dtypes is None:
+        dtype = getattr(table, "dtype", None)
+        names, dtypes = [getattr(table, "name", None)], [] if dtype is None else [dtype]
+    names, dtypes = list(names), list(dtypes)
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(
+            f"{what} has {names.count(twice[0])} columns of the name {twice[0]!r}: rename or drop "
+            "all but one."
+        )
+    for name, dtype in zip(names, dtypes, strict=False):
+        if _is_of_time(dtype):
+            column = "" if name is None else f" in column {name!r}"
+            raise ValueError(
+                f"Input {what} holds times{column} ({dtype}), not numbers. Give the time since "
+                "some moment, such as the power-on, as a number of seconds."
+            )
+    if dtypes and all(hasattr(dtype, "fill_value") for dtype in dtypes) and names != [None]:
+        raise TypeError(
+            f"Sparse data was passed for {what}, in columns of a pandas frame; dense data is "
+            f"required. Give {what}.sparse.to_dense()."
+        )
+
+
+def _is_of_time(dtype):
+    """Whether a dtype of NumPy, pandas or polars is one of dates, times or durations."""
+    of_polars = getattr(dtype, "is_temporal", None)
+    if callable(of_polars):
+        return bool(of_polars())
+    return getattr(dtype, "kind", "") in ("m", "M") or hasattr(dtype, "freq")
+
+
+def _name_what_is_no_number(table, what, error):
+    """Raise ``error`` again by the first column and row of the table that float() refuses."""
+    advice = "A target must be a number."
+    if what == "X":
+        advice = (
+            "Drop the column, or encode categories as numbers in a Pipeline before "
+            "(sklearn.preprocessing.OneHotEncoder or OrdinalEncoder)."
+        )
+    for name, column in _columns(table):
+        if getattr(getattr(column, "dtype", None), "kind", "O") in "biufc":
+            continue
+        for row, value in enumerate(column):
+            try:
+                # Complex numbers are scikit-learn's to refuse.
+                float(np.nan if value is None or isinstance(value, complex) else value)
+            except (TypeError, ValueError) as refusal:
+                kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
+                where = "" if name is None else f" in column {name!r}"
+                raise type(refusal)(
+                    f"Input {what} holds {kind}{where}, first at row {row}: {refusal}. {advice}"
+                ) from error
+
+
+def _columns(table):
+    """Names and columns of a frame or array that may hold anything; of one dimension no name."""
+    if hasattr(table, "iloc") and hasattr(table, "columns"):
+        return [(name, table.iloc[:, j]) for j, name in enumerate(table.columns)]
+    if hasattr(table, "get_columns"):
+        return [(column.name, column) for column in table.get_columns()]
+    if isinstance(table, str | bytes) or not hasattr(table, "__len__"):
+        return []
+    try:
+        array = np.asarray(table, dtype=object)
+    except ValueError:
+        return []
+    if array.ndim == 1:
+        return [(getattr(table, "name", None), array)]
+    return [(f"x{j}", array[:, j]) for j in range(array.shape[1])] if array.ndim == 2 else []
+
+
+def group_numbers(groups):
+    """The groups of rows as numbers; ValueError where one is missing, or they cannot be told."""
+    groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else np.asarray(groups)
+    if groups.ndim == 2 and groups.shape[1] == 1:
+        groups = groups.ravel()
+    if groups.ndim != 1:
+        raise ValueError(
+            f"groups must have one entry per row; it has {groups.ndim} dimensions, of shape "
+            f"{groups.shape}. Make one label of several, such as 'device 1, run 2'."
+        )
+    missing = [i for i, group in enumerate(groups) if group is None or group != group]
+    if missing:
+        raise ValueError(
+            f"groups has no value for {len(missing)} of {len(groups)} rows, first at row "
+            f"{missing[0]}: every row must belong to a group."
+        )
+    try:
+        return np.unique(groups, return_inverse=True)[1]
+    except TypeError as error:
+        kinds = sorted({type(group).__name__ for group in groups})
+        raise ValueError(
+            f"groups holds {' and '.join(kinds)}, which cannot be put in order: give numbers "
+            "alone or text alone."
+        ) from error
 
 
 def check_finite(values, what, names):
@@ -92,6 +232,12 @@ def positive_weights(sample_weight, n_rows):
             "are needed."
         )
     return None if n_kept == n_rows else keep
+
+
+def bearable_weights(sample_weight):
+    """Weights by a power of two where their sum would overflow, or their digits be lost."""
+    exponent = int(np.frexp(np.max(sample_weight, initial=0.0))[1])
+    return np.ldexp(sample_weight, -exponent) if abs(exponent) > _FAR else sample_weight
 
 
 def warn_user(message, category):

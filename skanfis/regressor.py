@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils import check_random_state, column_or_1d
+from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from ._anfis import TrainingData, train
@@ -19,7 +19,15 @@ from ._sklearn import (
     check_sample_weight,
     fit_context,
 )
-from ._validation import check_finite, feature_indices, positive_weights
+from ._validation import (
+    bearable_weights,
+    check_finite,
+    feature_indices,
+    group_numbers,
+    named_refusals,
+    positive_weights,
+    refuse_lazy,
+)
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
 from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
@@ -638,17 +646,19 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
 
     def _check_training_data(self, X, y, sample_weight, groups):
         """The data, of all rows with weight."""
+        refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
         numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
         output_names = _target_names(y)
-        X, y = validate_data(
-            self,
-            X,
-            y,
-            validate_separately=(
-                {**numeric, "ensure_min_samples": 2},
-                {**numeric, "ensure_2d": False},
-            ),
-        )
+        with named_refusals(X=X, y=y):
+            X, y = validate_data(
+                self,
+                X,
+                y,
+                validate_separately=(
+                    {**numeric, "ensure_min_samples": 2},
+                    {**numeric, "ensure_2d": False},
+                ),
+            )
         check_consistent_length(X, y, groups)
         self._single_output = y.ndim == 1
         targets = y.reshape(-1, 1) if y.ndim == 1 else y
@@ -657,10 +667,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             output_names = ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
         check_finite(X, "X", self._input_names())
         check_finite(targets, "y", output_names)
-        groups = None if groups is None else _checked_groups(groups)
+        groups = None if groups is None else group_numbers(groups)
         keep = None
         if sample_weight is not None:
             sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+            sample_weight = bearable_weights(sample_weight)
             keep = positive_weights(sample_weight, X.shape[0])
         if keep is not None:
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
@@ -671,9 +682,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _check_inputs(self, X):
         check_is_fitted(self)
         if not self._is_plain_input(X):
-            X = validate_data(
-                self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
-            )
+            with named_refusals(X=X):
+                X = validate_data(
+                    self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
+                )
         check_finite(X, "X", self.model_.input_names)
         return X
 
@@ -696,16 +708,3 @@ def _target_names(y):
         names = [getattr(y, "name", None)]
     names = list(names)
     return tuple(names) if all(isinstance(name, str) and name for name in names) else None
-
-
-def _checked_groups(groups):
-    """Groups as numbers; ValueError where one is missing."""
-    groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else groups
-    groups = column_or_1d(groups)
-    missing = [i for i, group in enumerate(groups) if group is None or group != group]
-    if missing:
-        raise ValueError(
-            f"groups has no value for {len(missing)} of {len(groups)} rows, first at row "
-            f"{missing[0]}: every row must belong to a group."
-        )
-    return np.unique(groups, return_inverse=True)[1]

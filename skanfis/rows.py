@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Rows", "Scale", "column_statistics", "fingerprint"]
+__all__ = ["Rows", "Scale", "check_scales", "column_statistics", "fingerprint"]
 
 # Rows that are read at once where no cache-sized working set asks for fewer.
 _READ_ROWS = 4096
@@ -18,6 +18,12 @@ _READ_ROWS = 4096
 # whatever the number of workers.
 _BLOCKS_PER_CHUNK = 16
 
+
+# Exponents of two beyond which a column is shifted: sums of squares stay finite up to there.
+_FAR = 400
+# What a column may hold, and its slopes (by their logarithm): room is left for sums and products.
+_LARGEST = 1e300
+_LARGEST_SLOPE = 950
 
 # Any fixed number would do.
 _FINGERPRINT_SEED = 20090101
@@ -70,37 +76,87 @@ def column_statistics(values, sample_weight=None):
     """The :class:`Scale` of every column of ``values`` (n_rows, n_columns), in two passes.
 
     The variance is taken about the mean, in a second pass: columns far from the origin lose no
-    digits. A constant column has scale one.
+    digits. A constant column has scale one. Columns near the ends of the range of floats are taken
+    by a power of two nearer to one, so that neither sums nor differences overflow.
     """
-    parts = _slices(values.shape[0], _READ_ROWS)
-    n_columns = values.shape[1]
-    total, first = 0.0, np.zeros(n_columns)
-    minimum, maximum = np.full(n_columns, np.inf), np.full(n_columns, -np.inf)
-    # Sums are of differences from the first row, for the same reason.
-    origin = np.array(values[0], dtype=float)
-    for part in parts:
-        block = np.asarray(values[part], dtype=float)
-        weight = _weights_of(sample_weight, part, block.shape[0])
-        total += weight.sum()
-        first += weight @ (block - origin)
-        np.minimum(minimum, block.min(axis=0), out=minimum)
-        np.maximum(maximum, block.max(axis=0), out=maximum)
+    minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
+    with np.errstate(over="ignore", invalid="ignore"):
+        origin, total, first = _first_pass(values, sample_weight, 0, minimum, maximum)
+        exponents = np.frexp(np.maximum(np.abs(minimum), np.abs(maximum)))[1]
+    shift = np.where(np.abs(exponents) > _FAR, -exponents, 0)
+    if shift.any():
+        origin, total, first = _first_pass(values, sample_weight, shift, minimum, maximum)
+    low, high = np.ldexp(minimum, shift), np.ldexp(maximum, shift)
     mean = origin + first / total
     constant = minimum == maximum
     # Deviations count in parts of the range: their squares neither overflow nor vanish.
-    span = np.where(constant, 1.0, maximum - minimum)
-    second = np.zeros(n_columns)
-    for part in parts:
-        block = np.asarray(values[part], dtype=float)
+    span = np.where(constant, 1.0, high - low)
+    second = np.zeros(values.shape[1])
+    for part in _slices(values.shape[0], _READ_ROWS):
+        block = _shifted(values[part], shift)
         weight = _weights_of(sample_weight, part, block.shape[0])
         second += weight @ ((block - mean) / span) ** 2
-    scale = span * np.sqrt(second / total)
+    scale = np.ldexp(span * np.sqrt(second / total), -shift)
     return Scale(
-        np.where(constant, minimum, mean),
+        np.where(constant, minimum, np.ldexp(mean, -shift)),
         np.where(constant | (scale == 0.0), 1.0, scale),
         minimum,
         maximum,
     )
+
+
+def _first_pass(values, sample_weight, shift, minimum, maximum):
+    """The first row, the total weight, and the weighted sum of differences from that row.
+
+    All but the range, which is written to ``minimum`` and ``maximum``, is in shifted units.
+    """
+    # Differences, so that columns far from the origin lose no digits.
+    origin = _shifted(values[0], shift)
+    total, first = 0.0, np.zeros(values.shape[1])
+    for part in _slices(values.shape[0], _READ_ROWS):
+        block = np.asarray(values[part], dtype=float)
+        np.minimum(minimum, block.min(axis=0), out=minimum)
+        np.maximum(maximum, block.max(axis=0), out=maximum)
+        weight = _weights_of(sample_weight, part, block.shape[0])
+        total += weight.sum()
+        first += weight @ (_shifted(block, shift) - origin)
+    return origin, total, first
+
+
+def _shifted(block, shift):
+    block = np.asarray(block, dtype=float)
+    return np.ldexp(block, shift) if np.any(shift) else block
+
+
+def check_scales(inputs, targets, input_names, output_names):
+    """Raise ValueError where a model of such columns, in their units, is beyond what floats hold.
+
+    Its slopes are changes of a target by changes of an input.
+    """
+    for what, scale, names in (("X", inputs, input_names), ("y", targets, output_names)):
+        sizes = np.maximum(np.abs(scale.minimum), np.abs(scale.maximum))
+        for size, spread, constant, name in zip(
+            sizes, scale.scale, scale.is_constant, names, strict=True
+        ):
+            if size > _LARGEST:
+                raise ValueError(
+                    f"Column {name!r} of {what} holds numbers up to {size:.3g}; beyond "
+                    f"{_LARGEST:.0e} sums overflow. Give it in a larger unit."
+                )
+            if not constant and spread < 1.0 / _LARGEST:
+                raise ValueError(
+                    f"Column {name!r} of {what} varies by {spread:.3g} only; below "
+                    f"{1.0 / _LARGEST:.0e} floats lose their digits. Give it in a smaller unit."
+                )
+    for j in np.flatnonzero(~inputs.is_constant):
+        for k in np.flatnonzero(~targets.is_constant):
+            slope = np.log2(targets.scale[k]) - np.log2(inputs.scale[j])
+            if abs(slope) > _LARGEST_SLOPE:
+                raise ValueError(
+                    f"Column {output_names[k]!r} of y varies by {targets.scale[k]:.3g} and column "
+                    f"{input_names[j]!r} of X by {inputs.scale[j]:.3g}: floats hold no slope of "
+                    "one by the other. Give one of them in another unit."
+                )
 
 
 def _weights_of(sample_weight, part, n_rows):

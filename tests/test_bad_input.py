@@ -109,6 +109,116 @@ def test_text_in_x():
         ANFISRegressor().fit(FRAME.assign(temperature="warm"), Y)
 
 
+TIMES = pd.date_range("2020", periods=N_ROWS)
+LO_HI = ["lo", "hi"] * (N_ROWS // 2)
+TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the column, or encode"]
+
+
+@pytest.mark.parametrize(
+    ("rate", "said"),
+    [
+        (LO_HI, TEXT),
+        (pd.Categorical(LO_HI), TEXT),
+        (pd.array(LO_HI, dtype="string"), TEXT),
+        (["1.5", "2"] * 20 + LO_HI[:20], ["text in column 'rate', first at row 40", "'lo'"]),
+        (pd.Series([[1]] * N_ROWS), ["holds a list in column 'rate', first at row 0"]),
+        (TIMES, ["X holds times in column 'rate' (datetime64", "number of seconds"]),
+        (TIMES.tz_localize("UTC"), ["X holds times in column 'rate' (datetime64", "UTC"]),
+        (TIMES - TIMES[0], ["X holds times in column 'rate' (timedelta64"]),
+        (TIMES.to_period(), ["X holds times in column 'rate' (period"]),
+    ],
+)
+def test_column_that_is_no_number_is_named(rate, said):
+    bad = FRAME.assign(rate=rate)
+    for act in (ANFISRegressor(**QUICK).fit, ANFISRegressor(**QUICK).fit(FRAME, Y).score):
+        with pytest.raises((TypeError, ValueError)) as refusal:
+            act(bad, Y)
+        assert re.search(".*".join(map(re.escape, said)), str(refusal.value))
+
+
+def test_table_of_times_alone_is_no_table_of_nanoseconds():
+    with refused(ValueError, "X holds times in column 'start'"):
+        ANFISRegressor().fit(pd.DataFrame({"start": TIMES}), Y)
+    with refused(ValueError, "X holds times (datetime64"):
+        ANFISRegressor().fit(TIMES.to_numpy().reshape(-1, 1), Y)
+
+
+def test_array_of_text_is_named_by_place():
+    with refused(ValueError, "X holds text in column 'x1', first at row 2", "'b'"):
+        ANFISRegressor().fit([[1.0, 2.0], [3.0, 4.0], [5.0, "b"]], Y[:3])
+
+
+@pytest.mark.parametrize(
+    ("targets", "said"),
+    [
+        (
+            pd.Series(LO_HI, name="error"),
+            ["y holds text in column 'error', first at row 0", "'lo'"],
+        ),
+        (LO_HI, ["y holds text, first at row 0", "'lo'", "must be a number"]),
+        (pd.Series(TIMES, name="end"), ["y holds times in column 'end'"]),
+        (
+            pd.DataFrame(np.ones((N_ROWS, 2)), columns=["e", "e"]),
+            ["y has 2 columns of the name 'e'"],
+        ),
+    ],
+)
+def test_target_that_is_no_number_is_named(targets, said):
+    with refused(ValueError, *said):
+        ANFISRegressor().fit(X, targets)
+
+
+def test_two_columns_of_one_name():
+    twice = FRAME.set_axis(["rate", "time", "rate"], axis=1)
+    with refused(ValueError, "X has 2 columns of the name 'rate'", "rename or drop"):
+        ANFISRegressor().fit(twice, Y)
+    with refused(ValueError, "X has 2 columns of the name 'rate'"):
+        ANFISRegressor(**QUICK).fit(FRAME, Y).predict(twice)
+
+
+@pytest.mark.parametrize("fill", [0.0, np.nan])
+def test_sparse_frame(fill):
+    frame = FRAME.astype(pd.SparseDtype(float, fill))
+    with refused(TypeError, "Sparse data was passed for X", "X.sparse.to_dense()"):
+        ANFISRegressor().fit(frame, Y)
+
+
+def test_frames_of_polars():
+    polars = pytest.importorskip("polars")
+    frame = polars.DataFrame({name: FRAME[name].to_numpy() for name in NAMES})
+    model = ANFISRegressor(**QUICK).fit(frame, Y)
+    with refused(TypeError, "X is a lazy frame", "X.collect()"):
+        ANFISRegressor().fit(frame.lazy(), Y)
+    with refused(TypeError, "X is a lazy frame", "X.collect()"):
+        model.predict(frame.lazy())
+    for what in ("y", "sample_weight", "groups"):
+        with refused(TypeError, f"{what} is a lazy frame"):
+            ANFISRegressor().fit(frame, **({"y": Y} | {what: frame.lazy()}))
+    with refused(ValueError, "X holds text in column 'rate', first at row 0", "'lo'"):
+        model.predict(frame.with_columns(polars.Series("rate", LO_HI)))
+    with refused(ValueError, "X holds times in column 'time'"):
+        model.predict(frame.with_columns(polars.Series("time", TIMES.to_numpy())))
+
+
+@pytest.mark.parametrize("groups", [[1, "a"] * 30, np.array([1, "a"] * 30, dtype=object)])
+def test_groups_of_two_kinds(groups):
+    with refused(ValueError, "groups holds int and str", "numbers alone or text alone"):
+        ANFISRegressor(**QUICK).fit(X, Y, groups=groups)
+
+
+def test_groups_of_pairs():
+    with refused(ValueError, "groups must have one entry per row", "(60, 2)", "one label"):
+        ANFISRegressor(**QUICK).fit(X, Y, groups=[(1, 2)] * N_ROWS)
+
+
+@pytest.mark.parametrize("groups", [TIMES, LO_HI, pd.Series(LO_HI, dtype="category")])
+def test_groups_of_any_one_kind_serve(groups):
+    ANFISRegressor(**QUICK).fit(X, Y, groups=groups)
+    # An error elsewhere is not taken for theirs.
+    with refused(ValueError, "inconsistent numbers of samples"):
+        ANFISRegressor(**QUICK).fit(X, Y[:-1], groups=groups)
+
+
 def test_text_as_y():
     with pytest.raises(ValueError, match=r"string|numeric|float"):
         ANFISRegressor().fit(X, np.array(["low", "high"] * 30))

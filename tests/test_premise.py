@@ -1,16 +1,21 @@
 """Displacements: what they mean, the order they keep, the box, and the chain rule through them."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
-from skanfis.membership import Bell, Gaussian
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.premise import Premise
 
 from . import oracles
 
 LOW, HIGH = np.array([-2.0, -3.0, -1.0]), np.array([2.5, 1.0, 4.0])
+# As in the module.
+MARGIN, FREE_MARGIN = 0.25, 1.0
+SHRINKAGE, FACTOR = np.log(1.3), np.log(4.0)
 
 
 def grid(families, counts, inputs=None):
@@ -18,136 +23,322 @@ def grid(families, counts, inputs=None):
 
 
 def scattered(family, n_rules, inputs):
+    """Rules with terms of their own, all in different places."""
     g, inputs = np.random.default_rng(2), np.array(inputs)
     centers = g.uniform(LOW[inputs], HIGH[inputs], (n_rules, inputs.size))
     theta = family.from_center_and_width(centers, g.uniform(0.5, 1.5, centers.shape))
     return ScatteredAntecedent.build(family, inputs, theta)
 
 
-GRIDS = {
+def shared_places(family):
+    """Four terms on each of two inputs, two of the four in one place; one input with one term."""
+    centers = np.array([[-1.0, 0.5, 0.5, 2.0], [-2.0, -2.0, 0.0, 0.5]])
+    theta = family.from_center_and_width(centers, np.array([[1.0, 0.5, 0.8, 1.2]] * 2))
+    groups = [TermGroup(family, np.full(4, j), theta[:, j]) for j in range(2)]
+    groups.append(
+        TermGroup(
+            family, np.array([2]), family.from_center_and_width(np.array([1.5]), np.array([2.0]))
+        )
+    )
+    table = np.array([[0, 4, 8], [1, 5, 8], [2, 6, 8], [3, 7, 8]])
+    return RuleTableAntecedent(tuple(groups), table)
+
+
+ORDERED = {
     "equal counts": grid([Gaussian] * 2, [3, 3], [0, 2]),
     "gaussians": grid([Gaussian] * 3, [2, 4, 3]),
     "bells": grid([Bell] * 2, [3, 2], [0, 2]),
     "families that alternate": grid([Bell, Gaussian, Bell], [2, 3, 4]),
-}
-SCATTERED = {
     "scattered": scattered(Gaussian, 3, [0, 1, 2]),
     "scattered bells": scattered(Bell, 4, [1, 2]),
+    **{name: grid([family] * 2, [2, 5], [0, 1]) for name, family in MEMBERSHIPS.items()},
 }
-ANTECEDENTS = GRIDS | SCATTERED
+ALONE = {"shared places": shared_places(Gaussian), "shared, bells": shared_places(Bell)}
+ANTECEDENTS = ORDERED | ALONE
 ALL = pytest.mark.parametrize("antecedent", ANTECEDENTS.values(), ids=list(ANTECEDENTS))
-ON_GRIDS = pytest.mark.parametrize("antecedent", GRIDS.values(), ids=list(GRIDS))
-ON_SCATTERED = pytest.mark.parametrize("antecedent", SCATTERED.values(), ids=list(SCATTERED))
+ON_ORDERED = pytest.mark.parametrize("antecedent", ORDERED.values(), ids=list(ORDERED))
+ON_ALONE = pytest.mark.parametrize("antecedent", ALONE.values(), ids=list(ALONE))
+FREE_OR_NOT = pytest.mark.parametrize("is_free", [False, True])
 
 
 def in_the_box(premise, rng, n=20):
     """Displacements inside the box, and at its corners."""
     inside = rng.uniform(premise.lower, premise.upper, (n, premise.size))
     corners = np.where(rng.random((n, premise.size)) < 0.5, premise.lower, premise.upper)
-    return np.vstack([inside, corners])
+    return np.vstack([inside, corners, premise.lower, premise.upper])
 
 
-def parts(antecedent, vector):
-    """A vector laid out as the parameters, as (input, theta-like block) for every input."""
-    start = 0
+def terms(antecedent, vector):
+    """A vector laid out as the parameters, by input: families and columns from left to right."""
+    by_input, start = {}, 0
+    at_start = antecedent.parameters
     for group in antecedent.groups:
-        block = vector[start : start + group.theta.size].reshape(group.theta.shape)
+        shape = group.theta.shape
+        block = vector[start : start + group.theta.size].reshape(shape)
+        places = at_start[start : start + group.theta.size].reshape(shape)[0]
         start += group.theta.size
-        for j in dict.fromkeys(group.inputs.tolist()):
-            yield j, block[:, group.inputs == j]
+        for t, j in enumerate(group.inputs.tolist()):
+            by_input.setdefault(j, []).append((places[t], group.family, block[:, t]))
+    return {j: sorted(own, key=lambda term: term[0]) for j, own in by_input.items()}
 
 
-def by_hand(antecedent, displacement):
-    """Locations and logarithms as the module's docstring says, one number at a time."""
-    blocks = []
-    moves = parts(antecedent, displacement)
-    for (_, theta), (_, d) in zip(parts(antecedent, antecedent.parameters), moves, strict=True):
-        moved = theta + d
-        if isinstance(antecedent, GridAntecedent):
-            gaps = np.diff(theta[0])
-            moved[0, 0] = theta[0, 0] + d[0, 0] * gaps.mean()
-            for k, gap in enumerate(gaps):
-                moved[0, k + 1] = moved[0, k] + gap * np.exp(d[0, k + 1])
-        else:
-            moved[0] = theta[0] + d[0] * np.exp(theta[1])
-        blocks.append(moved)
-    return blocks
+def locations(antecedent, vector):
+    return {j: np.array([t[0] for _, _, t in own]) for j, own in terms(antecedent, vector).items()}
+
+
+def kind_of(antecedent):
+    """Of every parameter, "location", "log_width" or "log_shape"."""
+    kinds = [
+        np.repeat([p.kind for p in group.family.parameters], group.n_terms)
+        for group in antecedent.groups
+    ]
+    return np.concatenate(kinds)
+
+
+def spacing(places):
+    """Distance of each term to its neighbours: the smooth minimum, one by one."""
+    found = []
+    for k in range(len(places)):
+        gaps = [
+            abs(places[k] - places[other])
+            for other in (k - 1, k + 1)
+            if other in range(len(places))
+        ]
+        found.append(sum(gap**-4.0 for gap in gaps) ** -0.25)
+    return np.array(found)
+
+
+def span(places, j, margin):
+    """Where the terms of an input may stand."""
+    beyond = margin * (places[-1] - places[0]) / (len(places) - 1)
+    return min(LOW[j], places[0]) - beyond, max(HIGH[j], places[-1]) + beyond
 
 
 @ALL
-def test_displacement_zero_is_the_start(antecedent):
-    premise = Premise.of(antecedent, LOW, HIGH)
+@FREE_OR_NOT
+def test_displacement_zero_is_the_start(antecedent, is_free):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free)
     assert premise.size == antecedent.parameters.size
-    assert_array_equal(premise.parameters(np.zeros(premise.size)), antecedent.parameters)
+    zero = np.zeros(premise.size)
+    assert_allclose(premise.parameters(zero), antecedent.parameters, rtol=1e-13, atol=1e-13)
+    assert_allclose(premise.displacement(antecedent.parameters), 0.0, atol=1e-13)
     assert (premise.lower < 0.0).all()
-    assert (premise.upper > 0.0).all()
+    assert (premise.upper >= 0.0).all()
 
 
-@ALL
-def test_displacements_mean_what_is_written(antecedent, rng):
-    premise = Premise.of(antecedent, LOW, HIGH)
+@ON_ORDERED
+@FREE_OR_NOT
+def test_terms_stay_in_order_and_where_the_data_are(antecedent, is_free, rng):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free)
+    start = locations(antecedent, antecedent.parameters)
     for displacement in in_the_box(premise, rng):
-        found = [block for _, block in parts(antecedent, premise.parameters(displacement))]
-        for one, other in zip(found, by_hand(antecedent, displacement), strict=True):
-            assert_allclose(one, other, rtol=1e-12, atol=1e-12)
+        for j, places in locations(antecedent, premise.parameters(displacement)).items():
+            low, high = span(start[j], j, FREE_MARGIN if is_free else MARGIN)
+            assert (np.diff(np.concatenate([[low], places, [high]])) > 0.0).all()
 
 
-@ON_GRIDS
-def test_terms_of_a_grid_stay_in_order(antecedent, rng):
+@ON_ORDERED
+def test_gaps_are_what_moves(antecedent, rng):
+    # Of their logarithms only differences count: the sum of all gaps is the range.
     premise = Premise.of(antecedent, LOW, HIGH)
-    starts = [np.diff(theta[0]) for _, theta in parts(antecedent, antecedent.parameters)]
-    for displacement in in_the_box(premise, rng):
-        moved = parts(antecedent, premise.parameters(displacement))
-        for start, (_, theta) in zip(starts, moved, strict=True):
-            growth = np.diff(theta[0]) / start
-            assert (growth > 0.2 - 1e-12).all()
-            assert (growth < 2.0 + 1e-12).all()
+    start = locations(antecedent, antecedent.parameters)
+    at = np.cumsum(np.ones(premise.size)) - 1.0
+    for displacement in in_the_box(premise, rng, 5):
+        for j, places in locations(antecedent, premise.parameters(displacement)).items():
+            ends = span(start[j], j, MARGIN)
+            changes = [
+                np.log(np.diff(np.concatenate([ends[:1], p, ends[1:]]))) for p in (places, start[j])
+            ]
+            change = changes[0] - changes[1]
+            own = np.array([int(t[0]) for _, _, t in terms(antecedent, at)[j]])
+            # The basis is orthonormal: lengths are kept, the mean is of no account.
+            assert_allclose(
+                np.linalg.norm(change - change.mean()),
+                np.linalg.norm(displacement[own]),
+                rtol=1e-9,
+            )
 
 
-@ALL
-def test_widths_and_shapes_stay_within_a_factor_of_four(antecedent, rng):
-    premise = Premise.of(antecedent, LOW, HIGH)
-    start = parts(antecedent, antecedent.parameters)
-    for _, theta in start:
-        assert theta.shape[0] > 1
-    for displacement in in_the_box(premise, rng):
-        change = premise.parameters(displacement) - antecedent.parameters
-        for _, moved in parts(antecedent, change):
-            assert (np.abs(moved[1:]) <= np.log(4.0) + 1e-12).all()
+@ON_ORDERED
+@FREE_OR_NOT
+def test_widths_go_with_the_distance_to_the_neighbours(antecedent, is_free, rng):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free)
+    start = antecedent.parameters
+    for displacement in in_the_box(premise, rng, 5):
+        moved = terms(antecedent, premise.parameters(displacement))
+        by_hand = terms(antecedent, start + displacement)
+        for j, own in moved.items():
+            growth = np.log(
+                spacing(locations(antecedent, premise.parameters(displacement))[j])
+                / spacing(locations(antecedent, start)[j])
+            )
+            for (_, family, found), (_, _, expected), log_spacing in zip(
+                own, by_hand[j], growth, strict=True
+            ):
+                for parameter, one, other in zip(family.parameters, found, expected, strict=True):
+                    if parameter.kind == "location":
+                        continue
+                    widening = log_spacing if parameter.kind == "log_width" else 0.0
+                    assert_allclose(one, other + widening, rtol=1e-10, atol=1e-10)
 
 
-@ON_SCATTERED
-def test_scattered_terms_stay_within_a_width_of_the_data(antecedent):
-    premise = Premise.of(antecedent, LOW, HIGH)
-    widths = [np.exp(theta[1]) for _, theta in parts(antecedent, antecedent.parameters)]
+def crossing(left, right):
+    """The greatest min(mu, mu) of two terms, on a fine grid around them."""
+    (_, one, theta), (_, other, phi) = left, right
+    reach = 3.0 * (phi[0] - theta[0])
+    x = np.linspace(theta[0] - reach, phi[0] + reach, 2001)[None]
+    mu = [family.log_value(x, t[:, None])[0] for family, t in ((one, theta), (other, phi))]
+    return np.exp(np.minimum(*mu).max())
+
+
+def on_flanks(left, right):
+    """The same of terms that are true to one side for good: the truth of the one that falls."""
+    middle = np.array([[0.5 * (left[2][0] + right[2][0])]])
+    return min(float(family.value(middle, t[:, None])[0, 0]) for _, family, t in (left, right))
+
+
+PLACES = {
+    "two": np.array([-2.0, 2.5]),
+    "even": np.linspace(-2.0, 2.5, 5),
+    "uneven": np.array([-1.5, -1.2, 0.3, 2.0]),
+}
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+@pytest.mark.parametrize("places", PLACES.values(), ids=list(PLACES))
+@pytest.mark.parametrize("overlap", [0.4, 0.6])
+def test_neighbours_can_be_told_apart_anywhere_in_the_box(family, places, overlap, rng):
+    theta = family.start(places, spacing(places), overlap)
+    antecedent = GridAntecedent.build([family], [0], [theta])
+    premise = Premise.of(antecedent, LOW[:1], HIGH[:1])
+    truth = on_flanks if family.name in {"s_shaped", "z_shaped"} else crossing
+    widths = kind_of(antecedent) == "log_width"
+    highest = []
+    for displacement in in_the_box(premise, rng, 60):
+        # With all widths at their most too: between, terms are narrower.
+        for x in (displacement, np.where(widths, premise.upper, displacement)):
+            (own,) = terms(antecedent, premise.parameters(x)).values()
+            highest += [truth(*pair) for pair in pairwise(own)]
+    assert max(highest) <= 0.9 + 1e-3
+    # The bound is not idle: terms may overlap far more than at the start.
+    assert max(highest) > overlap + 0.1
+
+
+@ON_ORDERED
+def test_box_of_ordered_terms(antecedent):
+    premise, kinds = Premise.of(antecedent, LOW, HIGH), kind_of(antecedent)
+    assert_array_equal(premise.lower[kinds == "location"], -FACTOR)
+    assert_array_equal(premise.upper[kinds == "location"], FACTOR)
+    assert_array_equal(premise.lower[kinds == "log_width"], -SHRINKAGE)
+    assert (premise.upper[kinds == "log_width"] <= FACTOR).all()
+    assert_array_equal(premise.lower[kinds == "log_shape"], -FACTOR)
+    # Sharper corners make a term truer next to its neighbour.
+    assert_array_equal(premise.upper[kinds == "log_shape"], np.log(1.5))
+
+
+@ON_ORDERED
+def test_free_terms_may_be_four_times_as_wide_and_leave_the_data(antecedent):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free=True)
+    assert_array_equal(premise.lower, -FACTOR)
+    assert_array_equal(premise.upper, FACTOR)
+    # The further gap at its least: the outermost term is beyond what it may otherwise reach.
+    start = locations(antecedent, antecedent.parameters)
+    x = np.zeros(premise.size)
+    at = np.cumsum(np.ones(premise.size)) - 1.0
+    for j, places in start.items():
+        own = np.array([int(t[0]) for _, _, t in terms(antecedent, at)[j]])
+        ends = span(places, j, FREE_MARGIN)
+        gaps = np.diff(np.concatenate([ends[:1], places, ends[1:]]))
+        change = np.zeros(gaps.size)
+        change[-1] = -5.0
+        basis = np.linalg.svd(np.ones((1, gaps.size)))[2][1:].T
+        x[own] = np.clip(basis.T @ change, -FACTOR, FACTOR)
+    moved = locations(antecedent, premise.parameters(x))
+    for j, places in moved.items():
+        assert places[-1] > span(start[j], j, MARGIN)[1] or places[-1] > start[j][-1]
+        assert places[-1] < span(start[j], j, FREE_MARGIN)[1]
+
+
+@ON_ALONE
+def test_terms_that_share_a_place_move_by_themselves(antecedent, rng):
+    premise, kinds = Premise.of(antecedent, LOW, HIGH), kind_of(antecedent)
+    raw = antecedent.parameters
+    unit = np.ones(raw.size)
+    for own in terms(antecedent, np.arange(raw.size)).values():
+        for _, _, t in own:
+            location, width = int(t[0]), int(t[1])
+            unit[location] = np.exp(raw[width])
+    for displacement in in_the_box(premise, rng, 5):
+        expected = raw + unit * displacement
+        assert_allclose(premise.parameters(displacement), expected, rtol=1e-12, atol=1e-12)
     for edge, data, side in ((premise.lower, LOW, -1.0), (premise.upper, HIGH, 1.0)):
-        at_edge = parts(antecedent, premise.parameters(edge))
-        for width, (j, theta) in zip(widths, at_edge, strict=True):
-            assert_allclose(theta[0], data[j] + side * width, rtol=1e-12)
+        assert_allclose(np.abs(edge[kinds != "location"]), FACTOR)
+        for j, own in terms(antecedent, premise.parameters(edge)).items():
+            # By one of its first width beyond the data.
+            start = terms(antecedent, raw)[j]
+            for (_, _, at_edge), (_, _, at_start) in zip(own, start, strict=True):
+                assert_allclose(at_edge[0], data[j] + side * np.exp(at_start[1]), rtol=1e-12)
 
 
-@ON_GRIDS
-def test_first_term_of_a_grid_shifts_by_one_spacing_at_most(antecedent):
-    premise = Premise.of(antecedent, LOW, HIGH)
-    start = list(parts(antecedent, antecedent.parameters))
-    for edge, side in ((premise.lower, -1.0), (premise.upper, 1.0)):
-        at_edge = parts(antecedent, premise.parameters(edge))
-        for (_, theta), (_, moved) in zip(start, at_edge, strict=True):
-            shift = moved[0, 0] - theta[0, 0]
-            assert_allclose(shift, side * np.diff(theta[0]).mean(), rtol=1e-12)
+def test_term_beyond_the_data_may_stay_there():
+    theta = Gaussian.from_center_and_width(np.array([9.0, 9.0]), np.ones(2))
+    group = TermGroup(Gaussian, np.zeros(2, dtype=int), theta)
+    premise = Premise.of(RuleTableAntecedent((group,), np.array([[0], [1]])), LOW, HIGH)
+    assert_array_equal(premise.upper[:2], 0.0)
+    assert_allclose(premise.parameters(premise.lower)[:2], LOW[0] - 1.0)
 
 
 @ALL
-def test_pull_back_is_the_chain_rule(antecedent, rng):
+@FREE_OR_NOT
+def test_displacement_undoes_parameters(antecedent, is_free, rng):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free)
+    for displacement in in_the_box(premise, rng, 10):
+        found = premise.displacement(premise.parameters(displacement))
+        assert_allclose(found, displacement, rtol=1e-9, atol=1e-9)
+
+
+@ALL
+def test_edge_comes_back_to_the_last_bit(antecedent, rng):
+    # One bit off, and what is held by its edge would count as free to move.
     premise = Premise.of(antecedent, LOW, HIGH)
+    is_gap = np.zeros(premise.size, dtype=bool)
+    if antecedent in ORDERED.values():
+        is_gap = kind_of(antecedent) == "location"
+    for _ in range(20):
+        inside = rng.uniform(0.5 * premise.lower, 0.5 * premise.upper)
+        displacement = np.where(rng.random(premise.size) < 0.5, premise.upper, inside)
+        displacement[is_gap] *= 0.5
+        some = int(rng.integers(premise.size))
+        displacement[some] = premise.lower[some]
+        found = premise.displacement(premise.parameters(displacement))
+        on_edge = (displacement == premise.lower) | (displacement == premise.upper)
+        assert_array_equal(found[on_edge], displacement[on_edge])
+        assert_allclose(found, displacement, rtol=1e-9, atol=1e-9)
+
+
+def test_parameters_out_of_order_have_a_displacement_too():
+    # As a step of Jang's leaves them: what cannot be is as near to it as may be.
+    premise = Premise.of(ORDERED["gaussians"], LOW, HIGH)
+    raw = ORDERED["gaussians"].parameters
+    raw[0], raw[1] = raw[1], raw[0]
+    found = premise.displacement(raw)
+    assert np.isfinite(found).all()
+    found = premise.parameters(np.clip(found, premise.lower, premise.upper))
+    assert found[1] > found[0]
+
+
+@ALL
+@FREE_OR_NOT
+def test_pull_back_is_the_chain_rule(antecedent, is_free, rng):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free)
     gradient = rng.normal(size=premise.size)
     root = rng.normal(size=(premise.size, premise.size))
     for displacement in in_the_box(premise, rng, 2):
         jacobian = oracles.central_difference(premise.parameters, displacement, 1e-2)
         slope, curvature = premise.pull_back(displacement, gradient, root.T @ root)
-        assert_allclose(slope, jacobian.T @ gradient, rtol=1e-9, atol=1e-9)
+        assert_allclose(slope, jacobian.T @ gradient, rtol=1e-8, atol=1e-8)
         half = root @ jacobian
-        assert_allclose(curvature, half.T @ half, rtol=1e-8, atol=1e-8)
+        assert_allclose(curvature, half.T @ half, rtol=1e-7, atol=1e-7)
 
 
 @ALL
@@ -155,13 +346,31 @@ def test_nothing_is_changed_in_place(antecedent, rng):
     premise = Premise.of(antecedent, LOW, HIGH)
     displacement = rng.uniform(premise.lower, premise.upper)
     copies = displacement.copy(), antecedent.parameters.copy()
-    premise.parameters(displacement)
+    parameters = premise.parameters(displacement)
+    premise.displacement(parameters)
     premise.pull_back(displacement, np.ones(premise.size), np.eye(premise.size))
     assert_array_equal(displacement, copies[0])
+    assert_array_equal(parameters, premise.parameters(displacement))
     assert_array_equal(antecedent.parameters, copies[1])
+
+
+@pytest.mark.parametrize(("offset", "scale"), [(3.0, 1e-4), (-1e3, 1e5)])
+def test_units_do_not_matter(offset, scale, rng):
+    antecedent = ORDERED["gaussians"]
+    moved = antecedent.change_units(np.full(3, offset), np.full(3, scale))
+    one = Premise.of(antecedent, LOW, HIGH)
+    other = Premise.of(moved, offset + scale * LOW, offset + scale * HIGH)
+    assert_allclose(other.lower, one.lower, rtol=1e-6)
+    assert_allclose(other.upper, one.upper, rtol=1e-6)
+    for displacement in in_the_box(one, rng, 3):
+        at = antecedent.with_parameters(one.parameters(displacement))
+        expected = at.change_units(np.full(3, offset), np.full(3, scale)).parameters
+        found = other.parameters(displacement)
+        assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * scale)
 
 
 def test_without_terms_there_is_nothing_to_move():
     premise = Premise.of(GridAntecedent((), counts=()), LOW, HIGH)
     assert premise.size == 0
     assert premise.parameters(np.empty(0)).size == 0
+    assert premise.displacement(np.empty(0)).size == 0

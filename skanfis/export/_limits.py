@@ -1,11 +1,23 @@
-"""How large a model a file may describe: known before memory is asked for."""
+"""What a file may describe: of what size, known before memory is asked for, by which numbers."""
 
-__all__ = ["LARGEST_NUMBER", "MOST_NUMBERS", "check_size", "read_bytes"]
+__all__ = [
+    "LARGEST_NUMBER",
+    "MOST_NUMBERS",
+    "SMALLEST_NUMBER",
+    "check_size",
+    "number",
+    "read_bytes",
+    "shown",
+]
 
 # A rule base holds rules x terms, its consequents rules x (1 + inputs) x outputs: 160 MB.
 MOST_NUMBERS = 20_000_000
 # Squares of numbers up to this size, and of their ratios, are finite.
 LARGEST_NUMBER = 1e50
+# Of lengths and factors, which something is divided by.
+SMALLEST_NUMBER = 1e-50
+
+_SHOWN = 60
 
 
 def check_size(n_rules, n_terms, n_inputs, n_outputs):
@@ -16,6 +28,22 @@ def check_size(n_rules, n_terms, n_inputs, n_outputs):
             f"{n_rules} rules over {n_terms} terms, {n_inputs} inputs and {n_outputs} outputs are "
             f"{needed:,} numbers; at most {MOST_NUMBERS:,} are read."
         )
+
+
+def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER):
+    """A number of a file as a float; ValueError, with its place, where it is out of its range."""
+    if type(value) not in (int, float) or not lowest <= value <= highest:
+        wanted = f"from {lowest:g} to {highest:g}"
+        if lowest == -highest:
+            wanted = f"of size up to {highest:g}"
+        raise ValueError(f"{where}: {shown(value)} is not a number {wanted}.")
+    return float(value)
+
+
+def shown(value):
+    """The value, shortened and safe to print."""
+    text = ascii(value)
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
 
 
 def read_bytes(path, most_bytes):

@@ -7,7 +7,7 @@ what is summed is no larger than it must be. Memberships take the inputs themsel
 says how an offset costs them nothing either.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import fsum
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..antecedent import GridAntecedent, RuleTableAntecedent
 from ..membership import Membership
 from ._constants import CONSTANTS_OF
 
-__all__ = ["Numbers", "TermTable"]
+__all__ = ["Numbers", "TermTable", "as_held"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,6 +178,26 @@ def _support(model, reference):
     table = np.column_stack([support.share, support.radius, center, factor])
     table[support.share == 0.0] = 0.0
     return _rounded(table, dtype, "where the training data of a rule lie")
+
+
+def as_held(model, numbers):
+    """The model with its box as the numbers round it, and with the terms that lie on its edges.
+
+    What is left between it and a function on the numbers is the function's own rounding.
+    """
+    low, high = numbers.low, numbers.high
+    groups = []
+    for group in model.antecedent.groups:
+        theta = group.theta.copy()
+        location, rest = _on_rounded_edge(theta[0], group.inputs, model, low, high)
+        theta[0] = location + rest
+        groups.append(replace(group, theta=theta))
+    return replace(
+        model,
+        antecedent=replace(model.antecedent, groups=tuple(groups)),
+        minimum=low.astype(float),
+        maximum=high.astype(float),
+    )
 
 
 def _rounded(values, dtype, what):

@@ -49,7 +49,14 @@ from ..membership import MEMBERSHIPS
 from ..model import OUT_OF_BOUNDS, TSKModel
 from ..support import RuleSupport
 from ._fold import fold
-from ._limits import LARGEST_NUMBER, check_size, read_bytes
+from ._limits import (
+    LARGEST_NUMBER,
+    SMALLEST_NUMBER,
+    check_size,
+    number,
+    read_bytes,
+    shown,
+)
 
 __all__ = ["export_json", "read_json", "write_json"]
 
@@ -75,7 +82,8 @@ _FILE = [
 ]
 _INPUT = ["name", "minimum", "maximum", "reference", "spread"]
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
-_SHOWN = 60
+# Of weights, each of which is a part of the whole.
+_ROUNDING = 1e-6
 
 
 def export_json(estimator):
@@ -95,7 +103,8 @@ def export_json(estimator):
     Raises
     ------
     ValueError
-        If a step in front cannot be folded, or if a membership is not one of skanfis' own.
+        If a step in front cannot be folded, if a membership is not one of skanfis' own, or if
+        :func:`read_json` would refuse a number, such as a spread beyond 1e50.
     TypeError
         If ``estimator`` is no such estimator.
 
@@ -135,20 +144,23 @@ def export_json(estimator):
             strict=True,
         )
     ]
-    return _laid_out(
-        {
-            "format": _FORMAT,
-            "version": _VERSION,
-            "inputs": inputs,
-            "outputs": list(model.output_names),
-            "out_of_bounds": model.out_of_bounds,
-            "max_extrapolation": None if isinf(limit) else limit,
-            "rule_base": _KINDS[type(model.antecedent)],
-            "terms": terms,
-            "rules": rules,
-            "support": None if model.support is None else _support_items(model.support),
-        }
-    )
+    document = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "inputs": inputs,
+        "outputs": list(model.output_names),
+        "out_of_bounds": model.out_of_bounds,
+        "max_extrapolation": None if isinf(limit) else limit,
+        "rule_base": _KINDS[type(model.antecedent)],
+        "terms": terms,
+        "rules": rules,
+        "support": None if model.support is None else _support_items(model.support),
+    }
+    try:
+        _model(document)
+    except ValueError as error:
+        raise ValueError(f"the model cannot be written such that it can be read: {error}") from None
+    return _laid_out(document)
 
 
 def write_json(estimator, path):
@@ -232,7 +244,11 @@ def read_json(path):
 
 def parse_json(text):
     """The model that a JSON text describes; ValueError where it is none."""
-    document = json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition)
+    return _model(json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition))
+
+
+def _model(document):
+    """The model that a file's content describes."""
     _check_version(document)
     _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
         document, _FILE, "the file"
@@ -240,16 +256,17 @@ def parse_json(text):
     input_names, box = _inputs(_list(inputs, "inputs"))
     outputs = [_text(name, "outputs") for name in _list(outputs, "outputs")]
     if policy not in OUT_OF_BOUNDS:
-        raise ValueError(f"out_of_bounds is {_shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
-    limit = inf if limit is None else _number(limit, "max_extrapolation")
-    if limit < 0.0:
-        raise ValueError("max_extrapolation must not be negative.")
+        raise ValueError(f"out_of_bounds is {shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
+    limit = inf if limit is None else number(limit, "max_extrapolation", 0.0)
     n_rules = len(_list(rules, "rules"))
     check_size(n_rules, len(_list(terms, "terms", 0)), len(inputs), len(outputs))
     groups, initial_groups, term_names = _read_terms(terms, len(inputs))
     table, weights, rows, coefficients = _rules(rules, len(terms), len(inputs), len(outputs))
+    antecedent = _rule_base(kind, groups, table)
+    if not abs(weights.sum() - 1.0) <= _ROUNDING:
+        raise ValueError(f"rules[].weight: the sum over all rules is {weights.sum():g}, not 1.")
     return TSKModel(
-        antecedent=_rule_base(kind, groups, table),
+        antecedent=antecedent,
         initial_antecedent=_rule_base(kind, initial_groups, table),
         coefficients=coefficients,
         reference=box[2],
@@ -308,7 +325,7 @@ def _without_repetition(pairs):
     members: dict = {}
     for key, value in pairs:
         if key in members:
-            raise ValueError(f"the key {_shown(key)} stands twice in one object.")
+            raise ValueError(f"the key {shown(key)} stands twice in one object.")
         members[key] = value
     return members
 
@@ -318,10 +335,10 @@ def _check_version(document):
         raise ValueError(f'not a model of skanfis: it has no "format": "{_FORMAT}".')
     version = document.get("version")
     if type(version) is not int or version < 1:
-        raise ValueError(f'"version" is {_shown(version)}, not a whole number from 1 on.')
+        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
     if version > _VERSION:
         raise ValueError(
-            f"the file is of version {_shown(version)}, this skanfis reads version {_VERSION}: "
+            f"the file is of version {shown(version)}, this skanfis reads version {_VERSION}: "
             "upgrade skanfis to read it."
         )
 
@@ -332,9 +349,12 @@ def _inputs(inputs):
     for j, item in enumerate(inputs):
         where = f"inputs[{j}]"
         name, *numbers = _members(item, _INPUT, where)
-        low, high, reference, spread = (_number(number, where) for number in numbers)
-        if low > high or spread <= 0.0:
-            raise ValueError(f"{where}: minimum is above maximum, or spread is not positive.")
+        low, high, reference, spread = (
+            number(value, f"{where}.{key}", SMALLEST_NUMBER if key == "spread" else -LARGEST_NUMBER)
+            for key, value in zip(_INPUT[1:], numbers, strict=True)
+        )
+        if low > high:
+            raise ValueError(f"{where}: minimum is above maximum.")
         names.append(_text(name, where))
         box.append([low, high, reference, spread])
     return tuple(names), np.array(box).T.copy()
@@ -357,7 +377,7 @@ def _read_terms(terms, n_inputs):
         names.append(_text(name, where))
         after.append((j, family, _theta(family, theta, where)))
         start = _members(start, keys, f'"before_training" of {where}')
-        before.append((j, family, _theta(family, start, where)))
+        before.append((j, family, _theta(family, start, f"{where}.before_training")))
     return _groups(after), _groups(before), tuple(names)
 
 
@@ -365,7 +385,7 @@ def _theta(family, theta, where):
     numbers = []
     for parameter, value in zip(family.parameters, theta, strict=True):
         largest = LARGEST_NUMBER if parameter.kind == "location" else _LARGEST_LOG
-        numbers.append(_number(value, where, largest))
+        numbers.append(number(value, f"{where}.{_key(parameter)}", -largest, largest))
     return numbers
 
 
@@ -387,13 +407,14 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
             item, ["terms", "weight", "rows", "consequents"], where
         )
         table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
-        weights.append(_number(weight, where))
-        rows.append(_number(n_rows, where))
-        if weights[-1] < 0.0 or rows[-1] < 0.0:
-            raise ValueError(f'"weight" and "rows" of {where} must not be negative.')
+        weights.append(number(weight, f"{where}.weight", 0.0, 1.0 + _ROUNDING))
+        rows.append(number(n_rows, f"{where}.rows", 0.0))
         by_output = [
-            [_number(number, where) for number in _list(one, where)]
-            for one in _list(by_output, where)
+            [
+                number(value, f"{where}.consequents[{k}][{j}]")
+                for j, value in enumerate(_list(one, f"{where}.consequents[{k}]"))
+            ]
+            for k, one in enumerate(_list(by_output, f"{where}.consequents"))
         ]
         n_basis = len(by_output[0])
         if len(by_output) != n_outputs or n_basis not in (1, 1 + n_inputs):
@@ -440,9 +461,8 @@ def _support(items, n_rules, n_inputs):
     for r, item in enumerate(items):
         where = f"support[{r}]"
         *numbers, middle, triangle = _members(item, ["share", "radius", "center", "factor"], where)
-        share, radius = (_number(number, where) for number in numbers)
-        if not 0.0 <= share <= 1.0 or radius < 0.0:
-            raise ValueError(f'"share" of {where} must be from 0 to 1, "radius" not negative.')
+        share = number(numbers[0], f"{where}.share", 0.0, 1.0)
+        radius = number(numbers[1], f"{where}.radius", 0.0)
         if len(_list(middle, where)) != n_inputs or len(_list(triangle, where)) != n_factor:
             raise ValueError(
                 f'"center" and "factor" of {where} must be lists of {n_inputs} and {n_factor} '
@@ -450,8 +470,8 @@ def _support(items, n_rules, n_inputs):
             )
         shares.append(share)
         radii.append(radius)
-        centers.append([_number(number, where) for number in middle])
-        factors.append([_number(number, where) for number in triangle])
+        centers.append([number(value, f"{where}.center") for value in middle])
+        factors.append([number(value, f"{where}.factor") for value in triangle])
     # Asked for now that the file has shown to be as large.
     factor = np.zeros((n_rules, n_inputs, n_inputs))
     factor[:, *np.tril_indices(n_inputs)] = factors
@@ -472,7 +492,7 @@ def _rule_base(kind, groups, table):
     elif kind == "table":
         antecedent, fits = RuleTableAntecedent(groups, table), True
     else:
-        raise ValueError(f'"rule_base" is {_shown(kind)}, not {", ".join(_KINDS.values())}.')
+        raise ValueError(f'"rule_base" is {shown(kind)}, not {", ".join(_KINDS.values())}.')
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
     _check_columns(inputs, table)
@@ -494,41 +514,29 @@ def _check_columns(inputs, table):
 def _members(item, keys, where):
     """The values of exactly these keys."""
     if not isinstance(item, dict):
-        raise ValueError(f"{where} is {_shown(item)}, not an object.")
+        raise ValueError(f"{where} is {shown(item)}, not an object.")
     if missing := [key for key in keys if key not in item]:
-        raise ValueError(f"{where} has no {_shown(missing[0])}.")
+        raise ValueError(f"{where} has no {shown(missing[0])}.")
     if unknown := [key for key in item if key not in keys]:
-        raise ValueError(f"{where} has the unknown key {_shown(unknown[0])}.")
+        raise ValueError(f"{where} has the unknown key {shown(unknown[0])}.")
     return [item[key] for key in keys]
 
 
 def _list(value, where, least=1):
     if not isinstance(value, list) or len(value) < least:
-        raise ValueError(f"{where}: {_shown(value)} is not a list of {least} or more.")
+        raise ValueError(f"{where}: {shown(value)} is not a list of {least} or more.")
     return value
 
 
 def _text(value, where):
     if not isinstance(value, str):
-        raise ValueError(f"{where}: {_shown(value)} is not a name in quotes.")
+        raise ValueError(f"{where}: {shown(value)} is not a name in quotes.")
     return value
-
-
-def _number(value, where, largest=LARGEST_NUMBER):
-    if type(value) not in (int, float) or not abs(value) <= largest:
-        raise ValueError(f"{where}: {_shown(value)} is not a number of size up to {largest:g}.")
-    return float(value)
 
 
 def _whole(value, lowest, highest, where):
     if type(value) is not int or not lowest <= value <= highest:
         raise ValueError(
-            f"{where}: {_shown(value)} is not a whole number from {lowest} to {highest}."
+            f"{where}: {shown(value)} is not a whole number from {lowest} to {highest}."
         )
     return value
-
-
-def _shown(value):
-    """The value, shortened and safe to print."""
-    text = ascii(value)
-    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."

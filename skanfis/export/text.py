@@ -115,14 +115,14 @@ def export_text(
     chosen = choose_rules(model, sort_by, max_rules, min_weight)
     reference = round_reference(model) if about == "mean" else 0.0 * model.reference
     consequents = consequents_about(model, reference)
+    told = [_told(consequents[:, :, k], model, precision) for k in range(model.n_outputs)]
     premises = conditions(model)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
     for r in chosen:
         lines = [_heading(model, r), f"  IF {premise_text(model, premises[r])}"]
         word = "THEN"
         for k, name in enumerate(model.output_names):
-            told = _told(consequents[:, :, k], model, precision)[r]
-            value = consequent_text(told, model.input_names, reference, precision)
+            value = consequent_text(told[k][r], model.input_names, reference, precision)
             lines.append(f"  {word} {name} = {value}")
             word = " AND"
         parts.append("\n".join(lines))

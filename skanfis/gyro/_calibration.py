@@ -12,11 +12,13 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from .. import ANFISRegressor
 from ._ask import ask
+from ._glitches import find_glitches
 from ._split import Split
 from ._structure import grow_terms, held_out_rms
 from ._units import SIGNALS
 from .compensator import GyroCompensator, features
 from .compose import ResidualRegressor
+from .log import LogError
 from .metrics import scale_factor
 from .physics import OpenLoopArcsineRegressor
 
@@ -57,7 +59,8 @@ class Calibration:
     """A compensator, and what was found out about it.
 
     ``before`` and ``after`` are the indicated rate and the held-out compensated one of every row,
-    ``inside`` whether the row was in the bounds of the model that had not seen it.
+    ``inside`` whether the row was in the bounds of the model that had not seen it. ``warnings`` are
+    those of the fit; ``cautions`` say why the compensator should not be used as it is.
     """
 
     recipe: Recipe
@@ -73,6 +76,7 @@ class Calibration:
     baselines: dict
     n_fit_rows: int
     warnings: list
+    cautions: list
 
     @property
     def rate(self):
@@ -80,10 +84,10 @@ class Calibration:
         return self.log["rate"].to_numpy()
 
 
-def calibrate(log, split, recipe, tell):
+def calibrate(log, split, recipe, tell, name_row="row {}".format):
     """Choose the structure, compensate every row by a model that is new to it, fit to all rows.
 
-    ``tell`` is called with a line of text for every step.
+    ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
     """
     factor = 1.0
     if recipe.output_unit in SIGNALS:
@@ -91,11 +95,24 @@ def calibrate(log, split, recipe, tell):
     X = features(log, recipe.inputs, recipe.time_constant)
     before = log["output"].to_numpy() / factor
     error = before - log["rate"].to_numpy()
+    glitches = [
+        f"{name_row(glitch.row)}: {glitch.reason} is supported by no other row; if it is a glitch, "
+        "drop this row and calibrate again."
+        for glitch in find_glitches(log, error)
+    ]
+    for sentence in glitches:
+        tell(f"warning: {sentence}")
     target = log["rate"].to_numpy() if recipe.physics else error
     rng = np.random.default_rng(0)
     chosen, tried, baselines = _search(X, target, error, split, recipe, rng, tell)
     make = partial(make_estimator, recipe, chosen)
     predicted, inside = _held_out(make, X, target, split, recipe, rng, tell)
+    if not (inside & np.isfinite(predicted)).any():
+        raise LogError(
+            f"the compensator could not be checked: every row lies outside the range of the rows "
+            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
+            "overlap in temperature, rate and time."
+        )
     rows = _some(np.arange(len(X)), recipe.fit_rows, X, rng)
     tell(f"fitting to {rows.size:,} rows")
     with warnings.catch_warnings(record=True) as caught:
@@ -110,6 +127,7 @@ def calibrate(log, split, recipe, tell):
         time_constant=recipe.time_constant,
         min_coverage=recipe.min_coverage,
     )
+    after = compensator.compensate(before, predicted)
     return Calibration(
         recipe=recipe,
         compensator=compensator,
@@ -117,14 +135,29 @@ def calibrate(log, split, recipe, tell):
         log=log,
         X=X,
         before=before,
-        after=compensator.compensate(before, predicted),
+        after=after,
         inside=inside,
         terms=chosen[1],
         tried=tried,
         baselines=baselines,
         n_fit_rows=rows.size,
         warnings=sorted({str(warning.message) for warning in caught}),
+        cautions=[*_what_is_worse(error, after - log["rate"].to_numpy(), inside), *glitches],
     )
+
+
+def _what_is_worse(before, after, inside):
+    """Sentences about the held-out rows, in range and out of it, that are better left alone."""
+    for rows, where in ((inside, "in range"), (~inside, "out of range")):
+        answered = rows & np.isfinite(after)
+        if not answered.any():
+            continue
+        was, became = (float(np.sqrt(np.mean(e[answered] ** 2))) for e in (before, after))
+        if became > was:
+            yield (
+                f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
+                f"{became:.4g} deg/s RMS."
+            )
 
 
 def make_estimator(recipe, choice):

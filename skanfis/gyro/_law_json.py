@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..export._limits import SMALLEST_NUMBER, number, shown
 from .physics import OpenLoopArcsineRegressor, check_parameters
 
 __all__ = ["law_document", "read_law"]
@@ -13,8 +14,8 @@ _PARAMETERS = ("max_phase", "out_of_bounds")
 _KEYS = ("columns", *_POLYNOMIALS, *_NUMBERS, *_RANGE, *_PARAMETERS)
 _ROLES = ("output", "temperature", "temperature_rate")
 _MOST_COEFFICIENTS = 6
-# Products of such numbers with each other are finite.
-_LARGEST = 1e50
+# What phase and rate are divided by.
+_NEVER_ZERO = ("amplitude", "sagnac_factor")
 
 
 def law_document(law, inputs):
@@ -42,26 +43,28 @@ def read_law(document, inputs):
     ):
         raise ValueError(f"the law's columns are {columns!r}; they must be 1 to 3 of the inputs")
     longest = _MOST_COEFFICIENTS if len(columns) > 1 else 1
-    lists = {key: _numbers(document, key, 1, longest) for key in _POLYNOMIALS}
-    edges = {key: _numbers(document, key, len(columns), len(columns)) for key in _RANGE}
+    lists = {key: _numbers(document[key], key, 1, longest) for key in _POLYNOMIALS}
+    for key in _NEVER_ZERO:
+        number(abs(float(lists[key][0])), f"law.{key}[0], in size", SMALLEST_NUMBER)
+    edges = {key: _numbers(document[key], key, len(columns), len(columns)) for key in _RANGE}
     if (edges["minimum"] > edges["maximum"]).any():
         raise ValueError("the law's minimum is above its maximum")
-    numbers = {key: _numbers({key: [document[key]]}, key, 1, 1)[0] for key in _NUMBERS}
+    numbers = {key: number(document[key], f"law.{key}") for key in _NUMBERS}
     if len(columns) < len(_ROLES) and numbers["thermometer_lag"] != 0.0:
         raise ValueError("the law has a thermometer_lag and no column for the temperature's rate")
-    _numbers({"max_phase": [document["max_phase"]]}, "max_phase", 1, 1)
+    number(document["max_phase"], "law.max_phase", 0.0, np.pi / 2.0)
     law = OpenLoopArcsineRegressor(
         **dict(zip(_ROLES, [*columns, None, None], strict=False)),
         **{
             f"{name}_degree": lists[key].size - 1
             for name, key in zip(("amplitude", "sagnac", "bias"), _POLYNOMIALS, strict=True)
         },
-        reference_temperature=float(numbers["reference_temperature"]),
+        reference_temperature=numbers["reference_temperature"],
         warn_out_of_bounds=False,
         **{key: document[key] for key in _PARAMETERS},
     )
     check_parameters(law)
-    fitted = lists | edges | {key: float(value) for key, value in numbers.items()}
+    fitted = lists | edges | numbers
     for key, value in fitted.items():
         setattr(law, f"{key}_", value)
     law.n_features_in_ = len(inputs)
@@ -70,14 +73,8 @@ def read_law(document, inputs):
     return law
 
 
-def _numbers(document, key, fewest, most):
-    values = document[key]
-    if (
-        not isinstance(values, list)
-        or not fewest <= len(values) <= most
-        or any(type(value) not in (int, float) for value in values)
-        or any(not abs(value) <= _LARGEST for value in values)
-    ):
+def _numbers(values, key, fewest, most):
+    if not isinstance(values, list) or not fewest <= len(values) <= most:
         count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-        raise ValueError(f"the law's {key} must hold {count} finite number(s), not {values!r}")
-    return np.array(values, dtype=float)
+        raise ValueError(f"law.{key}: {shown(values)} must be a list of {count} number(s)")
+    return np.array([number(value, f"law.{key}[{k}]") for k, value in enumerate(values)])

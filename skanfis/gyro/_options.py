@@ -23,6 +23,9 @@ Written to a folder: the model (compensator.json, and compensator.joblib as a Py
 report with tables and pictures for any browser (report.html), and the rules as text (rules.txt).
 """
 
+# A grid that could neither be told nor learnt: the search takes 36.
+_MOST_RULES = 500
+
 _EPILOG = """\
 examples:
   python -m skanfis.gyro log.csv
@@ -41,8 +44,10 @@ exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
 
-security: a .joblib file can run any code when it is loaded. Apply only those that you, or someone
-whom you trust, have written. The .json file is read as data, and runs nothing.
+security: --apply reads every file as JSON first, that is as data, and runs nothing of it. Only a
+file whose name ends in .joblib is unpickled where it is no JSON: unpickling runs whatever code the
+file holds, with all your rights. Apply such a file only if you, or someone whom you trust, have
+written it.
 """
 
 
@@ -77,8 +82,16 @@ def make_parser():
         help="units of the columns, by default s, degC and deg/s. "
         + "; ".join(f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES),
     )
-    reading.add_argument("--separator", default=",", metavar="SIGN", help="between columns (,)")
-    reading.add_argument("--decimal", default=".", metavar="SIGN", help="of decimal fractions (.)")
+    reading.add_argument(
+        "--separator",
+        type=_sign,
+        default=",",
+        metavar="SIGN",
+        help=r"between columns (,); \t for a tab",
+    )
+    reading.add_argument(
+        "--decimal", type=_sign, default=".", metavar="SIGN", help="of decimal fractions (.)"
+    )
     reading.add_argument("--device", metavar="NAME", help="use the rows of this device only")
     reading.add_argument(
         "--at-rest",
@@ -142,13 +155,17 @@ def make_parser():
     )
     model.add_argument(
         "--time-constant",
-        type=_positive,
+        type=_seconds,
         default=30.0,
         metavar="S",
         help="of the low-pass of the temperature's rate (30)",
     )
     model.add_argument(
-        "--max-rules", type=_count, default=36, metavar="N", help="most rules of a search (36)"
+        "--max-rules",
+        type=_rules,
+        default=36,
+        metavar="N",
+        help=f"most rules of a search (36); {_MOST_RULES} at most",
     )
     model.add_argument(
         "--fit-rows",
@@ -157,7 +174,9 @@ def make_parser():
         metavar="N",
         help="fit to so many rows, chosen at random, of a longer log (100000); all are checked",
     )
-    model.add_argument("--jobs", type=int, metavar="N", help="threads for a fit (1)")
+    model.add_argument(
+        "--jobs", type=_jobs, metavar="N", help="threads for a fit (1); -1 is one per core"
+    )
     parser.add_argument(
         "--groups",
         choices=KINDS,
@@ -169,8 +188,9 @@ def make_parser():
     output.add_argument(
         "--apply",
         metavar="MODEL",
-        help="compensate the logs by this model (.json or .joblib) instead of calibrating; a "
-        "column for the rate is not needed, and is compared with where it is there",
+        help="compensate the logs by this model (compensator.json) instead of calibrating; a "
+        "column for the rate is not needed, and is compared with where it is there. A .joblib file "
+        "is taken too, and can run any code: see below",
     )
     output.add_argument(
         "--output",
@@ -198,7 +218,26 @@ def _terms(text):
         terms = ()
     if not terms or min(terms) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} must be search, auto, or numbers such as 2,3,3")
+    n_rules = math.prod(terms)
+    if n_rules > _MOST_RULES:
+        raise argparse.ArgumentTypeError(
+            f"{text} makes {n_rules:,} rules; at most {_MOST_RULES} are learnt. Use fewer terms"
+        )
     return terms
+
+
+def _sign(text):
+    sign = "\t" if text == r"\t" else text
+    if (
+        len(sign) != 1
+        or sign.isalnum()
+        or not (sign.isprintable() or sign == "\t")
+        or sign in "\"'+-"
+    ):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} must be one sign, such as a comma, and neither letter, digit, quote, + nor -"
+        )
+    return sign
 
 
 def _positive(text):
@@ -207,6 +246,20 @@ def _positive(text):
 
 def _extent(text):
     return _number(text, float, lambda value: value >= 0, "a number, zero or positive, or inf")
+
+
+def _seconds(text):
+    return _number(text, float, lambda value: 1e-9 <= value <= 1e9, "a number from 1e-9 to 1e9")
+
+
+def _rules(text):
+    what = f"a whole number from 1 to {_MOST_RULES}"
+    return _number(text, int, lambda value: 1 <= value <= _MOST_RULES, what)
+
+
+def _jobs(text):
+    what = "a whole number, 1 or more, or -1 for one per core"
+    return _number(text, int, lambda value: value >= 1 or value == -1, what)
 
 
 def _count(text):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..inspection import MembershipDisplay
 from ._results import rules_of
+from .allan import ROWS_PER_TIME
 from .displays import (
     AllanDisplay,
     CoverageDisplay,
@@ -149,7 +150,13 @@ def why_no_allan(results):
     steps = results.steps
     if not steps.size or np.ptp(steps) > _UNEVEN * np.median(steps):
         return "the rows are not evenly spaced in time"
-    return "" if results.in_whole_runs.any() else "no run is in range from end to end"
+    rows = results.in_whole_runs
+    if not rows.any():
+        return "no run is in range from end to end"
+    runs = np.zeros(rows.size) if results.run is None else results.run
+    _, lengths = np.unique(runs[rows].astype(str), return_counts=True)
+    is_enough = lengths.max() >= ROWS_PER_TIME
+    return "" if is_enough else f"no run in range has {ROWS_PER_TIME} rows"
 
 
 PICTURES = (

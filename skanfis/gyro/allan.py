@@ -25,7 +25,7 @@ _FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
 _POINTS_PER_SLOPE = 3
 _SLOPE_TOLERANCE = 0.15
 # A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
-_ROWS_PER_TIME = 10
+ROWS_PER_TIME = 10
 
 
 def allan_deviation(error, sampling_interval, *, run=None):
@@ -74,7 +74,7 @@ def allan_deviation(error, sampling_interval, *, run=None):
         raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
     variances: dict[int, list] = {}
     for rows in rows_by_run(run, error.size, at_least=1):
-        if rows.size < _ROWS_PER_TIME:
+        if rows.size < ROWS_PER_TIME:
             continue
         drift = _SECONDS_PER_HOUR * error[rows]
         times, deviations, _, counts = oadev(
@@ -82,10 +82,10 @@ def allan_deviation(error, sampling_interval, *, run=None):
         )
         for time, deviation, n in zip(times, deviations, counts, strict=True):
             multiple = round(time / sampling_interval)
-            if multiple * _ROWS_PER_TIME <= rows.size:
+            if multiple * ROWS_PER_TIME <= rows.size:
                 variances.setdefault(multiple, []).append((deviation**2, n))
     if not variances:
-        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
+        raise ValueError(f"No Allan deviation: no run has {ROWS_PER_TIME} rows.")
     lines = []
     for multiple, found in sorted(variances.items()):
         squares, counts = np.transpose(found)

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.polynomial import Polynomial
 from scipy.stats import qmc
 
-from ..export._numbers import Numbers
+from ..export._numbers import Numbers, as_held
 from ..export.c import CCode
 from ..export.c._cost import cost
 from ..export.c._dialect import Dialect
@@ -415,6 +415,7 @@ def _known_answers(composition, numbers, min_coverage):
     Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
     """
     law, rules = composition.law, composition.rules
+    rules = replace(rules, model=as_held(rules.model, numbers))
     low, high = composition.box
     points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
     kind = np.arange(len(points)) % 4

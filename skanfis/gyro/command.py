@@ -9,17 +9,28 @@ import numpy as np
 import pandas as pd
 
 from ..export import export_c
+from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
 from ._options import PROGRAM, make_parser
 from ._split import choose_split
+from ._staging import Staging
 from .c_code import export_c_physics
 from .compensator import INPUTS, STATUS, GyroCompensator
 from .html_report import report_page, rules_text
-from .log import LogError, check_log, declared_units, located, read_log
+from .log import (
+    LogError,
+    check_at_rest,
+    check_log,
+    declared_units,
+    line_of,
+    located,
+    read_log,
+)
 
 __all__ = ["main"]
 
 DONE, FAILED, MISUSED, REFUSED, EXISTS = 0, 1, 2, 3, 4
+INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = {
     "model": "compensator.joblib",
@@ -39,17 +50,26 @@ def main(arguments=None):
         run = _apply if options.apply else _calibrate
         return run(options, tell)
     except _UsageError as error:
-        parser.error(str(error))  # exits
+        parser.error(printable(error))  # exits
     except LogError as error:
         return _say_error(error, REFUSED)
-    except FileExistsError as error:
+    except _ExistsError as error:
         return _say_error(error, EXISTS)
-    except (OSError, ImportError) as error:
-        return _say_error(error, FAILED)
+    except OSError as error:
+        return _say_error(_told(error), FAILED)
+    except (ImportError, ValueError, ArithmeticError, MemoryError) as error:
+        # Of what the log made of the arithmetic: one sentence too.
+        return _say_error(str(error) or type(error).__name__, FAILED)
+    except KeyboardInterrupt:
+        return _say_error("interrupted; nothing was written.", INTERRUPTED)
 
 
 class _UsageError(ValueError):
     """Options that make no sense."""
+
+
+class _ExistsError(Exception):
+    """A file that would be replaced."""
 
 
 class _Progress:
@@ -66,7 +86,7 @@ class _Progress:
 
     def __call__(self, text):
         if not self._quiet:
-            sys.stderr.write(f"{self.seconds:7.1f} s  {text}\n")
+            _write_to(sys.stderr, f"{self.seconds:7.1f} s  {printable(text)}\n")
             sys.stderr.flush()
 
 
@@ -74,13 +94,28 @@ def _calibrate(options, tell):
     units = _pairs(options.units, "--units")
     folder = options.output or Path(f"{Path(options.logs[0]).stem}-compensator")
     if folder.exists() and not folder.is_dir():
-        raise FileExistsError(f"{folder} is a file; --output is the folder to write to.")
+        raise _ExistsError(f"{folder} is a file; --output is the folder to write to.")
     files = [*_FILES.values(), *(_C_FILES if options.c else ())]
     _refuse_existing([folder / name for name in files], options.force)
+    _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
     _require_matplotlib()
+    with Staging(folder) as staging:
+        calibration = _calibration(options, units, tell)
+        tell("drawing the report")
+        _write(calibration, options, staging.path)
+        staging.publish()
+    for message in calibration.warnings:
+        tell(f"warning: {message}")
+    _say(_summary(calibration, folder))
+    tell("done, but see the warnings" if calibration.cautions else "done")
+    return DONE
+
+
+def _calibration(options, units, tell):
     needed = ("temperature", "output") if options.at_rest else ("temperature", "output", "rate")
     log = _read(options, needed, tell)
     if options.at_rest:
+        _located(lambda: check_at_rest(log, declared_units(units).get("output", "deg/s")), options)
         log = log.assign(rate=0.0)
     inputs = tuple(options.inputs or _default_inputs(log, options.at_rest))
     if options.physics and "output" not in inputs:
@@ -107,14 +142,7 @@ def _calibrate(options, tell):
     split = choose_split(log, options.groups, uses_output="output" in inputs)
     tell(f"inputs: {', '.join(inputs)}")
     tell(f"check: {split.sentence}")
-    calibration = calibrate(log, split, recipe, tell)
-    tell("drawing the report")
-    _write(calibration, options, folder)
-    for message in calibration.warnings:
-        tell(f"warning: {message}")
-    _say(_summary(calibration, folder))
-    tell("done")
-    return DONE
+    return calibrate(log, split, recipe, tell, _name_row(log, options))
 
 
 def _apply(options, tell):
@@ -132,14 +160,17 @@ def _apply(options, tell):
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
-    log = _read(options, sorted(needed), tell)
-    _check(log, options, inputs=())
-    tell("compensating")
-    compensated = compensator.apply(log)
-    labels = [name for name in ("device", "run", "time") if name in log]
-    tell(f"writing {target}")
-    # Twelve digits are beyond any gyro, and short beside the seventeen of a double.
-    pd.concat([log[labels], compensated], axis=1).to_csv(target, index=False, float_format="%.12g")
+    with Staging(target.parent) as staging:
+        log = _read(options, sorted(needed), tell)
+        _check(log, options, inputs=())
+        tell("compensating")
+        compensated = compensator.apply(log)
+        labels = [name for name in ("device", "run", "time") if name in log]
+        tell(f"writing {target}")
+        table = pd.concat([log[labels], compensated], axis=1)
+        # Twelve digits are beyond any gyro, and short beside the seventeen of a double.
+        table.to_csv(staging.path / target.name, index=False, float_format="%.12g")
+        staging.publish()
     _say(_summary_of_rows(log, compensated, compensator, target))
     tell("done")
     return DONE
@@ -173,12 +204,32 @@ def _read(options, require, tell):
 
 def _check(log, options, **requirements):
     """As :func:`check_log`, with errors in the words of the file."""
+    units = _pairs(options.units, "--units")
+    _located(lambda: check_log(log, units=units, **requirements), options)
+
+
+def _located(check, options):
+    """Do a check, with errors in the words of the file."""
     try:
-        check_log(log, units=_pairs(options.units, "--units"), **requirements)
+        check()
     except LogError as error:
-        is_whole_file = len(options.logs) == 1 and options.device is None
-        path = options.logs[0] if is_whole_file else None
-        raise located(error, _pairs(options.columns, "--columns"), path) from error
+        columns = _pairs(options.columns, "--columns")
+        raise located(error, columns, _only_file(options), options.separator) from error
+
+
+def _only_file(options):
+    """The file whose rows are those of the log; None where there is no such file."""
+    return options.logs[0] if len(options.logs) == 1 and options.device is None else None
+
+
+def _name_row(log, options):
+    """A function that says where a row of the log is found."""
+    path = _only_file(options)
+    if path is not None:
+        return lambda row: f"{path}, line {line_of(path, row, options.separator)}"
+    if "run" in log:
+        return lambda row: f"row {row}, in run {log['run'].iloc[row]}"
+    return "row {}".format
 
 
 def _of_device(log, device):
@@ -214,21 +265,37 @@ def _default_inputs(log, at_rest):
 
 
 def _load(path):
-    if path.endswith(".json"):
-        try:
-            return GyroCompensator.read_json(path)
-        except ValueError as error:
+    """The compensator of a file: of JSON, or else by its name a pickle, which may run any code."""
+    try:
+        return GyroCompensator.read_json(path)
+    except ValueError as error:
+        if Path(path).suffix.lower() != ".joblib":
             raise _UsageError(str(error)) from error
-    loaded = joblib.load(path)
+    try:
+        loaded = joblib.load(path)
+    except Exception as error:
+        # A damaged pickle may raise anything.
+        raise _UsageError(
+            f"{path} cannot be loaded ({type(error).__name__}: {error}): it is damaged, or no "
+            "compensator. Use compensator.json."
+        ) from error
     if not isinstance(loaded, GyroCompensator):
         raise _UsageError(f"{path} holds a {type(loaded).__name__}, not a GyroCompensator.")
     return loaded
 
 
 def _refuse_existing(paths, force):
-    there = [str(path) for path in paths if path.exists()]
-    if there and not force:
-        raise FileExistsError(f"{there[0]} exists already: choose another --output, or --force.")
+    for path in paths:
+        if path.is_dir():
+            raise _ExistsError(f"{path} is a folder: choose another --output.")
+        if path.exists() and not force:
+            raise _ExistsError(f"{path} exists already: choose another --output, or --force.")
+
+
+def _refuse_twice(names, sentence):
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise _UsageError(sentence.format(name))
 
 
 def _require_matplotlib():
@@ -238,13 +305,15 @@ def _require_matplotlib():
     except ImportError as error:
         message = "the report needs matplotlib: pip install 'skanfis[plot]'"
         raise ImportError(message) from error
+    except ValueError as error:
+        # Of its settings; MPLBACKEND is one.
+        reason = printable(str(error).partition(";")[0])
+        raise ImportError(f"matplotlib cannot be imported: {reason}.") from error
 
 
 def _write(calibration, options, folder):
-    # First what takes long: nothing is written if it fails.
     page = report_page(calibration, _title(options.logs))
     compensator = calibration.compensator
-    folder.mkdir(parents=True, exist_ok=True)
     (folder / _FILES["report"]).write_text(page, encoding="utf-8")
     joblib.dump(compensator, folder / _FILES["model"])
     compensator.write_json(folder / _FILES["json"])
@@ -258,7 +327,7 @@ def _write(calibration, options, folder):
 
 def _title(logs):
     names = [Path(log).name for log in logs]
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    return printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
 
 
 def _summary(calibration, folder):
@@ -279,8 +348,9 @@ def _summary(calibration, folder):
     lines += [
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
+        *(f"WARNING        {sentence}" for sentence in calibration.cautions),
     ]
-    return "\n".join(lines)
+    return lines
 
 
 def _summary_of_rows(log, compensated, compensator, target):
@@ -301,7 +371,7 @@ def _summary_of_rows(log, compensated, compensator, target):
                     f"RMS error      {_rms(before):.4g} deg/s before, "
                     f"{_rms(after[np.isfinite(after)]):.4g} after ({label})"
                 )
-    return "\n".join(lines)
+    return lines
 
 
 def _rms(errors):
@@ -320,10 +390,24 @@ def _pairs(texts, option):
     return pairs
 
 
-def _say(text):
-    sys.stdout.write(text + "\n")
+def _told(error):
+    """An error of the system in one sentence."""
+    if error.filename is None or error.strerror is None:
+        return error
+    return f"{error.filename}: {error.strerror}."
+
+
+def _say(lines):
+    for line in lines:
+        _write_to(sys.stdout, f"{printable(line)}\n")
 
 
 def _say_error(error, code):
-    sys.stderr.write(f"{PROGRAM}: {error}\n")
+    _write_to(sys.stderr, f"{PROGRAM}: {printable(error)}\n")
     return code
+
+
+def _write_to(stream, text):
+    """Text to a stream, with escapes for what its encoding lacks."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    stream.write(text.encode(encoding, "backslashreplace").decode(encoding))

@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json
+from ..export._limits import SMALLEST_NUMBER, number, shown
 from ..export.model_json import parse_json
 from ._ask import ask
 from ._frozen import FrozenRules, joined, law_and_rules
@@ -28,6 +29,7 @@ STATUS = {"OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
 _KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
 _MOST_BYTES = 2**24
+_LONGEST_UNIT = 40
 # Rows whose inputs, predictions and coverage are held at a time.
 _BLOCK_ROWS = 65_536
 
@@ -130,17 +132,18 @@ class GyroCompensator:
             for start in range(0, len(X), _BLOCK_ROWS)
         ]
         predicted, inside, coverage = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-        refused = ~np.isfinite(predicted)
-        predicted[refused] = np.nan
+        compensated = self.compensate(indicated, predicted)
+        refused = ~np.isfinite(compensated)
+        compensated[refused] = np.nan
         status = (
             STATUS["OUT_OF_RANGE"] * ~inside
-            | STATUS["UNCOVERED"] * (~refused & (coverage < self.min_coverage))
+            | STATUS["UNCOVERED"] * (~refused & ~(coverage >= self.min_coverage))
             | STATUS["NO_OUTPUT"] * refused
         )
         return pd.DataFrame(
             {
                 "rate_indicated": indicated,
-                "rate_compensated": self.compensate(indicated, predicted),
+                "rate_compensated": compensated,
                 "coverage": coverage,
                 "status": status.astype(np.uint8),
             },
@@ -179,7 +182,7 @@ class GyroCompensator:
         ------
         ValueError, TypeError
             If the estimator is neither an ANFIS behind scalers nor a :class:`ResidualRegressor` of
-            the arcsine law and such.
+            the arcsine law and such, or a number is beyond what :meth:`read_json` takes.
         OSError
             If the file cannot be written.
         """
@@ -193,6 +196,8 @@ class GyroCompensator:
             "model": json.loads(export_json(rules.model)),
         }
         text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+        # What could not be read again is not written.
+        _settings(json.loads(text))
         Path(path).write_text(text, encoding="utf-8", newline="\n")
 
     @classmethod
@@ -211,7 +216,8 @@ class GyroCompensator:
         Raises
         ------
         ValueError
-            If the file is not such a compensator.
+            If the file is not such a compensator, or a number in it is out of its range. The
+            message says where, as in ``model.inputs[0].spread``.
         OSError
             If it cannot be opened.
         """
@@ -223,7 +229,8 @@ class GyroCompensator:
             document = json.loads(data.decode("utf-8"))
             return cls(**_settings(document))
         except (ValueError, RecursionError) as error:
-            raise ValueError(f"{path} is no gyro compensator: {error}.") from error
+            reason = str(error).removesuffix(".")
+            raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
 
     def _parts(self):
         """The law, or None, and the rules."""
@@ -271,18 +278,28 @@ def _settings(document):
         raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
     if document["predicts"] not in ("error", "rate"):
         raise ValueError(f"predicts is {document['predicts']!r}")
-    for key in ("scale_factor", "time_constant", "min_coverage"):
-        value = document[key]
-        if type(value) not in (int, float) or not np.isfinite(value):
-            raise ValueError(f"{key} is {value!r}, no finite number")
-    if not isinstance(document["output_unit"], str):
-        raise ValueError("output_unit is no text")
-    columns, model = document["columns"], parse_json(json.dumps(document["model"]))
+    scale_factor = number(document["scale_factor"], "scale_factor")
+    numbers = {
+        # Its sign is that of the axis.
+        "scale_factor": np.copysign(
+            number(abs(scale_factor), "scale_factor, in size", SMALLEST_NUMBER), scale_factor
+        ).item(),
+        "time_constant": number(document["time_constant"], "time_constant", SMALLEST_NUMBER),
+        "min_coverage": number(document["min_coverage"], "min_coverage", 0.0, 1.0),
+    }
+    unit = document["output_unit"]
+    if not (isinstance(unit, str) and unit.isprintable() and 0 < len(unit) <= _LONGEST_UNIT):
+        raise ValueError(f"output_unit: {shown(unit)} is not the name of a unit")
+    columns = document["columns"]
+    try:
+        model = parse_json(json.dumps(document["model"]))
+    except ValueError as error:
+        raise ValueError(f"model.{error}") from error
     if not _are_of(columns, inputs):
         raise ValueError(f"columns is {columns!r}; they must be of the inputs")
     if model.n_inputs != len(columns) or model.n_outputs != 1:
         raise ValueError(f"its model has {model.n_inputs} inputs and {model.n_outputs} outputs")
-    settings = {key: document[key] for key in _KEYS}
+    settings = {key: document[key] for key in _KEYS} | numbers
     estimator = FrozenRules(model, np.array([inputs.index(name) for name in columns]))
     if document["law"] is not None:
         estimator = joined(read_law(document["law"], inputs), estimator)

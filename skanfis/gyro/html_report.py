@@ -64,6 +64,8 @@ def _target(calibration):
 
 def _headline(page, results):
     calibration = results.calibration
+    for sentence in calibration.cautions:
+        page.paragraph(f"Warning: {sentence}", kind="warn")
     beyond = results.beyond
     after = results.error_after
     unit = SYMBOL[results.unit]

@@ -7,6 +7,8 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 
 import csv
 import difflib
+import os
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +30,14 @@ _PLAUSIBLE = {
 _LONGEST_RUN = 31 * 86_400.0  # s
 _FASTEST_CHANGE = 100.0  # degC/min over a whole run: no chamber does that
 _FEWEST_ROWS = 20
+_FEWEST_ROWS_PER_RUN = 3
+_LONGEST_FIELD = 2**31 - 1
+# At rest, the earth's rate included.
+_LARGEST_AT_REST = 0.1  # deg/s, with the noise of a rate table's encoder
+_WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
+# Noise in 20 times its usual step is none; glitches are rare.
+_JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
+_LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _FOLLOWS = 0.9  # correlation of output with rate below which one of them is something else
 
 
@@ -74,7 +84,8 @@ def read_log(paths, *, columns=None, units=None, require=None, separator=",", de
         CSV files with a header line, in UTF-8.
     columns : dict of str to str, default=None
         Names in the file by part: keys "time", "temperature", "output", "rate", "run", "device".
-        A part that is not named here has its own name in the file.
+        A part that is not named here has its own name in the file. Blanks around names, and
+        capitals, do not matter where one column alone fits.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
         and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be a raw signal, in
@@ -96,10 +107,11 @@ def read_log(paths, *, columns=None, units=None, require=None, separator=",", de
     Raises
     ------
     LogError
-        If a file is empty or no such table; if a column that is required is not there; if a value
-        is missing or no number. The message names the file, its column and line.
+        If a file is empty, no such table, or there twice; if a column that is required is not
+        there; if a value is missing or no number. The message names the file, its column and line.
     ValueError
-        If ``columns``, ``units`` or ``require`` name an unknown part or unit.
+        If ``columns``, ``units`` or ``require`` name an unknown part or unit, or if ``separator``
+        or ``decimal`` is no single sign.
     OSError
         If a file cannot be read.
 
@@ -126,8 +138,33 @@ def read_log(paths, *, columns=None, units=None, require=None, separator=",", de
         raise LogError(f"two parts cannot be the same column of the file, {shared[0]!r}.")
     wanted = {*require, *(columns or {})}
     paths = [paths] if isinstance(paths, str | Path) else list(paths)
+    _check_signs(separator, decimal)
+    _check_different(paths)
     tables = [_read_table(path, names, units, wanted, separator, decimal) for path in paths]
     return _name_runs(_join(tables, paths))
+
+
+def _check_signs(separator, decimal):
+    """ValueError where either is no single sign, or both are the same."""
+    for name, sign in (("separator", separator), ("decimal", decimal)):
+        if not isinstance(sign, str) or len(sign) != 1 or sign.isalnum() or sign in '\r\n"':
+            raise ValueError(f"{name}={sign!r} must be one sign, such as a comma.")
+    if separator == decimal:
+        raise ValueError(f"separator and decimal are both {separator!r}: numbers would be cut.")
+
+
+def _check_different(paths):
+    """LogError where one file is there twice: as two runs, each would be tested by the other."""
+    seen: dict = {}
+    for path in paths:
+        try:
+            status = os.stat(path)
+        except OSError:
+            continue  # said when it is read
+        key = status.st_dev, status.st_ino
+        if key in seen:
+            raise LogError(f"{path}: is the same file as {seen[key]}; name every log once.")
+        seen[key] = path
 
 
 def declared_units(units):
@@ -188,6 +225,10 @@ def check_log(log, *, inputs=("temperature", "output"), units=None, min_temperat
     for part in _PLAUSIBLE:
         if part in log and units[part] not in SIGNALS:
             _check_plausible(log[part].to_numpy(), part, units[part])
+    if "output" in log and units["output"] in SIGNALS:
+        _check_signal(log["output"].to_numpy(), units["output"])
+    if "run" in log and len(inputs):
+        _check_runs(log["run"])
     if "time" in log:
         _check_time(log, units["time"])
     if {"temperature", "temperature_rate"} & set(inputs):
@@ -195,6 +236,40 @@ def check_log(log, *, inputs=("temperature", "output"), units=None, min_temperat
     if "output" in inputs and "rate" in log:
         _check_output_follows_rate(log, units)
     return log
+
+
+def check_at_rest(log, unit):
+    """Refuse a log of a gyro that has turned; ``unit`` is that of the output.
+
+    A raw signal, whose scale is not known, is told by its jumps alone, those of a rate table.
+    """
+    if "rate" in log:
+        rate = log["rate"].to_numpy()
+        row = int(np.argmax(np.abs(rate)))
+        if abs(rate[row]) > _LARGEST_AT_REST:
+            raise LogError(f"{rate[row]:.4g} deg/s: the gyro was not at rest.", "rate", row)
+    output = log["output"].to_numpy()
+    if unit not in SIGNALS:
+        low, high = np.quantile(output, [0.01, 0.99])
+        if high - low > _WIDEST_AT_REST:
+            raise LogError(
+                f"spans {low:.4g} to {high:.4g} deg/s: no bias does, the gyro was not at rest.",
+                "output",
+            )
+    steps = np.abs(np.diff(output))
+    if "run" in log:
+        run = log["run"].to_numpy()
+        steps = steps[run[1:] == run[:-1]]
+    if not steps.any():
+        return
+    usual = max(np.median(steps), steps[steps > 0.0].min())
+    jumps = np.count_nonzero(steps > _JUMP * usual)
+    if jumps > max(_FEWEST_JUMPS, _RARE * steps.size):
+        raise LogError(
+            f"jumps {jumps} times by more than {_JUMP:g} times its usual step: the gyro was not at "
+            "rest, or moved from level to level.",
+            "output",
+        )
 
 
 def _checked(given, what, allowed):
@@ -208,22 +283,34 @@ def _checked(given, what, allowed):
 def _read_table(path, names, units, wanted, separator, decimal):
     """The parts of one file, converted; LogError with the file's name, column and line."""
     header = _header(path, separator)
+    taken = [name for name in names.values() if name in header]
+    found = {part: _place(path, header, names[part], taken) for part in COLUMNS}
     for part in COLUMNS:
-        if part in wanted and names[part] not in header:
+        if part in wanted and found[part] is None:
             raise LogError(f"{path}: {_no_column(part, names[part], header)}")
-    parts = [part for part in COLUMNS if names[part] in header]
+    places = {part: place for part, place in found.items() if place is not None}
+    names = names | {part: header[place] for part, place in places.items()}
+    parts = list(places)
     quantities = [part for part in QUANTITIES if part in parts]
-    dtypes = {names[part]: float if part in quantities else "category" for part in parts}
+    if len(set(places.values())) < len(parts):
+        raise LogError(f"{path}: two parts cannot be the same column of the file.")
+    dtypes = {part: float if part in quantities else "category" for part in parts}
     _check_lengths(path, separator, len(header))
-    options = _options(separator) | {"decimal": decimal, "usecols": list(dtypes)}
+    # By place: a name may stand twice among the columns that play no part.
+    by_place = {place: part for part, place in places.items()}
+    options = _options(separator) | {
+        "decimal": decimal,
+        "header": 0,
+        "names": [by_place.get(place, place) for place in range(len(header))],
+        "usecols": list(dtypes),
+    }
     try:
-        table = pd.read_csv(path, dtype=dtypes, **options)
+        table = pd.read_csv(path, dtype=dtypes, **options)[parts]
     except pd.errors.ParserError as error:
         raise LogError(f"{path}: is no table: {error}") from error
     except ValueError as error:
         text = pd.read_csv(path, dtype=str, **options)
-        raise _no_number(text, path, quantities, names, decimal, error) from error
-    table = table.rename(columns={names[part]: part for part in parts})[parts]
+        raise _no_number(text, path, names, separator, decimal, error) from error
     try:
         for part in quantities:
             _check_finite(table[part], part)
@@ -233,20 +320,32 @@ def _read_table(path, names, units, wanted, separator, decimal):
             # pandas makes numbers of labels that look like such.
             table[part] = table[part].cat.rename_categories(str)
     except LogError as error:
-        raise _located(path, names, error) from error
+        raise _located(path, names, error, separator) from error
     return table
 
 
 def _header(path, separator):
     """Names of the columns of a file; LogError where it has none."""
-    try:
-        return list(pd.read_csv(path, nrows=0, **_options(separator)))
-    except pd.errors.EmptyDataError as error:
-        raise LogError(f"{path}: is empty.") from error
-    except UnicodeDecodeError as error:
-        raise LogError(f"{path}: is not text in UTF-8; save it as such.") from error
-    except pd.errors.ParserError as error:
-        raise LogError(f"{path}: is no table: {error}") from error
+    for _, values in _records(path, separator):
+        return values
+    raise LogError(f"{path}: is empty.")
+
+
+def _place(path, header, name, taken=()):
+    """Position of a column by its name, or by that but for blanks around it and capitals."""
+    if name in header:
+        found = [place for place, other in enumerate(header) if other == name]
+    else:
+        plain = name.strip().casefold()
+        found = [
+            place
+            for place, other in enumerate(header)
+            if other.strip().casefold() == plain and other not in taken
+        ]
+    if len(found) > 1:
+        names = " and ".join(repr(header[place]) for place in found)
+        raise LogError(f"{path}: the header has {names}; which is meant? Rename one of them.")
+    return found[0] if found else None
 
 
 def _check_lengths(path, separator, n_columns):
@@ -254,16 +353,45 @@ def _check_lengths(path, separator, n_columns):
 
     pandas cuts them without a word where it reads some columns only.
     """
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        for number, line in enumerate(file, start=1):
-            # Counting is fast, and nearly always enough: quotes may hide a separator.
-            if line.count(separator) >= n_columns:
-                values = next(csv.reader([line], delimiter=separator))
-                if any(value.strip() for value in values[n_columns:]):
-                    raise LogError(
-                        f"{path}, line {number}: has {len(values)} values, more than the "
-                        f"{n_columns} columns of the header."
-                    )
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            # Counting is fast, and right as long as there are no quotes.
+            if all(line.count(separator) < n_columns and '"' not in line for line in file):
+                return
+    except UnicodeDecodeError as error:
+        raise _no_text(path) from error
+    for line, values in _records(path, separator):
+        if any(value.strip() for value in values[n_columns:]):
+            raise LogError(
+                f"{path}, line {line}: has {len(values)} values, more than the {n_columns} columns "
+                "of the header."
+            )
+
+
+def _records(path, separator):
+    """First line, from 1, and values of every record that is not blank; quotes may hide line ends.
+
+    LogError where the file is no such table.
+    """
+    limit = csv.field_size_limit(_LONGEST_FIELD)
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            reader = csv.reader(file, delimiter=separator, skipinitialspace=True)
+            line = 1
+            for values in reader:
+                if len(values) > 1 or "".join(values).strip():
+                    yield line, values
+                line = reader.line_num + 1
+    except UnicodeDecodeError as error:
+        raise _no_text(path) from error
+    except csv.Error as error:
+        raise LogError(f"{path}, line {reader.line_num}: is no table: {error}.") from error
+    finally:
+        csv.field_size_limit(limit)
+
+
+def _no_text(path):
+    return LogError(f"{path}: is not text in UTF-8; save it as such.")
 
 
 def _options(separator):
@@ -291,27 +419,27 @@ def _no_column(part, name, header):
     )
 
 
-def _no_number(text, path, quantities, names, decimal, error):
+def _no_number(text, path, names, separator, decimal, error):
     """The error for the first value in a table of strings that is no number."""
-    for part in quantities:
-        column = text[names[part]]
+    for part in [part for part in QUANTITIES if part in text]:
+        column = text[part]
         numbers = pd.to_numeric(column.str.replace(decimal, ".", regex=False), errors="coerce")
         bad = np.flatnonzero(numbers.isna() & column.notna())
         if bad.size:
             reason = f"{column.iloc[bad[0]]!r} is not a number."
-            return _located(path, names, LogError(reason, part, int(bad[0])))
+            return _located(path, names, LogError(reason, part, int(bad[0])), separator)
     return LogError(f"{path}: {error}")
 
 
-def _located(path, names, error):
+def _located(path, names, error, separator):
     """An error of one part and row as one of the file's column and line."""
-    place = "" if error.row is None else f", line {_line(path, error.row)}"
+    place = "" if error.row is None else f", line {line_of(path, error.row, separator)}"
     part = "" if names[error.column] == error.column else f" ({error.column})"
     column = f", column {names[error.column]!r}{part}"
     return LogError(f"{path}{place}{column}: {error.reason}")
 
 
-def located(error, columns, path=None):
+def located(error, columns, path=None, separator=","):
     """An error of :func:`check_log` in the names of the file's columns, and by its line.
 
     Without ``path``, where rows are not one file's, the row stays.
@@ -320,19 +448,14 @@ def located(error, columns, path=None):
         return error
     names = {part: part for part in COLUMNS} | columns
     if path is not None:
-        return _located(path, names, error)
+        return _located(path, names, error, separator)
     return LogError(error.reason, names[error.column], error.row)
 
 
-def _line(path, row):
-    """Line of the file, from 1, that holds a row; blank lines are none."""
-    filled = -1
-    with open(path, encoding="utf-8-sig") as file:
-        for number, line in enumerate(file, start=1):
-            filled += not line.isspace()
-            if filled > row:
-                return number
-    return row + 2
+def line_of(path, row, separator):
+    """Line of the file, from 1, on which a row starts."""
+    lines = (line for line, _ in _records(path, separator))
+    return next(islice(lines, row + 1, None), row + 2)
 
 
 def _join(tables, paths):
@@ -402,6 +525,22 @@ def _check_plausible(values, part, unit):
             f"are outside {low:g} to {high:g}){advice}",
             part,
             row,
+        )
+
+
+def _check_signal(values, unit):
+    largest = np.abs(values).max()
+    if not 1.0 / _LARGEST_SIGNAL < largest < _LARGEST_SIGNAL:
+        raise LogError(f"signals up to {largest:.3g} {unit} are not plausible.", "output")
+
+
+def _check_runs(run):
+    n_runs = run.nunique()
+    if n_runs * _FEWEST_ROWS_PER_RUN > len(run):
+        raise LogError(
+            f"{n_runs} runs in {len(run)} rows are too many; is it a counter of rows? A run lasts "
+            f"from one power-on to the next; at least {_FEWEST_ROWS_PER_RUN} rows of each are due.",
+            "run",
         )
 
 

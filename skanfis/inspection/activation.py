@@ -6,6 +6,7 @@ from ..export._fold import fold, fold_with_rows
 from ..export._reading import knows_data
 from ..export.text import rows_text
 from ._common import one_axes, premises
+from .labels import as_label
 
 __all__ = ["RuleActivationDisplay"]
 
@@ -134,14 +135,17 @@ class RuleActivationDisplay:
         if self.weights.size <= _MOST_NUMBERED:
             for cell in np.argwhere(self.rules >= 0):
                 self._write(cell, image)
-        self.ax_.set_xticks(np.arange(across) + 0.5, self.labels_across)
-        self.ax_.set_yticks(np.arange(down) + 0.5, self.labels_down)
+        self.ax_.set_xticks(np.arange(across) + 0.5, list(map(as_label, self.labels_across)))
+        self.ax_.set_yticks(np.arange(down) + 0.5, list(map(as_label, self.labels_down)))
         if max(map(len, self.labels_across), default=0) * across > 60:
             for label in self.ax_.get_xticklabels():
                 label.set(rotation=45, rotation_mode="anchor", ha="right")
         self.ax_.invert_yaxis()
         self.ax_.tick_params(length=0)
-        self.ax_.set(xlabel=", ".join(self.inputs_across), ylabel=", ".join(self.inputs_down))
+        self.ax_.set(
+            xlabel=as_label(", ".join(self.inputs_across)),
+            ylabel=as_label(", ".join(self.inputs_down)),
+        )
         if np.any(self.rows < _EMPTY):
             self.ax_.set_title("hatched: strongest on no row", fontsize="small", loc="left")
         return self

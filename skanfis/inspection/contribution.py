@@ -17,6 +17,7 @@ from ._common import (
     premises,
     terms_text,
 )
+from .labels import as_label
 
 __all__ = ["RuleContributionDisplay"]
 
@@ -193,7 +194,11 @@ class RuleContributionDisplay:
         for r, shade in zip(told, colors(told.size, colormap), strict=True):
             line = self.baseline + self.contributions[r]
             self.ax_.plot(
-                self.grid, line, color=shade, linewidth=1.5, label=f"{r}: {self.rule_terms[r]}"
+                self.grid,
+                line,
+                color=shade,
+                linewidth=1.5,
+                label=as_label(f"{r}: {self.rule_terms[r]}"),
             )
         if told.size < len(self.contributions):
             others = self.baseline + np.delete(self.contributions, told, axis=0).sum(axis=0)
@@ -201,11 +206,11 @@ class RuleContributionDisplay:
             self.ax_.plot(self.grid, others, ":", color="0.5", linewidth=1.5, label=label)
         self.ax_.plot(self.grid, total, color="black", linewidth=2.2, label="prediction")
         self.ax_.set(
-            xlabel=self.input_name,
-            ylabel=f"{self.output_name}: {self.baseline:.4g} + contribution",
+            xlabel=as_label(self.input_name),
+            ylabel=f"{as_label(self.output_name)}: {self.baseline:.4g} + contribution",
             xlim=(self.grid[0], self.grid[-1]),
         )
-        notes = [f"{name} = {value:.4g}" for name, value in self.held.items()]
+        notes = [f"{as_label(name)} = {value:.4g}" for name, value in self.held.items()]
         covered = self.coverage >= COVERED
         if covered.any() and not covered.all():
             self._shade(covered, total)
@@ -216,7 +221,7 @@ class RuleContributionDisplay:
             bbox_to_anchor=(1.0, 1.0),
             frameon=False,
             fontsize="small",
-            title="rule: " + ", ".join(self.premise_inputs),
+            title=as_label("rule: " + ", ".join(self.premise_inputs)),
             title_fontsize="small",
             alignment="left",
         )

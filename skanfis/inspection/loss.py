@@ -4,6 +4,7 @@ import numpy as np
 
 from ..export._fold import last_step
 from ._common import one_axes
+from .labels import as_label
 
 __all__ = ["LossCurveDisplay"]
 
@@ -102,7 +103,8 @@ class LossCurveDisplay:
         self.ax_ = one_axes(ax)
         self.figure_ = self.ax_.figure
         iterations = np.arange(len(self.loss))
-        style = {"label": self.name, "marker": ".", "markersize": 4, "linewidth": 1.5} | line_kw
+        name = None if self.name is None else as_label(self.name)
+        style = {"label": name, "marker": ".", "markersize": 4, "linewidth": 1.5} | line_kw
         (self.line_,) = self.ax_.plot(iterations, self.loss, **style)
         self.validation_line_ = None
         if self.validation_loss is not None:
@@ -112,7 +114,7 @@ class LossCurveDisplay:
                 "--",
                 color=self.line_.get_color(),
                 linewidth=self.line_.get_linewidth(),
-                label=None if self.name is None else f"{self.name}, rows held out",
+                label=None if name is None else f"{name}, rows held out",
             )
         self.ax_.set(xlabel="iteration", ylabel="mean squared error, standardised target")
         if np.all(self.loss > 0.0):

@@ -7,6 +7,7 @@ import numpy as np
 from ..export._fold import fold, fold_with_rows
 from ..export._reading import check_count
 from ._common import colors, panels, position
+from .labels import as_label
 
 __all__ = ["InputTerms", "MembershipDisplay"]
 
@@ -180,8 +181,8 @@ def _draw(axes, terms, show_before, colormap):
     ):
         if show_before:
             axes.plot(terms.grid, before, "--", color=shade, linewidth=1.0, alpha=0.7)
-        axes.plot(terms.grid, after, color=shade, linewidth=1.8, label=name)
-    axes.set(xlabel=terms.input_name, ylabel="membership", ylim=(0.0, 1.05))
+        axes.plot(terms.grid, after, color=shade, linewidth=1.8, label=as_label(name))
+    axes.set(xlabel=as_label(terms.input_name), ylabel="membership", ylim=(0.0, 1.05))
     axes.set_xlim(terms.grid[0], terms.grid[-1])
     if len(terms.term_names) <= _MOST_NAMED:
         axes.legend(

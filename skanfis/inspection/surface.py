@@ -5,6 +5,7 @@ import numpy as np
 from ..export._fold import fold, fold_with_rows
 from ..export._reading import check_choice, check_count
 from ._common import COVERED, coverage_if_known, held_row, one_axes, position
+from .labels import as_label
 
 __all__ = ["ResponseSurfaceDisplay"]
 
@@ -176,18 +177,18 @@ class ResponseSurfaceDisplay:
             self.surface_ = self.ax_.pcolormesh(
                 *grid, vmin=low, vmax=high, cmap=colormap, shading="nearest"
             )
-        self.figure_.colorbar(self.surface_, ax=self.ax_, label=self.output_name)
+        self.figure_.colorbar(self.surface_, ax=self.ax_, label=as_label(self.output_name))
         self._fade()
         if self.points is not None:
             self.ax_.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
         x, y = self.xx0[0], self.xx1[:, 0]
         self.ax_.set(
-            xlabel=self.input_names[0],
-            ylabel=self.input_names[1],
+            xlabel=as_label(self.input_names[0]),
+            ylabel=as_label(self.input_names[1]),
             xlim=(x[0], x[-1]),
             ylim=(y[0], y[-1]),
         )
-        notes = [f"{name} = {value:.4g}" for name, value in self.held.items()]
+        notes = [f"{as_label(name)} = {value:.4g}" for name, value in self.held.items()]
         if np.any(self.coverage < COVERED):
             notes.append("pale: few training data")
         self.ax_.set_title("; ".join(notes), fontsize="small", loc="left")

@@ -20,7 +20,7 @@ from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c
 from skanfis.export._fold import fold
 from skanfis.export.c._header import BITS
-from skanfis.membership import Gaussian
+from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 
 from ..oracles import random_grid
@@ -363,6 +363,38 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     (tmp_path / "m.c").write_text(spoilt, encoding="ascii")
     gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 1
+
+
+def far_off(mf, seed, offset=1e4):
+    """A model of inputs that lie so many standard deviations from zero, and its rows."""
+    g = np.random.default_rng(seed)
+    X = g.normal(size=(300, 2))
+    y = np.sin(2.0 * X[:, 0]) + X[:, 1] ** 2
+    model = ANFISRegressor(3, mf=mf, out_of_bounds="linear", max_iter=30)
+    return model.fit(X + offset, y), X + offset
+
+
+@needs_compiler
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+def test_float_self_test_bears_inputs_far_from_zero(tmp_path):
+    models = [far_off(mf, seed)[0] for mf in MEMBERSHIPS for seed in range(2)]
+    codes = [export_c(m, name=f"m{k}", dtype="float") for k, m in enumerate(models)]
+    # It begins with the self-test of each.
+    evaluate_all(codes, np.full((1, 2), 1e4, np.float32), tmp_path, "c99", [1] * len(codes))
+
+
+@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
+def test_header_says_what_float_makes_of_the_inputs():
+    model, X = far_off("gaussian", 0)
+    text = export_c(model, name="m", dtype="float").header.replace("\n *", "")
+    found = re.search(r"steps of (\S+) at the far end of .*?, (\S+) of .* by up to (\S+)\. ", text)
+    step, share, moved = map(float, found.groups())
+    assert step == pytest.approx(2.0**-10, rel=0.01)
+    assert share == pytest.approx(2.0**-10 / X.std(), rel=0.3)
+    # One digit is told.
+    rounded = model.model_.predict(X.astype(np.float32).astype(float))[:, 0]
+    assert 0.3 * moved < np.abs(model.predict(X) - rounded).max() < 1.5 * moved
+    assert "steps of" not in export_c(model, name="m").header
 
 
 HOSTILE = [

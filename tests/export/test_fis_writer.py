@@ -228,3 +228,21 @@ def test_refuses_a_membership_that_the_format_has_not(rng):
     model = build(oracles.random_grid(rng, [Own], [2], [0]))
     with pytest.raises(ValueError, match="'own' has no function in the"):
         export_fis(model)
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+@pytest.mark.parametrize("scale", [1e-55, 1e-51, 1e-30, 1e30, 3e50, 1e51])
+@pytest.mark.filterwarnings("ignore:.*no rule")
+def test_what_is_written_can_be_read_or_is_refused(family, scale, rng):
+    model = build(oracles.random_grid(rng, [family, family], [2, 3], [0, 2]))
+    antecedent = model.antecedent.change_units(np.zeros(3), np.full(3, scale))
+    box = {k: getattr(model, k) * scale for k in ("reference", "spread", "minimum", "maximum")}
+    moved = replace(model, antecedent=antecedent, **box)
+    if not 1e-40 < scale < 1e40:
+        with pytest.raises(ValueError, match="cannot be written such that it can be read"):
+            export_fis(moved)
+        return
+    text = export_fis(moved)
+    rows = rows_of(moved, 1.0)
+    found = parse_fis(text).predict(rows)
+    assert_allclose(found, moved.predict(rows), rtol=1e-9, atol=1e-9 * np.abs(found).max())

@@ -10,13 +10,14 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.export import export_json, read_json, write_json
+from skanfis.export import export_json, export_text, read_json, write_json
 from skanfis.export.model_json import parse_json
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import OUT_OF_BOUNDS, TSKModel
 from skanfis.support import RuleSupport
 
 from .. import oracles
+from .json_mutations import mutated_numbers, with_number
 from .rule_bases import MODELS, build, rows_of
 
 ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
@@ -140,19 +141,19 @@ REFUSED = [
     (_set("inputs", {}), "inputs: .* is not a list"),
     (_set("inputs", 0, []), r"inputs\[0\] is \[\], not an object"),
     (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),
-    (_set("inputs", 0, "spread", -1), r"inputs\[0\]: .* spread is not positive"),
-    (_set("inputs", 0, "spread", 0), r"inputs\[0\]: .* spread is not positive"),
-    (_set("max_extrapolation", -1), "max_extrapolation must not be negative"),
+    (_set("max_extrapolation", -1), "max_extrapolation: -1 is not a number from 0"),
     (_set("max_extrapolation", "inf"), "max_extrapolation: 'inf' is not a number"),
     (lambda d: d.pop("max_extrapolation"), "the file has no 'max_extrapolation'"),
     (_set("support", []), "support: .* is not a list of 1 or more"),
     (lambda d: d["support"].pop(), "support has 11 entries; the model has 12 rules"),
-    (_set("support", 2, "share", 1.5), r'"share" of support\[2\] must be from 0 to 1'),
-    (_set("support", 2, "radius", -0.1), r'support\[2\] must be from 0 to 1, "radius" not neg'),
+    (_set("support", 2, "share", 1.5), r"support\[2\]\.share: 1\.5 is not a number from 0 to 1"),
+    (_set("support", 2, "radius", -0.1), r"support\[2\]\.radius: -0\.1 is not a number from 0"),
     (_set("support", 0, "center", [0.0]), "must be lists of 3 and 6 numbers"),
     (_set("support", 0, "factor", [0.0] * 9), "must be lists of 3 and 6 numbers"),
     (_set("support", 0, "factor", ["0"] * 6), "'0' is not a number"),
     (_set("support", 0, "more", 1), r"support\[0\] has the unknown key"),
+    (_set("inputs", 0, "spread", -1), r"inputs\[0\]\.spread: -1 is not a number from 1e-50"),
+    (_set("inputs", 0, "spread", 0.0), r"inputs\[0\]\.spread: 0.0 is not a number from"),
     (_set("inputs", 0, "name", None), "None is not a name"),
     (_set("inputs", 0, "reference", "0"), "'0' is not a number"),
     (_set("inputs", 0, "reference", 1e60), "not a number of size up to 1e"),
@@ -176,7 +177,17 @@ REFUSED = [
     (_set("rules", 0, "terms", [0, 2, 99]), "99 is not a whole number from -1 to 6"),
     (_set("rules", 0, "terms", [0, 2, -2]), "-2 is not a whole number"),
     (_set("rules", 0, "terms", [0, 2, 5.0]), "5.0 is not a whole number"),
-    (_set("rules", 0, "weight", -0.1), "must not be negative"),
+    (_set("rules", 0, "weight", -0.1), r"rules\[0\]\.weight: -0.1 is not a number from 0 to 1"),
+    (_set("rules", 0, "weight", 0.9), r"rules\[\]\.weight: the sum over all rules is 1\.\d+"),
+    (_set("rules", 0, "rows", -1), r"rules\[0\]\.rows: -1 is not a number from 0 to 1e\+50"),
+    (
+        _set("rules", 0, "consequents", 1, 2, 1e51),
+        r"rules\[0\]\.consequents\[1\]\[2\]: 1e\+51 is not a number of size up to 1e\+50",
+    ),
+    (
+        _set("terms", 0, "before_training", "center", 10**60),
+        r"terms\[0\]\.before_training\.center: 10+\.\.\. is not a number of size up to",
+    ),
     (_set("rules", 0, "rows", None), "None is not a number"),
     (_set("rules", 0, "consequents", 0, [1.0, 2.0]), "of 1 or 4 numbers"),
     (_set("rules", 0, "consequents", 1, [1.0]), "other numbers of terms or coefficients"),
@@ -260,6 +271,32 @@ def test_refuses_to_write_a_membership_of_the_users_own(rng):
 
     with pytest.raises(ValueError, match="'own' is not one of skanfis' own"):
         export_json(build(oracles.random_grid(rng, [Own], [2], [0])))
+
+
+@pytest.mark.parametrize("kind", ["grid", "scattered", "rule table"])
+def test_no_number_that_is_read_makes_one_that_is_not_finite(kind):
+    model = MODELS[f"{kind}, order 1, 2 outputs"]
+    document, rows = json.loads(export_json(model)), rows_of(model, 2.0, 6)
+    n_read = 0
+    for path, value in mutated_numbers(document):
+        try:
+            read = parse_json(json.dumps(with_number(document, path, value)))
+        except ValueError:
+            continue
+        n_read += 1
+        for policy in ("clip", "linear"):
+            assert np.isfinite(read.with_out_of_bounds(policy).predict(rows)).all(), (path, value)
+        coverage = read.coverage(rows)
+        assert ((coverage >= 0.0) & (coverage <= 1.0 + 1e-9)).all(), (path, value)
+        export_text(read)
+        assert_same(parse_json(export_json(read)), read)
+    assert n_read > 50
+
+
+def test_what_could_not_be_read_is_not_written():
+    wide = replace(A_GRID, spread=np.array([1e-60, 1.0, 1.0]))
+    with pytest.raises(ValueError, match=r"cannot be written .*: inputs\[0\]\.spread: 1e-60"):
+        export_json(wide)
 
 
 def test_small_damage_is_never_anything_but_a_value_error(rng):

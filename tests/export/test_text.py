@@ -1,6 +1,7 @@
 """What is written is the model: read back by a person's means, it predicts what the model does."""
 
 import re
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +11,11 @@ from numpy.testing import assert_allclose
 from skanfis import ANFISRegressor
 from skanfis.export import export_text
 from skanfis.export.text import number, place
+from skanfis.membership import Gaussian
 
+from .. import oracles
 from ..oracles import textbook_membership
-from .rule_bases import MODELS, NAMES, rows_of
+from .rule_bases import MODELS, NAMES, build, rows_of
 
 ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -198,3 +201,16 @@ def test_a_model_without_data_has_no_weights_to_tell():
     text = export_text(model, max_rules=2)
     assert "\nRule 0:\n  IF" in text
     assert "\n10 rules left out.\n" in text
+
+
+def test_time_grows_with_the_number_of_rules_and_no_faster(rng):
+    def seconds(n_rules):
+        model = build(oracles.random_scattered(rng, Gaussian, n_rules, (0, 1, 2)))
+        start = time.perf_counter()
+        text = export_text(model)
+        assert text.count("\nRule ") == n_rules
+        return time.perf_counter() - start
+
+    few = min(seconds(2_000) for _ in range(3))
+    # Eight times the rules; 20 is for a busy machine. With the square of them it would be 60.
+    assert seconds(16_000) < 20 * few

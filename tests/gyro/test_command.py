@@ -1,6 +1,9 @@
 """The command: what it writes, says and refuses."""
 
 import json
+import os
+import pickle
+import shutil
 import subprocess
 import sys
 
@@ -276,10 +279,17 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
         (["--min-coverage", "2"], "must be a number from 0 to 1"),
         (["--fit-rows", "0"], "must be a whole number, 1 or more"),
-        (["--time-constant", "-1"], "must be a positive number"),
+        (["--time-constant", "-1"], "must be a number from 1e-9 to 1e9"),
         (["--physics", "--inputs", "temperature"], "needs the output"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
         (["--device", "a"], "no column for the device"),
+        (["--jobs", "0"], "must be a whole number, 1 or more, or -1"),
+        (["--terms", "9,9,9,9"], "9,9,9,9 makes 6,561 rules; at most 500"),
+        (["--max-rules", "1000"], "must be a whole number from 1 to 500"),
+        (["--inputs", "output", "output"], "--inputs: output is given twice"),
+        (["--separator", "(("], "must be one sign"),
+        (["--separator", ""], "must be one sign"),
+        (["--decimal", ","], "separator and decimal are both ','"),
     ],
 )
 def test_options_that_make_no_sense(tmp_path, log, arguments, message, capsys):
@@ -288,6 +298,7 @@ def test_options_that_make_no_sense(tmp_path, log, arguments, message, capsys):
         main([path, "--output", str(tmp_path / "out"), *arguments])
     assert caught.value.code == 2
     assert message in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "log.csv"]
 
 
 def test_a_file_that_is_not_there(tmp_path, capsys):
@@ -301,7 +312,7 @@ def test_runs_as_a_module():
     )
     for text in (
         "exit codes",
-        "can run any code when it is loaded",
+        "unpickling runs whatever code",
         "--apply MODEL",
         "outside the",
     ):
@@ -316,3 +327,199 @@ def test_more_rows_than_it_fits_to(tmp_path, log):
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     # The ends of every input's range are among the rows fitted to.
     assert (compensator.apply(log)["status"] & 1 == 0).all()
+
+
+# What broke under attack.
+
+
+class Bomb:
+    """A pickle that makes a folder where it is loaded."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __reduce__(self):
+        return os.mkdir, (str(self.folder),)
+
+
+@pytest.mark.parametrize(
+    "name", ["model.JSON", "model.jso", "model.txt", "model", "model.pkl", "model.joblib.json"]
+)
+def test_apply_unpickles_nothing_that_is_not_called_joblib(tmp_path, name, capsys):
+    (tmp_path / name).write_bytes(pickle.dumps(Bomb(tmp_path / "ran")))
+    with pytest.raises(SystemExit) as caught:
+        main(["--apply", str(tmp_path / name), str(tmp_path / "log.csv")])
+    assert caught.value.code == 2
+    assert "is no gyro compensator" in capsys.readouterr().err
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [("joblib", "model.JOBLIB"), ("json", "model.joblib"), ("json", "model.txt"), ("json", "m")],
+)
+def test_apply_takes_json_by_any_name_and_joblib_in_capitals(calibrated, tmp_path, source, name):
+    model = tmp_path / name
+    shutil.copy(calibrated / "out" / f"compensator.{source}", model)
+    target = tmp_path / "rates.csv"
+    arguments = [str(calibrated / "raw.csv"), *RENAMED, *UNITS, "--quiet", "--output", str(target)]
+    assert main(["--apply", str(model), *arguments]) == 0
+    assert (pd.read_csv(target)["status"] == 0).all()
+
+
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x80\x04\x95", None])
+def test_a_damaged_joblib_is_refused(calibrated, tmp_path, content, capsys):
+    model = tmp_path / "model.joblib"
+    whole = (calibrated / "out" / "compensator.joblib").read_bytes()
+    model.write_bytes(whole[:200] if content is None else content)
+    with pytest.raises(SystemExit):
+        main(["--apply", str(model), str(calibrated / "raw.csv")])
+    err = capsys.readouterr().err
+    assert "model.joblib cannot be loaded" in err
+    assert err.count("\n") == 3  # usage in two lines, and one sentence
+
+
+def test_labels_of_all_kinds_are_drawn_and_told(tmp_path, log, capsys):
+    labels = dict(enumerate([r"$\frac{0$", "$$", "\x1b[31mred", "a\nb", "\u202ecba"]))
+    labelled = log.assign(run=log["run"].map(labels))
+    path, out = write_log(tmp_path / "log.csv", labelled), tmp_path / "out"
+    assert main([path, "--terms", "1,1,1,2", "--output", str(out)]) == 0
+    told = "".join(capsys.readouterr())
+    assert all(sign.isprintable() or sign == "\n" for sign in told)
+
+
+@pytest.mark.usefixtures("no_report")
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
+@pytest.mark.parametrize("apply", [False, True])
+def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    path = os.fsdecode(b"raw\xff.csv")
+    shutil.copy(calibrated / "raw.csv", path)
+    how = ["--terms", "1,1,1,2"]
+    how = ["--apply", str(calibrated / "out" / "compensator.json")] if apply else how
+    assert main([path, *RENAMED, *UNITS, *how]) == 0
+    told = "".join(capsys.readouterr())
+    assert "raw\\udcff" in told
+    told.encode("utf-8")
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("apply", [False, True])
+def test_an_output_that_cannot_be_written_is_found_out_first(calibrated, tmp_path, apply, capsys):
+    (tmp_path / "file").write_text("here")
+    how = ["--apply", str(calibrated / "out" / "compensator.json")] if apply else []
+    arguments = [str(calibrated / "raw.csv"), *RENAMED, *UNITS, *how]
+    assert main([*arguments, "--output", str(tmp_path / "file" / "out" / "x")]) == 1
+    err = capsys.readouterr().err
+    assert "Not a directory" in err or "File exists" in err
+    assert "reading" not in err
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
+@pytest.mark.usefixtures("no_report")
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), ValueError("bad luck")])
+def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, error, capsys):
+    def fail(*_):
+        raise error
+
+    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "new" / "out"
+    arguments = [path, "--terms", "1,1,1,2", "--output", str(out), "--quiet"]
+    monkeypatch.setattr("skanfis.gyro.command.rules_text", fail)
+    assert main(arguments) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "log.csv"]
+    # Files of before stay as they are, even with --force.
+    out.mkdir(parents=True)
+    (out / "report.html").write_text("old")
+    assert main([*arguments, "--force"]) == 1
+    assert [(p.name, p.read_text()) for p in out.iterdir()] == [("report.html", "old")]
+    monkeypatch.undo()
+    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda calibration, title: "new")
+    assert main([*arguments, "--force"]) == 0
+    assert (out / "report.html").read_text() == "new"
+
+
+def test_a_backend_that_does_not_exist(tmp_path, log):
+    path = write_log(tmp_path / "log.csv", log)
+    done = subprocess.run(
+        [sys.executable, "-m", "skanfis.gyro", path, "--output", str(tmp_path / "out")],
+        env={**os.environ, "MPLBACKEND": "nonsense"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "matplotlib cannot be imported: Key backend: 'nonsense'" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_encoding_of_the_terminal_that_lacks_signs(tmp_path, log):
+    path = write_log(tmp_path / "log-°.csv", log.drop(columns="rate"), MEASURED[:3])
+    done = subprocess.run(
+        [sys.executable, "-m", "skanfis.gyro", path],
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 3
+    assert r"log-\xb0.csv" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_every_row_a_run_is_refused(tmp_path, log, capsys):
+    path = write_log(tmp_path / "log.csv", log.assign(run=np.arange(len(log))))
+    assert main([path, "--output", str(tmp_path / "out"), "--quiet"]) == 3
+    assert "450 runs in 450 rows are too many" in capsys.readouterr().err
+
+
+def test_groups_that_never_overlap_cannot_be_checked(tmp_path, log, capsys):
+    # Three runs, each warmest, coldest or fastest to warm from its first row on.
+    apart = log[log["run"] < 3].groupby("run").head(20).copy()
+    apart["temperature"] = (20.0 * apart["run"]).where(apart["run"] < 2, 10.0)
+    apart["output"] += 200.0 * (apart["run"] == 2)
+    apart["rate"] += 200.0 * (apart["run"] == 2)
+    path, out = write_log(tmp_path / "log.csv", apart), tmp_path / "out"
+    arguments = [path, "--terms", "1,1", "--inputs", "temperature", "output", "--groups", "run"]
+    assert main([*arguments, "--output", str(out), "--quiet"]) == 3
+    assert "every row lies outside the range" in capsys.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("n_rows", [6, 12])
+def test_short_runs_are_reported(tmp_path, log, n_rows):
+    path = write_log(tmp_path / "log.csv", log.groupby("run").head(n_rows))
+    arguments = [path, "--terms", "1,2", "--inputs", "temperature", "output", "--quiet"]
+    arguments += ["--min-temperature-span", "0.1", "--groups", "run"]
+    assert main([*arguments, "--output", str(tmp_path / "out")]) == 0
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_compensation_that_makes_it_worse_says_so(tmp_path, log, capsys):
+    path = write_log(tmp_path / "log.csv", log)
+    arguments = ["--inputs", "time", "--groups", "run", "--output", str(tmp_path / "out")]
+    assert main([path, *arguments]) == 0
+    out, err = capsys.readouterr()
+    assert "WARNING        the compensation makes held-out rows in range worse, from 1." in out
+    assert err.endswith("done, but see the warnings\n")
+
+
+def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
+    spoilt = log.copy()
+    spoilt.loc[100, "output"] += 140.0
+    path, out = write_log(tmp_path / "log.csv", spoilt), tmp_path / "out"
+    arguments = ["--terms", "2,2,2,2", "--output", str(out), "--quiet"]
+    assert main([path, *arguments]) == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith(f"WARNING        {path}, line 102: the output of")
+    # In the headline: before the first section.
+    assert page.index("line 102") < page.index("<section>")
+
+
+def test_a_log_that_moves_is_not_at_rest(tmp_path, log, capsys):
+    path = write_log(tmp_path / "log.csv", log, ["time", "temperature", "output", "run"])
+    arguments = ["--at-rest", "--output", str(tmp_path / "out"), "--quiet"]
+    assert main([path, *arguments]) == 3
+    assert "the gyro was not at rest" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 import json
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from skanfis.gyro import (
     ResidualRegressor,
     export_c_physics,
 )
+
+from ..export.json_mutations import mutated_numbers, with_number
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 FACTOR = -27_000.0  # counts per deg/s
@@ -194,18 +197,20 @@ def of_law(**changes):
         (of_law(columns=["output", "output"]), "the law's columns are"),
         (of_law(columns=[]), "the law's columns are"),
         (of_law(columns="output"), "the law's columns are"),
-        (of_law(columns=["output"]), "the law's amplitude must hold 1 finite number"),
-        (of_law(amplitude=[1.0] * 7), "amplitude must hold 1 to 6 finite number"),
-        (of_law(bias=[]), "bias must hold 1 to 6 finite number"),
-        (of_law(sagnac_factor=[float("nan")]), "sagnac_factor must hold"),
-        (of_law(sagnac_factor=["1"]), "sagnac_factor must hold"),
-        (of_law(offset=True), "offset must hold 1 finite number"),
-        (of_law(offset=1e60), "offset must hold 1 finite number"),
-        (of_law(minimum=[0.0]), "minimum must hold 2 finite number"),
+        (of_law(columns=["output"]), r"law\.amplitude: .* must be a list of 1 number"),
+        (of_law(amplitude=[1.0] * 7), r"law\.amplitude: .* must be a list of 1 to 6 number"),
+        (of_law(bias=[]), r"law\.bias: .* must be a list of 1 to 6 number"),
+        (of_law(sagnac_factor=[float("nan")]), r"law\.sagnac_factor\[0\]: nan is not a number"),
+        (of_law(sagnac_factor=[0.0, 1.0]), r"law\.sagnac_factor\[0\], in size: 0.0 is not"),
+        (of_law(amplitude=[0, 1]), r"law\.amplitude\[0\], in size: 0.0 is not"),
+        (of_law(sagnac_factor=["1"]), r"law\.sagnac_factor\[0\]: '1' is not a number"),
+        (of_law(offset=True), r"law\.offset: True is not a number"),
+        (of_law(offset=1e60), r"law\.offset: 1e\+60 is not a number of size up to 1e\+50"),
+        (of_law(minimum=[0.0]), r"law\.minimum: .* must be a list of 2 number"),
         (of_law(minimum=[1e30, 0.0]), "the law's minimum is above its maximum"),
         (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),
         (of_law(max_phase=2.0), "max_phase"),
-        (of_law(max_phase="1"), "max_phase must hold"),
+        (of_law(max_phase="1"), r"law\.max_phase: '1' is not a number from 0 to 1.57"),
         (of_law(out_of_bounds="hold"), "out_of_bounds='hold' must be one of"),
         (of_law(out_of_bounds=[]), "out_of_bounds"),
     ],
@@ -259,9 +264,14 @@ def test_json_gives_the_same_compensator(log, compensator, tmp_path):
         (lambda document: document | {"columns": ["time"] * 4}, "columns is"),
         (lambda document: document | {"columns": 4}, "columns is"),
         (lambda document: document | {"predicts": "phase"}, "predicts is 'phase'"),
-        (lambda document: document | {"scale_factor": "1"}, "scale_factor is '1'"),
-        (lambda document: document | {"time_constant": True}, "time_constant is True"),
-        (lambda document: document | {"output_unit": 3}, "output_unit is no text"),
+        (lambda document: document | {"scale_factor": "1"}, "scale_factor: '1' is not a number"),
+        (lambda document: document | {"scale_factor": 0}, "scale_factor, in size: 0.0 is not a"),
+        (lambda document: document | {"scale_factor": 10**60}, "scale_factor: 10.*is not a number"),
+        (lambda document: document | {"time_constant": 0.0}, "time_constant: 0.0 is not a number"),
+        (lambda document: document | {"min_coverage": 1.5}, "min_coverage: 1.5 is not a .* 0 to 1"),
+        (lambda document: document | {"time_constant": True}, "time_constant: True is not a"),
+        (lambda document: document | {"output_unit": 3}, "output_unit: 3 is not the name"),
+        (lambda document: document | {"output_unit": "\x1b[2J"}, r"output_unit: '\\x1b\[2J"),
         (lambda document: document | {"model": {}}, "is no gyro compensator"),
     ],
 )
@@ -271,6 +281,35 @@ def test_other_files_are_refused(compensator, tmp_path, change, message):
     path.write_text(json.dumps(change(json.loads(path.read_text()))))
     with pytest.raises(ValueError, match=message):
         GyroCompensator.read_json(path)
+
+
+@pytest.mark.parametrize("with_law", [False, True])
+def test_no_number_that_is_read_makes_a_rate_that_is_not_finite(
+    log, compensator, physics_json, tmp_path, with_law
+):
+    path = tmp_path / "compensator.json"
+    compensator.write_json(path)
+    document = json.loads(physics_json if with_law else path.read_text())
+    some, n_read = log.iloc[::100], 0
+    for where, value in mutated_numbers(document):
+        path.write_text(json.dumps(with_number(document, where, value)))
+        try:
+            read = GyroCompensator.read_json(path)
+        except ValueError:
+            continue
+        n_read += 1
+        applied = read.apply(some)
+        answered = applied["status"] & 8 == 0
+        assert np.isfinite(applied["rate_compensated"][answered]).all(), (where, value)
+        assert applied["coverage"].between(0.0, 1.0 + 1e-9).all(), (where, value)
+    assert n_read > 50
+
+
+def test_a_number_that_could_not_be_read_is_not_written(compensator, tmp_path):
+    path = tmp_path / "compensator.json"
+    with pytest.raises(ValueError, match="scale_factor, in size: 0"):
+        replace(compensator, scale_factor=0.0).write_json(path)
+    assert not path.exists()
 
 
 def test_what_is_no_json_is_refused(tmp_path):

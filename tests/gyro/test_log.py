@@ -6,6 +6,7 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, check_log, read_log
+from skanfis.gyro.log import check_at_rest
 
 CALLED_T = {"columns": {"temperature": "T"}}
 MEASURED = ["time", "temperature", "output", "rate", "run"]
@@ -107,6 +108,11 @@ def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
         ("temperature,output,rate,run\n1,2,3,\n", {}, "line 2, column 'run': no label"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"rate": "output"}}, "two parts"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"time": "t"}}, "'t' for the time"),
+        ("temperature,output,rate,rate\n1,2,3,4\n", {}, "header has 'rate' and 'rate'; which"),
+        ("temperature,output,Rate,RATE\n1,2,3,4\n", {}, "header has 'Rate' and 'RATE'; which"),
+        ('a,temperature,output,rate\n"b,\nc",1,2,x\n', {}, "line 2, column 'rate': 'x' is not"),
+        ('a,temperature,output,rate\n"b\nc",1,2,3\n"d",1,2,3,4\n', {}, "line 4: has 5 values"),
+        (f"temperature,output,rate\n1,2,{'3' * 200_000}x\n", {}, "line 2, column 'rate'"),
     ],
 )  # fmt: skip
 def test_files_that_are_refused(tmp_path, text, options, message):
@@ -119,6 +125,49 @@ def test_binary_files_are_refused(tmp_path):
     path.write_bytes(b"\xff\xfe\x00\x81,\n")
     with pytest.raises(LogError, match="UTF-8"):
         read_log(path)
+    path.write_bytes(b"temperature,output,rate\n1,2,3\n1,2,\xff\n")
+    with pytest.raises(LogError, match="UTF-8"):
+        read_log(path)
+
+
+QUOTED = ['"a, b,\nc, d"', '"say ""so"", twice"', '"' + 200_000 * "long, " + '"', "plain"]
+
+
+@pytest.mark.parametrize("note", QUOTED, ids=["line end", "quotes", "long", "plain"])
+def test_quotes_hide_separators_and_line_ends(tmp_path, note):
+    text = f"note,temperature,output,rate,run\n{note},20,1,2,{note}\n\nb,21,3,4,b\n"
+    read = read_log(written(tmp_path, text))
+    assert read["rate"].tolist() == [2.0, 4.0]
+    plain = note.strip('"').replace('""', '"')
+    assert set(read["run"]) == {plain, "b"}
+
+
+def test_names_of_columns_up_to_blanks_and_capitals(tmp_path):
+    text = " Temperature ,OUTPUT\t, Rate\n20,1,2\n21,3,4\n"
+    read = read_log(written(tmp_path, text))
+    assert list(read) == ["temperature", "output", "rate"]
+    assert read["rate"].tolist() == [2.0, 4.0]
+    # A name that fits to the letter comes first, and a column plays one part.
+    text = "Rate,rate,temperature,Output\n9,2,20,1\n9,4,21,3\n"
+    read = read_log(written(tmp_path, text), columns={"output": "Output"})
+    assert read["rate"].tolist() == [2.0, 4.0]
+    read = read_log(
+        written(tmp_path, "Output,temperature,speed\n1,20,2\n"),
+        columns={"rate": "Output", "output": "speed"},
+    )
+    assert read.iloc[0].tolist() == [20.0, 2.0, 1.0]
+
+
+def test_other_columns_may_share_a_name(tmp_path):
+    text = "x,temperature,x,output,,rate,\n1,20,2,3,4,5,6\n"
+    assert read_log(written(tmp_path, text)).iloc[0].tolist() == [20.0, 3.0, 5.0]
+
+
+def test_one_file_twice_is_refused(tmp_path, log):
+    path = table(tmp_path, log)
+    for again in (path, tmp_path / "." / "log.csv", str(path)):
+        with pytest.raises(LogError, match=r"log.csv: is the same file as .*log.csv"):
+            read_log([path, again])
 
 
 def test_files_with_different_columns_are_refused(tmp_path, log):
@@ -134,6 +183,11 @@ def test_files_with_different_columns_are_refused(tmp_path, log):
         ({"units": {"run": "s"}}, "units: there is no 'run'"),
         ({"units": {"time": "deg/s"}}, "time has no unit 'deg/s'.* s, ms"),
         ({"require": ["speed"]}, "require: there is no 'speed'"),
+        ({"separator": ""}, "separator='' must be one sign"),
+        ({"separator": "(("}, r"separator='\(\(' must be one sign"),
+        ({"separator": "\n"}, "must be one sign"),
+        ({"decimal": "5"}, "decimal='5' must be one sign"),
+        ({"decimal": ","}, "separator and decimal are both ','"),
     ],
 )
 def test_unknown_names_are_no_matter_of_the_log(tmp_path, log, options, message):
@@ -179,6 +233,7 @@ def scaled(part, factor):
         (scaled("output", TO_RADIANS), "output", None, "is the output in rad/s"),
         (scaled("rate", TO_RADIANS), "output", None, "the rate in rad/s"),
         (scaled("output", 3), "output", None, "are the units right"),
+        (lambda log: log.assign(run=np.arange(len(log))), "run", None, "180 runs in 180 rows are"),
     ],
 )
 def test_logs_that_are_refused(log, spoil, column, row, message):
@@ -191,11 +246,36 @@ def test_a_raw_signal_may_have_any_scale_and_sign(log):
     check_log(log.assign(output=-3e4 * log["output"]), units={"output": "counts"})
 
 
+@pytest.mark.parametrize("factor", [1e-300, 1e-40, 1e40, 1e300])
+def test_a_raw_signal_beyond_any_converter_is_refused(log, factor):
+    with pytest.raises(LogError, match="counts are not plausible"):
+        check_log(log.assign(output=factor * log["output"]), units={"output": "counts"})
+
+
 def test_a_gyro_at_rest_has_a_bias_to_learn(log):
     at_rest = log.assign(output=log["output"] - log["rate"], rate=0.0)
     check_log(at_rest, inputs=("temperature",))
     with pytest.raises(LogError, match="leave output out"):
         check_log(at_rest, inputs=("temperature", "output"))
+
+
+def test_a_log_at_rest_is_told_from_one_that_moves(log):
+    at_rest = make_ofog(n_devices=1, n_runs=3, rates=[0.0], profile="ramps", random_state=0)
+    check_at_rest(at_rest, "deg/s")
+    check_at_rest(at_rest.assign(output=3e4 * at_rest["output"]).round(0), "counts")
+    check_at_rest(at_rest.assign(output=0.5, rate=0.0042), "deg/s")
+    with pytest.raises(LogError, match="deg/s: the gyro was not at rest") as caught:
+        check_at_rest(log, "deg/s")
+    assert caught.value.column == "rate"
+    assert caught.value.row == log["rate"].abs().idxmax()
+    unknown = log.drop(columns="rate")
+    with pytest.raises(LogError, match=r"spans -\d+\S* to \d+\S* deg/s: no bias does"):
+        check_at_rest(unknown, "deg/s")
+    levels = unknown.assign(output=np.random.default_rng(0).normal(size=len(log)))
+    check_at_rest(levels, "counts")
+    levels["output"] += 300.0 * (np.arange(len(log)) // 10 % 3)
+    with pytest.raises(LogError, match=r"jumps \d+ times by more than 20 times its usual step"):
+        check_at_rest(levels, "counts")
 
 
 def test_a_log_that_is_not_learnt_from_may_be_short_and_narrow(log):

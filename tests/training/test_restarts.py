@@ -22,7 +22,9 @@ def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs
     g = np.random.default_rng(1)
     rows = oracles.bumpy_rows(g, 40, 2, n_outputs, weighted)
     alpha = 1e-2
-    problem = SeparableProblem(rows, oracles.random_grid(g, [Gaussian] * 2, [2, 2]), 1, Penalty(alpha=alpha))
+    problem = SeparableProblem(
+        rows, oracles.random_grid(g, [Gaussian] * 2, [2, 2]), 1, Penalty(alpha=alpha)
+    )
     evaluation = problem.evaluate(problem.antecedent.parameters)
     dense = oracles.DenseProblem(rows, problem.antecedent, 1, alpha)
     phi, total = dense.design(problem.antecedent.parameters) @ dense.local, 0.0

@@ -2,10 +2,16 @@
 
 import textwrap
 
+import numpy as np
+from scipy.stats import qmc
+
 from .._reading import policy_in_words
 from ._text import comment
 
 __all__ = ["BITS", "coverage_line", "header", "header_of", "policy_line"]
+
+# Where the slopes are looked at.
+_ROWS = 256
 
 BITS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
@@ -70,6 +76,7 @@ def header(model, numbers, dialect, cost, min_coverage):
     lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
     lines += ["Outputs y:"]
     lines += [f"  [{k}] {comment(name)}" for k, name in enumerate(model.output_names)]
+    lines += precision_lines(model, numbers)
     lines += [
         "",
         policy_line(model, "Outside this range"),
@@ -95,6 +102,28 @@ def coverage_line(cost):
             f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
             "multiply-adds more; where the strongest rule covers the row, a small part of them."
         )
+
+
+def precision_lines(model, numbers):
+    """What single precision makes of inputs that lie far from zero for their spread."""
+    if numbers.dtype != np.float32:
+        return []
+    steps = np.spacing(np.maximum(np.abs(numbers.low), np.abs(numbers.high))).astype(float)
+    shares = np.where(model.minimum < model.maximum, steps / model.spread, 0.0)
+    j = int(np.argmax(shares))
+    points = qmc.Halton(model.n_inputs, scramble=False).random(_ROWS)
+    slopes = np.abs(model.gradient(model.minimum + points * (model.maximum - model.minimum)))
+    moved = 0.5 * np.einsum("nio,i->no", slopes, steps).max(axis=0)
+    told = ", ".join(
+        f"{comment(name)} by up to {value:.1g}"
+        for name, value in zip(model.output_names, moved, strict=True)
+    )
+    return [
+        "",
+        f"Single precision has steps of {steps[j]:.2g} at the far end of [{j}], {shares[j]:.1g} of "
+        f"its standard deviation. Rounding inputs to such steps moves {told}. Subtract an offset "
+        "in double precision, before training and before the call, where that is too much.",
+    ]
 
 
 def header_of(title, lines, dialect, n_inputs, n_outputs):

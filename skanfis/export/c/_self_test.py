@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.stats import qmc
 
+from .._numbers import as_held
 from ._text import literals
 
 __all__ = ["ROWS", "TOLERANCE", "known_answers", "self_test", "size_of_sum"]
@@ -93,6 +94,7 @@ def known_answers(model, numbers, min_coverage, bits):
     Half of the rows lie in the box, the others up to half its width beyond; the first two are its
     corners. Rows so near to the coverage asked for that rounding decides are left out.
     """
+    model = as_held(model, numbers)
     points = qmc.Halton(model.n_inputs, scramble=False).random(4 * ROWS)
     low, width = numbers.low.astype(float), (numbers.high - numbers.low).astype(float)
     reach = np.where(np.arange(len(points)) % 2, 1.0, 2.0)[:, None]

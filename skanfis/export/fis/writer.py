@@ -9,6 +9,7 @@ import numpy as np
 from ..._validation import warn_user
 from .._fold import fold
 from .functions import function_of
+from .reader import parse_fis
 
 __all__ = ["export_fis", "write_fis"]
 
@@ -55,7 +56,8 @@ def export_fis(estimator):
     Raises
     ------
     ValueError
-        If a step in front cannot be folded, or if a membership has no function in the format.
+        If a step in front cannot be folded, if a membership has no function in the format, or if
+        :func:`read_fis` would refuse a number, such as a width beyond 1e50.
     TypeError
         If ``estimator`` is no such estimator.
 
@@ -115,7 +117,15 @@ def export_fis(estimator):
     for k, name in enumerate(output_names):
         interval, consequents = _consequents(model, k)
         lines += _variable(f"Output{k + 1}", name, interval, names, consequents)
-    return "\n".join([*lines, "", "[Rules]", *_rules(rules, model.n_outputs), ""])
+    text = "\n".join([*lines, "", "[Rules]", *_rules(rules, model.n_outputs), ""])
+    try:
+        parse_fis(text)
+    except ValueError as error:
+        raise ValueError(
+            f"the model cannot be written such that it can be read: {error} Train on inputs and "
+            "targets in other units."
+        ) from None
+    return text
 
 
 def write_fis(estimator, path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...inspection.labels import as_label
 from .._ask import ask
 from ._style import dress, make_axes
 
@@ -161,7 +162,10 @@ class CoverageDisplay:
                 x[[0, -1, -1, 0, 0]], y[[0, 0, -1, -1, 0]], "--", color="0.15", linewidth=1.2
             )
         dress(
-            self.ax_, self.names[0], self.names[1], "outside the dashed line every row is flagged"
+            self.ax_,
+            as_label(self.names[0]),
+            as_label(self.names[1]),
+            "outside the dashed line every row is flagged",
         )
         self.ax_.grid(False)
         return self

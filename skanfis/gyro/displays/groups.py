@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...inspection.labels import as_label
 from ._base import CompensationDisplay, check_rows, check_unit
 from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
 
@@ -110,7 +111,7 @@ class GroupResidualDisplay(CompensationDisplay):
         self.ax_.plot(before, lines, "o", color=BEFORE, label="before", markersize=5)
         self.ax_.plot(after, lines, "o", color=AFTER, label="after", markersize=5)
         self.ax_.set_xscale("log")
-        self.ax_.set_yticks(lines, [str(group) for group in groups])
+        self.ax_.set_yticks(lines, [as_label(group) for group in groups])
         self.ax_.set_ylim(-0.7, len(groups) - 0.3)
         left_out = len(self.groups) - len(groups)
         extent = f"worst {len(groups)} of {len(self.groups)}" if left_out else f"{len(groups)}"

@@ -1,0 +1,28 @@
+"""Names from files and tables, as pictures and terminals may show them."""
+
+import unicodedata
+
+__all__ = ["as_label", "printable"]
+
+# Some scripts are not written without them.
+_JOINERS = "\u200c\u200d"
+
+
+def printable(text):
+    """The text with escapes for what no reader sees: control signs, lone surrogates, line ends."""
+    return "".join(_escaped(sign) if _is_hidden(sign) else sign for sign in str(text))
+
+
+def as_label(name):
+    """A name for matplotlib, which takes what stands between dollars for mathematics."""
+    return printable(name).replace("$", r"\$")
+
+
+def _is_hidden(sign):
+    """Whether it is no sign that a reader sees."""
+    category = unicodedata.category(sign)
+    return (category[0] == "C" or category in ("Zl", "Zp")) and sign not in _JOINERS
+
+
+def _escaped(sign):
+    return sign.encode("unicode_escape").decode("ascii")

@@ -1,0 +1,90 @@
+"""Whatever the data: a model that answers, or one sentence that names what is wrong."""
+
+import re
+import warnings
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning, UnderdeterminedWarning
+from skanfis.export import export_json, export_text
+from skanfis.export.model_json import parse_json
+from skanfis.rows import column_statistics
+
+from .strategies import settings_of_fit, tables
+
+# What NumPy and SciPy say where arithmetic has gone wrong.
+RAW = re.compile("empty|SVD|singular|converge|zero-size|NaN|infs|operands|reduction|cannot reshape")
+
+
+def fitted(table, settings):
+    """A model, or None where the data are refused by a sentence of ours."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for expected in (ConstantInputWarning, OutOfBoundsWarning, UnderdeterminedWarning):
+            warnings.simplefilter("ignore", expected)
+        warnings.filterwarnings("ignore", category=Warning, message="solver=")
+        try:
+            return ANFISRegressor(**settings).fit(*table)
+        except ValueError as error:
+            if RAW.search(str(error)):
+                raise
+            return None
+
+
+@given(tables(), settings_of_fit)
+def test_a_fit_is_no_worse_than_the_mean(table, settings):
+    model = fitted(table, settings)
+    if model is None:
+        return
+    weight = np.ones(len(table.y)) if table.sample_weight is None else table.sample_weight
+    weight = weight / weight.max()
+    kept = weight > 0.0
+    X, size = table.X[kept], np.abs(table.y).max() or 1.0
+    predicted = model.predict(X)
+    assert np.isfinite(predicted).all()
+    off, y = (predicted - table.y[kept]) / size, table.y[kept] / size
+    mean = np.average(y, weights=weight[kept])
+    error, spread = (np.average(e**2, weights=weight[kept]) for e in (off, y - mean))
+    assert error <= 1.01 * spread + 1e-18
+
+
+@given(tables(), settings_of_fit, st.floats(1.0, 1e3))
+def test_a_model_answers_everywhere_and_comes_back(table, settings, reach):
+    model = fitted(table, settings)
+    if model is None:
+        return
+    frozen = model.model_
+    half = 0.5 * (frozen.maximum - frozen.minimum)
+    unit = np.random.default_rng(0).uniform(-reach, reach, (20, table.X.shape[1]))
+    rows = frozen.minimum + half * (1.0 + unit)
+    assert np.isfinite(frozen.with_out_of_bounds("clip").predict(rows)).all()
+    strengths, coverage = frozen.strengths(rows), frozen.coverage(rows)
+    np.testing.assert_allclose(strengths.sum(axis=1), 1.0, rtol=1e-9)
+    assert ((coverage >= 0.0) & (coverage <= 1.0 + 1e-9)).all()
+    assert export_text(model).count("\nRule ") == frozen.n_rules
+    try:
+        text = export_json(model)
+    except ValueError as error:
+        if "cannot be written such that it can be read" not in str(error):
+            raise
+        return
+    np.testing.assert_array_equal(parse_json(text).predict(rows), frozen.predict(rows))
+
+
+@given(tables())
+def test_statistics_are_those_of_exact_arithmetic(table):
+    found = column_statistics(table.X, None)
+    for j, column in enumerate(table.X.T):
+        # By a power of two: exact.
+        shift = -int(np.frexp(np.abs(column).max())[1])
+        values = np.ldexp(column, shift).astype(np.longdouble)
+        spread = np.sqrt(np.mean((values - values.mean()) ** 2))
+        assert found.minimum[j] == column.min()
+        assert found.maximum[j] == column.max()
+        if np.ptp(column) > 0.0:
+            np.testing.assert_allclose(
+                np.ldexp(found.scale[j], shift), float(spread), rtol=1e-6, atol=1e-15
+            )

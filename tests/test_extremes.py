@@ -1,0 +1,96 @@
+"""Data and weights near the ends of the range of floats: the model that there is, or the reason."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis import ANFISRegressor
+from skanfis.rows import column_statistics
+
+LOW, HIGH = -1000, 1000
+
+
+def table(n_rows=60):
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (n_rows, 2)) * [10.0, 1.0] + [100.0, 0.0]
+    return X, np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
+
+
+@pytest.mark.parametrize("exponent", [LOW, -500, 500, HIGH])
+@pytest.mark.parametrize("weighted", [False, True])
+def test_statistics_scale_exactly_with_powers_of_two(exponent, weighted):
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(500, 3)) * [1.0, 30.0, 1e-3] + [5.0, 0.0, 0.0]
+    values[:, 2] = 7.0
+    weight = rng.uniform(0.1, 2.0, 500) if weighted else None
+    plain = column_statistics(values, weight)
+    scaled = column_statistics(np.ldexp(values, exponent), weight)
+    for name in ("offset", "minimum", "maximum"):
+        assert_array_equal(getattr(scaled, name), np.ldexp(getattr(plain, name), exponent))
+    assert_array_equal(scaled.scale[:2], np.ldexp(plain.scale[:2], exponent))
+    assert scaled.scale[2] == plain.scale[2] == 1.0
+
+
+def test_statistics_of_the_widest_column():
+    values = np.array([[-1.7e308], [1.7e308], [0.0], [0.0]])
+    found = column_statistics(values)
+    assert_allclose(found.offset, 0.0, atol=1e290)
+    assert_allclose(found.scale, 1.7e308 / np.sqrt(2.0), rtol=1e-12)
+
+
+@pytest.mark.parametrize("weight", [5e-324, 1e-310, 1e-300, 1e300, 1e308])
+def test_weights_that_are_all_alike_are_none(weight):
+    X, y = table()
+    plain = ANFISRegressor(n_mfs=2, tol=0.1).fit(X, y)
+    weighted = ANFISRegressor(n_mfs=2, tol=0.1).fit(X, y, np.full(len(y), weight))
+    assert_allclose(weighted.predict(X), plain.predict(X), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("tiny", "full"), [(5e-324, 1.0), (1.0, 1e308), (5e-324, 1e308)])
+def test_weights_next_to_nothing_are_nothing(tiny, full):
+    X, y = table()
+    weight = np.where(np.arange(len(y)) % 2, full, tiny)
+    spoilt = np.where(weight == full, y, 1e3)
+    model = ANFISRegressor(n_mfs=2, tol=0.1, warn_out_of_bounds=False).fit(X, spoilt, weight)
+    heavy = weight == full
+    assert np.abs(model.predict(X[heavy]) - y[heavy]).max() < 0.2 * np.ptp(y)
+
+
+@pytest.mark.parametrize(
+    ("x_scale", "y_scale", "message"),
+    [
+        (1e-308, 1.0, r"Column 'x0' of X varies by 5\.\d+e-308 only.* smaller unit"),
+        (5e-324, 1.0, "Column 'x0' of X varies by .*e-323 only"),
+        (8e305, 1.0, r"Column 'x0' of X holds numbers up to .*e\+307; .* larger unit"),
+        (1.0, 1e307, r"Column 'y' of y holds numbers up to .*e\+308"),
+        (1.0, 1e-308, "Column 'y' of y varies by .*e-309 only"),
+        (1e-200, 1e200, r"'y' of y varies by .*e\+199 and column 'x0' of X by .* no slope"),
+        (1e200, 1e-200, "'y' of y varies by .* no slope of one by the other"),
+    ],
+)
+@pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"n_mfs": 2, "solver": "hybrid"}])
+def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings):
+    X, y = table()
+    with pytest.raises(ValueError, match=message):
+        ANFISRegressor(**settings).fit(X * x_scale, y * y_scale)
+
+
+@pytest.mark.parametrize("span", [8e307, 1.7e308])
+def test_differences_that_overflow_are_refused(span):
+    X, y = table()
+    wide = (X - X.mean(axis=0)) / np.abs(X - X.mean(axis=0)).max(axis=0) * span
+    with pytest.raises(ValueError, match="sums overflow"):
+        ANFISRegressor().fit(wide, y)
+    with pytest.raises(ValueError, match="sums overflow"):
+        ANFISRegressor().fit(X, wide[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("x_scale", "y_scale"), [(1e-290, 1e-290), (1e290, 1e290), (1e140, 1e-140)]
+)
+def test_what_floats_hold_is_learnt(x_scale, y_scale):
+    X, y = table()
+    settings = {"n_mfs": 2, "tol": 0.1}
+    plain = ANFISRegressor(**settings).fit(X, y).predict(X)
+    found = ANFISRegressor(**settings).fit(X * x_scale, y * y_scale).predict(X * x_scale)
+    assert_allclose(found / y_scale, plain, rtol=0, atol=1e-6 * np.ptp(y))
