@@ -23,6 +23,8 @@ TRUSTED_TYPES = [
     "skanfis.membership.sigmoid.SigmoidDifference",
     "skanfis.membership.sigmoid.SigmoidProduct",
     "skanfis.model.TSKModel",
+    "skanfis.readable.measures.Measures",
+    "skanfis.readable.report.Readability",
     "skanfis.regressor.ANFISRegressor",
     "skanfis.support.RuleSupport",
 ]
