@@ -19,7 +19,7 @@ from .grid import Spacing, grid_antecedent
 from .imported import imported_antecedent
 from .sample import ENOUGH_ROWS, SampleSize
 from .search import SEARCHED, StructureSearch
-from .size import GridSize, term_counts
+from .size import GridSize, RuleBaseSize, term_counts
 from .start import Start
 from .tuning import tuned_start
 
@@ -93,7 +93,7 @@ class StructureRequest:
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
         elif isinstance(self.n_mfs, str):
-            label = _labeller(self.partition, rows.sample_weight is not None)
+            label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
             antecedent = clustered_antecedent(self.families, rows, label, self.premise_inputs)
         else:
             antecedent = self._grid(rows)
@@ -119,11 +119,28 @@ class StructureRequest:
             "leave n_mfs at 'auto', or use partition='grid'."
         )
 
+    def _checked(self, label, rows):
+        """A labeller whose clusters are counted before any rule is made of them."""
+
+        def checked(table, weight):
+            labels = np.asarray(label(table, weight))
+            n_rules = np.unique(labels[labels >= 0]).size
+            size = RuleBaseSize(
+                n_rules,
+                n_rules * self.premise_inputs.size,
+                1 + self.consequent_inputs.size,
+                rows.y.shape[1],
+            )
+            size.check_fits(f"partition={self.partition!r}", _memory_limit())
+            return labels
+
+        return checked
+
     def _grid(self, rows):
         counts = self._grid_counts(rows)
         n_basis = 1 + self.consequent_inputs.size
-        GridSize(counts, n_basis, rows.y.shape[1]).check_fits(
-            self.n_mfs, get_config()["working_memory"] * _MIB, self.names
+        GridSize(counts, n_basis, rows.y.shape[1]).check_grid_fits(
+            self.n_mfs, _memory_limit(), self.names
         )
         return grid_antecedent(self.families, counts, Spacing(rows), _OVERLAP)
 
@@ -162,6 +179,11 @@ class StructureRequest:
                 "fewer rules.",
                 UnderdeterminedWarning,
             )
+
+
+def _memory_limit():
+    """Bytes that training may take."""
+    return get_config()["working_memory"] * _MIB
 
 
 def _labeller(clusterer, weighted):

@@ -6,14 +6,53 @@ from numbers import Integral
 
 import numpy as np
 
-__all__ = ["GridSize", "term_counts"]
+__all__ = ["GridSize", "RuleBaseSize", "term_counts"]
 
 # Of one term, whatever its family: what a limit on memory reckons with.
 _MOST_PREMISE_PARAMETERS = 4
+# Square matrices over all consequent parameters that exist at one time.
+_SQUARES = 14
 
 
-class GridSize:
-    """What a full grid amounts to, found without building any of it.
+class RuleBaseSize:
+    """What a rule base amounts to, found without building any of it.
+
+    Parameters
+    ----------
+    n_rules, n_terms : int
+        Rules, and terms of all inputs.
+    n_basis, n_outputs : int
+        Coefficients per rule and output; outputs.
+    """
+
+    def __init__(self, n_rules: int, n_terms: int, n_basis: int, n_outputs: int = 1):
+        self.n_rules = n_rules
+        self.n_columns = n_rules * n_basis
+        side = self.n_columns + n_outputs
+        n_premise = _MOST_PREMISE_PARAMETERS * n_terms
+        # The Gram matrix, its moments, local form and factor; the disagreement, the three parts of
+        # the penalty and their sum, and copies of these; the table of terms against rules; the
+        # same for the premises, and their products with the design.
+        self.n_bytes = 8 * (
+            _SQUARES * side**2
+            + n_terms * n_rules
+            + 4 * n_premise**2
+            + 2 * n_premise * self.n_columns
+        )
+
+    def check_fits(self, what, limit):
+        """Raise ValueError where training would need more than ``limit`` bytes."""
+        if self.n_bytes > limit:
+            raise ValueError(
+                f"{what} makes {_count(self.n_rules)} rules with {_count(self.n_columns)} consequent "
+                f"parameters; training them would take {_bytes(self.n_bytes)}, and the limit is "
+                f"{_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). Use fewer "
+                "clusters, or constants as consequents (order=0)."
+            )
+
+
+class GridSize(RuleBaseSize):
+    """What a full grid amounts to.
 
     Parameters
     ----------
@@ -24,18 +63,10 @@ class GridSize:
     """
 
     def __init__(self, counts: Sequence[int], n_basis: int, n_outputs: int = 1):
-        self.n_rules = prod(counts)
-        self.n_columns = self.n_rules * n_basis
-        side = self.n_columns + n_outputs
-        terms = sum(count for count in counts if count > 1)
-        n_premise = _MOST_PREMISE_PARAMETERS * terms
-        # The Gram matrix, its moments, local form and factor, and a copy of two of them; the table
-        # of terms against rules; the same for the premises, and their products with the design.
-        self.n_bytes = 8 * (
-            6 * side**2 + terms * self.n_rules + 4 * n_premise**2 + 2 * n_premise * self.n_columns
-        )
+        n_terms = sum(count for count in counts if count > 1)
+        super().__init__(prod(counts), n_terms, n_basis, n_outputs)
 
-    def check_fits(self, n_mfs, limit, names):
+    def check_grid_fits(self, n_mfs, limit, names):
         """Raise ValueError where training would need more than ``limit`` bytes."""
         if self.n_bytes <= limit:
             return
