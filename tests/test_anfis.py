@@ -114,20 +114,37 @@ def test_pipeline_is_a_clusterer_too():
     assert_allclose(scaled.predict(X), alone.predict(X), rtol=0, atol=1e-8)
 
 
-# ------------------------------------------------------------------------------ structure and ridge
+# ---------------------------------------------------------------------------- structure and weights
 
 
-@pytest.mark.parametrize(
-    ("n_rows", "alpha"),
-    [(24, 1e-12), (23, 1e-7)],  # four rules with three coefficients, and twice as many rows
-)
-def test_automatic_ridge_depends_on_the_number_of_distinct_rows(n_rows, alpha):
-    X, y = data(n_rows)
-    X, y = np.tile(X, (3, 1)), np.tile(y, 3)
-    automatic = ANFISRegressor(n_mfs=2).fit(X, y)
-    explicit = ANFISRegressor(n_mfs=2, alpha=alpha).fit(X, y)
-    assert_array_equal(automatic.consequents_, explicit.consequents_)
-    assert automatic.memberships_ == explicit.memberships_
+WEIGHTS = ("agreement_", "alpha_", "slope_alpha_", "stiffness_")
+
+
+def test_weights_given_are_obeyed():
+    X, y = data()
+    model = ANFISRegressor(n_mfs=2, agreement=0.3, alpha=0.02, stiffness=1e-3).fit(X, y)
+    assert [getattr(model, name) for name in WEIGHTS] == [0.3, 0.02, 0.02, 1e-3]
+    # One that is given leaves the others to be found.
+    model = ANFISRegressor(n_mfs=2, agreement=0.3).fit(X, y)
+    assert model.agreement_ == 0.3
+    assert model.alpha_ not in (0.0, 0.3)
+    model = ANFISRegressor(n_mfs=2, alpha=0.02).fit(X, y)
+    assert (model.alpha_, model.slope_alpha_) == (0.02, 0.02)
+    assert model.agreement_ > 0.0
+    assert model.stiffness_ > 0.0
+
+
+def test_automatic_weights_count_rows_by_weight_and_not_distinct_ones():
+    X, y = data(60)
+    y = y + 0.3 * np.random.default_rng(1).normal(size=60)
+    once = ANFISRegressor(n_mfs=2).fit(X, y)
+    tiled = ANFISRegressor(n_mfs=2).fit(np.tile(X, (10, 1)), np.tile(y, 10))
+    weighted = ANFISRegressor(n_mfs=2).fit(X, y, sample_weight=np.full(60, 10.0))
+    for name in WEIGHTS:
+        assert_allclose(getattr(weighted, name), getattr(tiled, name), rtol=1e-6)
+    assert_allclose(weighted.predict(X), tiled.predict(X), rtol=0, atol=1e-8)
+    # Ten rows where there was one: the prior counts for less.
+    assert tiled.stiffness_ < 0.5 * once.stiffness_
 
 
 @pytest.mark.parametrize("n_rows", [11, 12])

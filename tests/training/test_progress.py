@@ -48,7 +48,10 @@ class Recorder:
 def test_verbose_writes_a_line_per_iteration(capsys):
     model = ANFISRegressor(n_mfs=3, verbose=True).fit(X, Y)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "[ANFISRegressor] 9 rules, alpha 1e-12, stiffness 0"
+    weights = [f"{w:.3g}" for w in (model.agreement_, model.alpha_, model.stiffness_)]
+    assert lines[0] == "[ANFISRegressor] 9 rules, agreement {}, alpha {}, stiffness {}".format(
+        *weights
+    )
     assert len(lines) == 1 + model.n_iter_
     assert f"iteration {model.n_iter_}: loss {model.loss_curve_[-1]:.6g}" in lines[-1]
     ANFISRegressor(n_mfs=3).fit(X, Y)
@@ -130,9 +133,10 @@ def interrupt_after(monkeypatch, n_iter):
 
 class TestInterrupt:
     def test_what_there_is_is_kept_where_that_is_asked_for(self, monkeypatch):
-        whole = ANFISRegressor(n_mfs=3).fit(X, Y)
+        settings = {"n_mfs": 3, "agreement": 0.0, "alpha": 1e-10, "stiffness": 0.0}
+        whole = ANFISRegressor(**settings).fit(X, Y)
         interrupt_after(monkeypatch, 4)
-        model = ANFISRegressor(n_mfs=3, on_interrupt="stop", verbose=True)
+        model = ANFISRegressor(on_interrupt="stop", verbose=True, **settings)
         with pytest.warns(ConvergenceWarning, match="The user interrupted the training"):
             model.fit(X, Y)
         loss = np.mean((model.predict(X) - Y) ** 2) / np.var(Y)

@@ -1,5 +1,7 @@
 """Several starts, and the leave-one-out error that chooses among them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -21,40 +23,80 @@ from .. import oracles
 def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs):
     g = np.random.default_rng(1)
     rows = oracles.bumpy_rows(g, 40, 2, n_outputs, weighted)
-    alpha = 1e-2
-    problem = SeparableProblem(
-        rows, oracles.random_grid(g, [Gaussian] * 2, [2, 2]), 1, Penalty(alpha=alpha)
-    )
-    evaluation = problem.evaluate(problem.antecedent.parameters)
-    dense = oracles.DenseProblem(rows, problem.antecedent, 1, alpha)
-    phi, total = dense.design(problem.antecedent.parameters) @ dense.local, 0.0
+    penalty = Penalty(agreement=0.3, alpha=1e-2, slope=0.1)
+    antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    evaluation = problem.evaluate(antecedent.parameters)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
+    phi, total = dense.design(antecedent.parameters), 0.0
+    held = dense.residual_matrix(antecedent.parameters)[40:]
     for i in range(40):
         weight = dense.weight.copy()
         weight[i] -= 1.0 / rows.total_weight  # one unit of it
-        gram = (phi.T * weight) @ phi + alpha * np.eye(phi.shape[1])
+        gram = (phi.T * weight) @ phi + held.T @ held
         beta = np.linalg.solve(gram, (phi.T * weight) @ dense.y)
         total += dense.weight[i] * np.sum((dense.y[i] - phi[i] @ beta) ** 2)
     assert_allclose(restarts.leave_one_out_error(problem, evaluation), total, rtol=1e-8)
 
 
-def test_starts_lie_in_the_box_and_the_first_is_the_partitions_own():
+def test_starts_lie_in_the_box_and_the_first_is_as_given():
     g = np.random.default_rng(1)
     antecedent = oracles.random_grid(g, [Gaussian] * 2, [3, 3])
     premise = Premise.of(antecedent, np.full(2, -2.0), np.full(2, 2.0))
-    starts = restarts.displaced_starts(premise, 200, np.random.default_rng(0))
+    starts = restarts.displaced_starts(premise, None, 200, np.random.default_rng(0))
+    given = 0.1 * premise.upper
+    other = restarts.displaced_starts(premise, given, 200, np.random.default_rng(0))
     assert_array_equal(starts[0], 0.0)
+    assert_array_equal(other[0], given)
+    assert_array_equal(starts[1:], other[1:])
     assert (starts >= premise.lower).all()
     assert (starts <= premise.upper).all()
-    assert_allclose(starts[1:].std(), 0.3, rtol=0.05)
+    # Gaps have room on both sides, widths little below.
+    spread = starts[1:].std(axis=0)
+    wide = np.minimum(-premise.lower, premise.upper) > 1.0
+    assert wide.sum() == 6
+    assert_allclose(spread[wide], 0.3, rtol=0.15)
+    assert_allclose(starts[1:, wide].std(), 0.3, rtol=0.05)
+    assert (spread[~wide] < 0.3).all()
 
 
 def test_the_best_start_is_kept():
     X, y = make_jang_sinc()
     losses = [
-        ANFISRegressor(n_mfs=4, n_init=n, random_state=3, alpha=1e-10).fit(X, y).loss_curve_[-1]
+        ANFISRegressor(n_mfs=4, n_init=n, random_state=3, agreement=0, alpha=1e-10, stiffness=0)
+        .fit(X, y)
+        .loss_curve_[-1]
         for n in (1, 8)
     ]
-    assert losses[1] < 0.1 * losses[0]
+    assert losses[1] < 0.6 * losses[0]
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_it_is_kept_by_its_leave_one_out_error(n_jobs, monkeypatch):
+    g = np.random.default_rng(1)
+    antecedent = oracles.random_grid(g, [Gaussian] * 2, [3, 3])
+    premise = Premise.of(antecedent, np.full(2, -2.0), np.full(2, 2.0))
+    monkeypatch.setattr(restarts, "leave_one_out_error", lambda problem, _: problem)
+    seen = []
+
+    def learn(x):
+        # Anything with a problem and a result; the error is a stand-in for that of the run.
+        return SimpleNamespace(
+            x=x, problem=abs(x[0] - 0.2), result=SimpleNamespace(evaluation=None)
+        )
+
+    best = restarts.learn_from_starts(
+        learn, premise, None, 12, np.random.default_rng(0), n_jobs, seen.append
+    )
+    starts = restarts.displaced_starts(premise, None, 12, np.random.default_rng(0))
+    assert_array_equal([learned.x for learned in seen], starts)
+    assert_array_equal(best.x, starts[np.abs(starts[:, 0] - 0.2).argmin()])
+    # What is told of a start may end them all.
+    if n_jobs == 1:
+        first = restarts.learn_from_starts(
+            learn, premise, None, 12, np.random.default_rng(0), n_jobs, lambda learned: True
+        )
+        assert_array_equal(first.x, starts[0])
 
 
 @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}])

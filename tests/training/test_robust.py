@@ -41,7 +41,8 @@ def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
     monkeypatch.setattr(robust, "_MOST_ROUNDS", 500)
     X, y, *_ = with_outliers(200)
     weight = np.random.default_rng(1).uniform(0.5, 2.0, 200) if weighted else None
-    model = ANFISRegressor(n_mfs=1, loss="huber", epsilon=epsilon).fit(X, y, sample_weight=weight)
+    model = ANFISRegressor(n_mfs=1, alpha=0.0, loss="huber", epsilon=epsilon)
+    model.fit(X, y, sample_weight=weight)
     linear, weights = linear_huber(X, y, epsilon, weight)
     expected = [linear.intercept_, *linear.coef_]
     assert_allclose(model.consequents_[0], expected, rtol=1e-6)
