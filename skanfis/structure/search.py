@@ -1,12 +1,12 @@
 r"""Structure by itself: how many terms or rules, chosen by the error to be expected on new rows.
 
 What is compared are short trainings of candidate models on the rows themselves; no row is held out.
-The weights of every candidate's penalty are found by the evidence (``tuning``), and so is which
-candidates are worth a training: they are ranked by their evidence before any premise moves. Of those
-trained, the one wins whose final prediction error is the smallest, which counts the parameters that
-the penalty leaves (``Tuned.expected_error``). The evidence itself would be the other criterion: it
-ranks penalties well, but one prior for the large and the small departures of all rules makes it too
-sparing with rules (docs/mathematics.rst has both on the same data).
+The weights of every candidate's penalty are found by the evidence (``tuning``). The candidate wins
+whose final prediction error is the smallest, which counts the parameters that the penalty leaves
+(``Tuned.expected_error``); those are trained that promise most by it before any premise moves. The
+evidence itself would be the other criterion: it ranks penalties well, but one prior for the large
+and the small departures of all rules makes it too sparing with rules (docs/mathematics.rst has both
+on the same data).
 
 The search is greedy and small. Grids grow from the linear model, one term at a time, on the input
 where it pays most, from where the terms of the others are already; inputs that need no terms get
@@ -197,9 +197,11 @@ class StructureSearch:
         return [int(j) for j in self.inputs[np.argsort(-statistic, kind="stable")[:_MOST_GROWING]]]
 
     def _promising(self, candidates):
-        """Candidates by their evidence before the premises move, best first."""
+        """Candidates by their expected error before the premises move, best first."""
         fits = [c for c in candidates if not self._is_too_many(c, self.sample.n_rows)]
-        return sorted(fits, key=lambda c: self._train(c, self.sample, turns=0, first_steps=2).score)
+        untrained = [self._train(c, self.sample, turns=0, first_steps=2) for c in fits]
+        order = np.argsort([tuned.expected_error for tuned in untrained], kind="stable")
+        return [fits[k] for k in order]
 
     @staticmethod
     def _with_one_more(candidate, j):

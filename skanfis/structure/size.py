@@ -71,13 +71,13 @@ class GridSize(RuleBaseSize):
         if self.n_bytes <= limit:
             return
         smallest = GridSize([2] * len(names), 1 + len(names))
-        hint = f"n_mfs=2 makes {smallest.n_rules:,} rules, " if smallest.n_bytes <= limit else ""
+        hint = f"n_mfs=2 makes {smallest.n_rules:,} rules; " if smallest.n_bytes <= limit else ""
         raise ValueError(
             f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {_count(self.n_rules)} rules "
             f"with {_count(self.n_columns)} consequent parameters; training it would take "
             f"{_bytes(self.n_bytes)}, and the limit is {_bytes(limit)} "
             "(sklearn.set_config(working_memory=...), in MiB). Use fewer terms: "
-            f"{hint}or give one number per input, 1 for an input that needs no fuzzy terms; or use "
+            f"{hint}give one number per input, 1 for an input that needs no fuzzy terms; or use "
             "scattered rules, whose number does not grow with the inputs: partition=KMeans("
             "n_clusters=...)."
         )
