@@ -50,14 +50,20 @@ class Spacing:
 def _levels(column, weight):
     """Values between the outer quantiles, and G there, from 0 to 1."""
     order = np.argsort(column, kind="stable")
-    upto = np.cumsum(weight[order]) / weight.sum()
-    low, high = column[order[np.searchsorted(upto, [_EDGE, 1.0 - _EDGE])]]
+    low, high = (_quantile(column, weight, side) for side in (order, order[::-1]))
     if low == high:
         low, high = column[order[0]], column[order[-1]]
     values = np.unique(column)
     values = values[(values >= low) & (values <= high)]
     levels = np.concatenate([[0.0], np.cumsum(np.diff(values) ** _POWER)])
     return values, levels / max(levels[-1], np.finfo(float).tiny)
+
+
+def _quantile(column, weight, order):
+    """The first value in this order that has ``_EDGE`` of the weight up to it."""
+    upto = np.cumsum(weight[order])
+    # From either side alike, whatever the last bit of a sum.
+    return column[order[np.searchsorted(upto, (1.0 - 1e-9) * _EDGE * upto[-1])]]
 
 
 def grid_antecedent(families, counts, spacing: Spacing, overlap):

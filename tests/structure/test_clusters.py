@@ -6,11 +6,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.antecedent import RuleTableAntecedent
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
-from skanfis.structure import clustered_antecedent
-from skanfis.structure.clustered import representative_rows
 from skanfis.rows import Rows
+from skanfis.structure import SampleSize, clustered_antecedent, representative_rows
+from skanfis.structure.clusters import _HIGHEST_CROSSING
+from skanfis.structure.sample import effective_weight, search_sample
 
 
 def blobs(rng, n_per_blob=80, n_inputs=2):
@@ -33,9 +34,26 @@ def rules_of(family, rows, label):
 
 def rule_parameters(antecedent, n_inputs):
     """Theta as (n_parameters, n_rules, n_inputs), rules in the order of their first centre."""
-    (group,) = antecedent.groups
-    theta = group.theta.reshape(len(group.theta), -1, n_inputs)
+    theta = np.hstack([group.theta for group in antecedent.groups])
+    inputs = np.concatenate([group.inputs for group in antecedent.groups])
+    terms = antecedent.rule_terms
+    terms = np.take_along_axis(terms, np.argsort(inputs[terms], axis=1), axis=1)
+    theta = theta[:, terms]
+    assert theta.shape[2] == n_inputs
     return theta[:, np.argsort(theta[0, :, 0])]
+
+
+def highest_crossings(antecedent):
+    """Of every two terms that are neighbours on an input, where they cross, by brute force."""
+    z = np.linspace(-10.0, 10.0, 20_001)
+    found = []
+    for group in antecedent.groups:
+        for j in np.unique(group.inputs):
+            theta = group.theta[:, group.inputs == j]
+            theta = theta[:, np.argsort(theta[0])]
+            mu = group.family.value(z[None], theta)
+            found += list(np.minimum(mu[1:], mu[:-1]).max(axis=1))
+    return np.array(found)
 
 
 class TestRules:
@@ -45,17 +63,9 @@ class TestRules:
         mixed = clustered_antecedent([Gaussian, Bell], rows, by_k_means, np.arange(2))
         by_input = [group.theta for group in mixed.groups]
         for j, family in enumerate([Gaussian, Bell]):
-            alone = rules_of(family, rows, by_k_means).groups[0].theta
-            assert_allclose(by_input[j], alone.reshape(len(alone), -1, 2)[:, :, j])
-        plain = rules_of(Gaussian, rows, by_k_means)
-        same = RuleTableAntecedent(
-            tuple(
-                TermGroup(Gaussian, np.full(3, j), plain.groups[0].theta[:, j::2]) for j in range(2)
-            ),
-            mixed.table,
-        )
-        Z = rng.normal(size=(2, 50))
-        assert_allclose(same.strengths(Z), plain.strengths(Z), rtol=1e-12)
+            alone = rules_of(family, rows, by_k_means)
+            assert_allclose(by_input[j], alone.groups[j].theta)
+            assert_array_equal(alone.rule_terms, mixed.rule_terms)
 
     def test_clusters_are_sought_in_the_premise_inputs_alone(self, rng):
         X, y, *_ = blobs(rng)
@@ -63,7 +73,7 @@ class TestRules:
         rows = Rows.standardised(np.hstack([noise, X]), y)
         found = clustered_antecedent([Gaussian] * 3, rows, by_k_means, np.array([1, 2]))
         expected = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
-        assert set(found.groups[0].inputs) == {1, 2}
+        assert {int(j) for group in found.groups for j in group.inputs} == {1, 2}
         for one, other in zip(rule_parameters(found, 2), rule_parameters(expected, 2), strict=True):
             assert_allclose(one, other)
 
@@ -92,7 +102,7 @@ class TestRules:
         X, y, labels, _ = blobs(rng)
         rows = Rows.standardised(X, y)
         antecedent = rules_of(MEMBERSHIPS[name], rows, by_k_means)
-        assert isinstance(antecedent, ScatteredAntecedent)
+        assert isinstance(antecedent, RuleTableAntecedent)
         strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
         # The same partition under other names.
         assert len(set(zip(strongest.tolist(), labels.tolist(), strict=True))) == 3
@@ -154,8 +164,56 @@ class TestRules:
         padded = Rows.standardised(np.insert(X, 1, 7.0, axis=1), y)
         plain = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
         other = rules_of(Gaussian, padded, by_k_means)
-        assert_array_equal(other.groups[0].inputs, [0, 2] * 3)
+        assert {int(j) for group in other.groups for j in group.inputs} == {0, 2}
         assert_allclose(other.parameters, plain.parameters, rtol=1e-12, atol=1e-14)
+
+    def test_terms_that_nobody_could_tell_apart_are_one(self, rng):
+        # Four clumps at the corners of a square, a hair off each: two terms on either input.
+        corner = np.arange(400) % 4
+        X = np.array([[0.0, 0.0], [9.0, 0.1], [0.1, 9.0], [9.1, 9.1]])[corner]
+        X = X + rng.normal(size=X.shape)
+        rows = Rows.standardised(X, corner[:, None].astype(float))
+        antecedent = rules_of(
+            Gaussian, rows, lambda t, w: np.unique(t[:, 2], return_inverse=True)[1]
+        )
+        assert antecedent.n_rules == 4
+        assert antecedent.n_terms == 4
+        # A shared term has the mean and the deviation of both clumps, times sqrt(2) inputs.
+        z = (X - rows.inputs.offset) / rows.inputs.scale
+        for j, group in enumerate(antecedent.groups):
+            for term, side in zip(np.argsort(group.theta[0]), (False, True), strict=True):
+                members = z[(X[:, j] > 4.5) == side, j]
+                assert_allclose(group.theta[0, term], members.mean(), rtol=1e-9)
+                width = np.sqrt(2.0) * members.std()
+                assert_allclose(np.exp(group.theta[1, term]), width, rtol=1e-2)
+
+    @pytest.mark.parametrize("draw", ["lognormal", "standard_cauchy", "normal"])
+    @pytest.mark.parametrize("n_clusters", [3, 8, 20])
+    def test_no_two_terms_cross_too_high(self, rng, draw, n_clusters):
+        X = getattr(rng, draw)(size=(400, 3))
+        rows = Rows.standardised(X, np.sin(X[:, :1]))
+        for name in ("gaussian", "bell", "trapezoidal"):
+            antecedent = rules_of(
+                MEMBERSHIPS[name],
+                rows,
+                lambda t, w: KMeans(n_clusters, n_init=1, random_state=0).fit_predict(t),
+            )
+            assert (highest_crossings(antecedent) <= _HIGHEST_CROSSING + 1e-2).all()
+            assert len(np.unique(antecedent.rule_terms, axis=0)) == antecedent.n_rules
+
+    def test_an_input_that_tells_no_clusters_apart_has_no_terms(self, rng):
+        X, y, labels, _ = blobs(rng)
+        alike = rng.normal(size=(len(X), 1))
+        rows = Rows.standardised(np.hstack([X, alike]), y)
+        order = np.lexsort(rows.table(slice(None)).T[::-1])
+        antecedent = rules_of(Gaussian, rows, lambda t, w: labels[order])
+        plain = rules_of(
+            Gaussian,
+            Rows.standardised(X, y),
+            lambda t, w: labels[np.lexsort(np.hstack([X, y]).T[::-1])],
+        )
+        assert {int(j) for group in antecedent.groups for j in group.inputs} == {0, 1}
+        assert_allclose(antecedent.parameters, plain.parameters, rtol=1e-9)
 
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
     def test_clusters_of_the_target_alone_leave_one_rule(self):
@@ -246,9 +304,70 @@ class TestRepresentativeRows:
     def test_a_fit_by_clusters_does_not_see_the_order_of_the_rows(self, rng, monkeypatch):
         monkeypatch.setattr(representative_rows, "__defaults__", (200,))
         X = rng.uniform(-1.0, 1.0, (900, 2))
-        y = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2
+        y = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + 0.1 * rng.normal(size=900)
         turn = rng.permutation(900)
         partition = KMeans(3, n_init=2, random_state=0)
         one = ANFISRegressor(partition=partition, tol=0.01).fit(X, y)
         other = ANFISRegressor(partition=partition, tol=0.01).fit(X[turn], y[turn])
         assert_allclose(other.predict(X), one.predict(X), atol=1e-6)
+
+
+class TestSampleSize:
+    def test_repeats_are_rows_and_weight_but_not_distinct(self, rng):
+        X, y, times = many(rng)
+        size = SampleSize.of(
+            Rows.standardised(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
+        )
+        assert size.n_rows == size.weight == times.sum()
+        assert size.n_distinct_rows == len(np.unique(np.hstack([X, y]), axis=0))
+        assert size.n_distinct_inputs == len(np.unique(X, axis=0))
+        assert size.n_distinct_inputs < size.n_distinct_rows < size.n_rows
+
+    def test_whole_weights_count_as_copies(self, rng):
+        X, y, times = many(rng)
+        weighted = SampleSize.of(Rows.standardised(X, y, times.astype(float)))
+        repeated = SampleSize.of(
+            Rows.standardised(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
+        )
+        assert weighted.n_rows == len(X)
+        assert weighted.weight == repeated.weight
+        assert weighted.n_distinct_rows == repeated.n_distinct_rows
+        assert weighted.n_distinct_inputs == repeated.n_distinct_inputs
+
+    @pytest.mark.parametrize("unit", [1e-300, 1e-6, 0.5])
+    def test_weights_below_one_count_by_the_precision_they_leave(self, rng, unit):
+        # Kish: of equal weights every row counts; of a half with next to none, half of them.
+        X, y, _ = many(rng)
+        even = Rows.standardised(X, y, np.full(300, unit))
+        assert_allclose(effective_weight(even), 300.0, rtol=1e-12)
+        half = Rows.standardised(X, y, np.where(np.arange(300) < 150, unit, 1e-9 * unit))
+        assert_allclose(effective_weight(half), 150.0, rtol=1e-6)
+        share = rng.uniform(0.1, 1.0, 300)
+        uneven = Rows.standardised(X, y, unit * share)
+        assert_allclose(effective_weight(uneven), share.sum() ** 2 / (share**2).sum(), rtol=1e-12)
+
+    def test_counting_stops_as_soon_as_there_are_enough(self, rng):
+        X = np.vstack([rng.normal(size=(5000, 2)), np.zeros((5000, 2))])
+        rows = Rows.standardised(X, np.zeros((10_000, 1)))
+        assert SampleSize.of(rows, 100).n_distinct_inputs == 100
+        assert SampleSize.of(rows, 10_000).n_distinct_inputs == 5001
+
+    def test_rows_that_differ_in_the_last_digits_of_one_input_are_distinct(self, rng):
+        X = np.tile(rng.normal(size=3), (40, 1))
+        X[:, 1] += 1e-9 * np.arange(40)
+        size = SampleSize.of(Rows.standardised(X, np.zeros((40, 1))))
+        assert size.n_distinct_inputs == 40
+
+    @pytest.mark.parametrize("most", [10_000, 100])
+    def test_a_search_sees_repeated_rows_as_weighted_ones(self, rng, most):
+        X, y, times = many(rng)
+        weighted = search_sample(Rows.standardised(X, y, times.astype(float)), most)
+        repeated = search_sample(
+            Rows.standardised(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0)), most
+        )
+        assert_allclose(repeated.X, weighted.X, atol=1e-12)
+        assert_allclose(repeated.y, weighted.y, atol=1e-12)
+        assert_array_equal(repeated.sample_weight, weighted.sample_weight)
+        # Already in the units of all rows: what they are is not standardised again.
+        assert_array_equal(weighted.inputs.scale, 1.0)
+        assert_array_equal(weighted.inputs.offset, 0.0)
