@@ -45,6 +45,8 @@ _LARGEST = {"agreement": 1.0, "alpha": 1e4, "slope": 1e4, "stiffness": 1e4}
 # seen before: a fifth of a spacing is what a term is expected to move.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
+# Most of a target lies within so many standard deviations of its mean.
+_FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LARGEST_STEP = 100.0
 # The target of a fit that is exact to rounding has no more digits than this, squared.
@@ -188,13 +190,13 @@ def least_weights(posterior: Laplace, n_rules):
     """Weights below which the prior expects what no rule that can be read does.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
-    from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the target's
-    own variance, one.
+    from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
+    of what is far for a target, two of its standard deviations.
     """
-    noise = posterior.noise_variance / posterior.n_rows
     if n_rules == 1:
         return {}
-    return {"agreement": posterior.n_columns * noise, "alpha": noise}
+    noise = posterior.noise_variance / posterior.n_rows
+    return {"agreement": posterior.n_columns * noise / _FAR**2, "alpha": noise / _FAR**2}
 
 
 def reestimated(posterior: Laplace, free, least=None):

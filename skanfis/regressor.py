@@ -194,8 +194,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         The values used; ``slope_alpha_`` is that on the slopes of the rules' common line.
     structures_ : list of dict
         The candidates that were compared where the structure was chosen by itself, best first:
-        "structure", "alpha", "stiffness", and "expected_error" on new rows in standard deviations
-        of the target. Empty where the structure was given.
+        "structure", "expected_error" on new rows like these in standard deviations of the target,
+        "log_evidence", "agreement", "alpha", "stiffness"; with groups "held_out_error" decides.
+        Empty where the structure was given.
+    readability_ : skanfis.inspection.Readability
+        How far the rules can be read one by one, measured on the training rows.
     redundant_rules_ : list of dict
         Rules that do nothing: "rule", its number; "reason", "never fires" (nowhere in the
         training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
@@ -226,13 +229,19 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
 
     Notes
     -----
-    Where the structure is chosen by itself, a few dozen small models are trained for a few
-    iterations on at most 1,000 representative rows. They are compared by Akaike's final prediction
-    error [3]_, MSE (1 + k / N) / (1 - k / n), with the effective number of parameters k, those of
-    the premises counted twice. Nothing is held out, and nothing is random. It counts rows, and
-    cannot see that the rows of one run are alike: where they come in runs, give these to ``fit`` as
-    ``groups``. The structures are then compared by their error on the groups left out, a fifth of
-    them at a time.
+    What is trained is not the sum of the rules alone: rules that fire on the same row pay for their
+    disagreement (``agreement``), and every rule for its departure from the line that all have in
+    common (``alpha``), so that each can be read by itself. Where these weights and the pull of the
+    premises (``stiffness``) are "auto", they are found by the evidence, the probability of the data
+    with all parameters averaged out [3]_, on at most 1,000 representative rows; with data that seem
+    free of noise, from two sides. ``readability_`` says how far the rules can be read.
+
+    Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
+    compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the
+    effective number of parameters k that the penalty leaves. Nothing is held out, and nothing is
+    random. It counts rows, and cannot see that the rows of one run are alike: where they come in
+    runs, give these to ``fit`` as ``groups``. The structures are then compared by their error on the
+    groups left out, a fifth of them at a time.
 
     References
     ----------
@@ -241,7 +250,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     .. [2] G. H. Golub and V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least
        squares problems whose variables separate", SIAM Journal on Numerical Analysis 10 (1973)
        413-432.
-    .. [3] H. Akaike, "Fitting autoregressive models for prediction", Annals of the Institute of
+    .. [3] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447.
+    .. [4] H. Akaike, "Fitting autoregressive models for prediction", Annals of the Institute of
        Statistical Mathematics 21 (1969) 243-247.
 
     Examples
