@@ -35,7 +35,9 @@ def test_a_model_alone_has_no_loss_curve():
 
 def test_rows_held_out_are_a_dashed_line_of_the_same_colour():
     X = np.random.default_rng(0).uniform(-3, 3, (80, 1))
-    model = ANFISRegressor(n_mfs=3, early_stopping=True, random_state=0).fit(X, np.sin(X[:, 0]))
+    # Without a pull to where the evidence puts them, the premises move.
+    model = ANFISRegressor(n_mfs=3, stiffness=0.0, early_stopping=True, random_state=0)
+    model.fit(X, np.sin(X[:, 0]))
     display = drawn(LossCurveDisplay.from_estimator(model))
     line = display.validation_line_
     assert_array_equal(line.get_ydata(), model.validation_loss_curve_)
