@@ -381,12 +381,15 @@ def test_rows_that_are_all_the_same_in_the_target_too(settings, order):
 @pytest.mark.parametrize("order", [0, 1])
 def test_two_rows_are_enough(settings, order):
     model = ANFISRegressor(order=order, **settings).fit(X[:2], Y[:2])
-    if order == 1 or model.n_rules_ > 1:
-        # A line through two points has no degree of freedom left: by itself it gets a stiff ridge.
-        tolerance = 1e-3 if settings else 0.02
-        assert_allclose(model.predict(X[:2]), Y[:2], atol=tolerance * np.ptp(Y[:2]))
-    else:
-        assert_allclose(model.predict(X[:2]), Y[:2].mean(), rtol=1e-12)
+    found = model.predict(X[:2])
+    if model.n_rules_ == 1 and order == 0:
+        assert_allclose(found, Y[:2].mean(), rtol=1e-12)
+        return
+    # A line through two points has no degree of freedom left to tell their noise by: what the
+    # weights take for noise pulls the two together, that of constants alone by more.
+    assert Y[0] <= found[0] < found[1] <= Y[1]
+    tolerance = 0.4 if order == 0 else 0.02
+    assert_allclose(found, Y[:2], atol=tolerance * np.ptp(Y[:2]))
 
 
 def test_few_distinct_rows_often_repeated():
@@ -394,7 +397,7 @@ def test_few_distinct_rows_often_repeated():
     few, targets = np.repeat(X[:5], 12, axis=0), np.tile(Y[:3], 20)
     with pytest.warns(
         UnderdeterminedWarning,
-        match=r"8 rules with 4 coefficients each are 32 .* 5 distinct .* fewer rules, or raise",
+        match=r"8 rules with 4 coefficients each are 32 .* 5 distinct .* or use fewer rules",
     ):
         model = ANFISRegressor(n_mfs=2).fit(few, targets)
     means = targets.reshape(5, 12).mean(axis=1)
@@ -484,7 +487,7 @@ def test_terms_together_with_a_clusterer(n_mfs):
     ("n_inputs", "settings", "said"),
     [
         # 3^10 rules, with 11 coefficients each.
-        (10, {"n_mfs": 3}, ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "20.3 TB"]),
+        (10, {"n_mfs": 3}, ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "47.3 TB"]),
         (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^18 bytes"]),
         (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^18 bytes"]),
         (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^18 bytes"]),
@@ -512,7 +515,7 @@ def test_limit_on_memory_is_that_of_scikit_learn():
     # 64 rules with 4 coefficients: a Gram matrix of 256 x 256 is half a MB, and there are several.
     with config_context(working_memory=1), refused(ValueError, "64 rules", "256", "1.05 MB"):
         ANFISRegressor(**settings).fit(X, Y)
-    with config_context(working_memory=4), pytest.warns(UnderdeterminedWarning):
+    with config_context(working_memory=8), pytest.warns(UnderdeterminedWarning):
         assert ANFISRegressor(**settings).fit(X, Y).n_rules_ == 64
 
 

@@ -44,7 +44,7 @@ def estimators():
         "huber": {"loss": "huber"},
         "early stopping": {"early_stopping": True, "validation_fraction": 0.3},
         "restarts": {"n_init": 2},
-        "ridge by GCV": {"alpha": "gcv"},
+        "weights that are given": {"agreement": 0.1, "alpha": 0.01, "stiffness": 1e-3},
         "pruning": {"prune": True},
         "nothing iterated": {"max_iter": 0},
     }

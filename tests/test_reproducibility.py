@@ -27,7 +27,7 @@ SETTINGS = {
     "starts": {"n_mfs": 2, "n_init": 4},
     "huber": {"n_mfs": 2, "loss": "huber"},
     "early stopping": {"n_mfs": 3, "early_stopping": True},
-    "ridge": {"n_mfs": 3, "alpha": "gcv"},
+    "weights that are given": {"n_mfs": 3, "agreement": 0.1, "alpha": 0.01, "stiffness": 1e-3},
     "pruning": {"n_mfs": 4, "prune": True},
 }
 # Enough for several chunks of rows, so that workers have something to share.
