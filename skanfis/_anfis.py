@@ -34,6 +34,7 @@ from .training import (
     learn_from_starts,
     learn_robustly,
     redundant_rules,
+    resistant,
     rule_statistics,
     watch_all,
     without_rules,
@@ -187,11 +188,11 @@ class _Trainer:
         weights = None
         try:
             if self.estimator.loss == "huber":
+                self.rows, weights = resistant(self.rows)
+                if self.held_out is not None:
+                    self.held_out = replace(self.held_out, targets=self.rows.targets)
                 learned, weights = learn_robustly(
-                    self._learn,
-                    self._start,
-                    self.rows,
-                    self.estimator.epsilon,
+                    self._learn, self._start, self.rows, self.estimator.epsilon, weights
                 )
             else:
                 learned = self._learn(self.rows, self._start(self.rows), None)

@@ -20,9 +20,11 @@ where, for each, as much is paid as is determined (Fellner and Schall; Wood and 
 
     n / sigma^2  beta' tau_k P_k beta = m [ tr(P^- tau_k P_k) - tr(M^-1 tau_k P_k) ] ,
 
-    n / sigma^2  kappa |x|^2 = tr H (H + kappa)^-1 ,    sigma^2 = n 2F / ((n - 1) m) ,
+    n / sigma^2  kappa (|x|^2 + nu x0^2) = tr H (H + kappa)^-1 + nu ,    sigma^2 = n 2F / ((n - 1) m) ,
 
-each weight being multiplied by the ratio of the right side to the left. At fixed premises this
+each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
+the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
+to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this
 takes no pass over the rows: for any weights, beta is one solve away.
 """
 
@@ -65,6 +67,7 @@ class Laplace:
     twice_cost : float
         2F.
     n_outputs : int
+        Those that vary.
     determinants : float
         log |M| - log |P|+ + log R.
     by_weight : dict of str to (float, float, float)
@@ -103,7 +106,7 @@ class Laplace:
     def minus_twice_log(self):
         """-2 log p, up to a constant of the data."""
         consequents = self.freedom * np.log(self.twice_cost) + self.n_outputs * self.determinants
-        if self.curvature.size == 0:
+        if self.curvature.size == 0 or self.penalty.stiffness == 0.0:
             return consequents
         expected = self.prior_precision
         return (
@@ -172,13 +175,15 @@ def laplace(
         by_weight["stiffness"] = (
             paid,
             float(curvature.size),
-            float(np.sum(stiffness / (curvature + stiffness))),
+            # Without stiffness nothing is held, not even where there is no curvature either.
+            float(np.sum(stiffness / (curvature + stiffness))) if stiffness else 0.0,
         )
     return Laplace(
         penalty,
         n_rows,
         max(error + float(np.sum(solved * (matrix @ solved))) + paid, _LEAST_ERROR),
-        normal.coefficients.shape[1],
+        # A constant target, standardised zero, says nothing about the noise of another.
+        max(np.count_nonzero(normal.coefficients.any(axis=0)), 1),
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
         by_weight,
         curvature,

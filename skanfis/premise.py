@@ -165,6 +165,9 @@ class Premise:
 
     def parameters(self, displacement):
         """The antecedent's parameters at a displacement."""
+        if not np.any(displacement):
+            # What is not moved is as it was given, to the last bit.
+            return self.antecedent.parameters
         raw = self.antecedent.parameters + self._unit * displacement
         for row in self._ordered:
             gaps = row.gaps(displacement)

@@ -5,7 +5,7 @@ on [1, z], down the gradient of the cost over all rows,
 
     (n, beta) -> (n, beta) - kappa g / |g| ,    g = (dE / dn, dE / dbeta) ,
 
-with E = 1/(2 W) |y - Phi beta|_S^2 + alpha/2 |beta|^2, the mean of (t - o)^2 / 2 (Liu et al. 2009).
+with E the cost of ``objective``, half the mean of (t - o)^2 (Liu et al. 2009) and the penalty.
 It ends when the root mean square error meets a goal; the length kappa follows Jang's rule.
 
 The consequents start as the solution of least squares, once, and are never solved for again (the

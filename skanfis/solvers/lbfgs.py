@@ -2,7 +2,7 @@ r"""Full-batch quasi-Newton descent on premises and consequents together, withou
 
 SciPy's L-BFGS-B minimises the joint cost
 
-    E(x, beta) = 1/(2 W) |y - Phi(x) beta|_S^2 + alpha/2 |beta|^2 + stiffness/2 |x|^2
+    E(x, beta) = 1/2 [ |y - Phi(x) beta|_S^2 / W + beta' P beta + stiffness |x|^2 ]
 
 over the premises' displacements x in their box and all consequents beta, in each rule's own basis
 (see ``consequent``), where they are of one size. They start as the solution of least squares.

@@ -4,7 +4,7 @@ from .learner import Learned, Learner
 from .progress import CallbackBridge, Keeper, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics, without_rules
 from .restarts import learn_from_starts
-from .robust import learn_robustly
+from .robust import learn_robustly, resistant
 from .stopping import EarlyStopping, hold_out
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     "learn_from_starts",
     "learn_robustly",
     "redundant_rules",
+    "resistant",
     "rule_statistics",
     "watch_all",
     "without_rules",

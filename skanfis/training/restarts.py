@@ -4,7 +4,7 @@ The first start is the structure's own; every further one is displaced at random
 direction as steps go without leaving one arrangement of the terms for another (see ``premise`` for
 the units). What is best is the smallest leave-one-out error of the linear part,
 
-    mean of (r_i / (1 - h_i))^2 ,    h_i = phi_i' (Phi' S Phi + alpha W I)^-1 phi_i ,
+    mean of (r_i / (1 - h_i))^2 ,    h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i ,
 
 (Allen 1974; a row of weight s counts as s rows, of which one is left out), not the training error:
 of two minima that meet the data alike, it prefers the one whose rules each rest on many rows.

@@ -10,18 +10,32 @@ matrix serves as before. The scale s is the median of |r| over 0.6745, a robust 
 found anew in every turn. Of several outputs, r is the length of the row's residuals, over the root
 of their number.
 
+Before there is any model, rows far beyond all others already count less: by the residuals of a
+linear model that scikit-learn's HuberRegressor finds, beyond ten robust standard deviations. The
+target's own scale is found with these weights. A grid of many rules would otherwise spend a rule on
+each outlier before it is known for one.
+
 Weights change between runs of the solver and not inside one, whose steps compare costs: they are
 costs of one and the same problem only so.
 """
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import HuberRegressor
 
-__all__ = ["huber_weights", "learn_robustly"]
+from .._validation import warn_user
+from ..rows import column_statistics
+
+__all__ = ["huber_weights", "learn_robustly", "resistant"]
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
+# Of the linear model, robust standard deviations that no shape of a sound target leaves.
+_FAR = 10.0
+_MOST_STEPS = 1000
 _MOST_ROUNDS = 20
 _MOST_STARTS = 4
 # Rows of less weight have no part in where training starts.
@@ -42,18 +56,51 @@ def huber_weights(problem, evaluation, epsilon, sample_weight=None):
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
+def resistant(rows):
+    """The rows with the target's scale as it is without what is far off, and their weights."""
+    weights = np.ones(rows.n_rows)
+    Z, target, own = rows.read(slice(None))
+    sizes = np.zeros(rows.n_rows)
+    for values in target:
+        center = _weighted_median(values, own)
+        spread = _weighted_median(np.abs(values - center), own)
+        if spread == 0.0:
+            return rows, weights
+        linear = HuberRegressor(max_iter=_MOST_STEPS)
+        scaled = (values - center) / spread
+        with warnings.catch_warnings():
+            # A rough line will do.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            try:
+                linear.fit(Z.T, scaled, sample_weight=own)
+            except ValueError:
+                return rows, weights
+        sizes += (scaled - linear.predict(Z.T)) ** 2
+    sizes = np.sqrt(sizes / len(target))
+    scale = _weighted_median(sizes, own) / _NORMAL_MEDIAN
+    if scale == 0.0:
+        return rows, weights
+    weights = np.minimum(1.0, _FAR * scale / np.maximum(sizes, np.finfo(float).tiny))
+    if (weights == 1.0).all():
+        return rows, weights
+    targets = column_statistics(rows.y, _reweighted(rows, weights**2).sample_weight)
+    return replace(rows, targets=targets), weights
+
+
 def _weighted_median(values, weight):
-    if weight is None:
-        return float(np.median(values))
+    """Half of the weight is below, half above; between two values, their mean, as without weights."""
     order = np.argsort(values, kind="stable")
-    upto = np.cumsum(weight[order])
-    return float(values[order[np.searchsorted(upto, 0.5 * upto[-1])]])
+    upto = np.cumsum(np.ones(values.size) if weight is None else weight[order])
+    middle = np.searchsorted(upto, 0.5 * upto[-1])
+    after = min(middle + int(upto[middle] == 0.5 * upto[-1]), values.size - 1)
+    return 0.5 * float(values[order[middle]] + values[order[after]])
 
 
-def learn_robustly(learn, start, rows, epsilon):
+def learn_robustly(learn, start, rows, epsilon, weights):
     """Train and reweight until the weights settle.
 
-    ``learn(rows, start, displacement)`` trains, ``start(rows)`` gives a start. The first
+    ``learn(rows, start, displacement)`` trains, ``start(rows)`` gives a start; ``weights`` are those
+    of :func:`resistant`. The first
     start and what comes of it have seen the outliers in full: once the weights are settled,
     training starts afresh, from a start that sees no row of less than half its weight, and again
     for as long as that start comes out another one.
@@ -64,8 +111,8 @@ def learn_robustly(learn, start, rows, epsilon):
     weights : ndarray of shape (n_rows,)
         Of the last turn, 1 where a row counts in full.
     """
-    learned = learn(rows, start(rows), None)
-    learned, weights = _settle(learn, learned, rows, np.ones(rows.n_rows), epsilon)
+    learned = learn(_reweighted(rows, weights), start(_without_outliers(rows, weights)), None)
+    learned, weights = _settle(learn, learned, rows, weights, epsilon)
     for turn in range(_MOST_STARTS):
         again = start(_without_outliers(rows, weights))
         if turn > 0 and _is_same(again, learned.start):
@@ -83,8 +130,14 @@ def _settle(learn, learned, rows, weights, epsilon):
         weights = huber_weights(learned.problem, evaluation, epsilon, rows.sample_weight)
         reweighted = _reweighted(rows, weights)
         learned = learn(reweighted, learned.start, learned.displacement)
-        if np.mean(np.abs(weights - before)) < _SETTLED:
-            break
+        change = float(np.mean(np.abs(weights - before)))
+        if change < _SETTLED:
+            return learned, weights
+    warn_user(
+        f"loss='huber': the weights of the rows still change by {change:.2g} on average after "
+        f"{_MOST_ROUNDS} turns. Use fewer rules, or a larger epsilon.",
+        ConvergenceWarning,
+    )
     return learned, weights
 
 

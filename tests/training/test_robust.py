@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
@@ -95,3 +96,32 @@ def test_rows_that_were_not_trained_on_have_no_weight():
     weight[3] = 0.0
     dropped = ANFISRegressor(n_mfs=2, loss="huber", tol=1e-2).fit(X, y, sample_weight=weight)
     assert_array_equal(np.flatnonzero(np.isnan(dropped.robust_weights_)), [3])
+
+
+@pytest.mark.parametrize("settings", [{}, {"n_mfs": 4}])
+@pytest.mark.parametrize("size", [1e3, 1e6])
+def test_outliers_do_not_decide_on_the_start(settings, size):
+    g = np.random.default_rng(0)
+    X = g.uniform(-1, 1, (300, 2))
+    truth = np.sin(3 * X[:, 0]) * X[:, 1]
+    y = truth + 0.02 * g.normal(size=300)
+    is_outlier = np.isin(np.arange(300), g.choice(300, 5, replace=False))
+    model = ANFISRegressor(loss="huber", **settings).fit(X, y + size * is_outlier)
+    errors = model.predict(X) - truth
+    # Half of the noise; without a resistant start 18 and 0.9.
+    assert np.sqrt(np.mean(errors[~is_outlier] ** 2)) < 0.02
+
+
+@pytest.mark.parametrize("n_rows", [199, 200])
+def test_unit_weights_are_none(n_rows):
+    X, y, *_ = with_outliers(n_rows)
+    plain = ANFISRegressor(n_mfs=2, loss="huber").fit(X, y)
+    weighted = ANFISRegressor(n_mfs=2, loss="huber").fit(X, y, sample_weight=np.ones(n_rows))
+    assert_allclose(weighted.predict(X), plain.predict(X), rtol=1e-10)
+
+
+def test_weights_that_do_not_settle_are_told(monkeypatch):
+    monkeypatch.setattr(robust, "_MOST_ROUNDS", 1)
+    X, y, *_ = with_outliers(200)
+    with pytest.warns(ConvergenceWarning, match="weights of the rows still change"):
+        ANFISRegressor(n_mfs=2, loss="huber").fit(X, y)
