@@ -43,13 +43,22 @@ static void $name_normalise($real *l, $int n)
 }
 """
 
+# Near the foot of the only term that speaks its derivative is huge, and is the mean to a few digits:
+# it is told from itself exactly.
 _CENTRE = """
 /* Subtracts from n derivatives their mean by the n shares. */
 static void $name_centre($real *s, const $real *share, $int n)
 {
-    $int i;
-    $real mean = 0.0R;
+    $int i, top = 0;
+    $real most, mean = 0.0R;
+    for (i = 1; i < n; ++i) {
+        if (share[i] > share[top]) {
+            top = i;
+        }
+    }
+    most = s[top];
     for (i = 0; i < n; ++i) {
+        s[i] -= most;
         mean += share[i] * s[i];
     }
     for (i = 0; i < n; ++i) {
