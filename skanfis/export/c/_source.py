@@ -43,8 +43,8 @@ static void $name_normalise($real *l, $int n)
 }
 """
 
-# Near the foot of the only term that speaks its derivative is huge, and is the mean to a few digits:
-# it is told from itself exactly.
+# Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
+# left of it would have no digits.
 _CENTRE = """
 /* Subtracts from n derivatives their mean by the n shares. */
 static void $name_centre($real *s, const $real *share, $int n)
