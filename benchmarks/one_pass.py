@@ -16,8 +16,8 @@ from skanfis import objective
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.structure import grid_antecedent
 from skanfis.rows import Rows
+from skanfis.structure import grid_antecedent
 
 from .fresh import alone
 from .report import Measure, Results, Row, Table

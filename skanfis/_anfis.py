@@ -264,7 +264,8 @@ class _Trainer:
             candidates = start.candidates
             found = f"{len(candidates)} candidates compared, " if candidates else ""
             self.printer.note(
-                f"{found}{start.antecedent.n_rules} rules, agreement {start.penalty.agreement:.3g}, "
+                f"{found}{start.antecedent.n_rules} rules, "
+                f"agreement {start.penalty.agreement:.3g}, "
                 f"alpha {start.penalty.alpha:.3g}, stiffness {start.penalty.stiffness:.3g}"
             )
         return start

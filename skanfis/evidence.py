@@ -1,4 +1,4 @@
-r"""The evidence of a model: how probable the data are, with everything that was learnt averaged out.
+r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
 
 The cost of ``penalty`` is, in units of the noise's variance sigma^2, minus the logarithm of a
 posterior: y = Phi beta + eps with eps ~ N(0, sigma^2 / s), consequents with the prior precision
@@ -20,7 +20,9 @@ where, for each, as much is paid as is determined (Fellner and Schall; Wood and 
 
     n / sigma^2  beta' tau_k P_k beta = m [ tr(P^- tau_k P_k) - tr(M^-1 tau_k P_k) ] ,
 
-    n / sigma^2  kappa (|x|^2 + nu x0^2) = tr H (H + kappa)^-1 + nu ,    sigma^2 = n 2F / ((n - 1) m) ,
+    n / sigma^2  kappa (|x|^2 + nu x0^2) = tr H (H + kappa)^-1 + nu ,
+
+    sigma^2 = n 2F / ((n - 1) m) ,
 
 each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
 the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
@@ -98,7 +100,7 @@ class Laplace:
 
     @property
     def prior_precision(self):
-        """n kappa / sigma^2, in units of what is expected of it."""
+        """N kappa / sigma^2, in units of what is expected of it."""
         ratio = self.n_rows / self.noise_variance * self.penalty.stiffness
         return ratio * PRIOR_DISPLACEMENT**2
 
@@ -142,7 +144,9 @@ def laplace(
     """
     parts = {"agreement": normal.disagreement, "alpha": line.own, "slope": line.slopes}
     weights = _weighted(penalty)
-    matrix = sum(weights[key] * part for key, part in parts.items())
+    matrix = np.zeros_like(normal.gram)
+    for key, part in parts.items():
+        matrix += weights[key] * part
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     factor = NormalFactor(normal.gram + matrix)
@@ -183,7 +187,7 @@ def laplace(
         n_rows,
         max(error + float(np.sum(solved * (matrix @ solved))) + paid, _LEAST_ERROR),
         # A constant target, standardised zero, says nothing about the noise of another.
-        max(np.count_nonzero(normal.coefficients.any(axis=0)), 1),
+        max(int(np.count_nonzero(normal.coefficients.any(axis=0))), 1),
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
         by_weight,
         curvature,

@@ -2,7 +2,7 @@ r"""Training as a separable least-squares problem: cost, gradient and Gauss-Newt
 
 With premise parameters theta, design Phi(theta), weights S of sum W and consequents beta,
 
-    F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,    P = lambda Q(theta) + A ,
+    F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,   P = lambda Q(theta) + A ,
 
 where Q gives the disagreement of rules that fire together, A what else pulls on the consequents
 (see ``penalty``). beta is eliminated (variable projection: Golub and Pereyra 1973). With r the
@@ -361,7 +361,7 @@ class SeparableProblem:
         return np.sum(half**2, axis=0) / self._weight
 
     def _joint_pass(self, antecedent, coefficients):
-        """Slopes by theta and beta but for A, r' S r and V (per output), each rule's mass; over W."""
+        """Slopes by theta and beta but for A, r' S r and V (per output), rules' masses; over W."""
         agreement = self.penalty.agreement
         by_rule = coefficients.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
 

@@ -240,8 +240,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the
     effective number of parameters k that the penalty leaves. Nothing is held out, and nothing is
     random. It counts rows, and cannot see that the rows of one run are alike: where they come in
-    runs, give these to ``fit`` as ``groups``. The structures are then compared by their error on the
-    groups left out, a fifth of them at a time.
+    runs, give these to ``fit`` as ``groups``. The structures are then compared by their error on
+    the groups left out, a fifth of them at a time.
 
     References
     ----------

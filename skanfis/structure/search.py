@@ -14,9 +14,9 @@ none. Where there are many inputs, only those are tried on which the slope of th
 steepest: the squared correlations of what the linear model leaves with what terms would add.
 Scattered rules come in a short sequence of numbers.
 
-Rows that come in groups, runs of an instrument say, are more alike within a group than any criterion
-on the same rows can know. Where the groups are given, the score is instead the error of short
-trainings on the groups that are left out, a fifth of them at a time.
+Rows that come in groups, runs of an instrument say, are more alike within a group than any
+criterion on the same rows can know. Where the groups are given, the score is instead the error of
+short trainings on the groups that are left out, a fifth of them at a time.
 
 Beyond a thousand rows, the candidates see representative rows only: the search then takes no
 longer, whatever the number of rows.
@@ -136,7 +136,7 @@ class StructureSearch:
         self.spacing = Spacing(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.parent: Tuned | None = None  # of the grids that are tried
-        self.found: dict[Candidate, Tuned | None] = {}
+        self.found: dict[Candidate, Tuned] = {}
         self.scores: dict[Candidate, float] = {}
         self.folds = _folds(self.sample.groups)
 
@@ -229,7 +229,7 @@ class StructureSearch:
         )
 
     def _best_clusters(self, clustering):
-        sizes = _RADII
+        sizes = list(_RADII)
         if clustering != "subtractive":
             most = min(_MOST_COLUMNS, 2.0 * self.n_sample) / self.n_basis
             sizes = [size for size in _RULE_NUMBERS if size <= most]
@@ -266,7 +266,7 @@ class StructureSearch:
         return KMeans(candidate.size, n_init=3, random_state=self.seed)
 
     def _score(self, candidate):
-        """n log FPE, or the error on groups left out; infinite where there are too few rows."""
+        """N log FPE, or the error on groups left out; infinite where there are too few rows."""
         if candidate not in self.scores:
             self.scores[candidate] = self._train_and_score(candidate)
         return self.scores[candidate]

@@ -44,9 +44,9 @@ class RuleBaseSize:
         """Raise ValueError where training would need more than ``limit`` bytes."""
         if self.n_bytes > limit:
             raise ValueError(
-                f"{what} makes {_count(self.n_rules)} rules with {_count(self.n_columns)} consequent "
-                f"parameters; training them would take {_bytes(self.n_bytes)}, and the limit is "
-                f"{_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). Use fewer "
+                f"{what} makes {_count(self.n_rules)} rules with {_count(self.n_columns)} "
+                f"consequent parameters; training them would take {_bytes(self.n_bytes)}, and the "
+                f"limit is {_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). Use fewer "
                 "clusters, or constants as consequents (order=0)."
             )
 

@@ -172,7 +172,8 @@ def tune(
     if "stiffness" in free and not is_loose:
         stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
-    best, without_rise = None, 0
+    best: Tuned | None = None
+    without_rise = 0
     for turn in range(turns):
         is_first = is_loose and turn == 0
         weighted = problem.with_penalty(penalty)
@@ -199,6 +200,7 @@ def tune(
             best = found
         if without_rise == _PATIENCE:
             break
+    assert best is not None
     return replace(best, problem=problem.with_penalty(best.penalty))
 
 

@@ -90,4 +90,5 @@ class Learner:
     @staticmethod
     def premise(rows: Rows, start: Start):
         """What moves at a start, within the box of the data."""
-        return Premise.of(start.antecedent, *rows.inputs.box, start.is_free)
+        low, high = rows.inputs.box
+        return Premise.of(start.antecedent, low, high, start.is_free)

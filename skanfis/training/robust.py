@@ -88,7 +88,7 @@ def resistant(rows):
 
 
 def _weighted_median(values, weight):
-    """Half of the weight is below, half above; between two values, their mean, as without weights."""
+    """Half of the weight is below, half above; between two values, their mean."""
     order = np.argsort(values, kind="stable")
     upto = np.cumsum(np.ones(values.size) if weight is None else weight[order])
     middle = np.searchsorted(upto, 0.5 * upto[-1])
@@ -99,11 +99,10 @@ def _weighted_median(values, weight):
 def learn_robustly(learn, start, rows, epsilon, weights):
     """Train and reweight until the weights settle.
 
-    ``learn(rows, start, displacement)`` trains, ``start(rows)`` gives a start; ``weights`` are those
-    of :func:`resistant`. The first
-    start and what comes of it have seen the outliers in full: once the weights are settled,
-    training starts afresh, from a start that sees no row of less than half its weight, and again
-    for as long as that start comes out another one.
+    ``learn(rows, start, displacement)`` trains, ``start(rows)`` gives a start; ``weights`` are
+    those of :func:`resistant`. The first start and what comes of it may have seen outliers: once
+    the weights are settled, training starts afresh, from a start that sees no row of less than
+    half its weight, and again for as long as that start comes out another one.
 
     Returns
     -------
