@@ -1,4 +1,4 @@
-"""How many terms and rules: errors before memory, counts that stop early, sizes by "auto"."""
+"""How many terms and rules: what is asked for, and errors before memory."""
 
 import re
 import tracemalloc
@@ -6,15 +6,11 @@ import tracemalloc
 import numpy as np
 import pytest
 from sklearn import config_context
+from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
-from skanfis.structure import (
-    GridSize,
-    count_distinct_inputs,
-    structure,
-    term_counts,
-)
-from skanfis.rows import Rows
+from skanfis.structure import GridSize, size, term_counts
+from skanfis.structure.size import RuleBaseSize
 
 NAMES = ["time", "temperature", "rate"]
 GIB = 2**30
@@ -92,17 +88,17 @@ def test_size_of_a_grid_is_not_far_from_what_training_takes(rng):
 
 
 def test_grid_that_fits_passes_in_silence():
-    GridSize([3, 3, 3], n_basis=4).check_fits(3, GIB, NAMES)
+    GridSize([3, 3, 3], n_basis=4).check_grid_fits(3, GIB, NAMES)
     size = GridSize([3, 3, 3], n_basis=4)
-    size.check_fits(3, size.n_bytes, NAMES)
+    size.check_grid_fits(3, size.n_bytes, NAMES)
     with pytest.raises(ValueError, match="makes a grid of 27 rules"):
-        size.check_fits(3, size.n_bytes - 1, NAMES)
+        size.check_grid_fits(3, size.n_bytes - 1, NAMES)
 
 
 def test_message_says_how_large_the_grid_is_and_what_to_do():
     names = [f"x{j}" for j in range(8)]
     with pytest.raises(ValueError, match="grid of 6,561 rules") as error:
-        GridSize([3] * 8, n_basis=9).check_fits(3, GIB, names)
+        GridSize([3] * 8, n_basis=9).check_grid_fits(3, GIB, names)
     message = str(error.value)
     assert message.startswith("n_mfs=3 on 8 inputs makes a grid of 6,561 rules with 59,049 ")
     assert "and the limit is 1.07 GB" in message
@@ -116,7 +112,7 @@ def test_message_says_how_large_the_grid_is_and_what_to_do():
 def test_hint_at_two_terms_is_not_given_where_two_are_too_many():
     names = [f"x{j}" for j in range(20)]
     with pytest.raises(ValueError, match="grid of 1,048,576 rules") as error:
-        GridSize([2] * 20, n_basis=21).check_fits(2, GIB, names)
+        GridSize([2] * 20, n_basis=21).check_grid_fits(2, GIB, names)
     assert "n_mfs=2 makes" not in str(error.value)
 
 
@@ -132,14 +128,14 @@ def test_hint_at_two_terms_is_not_given_where_two_are_too_many():
     ],
 )
 def test_bytes_are_told_in_units_that_can_be_read(number, text):
-    assert structure._bytes(number) == text
+    assert size._bytes(number) == text
 
 
 @pytest.mark.parametrize("n_inputs", [400, 5000])
 def test_grid_on_hundreds_of_inputs_is_refused_like_any_other(n_inputs):
     names = [f"x{j}" for j in range(n_inputs)]
     with pytest.raises(ValueError, match="makes a grid of"):
-        GridSize([3] * n_inputs, n_basis=1 + n_inputs).check_fits(3, GIB, names)
+        GridSize([3] * n_inputs, n_basis=1 + n_inputs).check_grid_fits(3, GIB, names)
 
 
 def test_grid_that_is_too_large_is_refused_before_memory_is_asked_for(rng):
@@ -160,38 +156,36 @@ def test_limit_is_that_of_scikit_learn(rng):
         ANFISRegressor(n_mfs=2).fit(X, y)
 
 
-def rows_of(X):
-    return Rows.standardised(X, np.arange(len(X), dtype=float)[:, None])
+def test_a_grid_counts_as_the_rules_that_it_makes():
+    grid = GridSize([4, 1, 2], n_basis=4, n_outputs=3)
+    table = RuleBaseSize(8, n_terms=6, n_basis=4, n_outputs=3)
+    assert grid.n_bytes == table.n_bytes
 
 
-@pytest.mark.parametrize("n_rows", [60, 3 * structure._READ_ROWS])
-def test_distinct_inputs_are_counted_whatever_their_order(rng, n_rows):
-    distinct = rng.normal(size=(50, 3)) * [1.0, 1e6, 1e-6] + 1e3
-    X = distinct[rng.permutation(np.arange(n_rows) % 50)]
-    assert count_distinct_inputs(rows_of(X), 10_000) == 50
+@pytest.mark.parametrize("order", [0, 1])
+def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, order):
+    X, y = rng.normal(size=(400, 4)), rng.normal(size=400)
+    clusterer = KMeans(200, n_init=1, max_iter=2, random_state=0)
+    n_columns = 200 * (5 if order else 1)
+    limit = 8 * n_columns**2 / 2**20  # one of the matrices that training takes
+    tracemalloc.start()
+    try:
+        with (
+            config_context(working_memory=limit),
+            pytest.raises(
+                ValueError, match=rf"200 rules with {n_columns:,} consequent .*Use fewer"
+            ),
+        ):
+            ANFISRegressor(partition=clusterer, order=order).fit(X, y)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    # Clustering itself takes distances of all rows to all centres.
+    assert peak < max(8 * n_columns**2, 8e6)
 
 
-def test_rows_that_differ_in_the_last_digits_of_one_input_are_distinct(rng):
-    X = np.tile(rng.normal(size=3), (40, 1))
-    X[:, 1] += 1e-9 * np.arange(40)
-    assert count_distinct_inputs(rows_of(X), 1000) == 40
-
-
-def test_counting_stops_as_soon_as_there_are_enough(rng):
-    n = structure._READ_ROWS
-    X = np.vstack([rng.normal(size=(n, 2)), np.zeros((2 * n, 2))])
-    rows, read = rows_of(X), []
-
-    class Noting:
-        n_rows, X = rows.n_rows, rows.X
-
-        def read(self, part):
-            read.append(part.start)
-            return rows.read(part)
-
-    assert count_distinct_inputs(Noting(), 100) == 100
-    assert read == [0]
-    assert count_distinct_inputs(Noting(), n) == n
-    assert read == [0, 0]
-    assert count_distinct_inputs(Noting(), n + 2) == n + 1
-    assert read == [0, 0, 0, n, 2 * n]
+def test_clusters_that_fit_pass_in_silence(rng):
+    X = rng.normal(size=(300, 2))
+    with config_context(working_memory=1):
+        model = ANFISRegressor(partition=KMeans(3, random_state=0), tol=0.1).fit(X, X[:, 0] ** 2)
+    assert model.n_rules_ <= 3
