@@ -97,11 +97,11 @@ def export_text(
     <BLANKLINE>
     Rule 0, 50 % of the weight, strongest on 21 rows:
       IF hours is low
-      THEN drift = -10.4 - 2.49 * (hours - 5)
+      THEN drift = -1.09 - 0.886 * (hours - 5)
     <BLANKLINE>
     Rule 1, 50 % of the weight, strongest on 20 rows:
       IF hours is high
-      THEN drift = 11 - 1.47 * (hours - 5)
+      THEN drift = 1.75 + 0.09 * (hours - 5)
     <BLANKLINE>
     Terms:
       hours, trained from 0 to 10
