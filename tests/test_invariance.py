@@ -302,7 +302,7 @@ def test_structure_that_is_chosen_by_itself(name):
     assert other.n_rules_ == plain.n_rules_
     # What the penalty hardly costs is found less exactly than what is predicted.
     for key in ("agreement_", "alpha_", "slope_alpha_", "stiffness_"):
-        assert_allclose(getattr(other, key), getattr(plain, key), rtol=1e-4)
+        assert_allclose(getattr(other, key), getattr(plain, key), rtol=1e-2)
 
 
 @pytest.mark.parametrize(
