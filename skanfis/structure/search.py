@@ -58,11 +58,11 @@ _MOST_TERMS = 6
 # After each round, so many inputs stay in the running for a further term.
 _MOST_GROWING = 8
 # Of those that are tried in a round, so many are trained: the most promising at their start.
-_MOST_TRAINED = 3
+_MOST_TRAINED = 2
 # More inputs than this are screened before terms are tried on them.
 _MOST_UNSCREENED = 16
 # Turns of weights and premises of a candidate.
-_TURNS = 5
+_TURNS = 4
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)

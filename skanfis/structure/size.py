@@ -46,8 +46,8 @@ class RuleBaseSize:
             raise ValueError(
                 f"{what} makes {_count(self.n_rules)} rules with {_count(self.n_columns)} "
                 f"consequent parameters; training them would take {_bytes(self.n_bytes)}, and the "
-                f"limit is {_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). Use fewer "
-                "clusters, or constants as consequents (order=0)."
+                f"limit is {_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). Use "
+                "fewer clusters, or constants as consequents (order=0)."
             )
 
 

@@ -48,13 +48,13 @@ _LOOSE_ITERATIONS = 25
 # Of the noise's variance, what a loose training must bring it down to: rules that compensate one
 # another are the price, and not to be paid for less.
 _LESS_NOISE = 0.5
-FIRST_STEPS = 8
+FIRST_STEPS = 5
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 _MOST_COLUMNS = 512
 _FEW_STEPS, _FEW_TURNS = 3, 2
 # Part of the rows that effective parameters may be.
 _MOST_EFFECTIVE = 0.5
-_STEPS = 3
+_STEPS = 2
 _ITERATIONS = 4
 _MOST_TURNS = 8
 _TOLERANCE = 1e-3
