@@ -125,8 +125,12 @@ def test_units_of_inputs_and_target(case, exponent):
 
 @pytest.mark.parametrize(
     ("column", "factor"),
-    # An input that runs backwards leads to another minimum: gaps count from the first term on.
-    [*((column, factor) for column in range(4) for factor in (1e6, 1e-6)), (3, -1.0)],
+    # Where the first input runs backwards, 2e-4 of the span remain: gaps count from its first term
+    # on, and the solver takes other steps to a flat minimum.
+    [
+        *((column, factor) for column in range(4) for factor in (1e6, 1e-6)),
+        *((column, -1.0) for column in (1, 2, 3)),
+    ],
 )
 def test_unit_of_a_single_column(column, factor):
     case = named_case("gyro, 8 rules")
@@ -134,6 +138,16 @@ def test_unit_of_a_single_column(column, factor):
     factors[column] = factor
     found = case.fit(case.X * factors[:3], case.y * factors[3]).predict(case.X * factors[:3])
     case.assert_same(found / factors[3])
+
+
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"n_mfs": 3}, {"partition": "grid"}], ids=str)
+def test_an_input_with_a_long_tail_may_run_backwards(settings):
+    rng = np.random.default_rng(0)
+    X = rng.lognormal(size=(300, 3))
+    y = np.sin(2.0 * np.log(X[:, 0])) + 0.3 * X[:, 1] + 0.05 * rng.normal(size=300)
+    mirrored = X * [1.0, -1.0, 1.0]
+    plain, other = (ANFISRegressor(**settings).fit(data, y).predict(data) for data in (X, mirrored))
+    assert_allclose(other, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
 
 
 def test_offset_of_ten_thousand_spans(case):
