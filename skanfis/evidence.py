@@ -49,6 +49,8 @@ _LARGEST = {"agreement": 1.0, "alpha": 1e4, "slope": 1e4, "stiffness": 1e4}
 # seen before: a fifth of a spacing is what a term is expected to move.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
+# Least weights where there are fewer distinct rows than this per consequent.
+_UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -195,17 +197,25 @@ def laplace(
     )
 
 
-def least_weights(posterior: Laplace, n_rules):
+def least_weights(posterior: Laplace, n_rules, n_distinct):
     """Weights below which the prior expects what no rule that can be read does.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
     of what is far for a target, two of its standard deviations.
+
+    Where there are hardly more distinct rows than consequents, a model that passes through every row
+    explains them without noise, and nothing in the data speaks against it. And rounding errors grow
+    by 1 / alpha along what the data leave open. There the weights are never next to nothing.
     """
-    if n_rules == 1:
-        return {}
-    noise = posterior.noise_variance / posterior.n_rows
-    return {"agreement": posterior.n_columns * noise / _FAR**2, "alpha": noise / _FAR**2}
+    rows_each = n_distinct / posterior.n_columns
+    least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
+    weights = dict.fromkeys(("agreement", "alpha", "slope"), least)
+    if n_rules > 1:
+        noise = posterior.noise_variance / posterior.n_rows
+        weights["agreement"] = max(least, posterior.n_columns * noise / _FAR**2)
+        weights["alpha"] = max(least, noise / _FAR**2)
+    return weights
 
 
 def reestimated(posterior: Laplace, free, least=None):

@@ -12,8 +12,8 @@ change of some length by a factor of e. Terms stay what a person can read, by co
   widths are those of the start, plus log s_k / s_k(0), plus x. Terms that come together so become
   narrower by themselves. At the upper bound of x a term is 0.9 true at half the distance s_k, so
   that min(mu_k, mu_l) of two neighbours nowhere exceeds 0.9: they can be told apart.
-* Terms that share their place with others move by themselves: a location by its shift in units of
-  the term's own width, at most one width beyond the data.
+* Terms of scattered rules, and terms that share their place, move by themselves: a location by its
+  shift in units of the term's own width, at most one width beyond the data.
 
 ``is_free`` is the classic ANFIS: terms stay in order, but may leave the data by their distance, and
 be four times as wide. It fits exact data better, by rules that cannot be read.
@@ -26,7 +26,7 @@ from itertools import product
 
 import numpy as np
 
-from .antecedent import Antecedent
+from .antecedent import Antecedent, ScatteredAntecedent
 
 __all__ = ["Premise"]
 
@@ -126,10 +126,11 @@ class Premise:
         lower, upper = np.full(raw.size, -_LOG_FACTOR), np.full(raw.size, _LOG_FACTOR)
         unit, ordered = np.ones(raw.size), []
         terms = _terms(antecedent)
+        is_ordered = not isinstance(antecedent, ScatteredAntecedent)
         for j in sorted({term.input for term in terms}):
             own = sorted((t for t in terms if t.input == j), key=lambda t: raw[t.location])
             locations = np.array([term.location for term in own])
-            if len(own) > 1 and (np.diff(raw[locations]) > 0.0).all():
+            if is_ordered and len(own) > 1 and (np.diff(raw[locations]) > 0.0).all():
                 row = _Ordered.of(
                     locations,
                     np.concatenate([term.widths for term in own]),

@@ -9,7 +9,7 @@ otherwise hardly overlap.
 
 import numpy as np
 
-from ..antecedent import GridAntecedent, RuleTableAntecedent, TermGroup
+from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ..rows import Rows
 from .sample import representative_rows
 
@@ -24,14 +24,15 @@ _POINTS = 65
 _MOST_TURNS = 4
 
 
-def clustered_antecedent(families, rows: Rows, label, premise_inputs):
+def clustered_antecedent(families, rows: Rows, label, premise_inputs, share_terms=False):
     """A rule for every cluster that ``label(table, weight)`` finds in [z, y].
 
     z are the ``premise_inputs`` alone, in whose terms the rules are; ``families`` has one entry per
     input of the rows.
 
     ``label`` returns one integer per row; negative ones (noise) belong to no rule. A single cluster
-    is a single rule without terms: a linear model.
+    is a single rule without terms: a linear model. Where terms are shared, those of an input that
+    could not be told apart are one.
     """
     table, weight, _ = representative_rows(rows)
     n_inputs = rows.X.shape[1]
@@ -59,7 +60,23 @@ def clustered_antecedent(families, rows: Rows, label, premise_inputs):
             for m, c in zip(members, centers, strict=True)
         ]
     )
-    return _with_shared_terms(families, inputs, centers, spreads, masses)
+    if share_terms:
+        return _with_shared_terms(families, inputs, centers, spreads, masses)
+    widths = np.maximum(spreads, _SMALLEST_WIDTH) * np.sqrt(inputs.size)
+    if len({families[j] for j in inputs}) == 1:
+        family = families[inputs[0]]
+        theta = family.from_center_and_width(centers[:, inputs], widths[:, inputs])
+        return ScatteredAntecedent.build(family, inputs, theta)
+    groups = tuple(
+        TermGroup(
+            families[j],
+            np.full(found.size, j),
+            families[j].from_center_and_width(centers[:, j], widths[:, j]),
+        )
+        for j in inputs
+    )
+    first = found.size * np.arange(inputs.size)
+    return RuleTableAntecedent(groups, np.arange(found.size)[:, None] + first)
 
 
 def _with_shared_terms(families, inputs, centers, spreads, masses):

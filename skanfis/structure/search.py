@@ -42,7 +42,7 @@ from .grid import Spacing, grid_antecedent
 from .held_out import held_out_loss
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
-from .tuning import FIRST_PENALTY, FIRST_STEPS, MOST_ROWS, WORTHWHILE, Tuned, scaled, tune
+from .tuning import FIRST_PENALTY, FIRST_STEPS, MOST_ROWS, Tuned, scaled, settled, tune
 
 __all__ = ["SEARCHED", "Candidate", "StructureSearch"]
 
@@ -58,7 +58,7 @@ _MOST_TERMS = 6
 # After each round, so many inputs stay in the running for a further term.
 _MOST_GROWING = 8
 # Of those that are tried in a round, so many are trained: the most promising at their start.
-_MOST_TRAINED = 2
+_MOST_TRAINED = 3
 # More inputs than this are screened before terms are tried on them.
 _MOST_UNSCREENED = 16
 # Turns of weights and premises of a candidate.
@@ -72,7 +72,10 @@ _IN_WORDS = {
     "subtractive": "clusters of radius {}",
 }
 _MOST_FOLDS = 5
-# The same where the score is an error: a part of it, and a part over the root of the rows.
+# What a larger model must gain in n log FPE: "very strong" in the words of Kass and Raftery (1995).
+# The best of many candidates gains up to this on a plane with noise. Where the score is an error, a
+# part of it and a part over the root of the rows.
+_DECISIVE = 10.0
 _WORTHWHILE_ERROR = 0.005
 _ERROR_OF_ERROR = 0.5
 
@@ -241,7 +244,7 @@ class StructureSearch:
 
     def _is_better(self, candidate, than):
         if not self.folds:
-            return self._score(candidate) < self._score(than) - WORTHWHILE
+            return self._score(candidate) < self._score(than) - _DECISIVE
         worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(self.n_sample))
         return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
 
@@ -253,6 +256,7 @@ class StructureSearch:
                 rows,
                 lambda t, w: clusterer.fit(t, sample_weight=w).labels_,
                 self.inputs,
+                candidate.clustering == "k-means",
             )
         return grid_antecedent(self.families, candidate.counts, self.spacing, self.overlap)
 
@@ -352,7 +356,10 @@ class StructureSearch:
         n_rows = effective_weight(self.rows)
         penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows)
         return Start(
-            tuned.problem.antecedent, penalty, tuned.displacement, candidates=self._report()
+            tuned.problem.antecedent,
+            penalty,
+            settled(tuned.displacement),
+            candidates=self._report(),
         )
 
     def _report(self):

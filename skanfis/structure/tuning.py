@@ -34,6 +34,7 @@ __all__ = [
     "WORTHWHILE",
     "Tuned",
     "scaled",
+    "settled",
     "tune",
     "tuned_start",
 ]
@@ -52,6 +53,8 @@ FIRST_STEPS = 5
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 _MOST_COLUMNS = 512
 _FEW_STEPS, _FEW_TURNS = 3, 2
+# Distinct rows per consequent from which on the classic freedom is tried.
+_ROWS_EACH = 2.0
 # Part of the rows that effective parameters may be.
 _MOST_EFFECTIVE = 0.5
 _STEPS = 2
@@ -61,6 +64,7 @@ _TOLERANCE = 1e-3
 # What a larger or freer model must gain in -2 log p: less is "not worth more than a bare mention"
 # (Kass and Raftery 1995).
 WORTHWHILE = 2.0
+_DIGITS = 5
 # Turns without a rise of the evidence, and what counts as one, in -2 log p.
 _PATIENCE = 2
 _RISE = 0.5
@@ -141,6 +145,7 @@ def tune(
     if problem.n_columns > _MOST_COLUMNS:
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
     n_rules, penalty = problem.antecedent.n_rules, problem.penalty
+    n_distinct = problem.rows.n_rows  # a search sample has no row twice
 
     def posterior_at(evaluation, penalty, curvature=None):
         return laplace(
@@ -157,7 +162,7 @@ def tune(
     def improved(evaluation, penalty, steps, free, curvature=None):
         for _ in range(steps):
             posterior = posterior_at(evaluation, penalty, curvature)
-            least = None if is_free else least_weights(posterior, n_rules)
+            least = {} if is_free else least_weights(posterior, n_rules, n_distinct)
             penalty = reestimated(posterior, free, least)
         return posterior_at(evaluation, penalty, curvature)
 
@@ -231,20 +236,30 @@ def tuned_start(
         return tune(problem, premise, free, n_sample, turns, is_loose=is_free, is_free=is_free)
 
     best, is_free = tuned(False), False
-    if premises_move and problem.n_columns <= _MOST_COLUMNS and best.displacement.size:
+    # Where there are hardly more rows than consequents, any freedom finds a way to pass through all.
+    is_determined = sample.n_rows >= _ROWS_EACH * problem.n_columns
+    if premises_move and is_determined and problem.n_columns <= _MOST_COLUMNS and best.displacement.size:
         loose = tuned(True)
         if best.is_beaten_loosely(loose):
             best, is_free = loose, True
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
-    return Start(antecedent, penalty, best.displacement, is_free)
+    return Start(antecedent, penalty, settled(best.displacement), is_free)
+
+
+def settled(displacement):
+    """Displacements without the digits that rounding errors reach; training goes on from there."""
+    return np.round(displacement, _DIGITS)
 
 
 def scaled(penalty: Penalty, free, ratio):
-    """The free weights times a ratio: relative to a mean over rows, they fall with their number."""
+    """The free weights times a ratio: relative to a mean over rows, they fall with their number.
+
+    More digits than three say nothing, and would carry rounding errors into the model.
+    """
     own = {
         "agreement": penalty.agreement,
         "alpha": penalty.alpha,
         "slope": penalty.rho,
         "stiffness": penalty.stiffness,
     }
-    return replace(penalty, **{key: own[key] * ratio for key in free})
+    return replace(penalty, **{key: float(f"{own[key] * ratio:.3g}") for key in free})

@@ -35,7 +35,9 @@ __all__ = ["huber_weights", "learn_robustly", "resistant"]
 _NORMAL_MEDIAN = 0.6744897501960817
 # Of the linear model, robust standard deviations that no shape of a sound target leaves.
 _FAR = 10.0
-_MOST_STEPS = 1000
+_MOST_STEPS, _TIGHT = 1000, 1e-9
+# Digits of the first weights: more would only carry the minimiser's errors on.
+_DIGITS = 2
 _MOST_ROUNDS = 20
 _MOST_STARTS = 4
 # Rows of less weight have no part in where training starts.
@@ -66,7 +68,7 @@ def resistant(rows):
         spread = _weighted_median(np.abs(values - center), own)
         if spread == 0.0:
             return rows, weights
-        linear = HuberRegressor(max_iter=_MOST_STEPS)
+        linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
         scaled = (values - center) / spread
         with warnings.catch_warnings():
             # A rough line will do.
@@ -81,6 +83,7 @@ def resistant(rows):
     if scale == 0.0:
         return rows, weights
     weights = np.minimum(1.0, _FAR * scale / np.maximum(sizes, np.finfo(float).tiny))
+    weights = np.maximum(np.round(weights, _DIGITS), 10.0**-_DIGITS)
     if (weights == 1.0).all():
         return rows, weights
     targets = column_statistics(rows.y, _reweighted(rows, weights**2).sample_weight)
