@@ -22,8 +22,8 @@ from .rivals import BEST_OF, GLASS_BOXES, RIVALS, fitted_rival
 
 __all__ = ["SETS", "cases", "data_sets", "load", "rivals", "run"]
 
-# Those that the ratio needs first.
-REMEMBERED = (BEST_OF, tuple(RIVALS))
+# Those that the ratio needs first, what takes minutes last.
+REMEMBERED = (BEST_OF, tuple(name for name in RIVALS if name != "EBM"), ("EBM",))
 _SEED = 0
 
 
@@ -152,8 +152,6 @@ def rivals(real_set, names=tuple(RIVALS), fit=True):
         )
         if figures is not None:
             found[rival] = figures
-    if not set(BEST_OF) <= set(found):
-        raise LookupError("its rivals are not remembered yet")
     return found
 
 
@@ -162,6 +160,8 @@ def measure(real_set, options):
     X, y = load(real_set)
     start = perf_counter()
     found = rivals(real_set, fit=not options.quick)
+    if not set(BEST_OF) <= set(found):
+        raise LookupError("its rivals are not remembered yet")
     rivals_wall = perf_counter() - start
     squares, times, read, beyond = [], [], [], 0.0
     for train, test in folds(X):
