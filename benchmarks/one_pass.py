@@ -17,7 +17,7 @@ from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.rows import Rows
-from skanfis.structure import grid_antecedent
+from skanfis.structure import Spacing, grid_antecedent
 
 from .fresh import alone
 from .report import Measure, Results, Row, Table
@@ -37,8 +37,7 @@ def make_problem():
     np.sin(y, out=y)
     y *= X[:, 1:2]
     rows = Rows.standardised(X, y)
-    low, high = ((edge - rows.inputs.offset) / rows.inputs.scale for edge in (X.min(0), X.max(0)))
-    antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], low, high, overlap=0.6)
+    antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], Spacing(rows), overlap=0.6)
     return SeparableProblem(rows, antecedent, order=1, penalty=Penalty(alpha=1e-12))
 
 

@@ -1,9 +1,9 @@
-"""How wide the terms of a grid start: the measurement behind ``training.start._OVERLAP``."""
+"""How wide the terms of a grid start: the measurement behind ``structure.request._OVERLAP``."""
 
 from unittest.mock import patch
 
 from skanfis import ANFISRegressor
-from skanfis.training import start
+from skanfis.structure import request as start
 
 from .gyro import measure, summary
 from .jang import PROBLEMS

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis.antecedent import GridAntecedent
 from skanfis.membership import MEMBERSHIPS
 from skanfis.membership.flanked import (
     PiShaped,
@@ -13,7 +14,6 @@ from skanfis.membership.flanked import (
     TwoSidedGaussian,
     ZShaped,
 )
-from skanfis.structure import grid_antecedent
 
 from .. import oracles
 
@@ -88,8 +88,8 @@ def test_a_peak_has_the_slope_of_its_side():
 
 def strengths_on_a_line(family, theta, x):
     """Normalised strengths of terms on one input."""
-    antecedent = grid_antecedent([family], [theta.shape[1]], np.zeros(1), np.ones(1), 0.6)
-    return antecedent.with_parameters(theta.ravel()).strengths(np.array([x]))
+    antecedent = GridAntecedent.build([family], [0], [theta])
+    return antecedent.strengths(np.array([x]))
 
 
 @WITH_FOOT
