@@ -139,10 +139,13 @@ def laplace(
     n_rules: int,
     displacement=None,
     curvature=None,
+    n_outputs=None,
 ):
     """The posterior at fixed premises, for a penalty of any weights.
 
-    ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own.
+    ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own;
+    ``n_outputs`` are those that vary, if not all do: a constant target says nothing about the noise
+    of another.
     """
     parts = {"agreement": normal.disagreement, "alpha": line.own, "slope": line.slopes}
     weights = _weighted(penalty)
@@ -188,8 +191,7 @@ def laplace(
         penalty,
         n_rows,
         max(error + float(np.sum(solved * (matrix @ solved))) + paid, _LEAST_ERROR),
-        # A constant target, standardised zero, says nothing about the noise of another.
-        max(int(np.count_nonzero(normal.coefficients.any(axis=0))), 1),
+        normal.coefficients.shape[1] if n_outputs is None else n_outputs,
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
         by_weight,
         curvature,

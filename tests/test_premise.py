@@ -22,12 +22,14 @@ def grid(families, counts, inputs=None):
     return oracles.random_grid(np.random.default_rng(1), families, counts, inputs)
 
 
-def scattered(family, n_rules, inputs):
+def scattered(family, n_rules, inputs, is_listed=True):
     """Rules with terms of their own, all in different places."""
     g, inputs = np.random.default_rng(2), np.array(inputs)
     centers = g.uniform(LOW[inputs], HIGH[inputs], (n_rules, inputs.size))
     theta = family.from_center_and_width(centers, g.uniform(0.5, 1.5, centers.shape))
-    return ScatteredAntecedent.build(family, inputs, theta)
+    own = ScatteredAntecedent.build(family, inputs, theta)
+    # The same listed one by one, whose terms are in order on each input.
+    return RuleTableAntecedent(own.groups, own.rule_terms) if is_listed else own
 
 
 def shared_places(family):
@@ -53,7 +55,11 @@ ORDERED = {
     "scattered bells": scattered(Bell, 4, [1, 2]),
     **{name: grid([family] * 2, [2, 5], [0, 1]) for name, family in MEMBERSHIPS.items()},
 }
-ALONE = {"shared places": shared_places(Gaussian), "shared, bells": shared_places(Bell)}
+ALONE = {
+    "shared places": shared_places(Gaussian),
+    "shared, bells": shared_places(Bell),
+    "terms of their own": scattered(Gaussian, 3, [0, 1, 2], is_listed=False),
+}
 ANTECEDENTS = ORDERED | ALONE
 ALL = pytest.mark.parametrize("antecedent", ANTECEDENTS.values(), ids=list(ANTECEDENTS))
 ON_ORDERED = pytest.mark.parametrize("antecedent", ORDERED.values(), ids=list(ORDERED))

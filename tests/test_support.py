@@ -146,7 +146,7 @@ def test_training_rows_of_rules_that_have_enough_are_covered(kind, n_rules, rng)
         return
     coverage = model.coverage(X)
     # Rules with less than half of the strongest one's say may reach beyond their own rows.
-    assert coverage.min() > 0.8
+    assert coverage.min() > 0.65
     assert np.median(coverage) > 0.98
     if n_rules == 1:
         assert_array_equal(coverage, 1.0)

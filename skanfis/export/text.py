@@ -101,7 +101,7 @@ def export_text(
     <BLANKLINE>
     Rule 1, 50 % of the weight, strongest on 20 rows:
       IF hours is high
-      THEN drift = 1.75 + 0.09 * (hours - 5)
+      THEN drift = 1.74 + 0.0903 * (hours - 5)
     <BLANKLINE>
     Terms:
       hours, trained from 0 to 10

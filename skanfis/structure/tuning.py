@@ -145,6 +145,7 @@ def tune(
     if problem.n_columns > _MOST_COLUMNS:
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
     n_rules, penalty = problem.antecedent.n_rules, problem.penalty
+    n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
     n_distinct = problem.rows.n_rows  # a search sample has no row twice
 
     def posterior_at(evaluation, penalty, curvature=None):
@@ -157,6 +158,7 @@ def tune(
             n_rules,
             x,
             curvature,
+            n_outputs,
         )
 
     def improved(evaluation, penalty, steps, free, curvature=None):
@@ -238,7 +240,12 @@ def tuned_start(
     best, is_free = tuned(False), False
     # Where there are hardly more rows than consequents, any freedom finds a way to pass through all.
     is_determined = sample.n_rows >= _ROWS_EACH * problem.n_columns
-    if premises_move and is_determined and problem.n_columns <= _MOST_COLUMNS and best.displacement.size:
+    if (
+        premises_move
+        and is_determined
+        and problem.n_columns <= _MOST_COLUMNS
+        and best.displacement.size
+    ):
         loose = tuned(True)
         if best.is_beaten_loosely(loose):
             best, is_free = loose, True

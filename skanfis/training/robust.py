@@ -149,7 +149,9 @@ def _reweighted(rows, weights):
 
 
 def _without_outliers(rows, weights):
-    return rows.part(weights >= _OUTLIER)
+    kept = weights >= _OUTLIER
+    # What is said of most rows is said of none.
+    return rows.part(kept) if 2 * np.count_nonzero(kept) >= rows.n_rows else rows
 
 
 def _is_same(one, other):

@@ -29,7 +29,9 @@ def by_k_means(table, weight):
 def rules_of(family, rows, label):
     """All inputs in the premises, all of one family."""
     n_inputs = rows.X.shape[1]
-    return clustered_antecedent([family] * n_inputs, rows, label, np.arange(n_inputs))
+    return clustered_antecedent(
+        [family] * n_inputs, rows, label, np.arange(n_inputs), share_terms=True
+    )
 
 
 def rule_parameters(antecedent, n_inputs):
@@ -60,7 +62,9 @@ class TestRules:
     def test_families_may_differ_from_input_to_input(self, rng):
         X, y, *_ = blobs(rng)
         rows = Rows.standardised(X, y)
-        mixed = clustered_antecedent([Gaussian, Bell], rows, by_k_means, np.arange(2))
+        mixed = clustered_antecedent(
+            [Gaussian, Bell], rows, by_k_means, np.arange(2), share_terms=True
+        )
         by_input = [group.theta for group in mixed.groups]
         for j, family in enumerate([Gaussian, Bell]):
             alone = rules_of(family, rows, by_k_means)
@@ -71,7 +75,9 @@ class TestRules:
         X, y, *_ = blobs(rng)
         noise = 100.0 * rng.normal(size=(len(X), 1))
         rows = Rows.standardised(np.hstack([noise, X]), y)
-        found = clustered_antecedent([Gaussian] * 3, rows, by_k_means, np.array([1, 2]))
+        found = clustered_antecedent(
+            [Gaussian] * 3, rows, by_k_means, np.array([1, 2]), share_terms=True
+        )
         expected = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
         assert {int(j) for group in found.groups for j in group.inputs} == {1, 2}
         for one, other in zip(rule_parameters(found, 2), rule_parameters(expected, 2), strict=True):
