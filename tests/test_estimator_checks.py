@@ -41,7 +41,7 @@ def estimators():
     for solver in sorted(set(SOLVERS) - {"varpro"}):
         yield solver, ANFISRegressor(partition=KMEANS, solver=solver, max_iter=MAX_ITER)
     around = {
-        # With weights of its own it passes through half of these few rows, and which half is chance.
+        # With weights of its own it passes through half of these few rows: which is chance.
         "huber": {"loss": "huber", "alpha": 0.01},
         "early stopping": {"early_stopping": True, "validation_fraction": 0.3},
         "restarts": {"n_init": 2},

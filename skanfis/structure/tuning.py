@@ -238,7 +238,7 @@ def tuned_start(
         return tune(problem, premise, free, n_sample, turns, is_loose=is_free, is_free=is_free)
 
     best, is_free = tuned(False), False
-    # Where there are hardly more rows than consequents, any freedom finds a way to pass through all.
+    # Where there are hardly more rows than consequents, any freedom passes through all.
     is_determined = sample.n_rows >= _ROWS_EACH * problem.n_columns
     if (
         premises_move
