@@ -207,8 +207,8 @@ def least_weights(posterior: Laplace, n_rules, n_distinct):
     of what is far for a target, two of its standard deviations.
 
     Where there are hardly more distinct rows than consequents, a model that passes through every
-    row explains them without noise, and nothing in the data speaks against it. And rounding errors grow
-    by 1 / alpha along what the data leave open. There the weights are never next to nothing.
+    row explains them without noise, and nothing in the data speaks against it. And rounding errors
+    grow by 1 / alpha along what the data leave open. There the weights are never next to nothing.
     """
     rows_each = n_distinct / posterior.n_columns
     least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
