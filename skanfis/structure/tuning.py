@@ -49,6 +49,8 @@ _LOOSE_ITERATIONS = 25
 # Of the noise's variance, what a loose training must bring it down to: rules that compensate one
 # another are the price, and not to be paid for less.
 _LESS_NOISE = 0.5
+# The same where terms are freed too, beyond all reading: only for data that are next to exact.
+_LEAST_NOISE = 0.01
 FIRST_STEPS = 5
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 _MOST_COLUMNS = 512
@@ -101,10 +103,10 @@ class Tuned:
             return np.inf
         return self.evaluation.mean_squared_error * (1.0 + share) / (1.0 - share)
 
-    def is_beaten_loosely(self, loose):
-        """Whether a loose training has found what this one took for noise."""
+    def is_beaten_loosely(self, loose, part=_LESS_NOISE):
+        """Whether a loose training has found what this one took for noise, down to a part of it."""
         noise, other = self.posterior.noise_variance, loose.posterior.noise_variance
-        return other < _LESS_NOISE * noise and loose.score < self.score - WORTHWHILE
+        return other < part * noise and loose.score < self.score - WORTHWHILE
 
 
 def tune(
@@ -231,11 +233,11 @@ def tuned_start(
     )
     n_sample = effective_weight(sample)
 
-    def tuned(is_free):
+    def tuned(is_loose, is_free=False):
         low, high = sample.inputs.minimum, sample.inputs.maximum
         premise = Premise.of(antecedent, low, high, is_free)
         turns = _MOST_TURNS if premises_move else 0
-        return tune(problem, premise, free, n_sample, turns, is_loose=is_free, is_free=is_free)
+        return tune(problem, premise, free, n_sample, turns, is_loose=is_loose, is_free=is_free)
 
     best, is_free = tuned(False), False
     # Where there are hardly more rows than consequents, any freedom passes through all.
@@ -246,9 +248,11 @@ def tuned_start(
         and problem.n_columns <= _MOST_COLUMNS
         and best.displacement.size
     ):
-        loose = tuned(True)
+        loose, free_terms = tuned(True), tuned(True, is_free=True)
         if best.is_beaten_loosely(loose):
-            best, is_free = loose, True
+            best = loose
+        if best.is_beaten_loosely(free_terms, _LEAST_NOISE):
+            best, is_free = free_terms, True
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
     return Start(antecedent, penalty, settled(best.displacement), is_free)
 

@@ -293,7 +293,7 @@ class TestEnd:
         result = hybrid(problem, premise, max_iter=30, tol=0.0, error_goal=goal)
         assert result.status == "error_goal"
         assert result.converged
-        first = int(np.argmax(free.loss_curve <= goal**2))
+        first = int(np.argmax(np.sqrt(free.loss_curve) <= goal))
         assert result.n_iter == first
         assert_array_equal(result.loss_curve, free.loss_curve[: first + 1])
         assert np.sqrt(result.evaluation.mean_squared_error) <= goal
