@@ -79,6 +79,8 @@ class Laplace:
         the prior; its trace in the posterior.
     curvature : ndarray of shape (n_displacements,)
         Eigenvalues of H.
+    n_columns : int
+        Consequent parameters of one output.
     """
 
     penalty: Penalty
