@@ -249,7 +249,7 @@ class _Trainer:
 
     def _start(self, rows):
         start = self.request.start(rows, self.size)
-        if self.estimator.solver != "varpro":
+        if self.learner.solver != "varpro":
             # Where the evidence was sought, variable projection has moved the premises already.
             start = replace(start, displacement=None)
         if self.estimator.term_names is not None:

@@ -21,9 +21,9 @@ sum over r' of the blocks G_(r, r'): nothing else is accumulated.
 
 *The rules' common line*, alpha. Disagreement is weighed by the rows and says nothing where there
 are none. There a pull of each rule by itself holds it: delta_r is how much the rule differs from
-the rules' common line b, in its value at its own centre and in its slopes times the distance to the
-farthest row for which it stands (see ``SeparableProblem``). b is the line of least squares through all rules,
-that for which sum_r |delta_r|^2 is smallest.
+the rules' common line b, in its value at its own centre and in its slopes times the distance to
+the farthest row for which it stands (see ``SeparableProblem``). b is the line of least squares
+through all rules, that for which sum_r |delta_r|^2 is smallest.
 
 *The slopes of that line*, rho, are a plain ridge; of a single rule it is all there is. Nothing
 pulls on the line's height: constants are free.

@@ -345,3 +345,11 @@ def test_a_single_group_says_nothing():
     X, y, run = runs(3)
     one, none = (ANFISRegressor().fit(X, y, groups=g) for g in (np.zeros(run.size), None))
     assert_array_equal(one.predict(X), none.predict(X))
+
+
+def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_start(rng):
+    X = inputs(rng)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="grid", max_iter=0).fit(X, y)
+    assert model.n_rules_ > 1
+    assert model.memberships_ == model.initial_memberships_
