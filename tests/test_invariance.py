@@ -25,7 +25,7 @@ from skanfis.membership import MEMBERSHIPS
 from skanfis.solvers import SOLVERS
 from skanfis.structure import representative_rows
 
-TOLERANCE = 5e-6
+TOLERANCE = 1e-6
 
 
 def gyro(n_rows=300):

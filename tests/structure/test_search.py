@@ -29,7 +29,7 @@ def test_linear_truth_gets_next_to_a_linear_model(rng):
     X = inputs(rng)
     y = X @ [1.0, -2.0, 0.5] + 0.1 * rng.standard_normal(400)
     model = ANFISRegressor(**QUIET).fit(X, y)
-    assert model.n_rules_ <= 2
+    assert model.n_rules_ == 1
     assert_allclose(
         model.consequents_[:, 1:], np.tile([1.0, -2.0, 0.5], (model.n_rules_, 1)), atol=0.1
     )
@@ -290,7 +290,7 @@ def test_too_few_rows_for_anything_but_a_line(rng):
 def test_noise_free_data_get_next_to_no_penalty():
     X, y = make_jang_three_input()
     model = ANFISRegressor().fit(X, y)
-    assert model.alpha_ <= 1e-4
+    assert model.alpha_ <= 1e-6
     assert model.score(X, y) > 0.9999
     assert_array_equal(model.predict(X), ANFISRegressor().fit(X, y).predict(X))
 
