@@ -29,7 +29,7 @@ from ._validation import (
     refuse_lazy,
 )
 from .exceptions import OutOfBoundsWarning
-from .membership import MEMBERSHIPS, membership_families
+from .membership import MEMBERSHIPS, TRIED_FAMILIES, membership_families
 from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
 from .readable import readability_of_rows
 from .solvers import SOLVERS
@@ -79,8 +79,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         :math:`\exp(-(x-c)^2 / 2\sigma^2)`; "bell", Jang's generalised bell
         :math:`1 / (1 + |(x-c)/a|^{2b})`; "triangular", "trapezoidal", "two_sided_gaussian",
         "pi_shaped", "s_shaped", "z_shaped", "sigmoid_difference" or "sigmoid_product"; or a class
-        of one's own. The first two are the sturdiest between sparse points. Not looked at where
-        ``partition`` is a model, which brings its own.
+        of one's own. The first two are the sturdiest between sparse points. "auto" trains the
+        structure that Gaussians have found, or that is given, with each of the first six as well,
+        for all inputs alike, and takes the one that promises the smallest error on new rows. Not
+        looked at where ``partition`` is a model, which brings its own.
     term_names : sequence of str or dict, default=None
         Names of the terms, for every input alike or by input ``{"temperature": ["cold", "hot"]}``,
         in ascending order on a grid, rule by rule otherwise. None: "low" to "high", NL to PL
@@ -273,7 +275,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             HasMethods(["fit", "fit_predict"]),
             HasMethods(["predict", "strengths"]),
         ],
-        "mf": [StrOptions(set(MEMBERSHIPS)), type, list, tuple, np.ndarray],
+        "mf": [StrOptions({"auto", *MEMBERSHIPS}), type, list, tuple, np.ndarray],
         "term_names": [list, tuple, np.ndarray, dict, None],
         "premise_features": ["array-like", str, Integral, None],
         "consequent_features": ["array-like", str, Integral, None],
@@ -606,6 +608,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             premises_move=self.solver != "lse" and self.max_iter > 0,
             seed=seed,
             names=names,
+            other_families=TRIED_FAMILIES[1:]
+            if isinstance(self.mf, str) and self.mf == "auto"
+            else (),
         )
 
     def _those_of_the_start(self):

@@ -8,6 +8,7 @@ from .sigmoid import SigmoidDifference, SigmoidProduct
 
 __all__ = [
     "MEMBERSHIPS",
+    "TRIED_FAMILIES",
     "Bell",
     "Gaussian",
     "Membership",
@@ -41,8 +42,24 @@ MEMBERSHIPS: dict[str, type[Membership]] = {
 }
 
 
+# Tried by mf="auto", the default first: those that may peak anywhere, without and with kinks.
+TRIED_FAMILIES: tuple[type[Membership], ...] = (
+    Gaussian,
+    Bell,
+    Triangular,
+    Trapezoidal,
+    TwoSidedGaussian,
+    PiShaped,
+)
+
+
 def membership_families(mf, input_names) -> list[type[Membership]]:
-    """One family per input, from a name, a class, or a sequence of these."""
+    """One family per input, from a name, a class, or a sequence of these.
+
+    "auto" is the first of ``TRIED_FAMILIES``, which the others are compared with.
+    """
+    if isinstance(mf, str) and mf == "auto":
+        return [TRIED_FAMILIES[0]] * len(input_names)
     given = [mf] * len(input_names) if isinstance(mf, str | type) else list(mf)
     if len(given) != len(input_names):
         raise ValueError(

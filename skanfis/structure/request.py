@@ -52,6 +52,8 @@ class StructureRequest:
         Of clusterings that have none of their own.
     names : sequence of str
         Of the inputs.
+    other_families : sequence of type of Membership
+        For all inputs in place of ``families``, where they promise a smaller error.
     """
 
     n_mfs: Any
@@ -64,6 +66,7 @@ class StructureRequest:
     premises_move: bool
     seed: int
     names: Sequence[str]
+    other_families: Sequence[type[Membership]] = ()
 
     @property
     def is_searched(self):
@@ -87,26 +90,40 @@ class StructureRequest:
                 self.seed,
                 self.weights,
                 _OVERLAP,
+                self.other_families,
             ).run(self.partition)
-        names: tuple[str, ...] = ()
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
-        elif isinstance(self.n_mfs, str):
-            label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
-            antecedent = clustered_antecedent(self.families, rows, label, self.premise_inputs)
-        else:
-            antecedent = self._grid(rows)
+            self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+            return replace(self._tuned(antecedent, rows, is_compared=False), term_names=names)
+        antecedent = self._antecedent(self.families, rows)
         self._warn_if_underdetermined(antecedent.n_rules, rows, size)
-        start = tuned_start(
+        is_compared = bool(self.other_families)
+        best = self._tuned(antecedent, rows, is_compared)
+        for family in self.other_families:
+            antecedent = self._antecedent([family] * len(self.families), rows)
+            other = self._tuned(antecedent, rows, is_compared)
+            best = other if other.expected_error < best.expected_error else best
+        return best
+
+    def _antecedent(self, families, rows):
+        """The rules that were asked for."""
+        if not isinstance(self.n_mfs, str):
+            return self._grid(families, rows)
+        label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
+        return clustered_antecedent(families, rows, label, self.premise_inputs)
+
+    def _tuned(self, antecedent, rows, is_compared):
+        return tuned_start(
             antecedent,
             rows,
             self.order,
             self.consequent_inputs,
             self.weights,
             self.premises_move,
+            is_compared,
         )
-        return replace(start, term_names=names)
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""
@@ -136,13 +153,13 @@ class StructureRequest:
 
         return checked
 
-    def _grid(self, rows):
+    def _grid(self, families, rows):
         counts = self._grid_counts(rows)
         n_basis = 1 + self.consequent_inputs.size
         GridSize(counts, n_basis, rows.y.shape[1]).check_grid_fits(
             self.n_mfs, _memory_limit(), self.names
         )
-        return grid_antecedent(self.families, counts, Spacing(rows), _OVERLAP)
+        return grid_antecedent(families, counts, Spacing(rows), _OVERLAP)
 
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""

@@ -88,12 +88,14 @@ class Candidate:
     size: float | None = None  # number of clusters, or the radius that they have
     clustering: str = ""  # "k-means", "subtractive" or "fcm"
     is_loose: bool = False  # whether its training begins with the premises (see ``tuning``)
+    family: type[Membership] | None = None  # where it is another one than that of the search
 
     def describe(self):
         """In words."""
+        family = "" if self.family is None else f", {self.family.name}"
         if self.counts is not None:
-            return f"grid {list(self.counts)}"
-        return _IN_WORDS[self.clustering].format(self.size)
+            return f"grid {list(self.counts)}{family}"
+        return _IN_WORDS[self.clustering].format(self.size) + family
 
 
 class StructureSearch:
@@ -114,6 +116,8 @@ class StructureSearch:
         The weights of the penalty that are given, by their names in ``evidence.FREE``.
     overlap : float
         Membership at which neighbouring terms of a grid cross.
+    other_families : sequence of type of Membership
+        For all inputs in place of ``families``, tried on the structure that is found.
     """
 
     def __init__(
@@ -126,10 +130,11 @@ class StructureSearch:
         seed,
         fixed: dict,
         overlap: float,
+        other_families: Sequence[type[Membership]] = (),
     ):
         self.rows, self.families, self.order, self.seed = rows, families, order, seed
         self.consequent_inputs = consequent_inputs
-        self.overlap = overlap
+        self.overlap, self.other_families = overlap, other_families
         self.free = [key for key in FREE if key not in fixed]
         self.first = replace(FIRST_PENALTY, **fixed)
         is_constant = rows.inputs.is_constant
@@ -156,6 +161,9 @@ class StructureSearch:
             clustering = "k-means" if partition == "auto" else partition
             clusters = self._best_clusters(clustering)
             best = best if clusters is None else self._better(best, clusters)
+        if best.counts is None or max(best.counts) > 1:
+            for family in self.other_families:
+                best = self._better(best, replace(best, family=family))
         return self._start(best)
 
     def _grow_grid(self, best):
@@ -249,16 +257,19 @@ class StructureSearch:
         return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
 
     def _antecedent(self, candidate, rows):
+        families = self.families
+        if candidate.family is not None:
+            families = [candidate.family] * len(families)
         if candidate.counts is None:
             clusterer = self._clusterer(candidate, rows.y.shape[1])
             return clustered_antecedent(
-                self.families,
+                families,
                 rows,
                 lambda t, w: clusterer.fit(t, sample_weight=w).labels_,
                 self.inputs,
                 candidate.clustering == "k-means",
             )
-        return grid_antecedent(self.families, candidate.counts, self.spacing, self.overlap)
+        return grid_antecedent(families, candidate.counts, self.spacing, self.overlap)
 
     def _clusterer(self, candidate, n_outputs):
         if candidate.clustering == "subtractive":

@@ -20,3 +20,4 @@ class Start:
     is_free: bool = False  # whether terms may become what nobody can read (see ``premise``)
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
+    expected_error: float = np.nan  # mean square on new rows, as far as it was sought

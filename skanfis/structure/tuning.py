@@ -214,18 +214,25 @@ def tune(
 
 
 def tuned_start(
-    antecedent: Antecedent, rows: Rows, order, consequent_inputs, weights, premises_move
+    antecedent: Antecedent,
+    rows: Rows,
+    order,
+    consequent_inputs,
+    weights,
+    premises_move,
+    is_compared=False,
 ) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows.
 
-    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``.
+    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``;
+    ``is_compared`` says that the error to be expected is wanted even where all of them are given.
     """
     free = [key for key in FREE if key not in weights]
     penalty = replace(FIRST_PENALTY, **weights)
     if not premises_move:
         free = [key for key in free if key != "stiffness"]
         penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
-    if not free:
+    if not free and not is_compared:
         return Start(antecedent, penalty)
     sample = search_sample(rows, MOST_ROWS)
     problem = SeparableProblem(
@@ -254,7 +261,13 @@ def tuned_start(
         if best.is_beaten_loosely(free_terms, _LEAST_NOISE):
             best, is_free = free_terms, True
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
-    return Start(antecedent, penalty, settled(best.displacement), is_free)
+    return Start(
+        antecedent,
+        penalty,
+        settled(best.displacement),
+        is_free,
+        expected_error=best.expected_error,
+    )
 
 
 def settled(displacement):

@@ -10,6 +10,7 @@ from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
+from skanfis.membership import TRIED_FAMILIES
 from skanfis.structure import search, tuning
 
 QUIET = {"warn_out_of_bounds": False}
@@ -353,3 +354,35 @@ def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_star
     model = ANFISRegressor(partition="grid", max_iter=0).fit(X, y)
     assert model.n_rules_ > 1
     assert model.memberships_ == model.initial_memberships_
+
+
+def piecewise_linear(rng, n_rows=600):
+    """Straight between five points."""
+    X = rng.uniform(-1.0, 1.0, (n_rows, 1))
+    knots = np.linspace(-1.0, 1.0, 5)
+    y = np.interp(X[:, 0], knots, [0.0, 2.0, -1.0, 1.5, 0.5])
+    return X, y + 0.02 * rng.standard_normal(n_rows)
+
+
+def test_family_is_that_of_the_truth_where_it_is_asked_for(rng):
+    X, y = piecewise_linear(rng)
+    settings = {"order": 0, "n_mfs": 5}
+    model = ANFISRegressor(mf="auto", **settings, **QUIET).fit(X, y)
+    assert model.model_.antecedent.groups[0].family.name == "triangular"
+    gaussian = ANFISRegressor(**settings, **QUIET).fit(X, y)
+    left, of_gaussians = 1.0 - model.score(X, y), 1.0 - gaussian.score(X, y)
+    assert left < 1e-3
+    assert left < 0.5 * of_gaussians
+
+
+def test_searched_structure_is_tried_with_every_family(rng):
+    X, y = piecewise_linear(rng)
+    model = ANFISRegressor(partition="grid", mf="auto", **QUIET).fit(X, y)
+    best = ANFISRegressor(partition="grid", **QUIET).fit(X, y).structures_[0]
+    found = {line["structure"]: line["expected_error"] for line in model.structures_}
+    families = [f"{best['structure']}, {family.name}" for family in TRIED_FAMILIES[1:]]
+    assert set(families) <= set(found)
+    assert found[best["structure"]] == best["expected_error"]
+    # What is trained is what promised most.
+    name = model.model_.antecedent.groups[0].family.name
+    assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"
