@@ -17,7 +17,7 @@ from threadpoolctl import ThreadpoolController
 
 from ._validation import warn_user
 from .antecedent import GridAntecedent
-from .model import TSKModel
+from .model import TargetRange, TSKModel
 from .naming import default_term_names, given_term_names
 from .penalty import Penalty
 from .rows import Rows, check_scales
@@ -245,6 +245,7 @@ class _Trainer:
             ).change_units(offset, scale),
             term_names=start.term_names,
             output_names=self.data.output_names,
+            target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
         )
 
     def _start(self, rows):

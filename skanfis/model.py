@@ -16,6 +16,9 @@ distance of L standard deviations h_j of each input in training,
 
 Strengths are those of the nearest point; they sum to one everywhere, so that no policy ever gives a
 silent zero.
+
+Outputs are held too, inside the box and out of it: within L standard deviations of the training
+target, or half a one where L is less, of its range. Whatever the inputs, no answer is further off.
 """
 
 from dataclasses import dataclass, replace
@@ -28,14 +31,45 @@ from .consequent import rule_outputs
 from .naming import default_term_names
 from .support import RuleSupport
 
-__all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel"]
+__all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel", "TargetRange"]
 
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # How far the tangent is followed by default, in standard deviations of each input.
 MAX_EXTRAPOLATION = 0.5
 
+# Of the target, in standard deviations, whatever the limit of inputs: what a peak between rows may
+# take beyond the range that was seen. The range has two deviations at least, so that this is a
+# quarter of it at most.
+_LEAST_MARGIN = 0.5
+
 # Bytes that the intermediate results of one block of rows may take.
 _BLOCK_BYTES = 2**21
+
+
+@dataclass(frozen=True, eq=False)
+class TargetRange:
+    """What the target was in training.
+
+    Attributes
+    ----------
+    minimum, maximum : ndarray of shape (n_outputs,)
+    spread : ndarray of shape (n_outputs,)
+        Weighted standard deviation, positive.
+    """
+
+    minimum: np.ndarray
+    maximum: np.ndarray
+    spread: np.ndarray
+
+    def change_units(self, offset, scale):
+        """The same in units y = offset + scale * y_now, with positive scales."""
+        low, high = (offset + scale * end for end in (self.minimum, self.maximum))
+        return TargetRange(low, high, scale * self.spread)
+
+    def limits(self, max_extrapolation):
+        """Lowest and highest output, (2, n_outputs)."""
+        margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
+        return np.stack([self.minimum - margin, self.maximum + margin])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,11 +98,14 @@ class TSKModel:
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float
         L of "linear": how far the tangent is followed, in standard deviations (``spread``) of each
-        input beyond its range; zero or positive, or infinite.
+        input beyond its range; zero or positive, or infinite. Where it is infinite, outputs are not
+        held either.
     support : RuleSupport or None
         Where the training data of every rule lie; None where the model knows of none.
     term_names : tuple of str
         One per term, unique on its input; where not given, see ``naming``.
+    target : TargetRange or None
+        What outputs are held by; None where the model knows of no data, and they are not held.
     output_names : tuple of str
         Where not given "y", or "y0", "y1", ... of several outputs.
     """
@@ -88,6 +125,7 @@ class TSKModel:
     support: RuleSupport | None = None
     term_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
+    target: TargetRange | None = None
 
     def __post_init__(self):
         if not self.term_names:
@@ -127,6 +165,13 @@ class TSKModel:
         textbook[:, : self.coefficients.shape[1]] = self.coefficients
         textbook[:, 0] -= np.einsum("j,rjo->ro", self.reference, textbook[:, 1:])
         return textbook
+
+    @property
+    def output_limits(self):
+        """Lowest and highest output that the model gives, (2, n_outputs); infinite if not held."""
+        if self.target is None:
+            return np.full((2, self.n_outputs), [[-np.inf], [np.inf]])
+        return self.target.limits(self.max_extrapolation)
 
     def memberships(self, trained=True):
         """Memberships in the user's units, after training or before it.
@@ -176,7 +221,7 @@ class TSKModel:
     def gradient(self, X):
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
 
-        Rows out of the box are taken at its nearest point.
+        Rows out of the box are taken at its nearest point, and outputs before they are held.
         """
         n_values = self.n_inputs * self.n_outputs
 
@@ -286,11 +331,18 @@ class TSKModel:
         reach = (self.max_extrapolation * self.spread)[:, None]
         return np.clip(way, -reach, reach)
 
+    def _hold(self, outputs):
+        """Outputs (n_outputs, n_rows) within their limits."""
+        if self.target is None:
+            return outputs
+        low, high = self.output_limits[:, :, None]
+        return np.minimum(np.maximum(outputs, low), high)
+
     def _strengths(self, Z):
         return self.antecedent.strengths(self._clip(Z))
 
     def _outputs(self, Z):
-        return self._combine(self.antecedent.strengths(Z), Z)
+        return self._hold(self._combine(self.antecedent.strengths(Z), Z))
 
     def _outputs_clipped(self, Z):
         return self._outputs(self._clip(Z))
@@ -299,7 +351,7 @@ class TSKModel:
         """Value and slope of the nearest point in the box."""
         inside = self._clip(Z)
         values, gradient = self._values_and_gradient(inside)
-        return values + np.einsum("ji,joi->oi", self._held(Z - inside), gradient)
+        return self._hold(values + np.einsum("ji,joi->oi", self._held(Z - inside), gradient))
 
     def _values_and_gradient(self, Z):
         """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).

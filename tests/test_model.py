@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian
-from skanfis.model import OUT_OF_BOUNDS, TSKModel
+from skanfis.model import OUT_OF_BOUNDS, TargetRange, TSKModel
 from skanfis.support import RuleSupport
 
 from . import oracles
@@ -442,3 +442,45 @@ def test_pickled_model_predicts_the_same_to_the_last_bit(frozen, rng):
             assert_array_equal(copy.with_out_of_bounds(policy).predict(X), expected)
         assert_array_equal(copy.coverage(X), frozen.coverage(X))
         assert copy.memberships() == frozen.memberships()
+
+
+# Outputs that are held -------------------------------------------------------------------------
+
+TARGET = TargetRange(np.array([-1.0]), np.array([0.5]), np.array([0.6]))
+
+
+@pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
+@pytest.mark.parametrize(("limit", "margin"), [(0.0, 0.3), (0.5, 0.3), (1.0, 0.6)])
+def test_outputs_are_held_beside_the_range_of_the_target(policy, limit, margin):
+    free = build(scattered(), out_of_bounds=policy, max_extrapolation=limit)
+    X = np.random.default_rng(4).uniform(-4.0, 4.0, (500, 3))
+    said, answer = free.predict(X), replace(free, target=TARGET).predict(X)
+    low, high = -1.0 - margin, 0.5 + margin
+    assert (said < low).any()
+    assert (said > high).any()
+    assert_array_equal(answer, np.clip(said, low, high))
+
+
+def test_tangent_without_end_is_not_held():
+    free = build(scattered(), out_of_bounds="linear", max_extrapolation=np.inf)
+    X = np.random.default_rng(4).uniform(-400.0, 400.0, (50, 3))
+    assert_array_equal(replace(free, target=TARGET).predict(X), free.predict(X))
+
+
+def test_no_row_however_far_is_answered_beyond_the_limits():
+    g = np.random.default_rng(0)
+    X, weight = g.standard_t(1.5, (200, 3)), g.integers(0, 3, 200)
+    y = np.sin(X[:, 0]) + 0.1 * g.standard_normal(200)
+    estimator = ANFISRegressor(3).fit(X, y, sample_weight=weight)
+    own = y[weight > 0]
+    deviation = np.sqrt(np.cov(y, fweights=weight, ddof=0))
+    limits = [own.min() - 0.5 * deviation, own.max() + 0.5 * deviation]
+    assert_allclose(estimator.model_.output_limits[:, 0], limits, rtol=1e-12)
+    anywhere = estimator.model_.predict(g.standard_t(0.5, (2000, 3)))
+    assert anywhere.min() >= limits[0]
+    assert anywhere.max() <= limits[1]
+
+
+def test_target_in_other_units():
+    moved = TARGET.change_units(np.array([10.0]), np.array([2.0]))
+    assert_allclose(moved.limits(0.5), 10.0 + 2.0 * TARGET.limits(0.5))

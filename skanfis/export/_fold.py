@@ -378,4 +378,5 @@ def _with_raw_target(model, label, transformer):
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T
     coefficients = model.coefficients * scale
     coefficients[:, 0] += offset
-    return replace(model, coefficients=coefficients)
+    target = None if model.target is None else model.target.change_units(offset, scale)
+    return replace(model, coefficients=coefficients, target=target)

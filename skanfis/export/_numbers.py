@@ -78,6 +78,8 @@ class Numbers:
         The inputs that take part in the consequents.
     reach : ndarray of shape (n_inputs,) or None
         How far the tangent is followed; None where it is without end.
+    output_low, output_high : ndarray of shape (n_outputs,) or None
+        What outputs are held within; None where they are not.
     support : ndarray of shape (n_rules, 2 + n_inputs + n_inputs (n_inputs + 1) / 2) or None
         Of each rule in coverage: its share, its radius, its centre, and its factor row by row up to
         the diagonal, for inputs about the reference in standard deviations. None where the model
@@ -98,6 +100,8 @@ class Numbers:
     coefficients: np.ndarray
     slope_inputs: np.ndarray
     reach: np.ndarray | None
+    output_low: np.ndarray | None
+    output_high: np.ndarray | None
     support: np.ndarray | None
 
     @classmethod
@@ -119,6 +123,7 @@ class Numbers:
             rule_terms = np.where(antecedent.rule_terms < 0, model.antecedent.n_terms, 0)
             rule_terms += np.maximum(antecedent.rule_terms, 0)
         offset, coefficients, slope_inputs = _consequents(model, reference)
+        output_low, output_high = _output_limits(model, dtype)
         return cls(
             dtype=dtype,
             low=low,
@@ -134,6 +139,8 @@ class Numbers:
             coefficients=_rounded(coefficients, dtype, "a consequent"),
             slope_inputs=slope_inputs,
             reach=_reach(model, dtype),
+            output_low=output_low,
+            output_high=output_high,
             support=None if model.support is None else _support(model, reference),
         )
 
@@ -167,6 +174,14 @@ def _reach(model, dtype):
     reach = model.max_extrapolation * model.spread
     held = np.minimum(reach, float(limits.max)).astype(dtype)
     return np.where(held < limits.tiny, dtype.type(0.0), held)
+
+
+def _output_limits(model, dtype):
+    """What outputs are held within, in a type, its ends standing for what is beyond; or None."""
+    if not np.isfinite(model.output_limits).all():
+        return None, None
+    end = float(np.finfo(dtype).max)
+    return np.clip(model.output_limits, -end, end).astype(dtype)
 
 
 def _support(model, reference):

@@ -6,7 +6,7 @@
         "format": "skanfis-model",
         "version": 1,
         "inputs": [{"name": "x0", "minimum": ..., "maximum": ..., "reference": ..., "spread": ...}],
-        "outputs": ["y"],
+        "outputs": [{"name": "y", "minimum": ..., "maximum": ..., "spread": ...}],
         "out_of_bounds": "linear",
         "max_extrapolation": 0.5,
         "rule_base": "grid",
@@ -27,8 +27,9 @@
 Numbers are written so that the same double comes back; widths stay the logarithms that the model
 holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
 terms are positions in "terms", -1 for an input that it does not look at. "max_extrapolation" is
-null where the tangent has no end. "support" has an entry per rule, its factor row by row up to the
-diagonal; it is null where the model knows of no data.
+null where the tangent has no end. An output's minimum, maximum and spread are those of the target
+in training. "support" has an entry per rule, its factor row by row up to the diagonal. Either is
+null where the model knows of no data.
 """
 
 import json
@@ -46,7 +47,7 @@ from ..antecedent import (
     TermGroup,
 )
 from ..membership import MEMBERSHIPS
-from ..model import OUT_OF_BOUNDS, TSKModel
+from ..model import OUT_OF_BOUNDS, TargetRange, TSKModel
 from ..support import RuleSupport
 from ._fold import fold
 from ._limits import (
@@ -81,6 +82,7 @@ _FILE = [
     "support",
 ]
 _INPUT = ["name", "minimum", "maximum", "reference", "spread"]
+_OUTPUT = ["name", "minimum", "maximum", "spread"]
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 # Of weights, each of which is a part of the whole.
 _ROUNDING = 1e-6
@@ -148,7 +150,7 @@ def export_json(estimator):
         "format": _FORMAT,
         "version": _VERSION,
         "inputs": inputs,
-        "outputs": list(model.output_names),
+        "outputs": _output_items(model),
         "out_of_bounds": model.out_of_bounds,
         "max_extrapolation": None if isinf(limit) else limit,
         "rule_base": _KINDS[type(model.antecedent)],
@@ -254,7 +256,7 @@ def _model(document):
         document, _FILE, "the file"
     )
     input_names, box = _inputs(_list(inputs, "inputs"))
-    outputs = [_text(name, "outputs") for name in _list(outputs, "outputs")]
+    output_names, target = _outputs(_list(outputs, "outputs"))
     if policy not in OUT_OF_BOUNDS:
         raise ValueError(f"out_of_bounds is {shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
     limit = inf if limit is None else number(limit, "max_extrapolation", 0.0)
@@ -280,7 +282,8 @@ def _model(document):
         max_extrapolation=limit,
         support=None if support is None else _support(support, n_rules, len(inputs)),
         term_names=term_names,
-        output_names=tuple(outputs),
+        output_names=output_names,
+        target=target,
     )
 
 
@@ -358,6 +361,39 @@ def _inputs(inputs):
         names.append(_text(name, where))
         box.append([low, high, reference, spread])
     return tuple(names), np.array(box).T.copy()
+
+
+def _output_items(model):
+    """Every output's name, and what the target was in training."""
+    target = model.target
+    if target is None:
+        return [dict.fromkeys(_OUTPUT) | {"name": name} for name in model.output_names]
+    numbers = (values.tolist() for values in (target.minimum, target.maximum, target.spread))
+    return [
+        dict(zip(_OUTPUT, item, strict=True))
+        for item in zip(model.output_names, *numbers, strict=True)
+    ]
+
+
+def _outputs(outputs):
+    """Names, and the range of the target, which is known of every output or of none."""
+    names, known = [], []
+    for k, item in enumerate(outputs):
+        where = f"outputs[{k}]"
+        name, *numbers = _members(item, _OUTPUT, where)
+        names.append(_text(name, where))
+        if all(value is None for value in numbers):
+            continue
+        low, high, spread = (
+            number(value, f"{where}.{key}", SMALLEST_NUMBER if key == "spread" else -LARGEST_NUMBER)
+            for key, value in zip(_OUTPUT[1:], numbers, strict=True)
+        )
+        if low > high:
+            raise ValueError(f"{where}: minimum is above maximum.")
+        known.append([low, high, spread])
+    if known and len(known) < len(names):
+        raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
+    return tuple(names), TargetRange(*np.array(known).T.copy()) if known else None
 
 
 def _read_terms(terms, n_inputs):

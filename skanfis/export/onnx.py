@@ -123,7 +123,10 @@ class _Formula:
         summed = self._weigh(strengths, by_rule)
         if self.policy == "linear":
             summed = summed + self._change(strengths, changes, by_rule, way_out)
-        y = summed + numbers.offset + not_finite
+        y = summed + numbers.offset
+        if numbers.output_low is not None:
+            y = y.at_least(numbers.output_low).at_most(numbers.output_high)
+        y = y + not_finite
         if self.policy == "nan":
             y = (_way_out(x, inside) > 0.0).where(np.full((1, 1), np.nan), y)
         return y

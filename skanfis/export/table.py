@@ -159,7 +159,7 @@ def explain(estimator, X, *, min_strength=0.0):
         * "row": its position in X, from 0;
         * "output": the name of the output;
         * "rule": the rule's number, missing for other lines;
-        * "if": its terms, "other rules", or "beyond x" (see below);
+        * "if": its terms, "other rules", "beyond x" or "held" (see below);
         * "strength": the part that the rule has in the row; the sum over rules is one;
         * "value": what the rule says there;
         * "contribution": strength times value. **The sum of the contributions to a row's output is
@@ -169,7 +169,8 @@ def explain(estimator, X, *, min_strength=0.0):
         ``out_of_bounds="linear"``, a line "beyond x" for each input that is outside has the way to
         the row: its "value" is the slope there, its "contribution" the slope times the distance, or
         times ``max_extrapolation`` standard deviations where that is less.
-        With "nan" the values and contributions of such rows are missing.
+        With "nan" the values and contributions of such rows are missing. Where an output is held at
+        the limits of its training, a line "held" has the difference to what the rules say.
 
     Raises
     ------
@@ -205,8 +206,13 @@ def explain(estimator, X, *, min_strength=0.0):
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
     lines = [_rule_lines(model, strengths, values, min_strength)]
+    said = np.einsum("nr,nro->no", strengths, values)
     if model.out_of_bounds == "linear" and not inside.all():
-        lines.append(_lines_beyond(model, model.way_out(rows), model.gradient(nearest)))
+        way, gradient = model.way_out(rows), model.gradient(nearest)
+        lines.append(_lines_beyond(model, way, gradient))
+        said += np.einsum("nj,njo->no", way, gradient)
+    low, high = model.output_limits
+    lines.append(_lines_held(model, np.clip(said, low, high) - said))
     table = pd.concat(lines).sort_values(["row", "output", "place"], kind="stable")
     table["output"] = np.array(model.output_names, dtype=object)[table["output"]]
     table["rule"] = table["rule"].astype("Int64")
@@ -257,6 +263,23 @@ def _rule_lines(model, strengths, values, min_strength):
         }
     )
     return pd.concat([fired, others]) if len(others) else fired
+
+
+def _lines_held(model, change):
+    """A line for each output that is held at its limit."""
+    row, output = np.nonzero(np.nan_to_num(change))
+    return pd.DataFrame(
+        {
+            "row": row,
+            "output": output,
+            "rule": np.nan,
+            "if": np.full(row.size, "held", dtype=object),
+            "strength": np.nan,
+            "value": np.nan,
+            "contribution": change[row, output],
+            "place": model.n_rules + 1 + model.n_inputs,
+        }
+    )
 
 
 def _lines_beyond(model, distance, gradient):

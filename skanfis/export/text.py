@@ -107,7 +107,8 @@ def export_text(
       hours, trained from 0 to 10
         low:  gaussian, center 0, width 4.95
         high: gaussian, center 10, width 4.95
-    Outside these ranges: out_of_bounds='linear', max_extrapolation=...
+    Outside these ranges: out_of_bounds='linear', max_extrapolation=0.5.
+    Held within the limits of its training: drift, -0.0169 to 5.68.
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))
@@ -222,4 +223,9 @@ def _legend(model, precision):
             f"    {term['name'] + ':':<{width + 1}} {term_text(term, precision)}" for term in terms
         ]
     lines.append(f"Outside these ranges: {model.policy}.")
+    for k, name in enumerate(model.output_names):
+        low, high = model.output_limits[:, k]
+        if np.isfinite([low, high]).all():
+            ends = " to ".join(place(end, precision, high - low) for end in (low, high))
+            lines.append(f"Held within the limits of its training: {name}, {ends}.")
     return "\n".join(lines)

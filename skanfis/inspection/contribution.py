@@ -26,7 +26,8 @@ class RuleContributionDisplay:
     """Contributions of the rules to the prediction along one input, the rest held.
 
     A rule contributes its strength times the distance of its value from a baseline; the sum of the
-    contributions and the baseline is the prediction.
+    contributions and the baseline is the prediction, before it is held at the limits of its
+    training.
 
     Make it with :meth:`from_estimator`; parameters are stored as attributes.
 

@@ -13,7 +13,7 @@ from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import OUT_OF_BOUNDS, TSKModel
 
 from ..oracles import random_grid, random_scattered
-from .rule_bases import OFFSET, SCALE, build
+from .rule_bases import OFFSET, SCALE, build, narrow_target
 
 N_ROWS = 10_000
 
@@ -56,7 +56,9 @@ def generate():
         policy, limit = policies[i % len(policies)], limits[i % len(limits)]
         antecedent = make(np.random.default_rng(i), family)
         label = f"{name}, {kind}, order {order}, {n_outputs} outputs, {policy} {limit}"
-        model = build(antecedent, order, n_outputs, out_of_bounds=policy, max_extrapolation=limit)
+        beyond = {"out_of_bounds": policy, "max_extrapolation": limit}
+        target = None if n_outputs == 1 else narrow_target(n_outputs)
+        model = build(antecedent, order, n_outputs, target=target, **beyond)
         yield Case(label, name, kind, model)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian, TwoSidedGaussian
-from skanfis.model import TSKModel
+from skanfis.model import TargetRange, TSKModel
 
 from .. import oracles
 
@@ -56,6 +56,12 @@ def build(antecedent, order=1, n_outputs=1, **changes):
         "support": oracles.random_support(g, n_rules, 3).change_units(OFFSET, SCALE),
     }
     return TSKModel(**(settings | changes))
+
+
+def narrow_target(n_outputs):
+    """A target whose limits hold some of the outputs, which are of order one."""
+    ones = np.ones(n_outputs)
+    return TargetRange(-1.0 * ones, 1.5 * ones, 0.8 * ones)
 
 
 MODELS = {

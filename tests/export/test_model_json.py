@@ -14,14 +14,13 @@ from skanfis.export import export_json, export_text, read_json, write_json
 from skanfis.export.model_json import parse_json
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import OUT_OF_BOUNDS, TSKModel
-from skanfis.support import RuleSupport
 
 from .. import oracles
 from .json_mutations import mutated_numbers, with_number
-from .rule_bases import MODELS, build, rows_of
+from .rule_bases import MODELS, build, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
-A_GRID = MODELS["grid, order 1, 2 outputs"]
+A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
 
 
 def changed(change, model=A_GRID):
@@ -42,8 +41,8 @@ def assert_same(read, model):
             for group, read_group in zip(ours.groups, theirs.groups, strict=True):
                 assert read_group.family is group.family
                 assert_array_equal(read_group.inputs, group.inputs)
-        elif field.name == "support" and ours is not None:
-            for part in fields(RuleSupport):
+        elif field.name in ("support", "target") and ours is not None:
+            for part in fields(ours):
                 assert_array_equal(getattr(theirs, part.name), getattr(ours, part.name))
         else:
             assert_array_equal(theirs, ours)
@@ -136,8 +135,16 @@ REFUSED = [
     (_set("out_of_bounds", "wrap"), "out_of_bounds is 'wrap'"),
     (_set("out_of_bounds", ["clip"]), "out_of_bounds is"),
     (_set("outputs", []), "outputs: .* is not a list of 1 or more"),
-    (_set("outputs", [1, 2]), "outputs: 1 is not a name"),
-    (_set("outputs", ["y"]), r'"consequents" of rules\[0\] must be one list per output'),
+    (_set("outputs", [1, 2]), r"outputs\[0\] is 1, not an object"),
+    (_set("outputs", 0, "name", 1), r"outputs\[0\]: 1 is not a name"),
+    (_set("outputs", 0, "spread", 0.0), r"outputs\[0\]\.spread: 0\.0 is not a number from"),
+    (_set("outputs", 0, "minimum", 3.0), r"outputs\[0\]: minimum is above maximum"),
+    (_set("outputs", 0, "minimum", None), r"outputs\[0\]\.minimum: None is not a number"),
+    (
+        lambda d: d["outputs"][0].update(minimum=None, maximum=None, spread=None),
+        "outputs: minimum, maximum and spread are null of some, but not of all",
+    ),
+    (lambda d: d["outputs"].pop(), r'"consequents" of rules\[0\] must be one list per output'),
     (_set("inputs", {}), "inputs: .* is not a list"),
     (_set("inputs", 0, []), r"inputs\[0\] is \[\], not an object"),
     (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),

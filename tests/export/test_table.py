@@ -1,5 +1,7 @@
 """Tables of rules and memberships hold the model; explanations add up to its predictions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,7 +13,7 @@ from sklearn.preprocessing import MinMaxScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.export import explain, memberships_table, rules_table
 
-from .rule_bases import MODELS, NAMES, rows_of
+from .rule_bases import MODELS, NAMES, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -111,6 +113,19 @@ def test_contributions_add_up_to_the_prediction(model, policy, min_strength):
     assert_allclose(sums(table, model), expected, rtol=0, atol=1e-12 * np.nanmax(abs(expected)))
     strengths = table.groupby(["row", "output"])["strength"].sum()
     assert_allclose(strengths, 1.0, rtol=1e-12)
+
+
+def test_an_output_that_is_held_has_a_line_for_it():
+    model = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
+    model = replace(model, out_of_bounds="linear")
+    rows = rows_of(model, 1.5)
+    table = explain(model, rows)
+    total = table.groupby(["row", "output"])["contribution"].sum().unstack()
+    assert_allclose(total, model.predict(rows), atol=1e-10)
+    said = replace(model, target=None).predict(rows)
+    low, high = model.output_limits
+    n_held = ((said < low) | (said > high)).sum()
+    assert (table["if"] == "held").sum() == n_held > 0
 
 
 @ALL

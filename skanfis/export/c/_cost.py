@@ -103,6 +103,8 @@ def table_bytes(numbers, code):
     real += [terms.constants for terms in numbers.terms]
     real += [numbers.inverse_spread, numbers.support] if code.judges_coverage else []
     real += [numbers.reach] if code.has_limit else []
+    if numbers.output_low is not None:
+        real += [numbers.output_low, numbers.output_high]
     positions = [numbers.term_inputs] if numbers.n_terms else []
     positions += [] if numbers.rule_terms is None else [numbers.rule_terms]
     positions += [numbers.slope_inputs] if code.selects_slopes else []

@@ -74,8 +74,11 @@ def header(model, numbers, dialect, cost, min_coverage):
     ]
     box = zip(model.input_names, numbers.low, numbers.high, strict=True)
     lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
-    lines += ["Outputs y:"]
-    lines += [f"  [{k}] {comment(name)}" for k, name in enumerate(model.output_names)]
+    lines += ["Outputs y, and what they are held within:"]
+    limits = zip(model.output_names, *model.output_limits, strict=True)
+    lines += [
+        f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in enumerate(limits)
+    ]
     lines += precision_lines(model, numbers)
     lines += [
         "",

@@ -97,6 +97,14 @@ _LIMIT = """
             }
 """
 
+_HOLD = """
+        if (y[o] < $name_output_low[o]) {
+            y[o] = $name_output_low[o];
+        } else if (y[o] > $name_output_high[o]) {
+            y[o] = $name_output_high[o];
+        }
+"""
+
 _REJECT_UNTOUCHED = """
 /* No outputs: y stays as it is. */
 #define $NAME_REJECT(y, status) ((status) | $NAME_NO_OUTPUT)
@@ -245,6 +253,10 @@ class Source:
         if self.has_limit:
             tables.append("/* How far the tangent is followed. */")
             tables.append(self.table(real, "reach", numbers.reach))
+        if numbers.output_low is not None:
+            tables.append("/* What outputs are held within. */")
+            tables.append(self.table(real, "output_low", numbers.output_low))
+            tables.append(self.table(real, "output_high", numbers.output_high))
         for k, terms in enumerate(numbers.terms):
             tables.append(self.table(real, f"terms{k}", terms.constants))
         if numbers.n_terms:
@@ -369,6 +381,7 @@ class Source:
         lines += [
             "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
             "        y[o] = $name_offset[o] + sum[o];",
+            *([_HOLD.strip("\n")] if numbers.output_low is not None else []),
             "    }",
             "    return status;",
             "}",
