@@ -1,35 +1,32 @@
 """What every ANFIS estimator shares: from validated data to the frozen model.
 
 The order of things: rows may be held out for early stopping; the partition gives a start; the
-solver runs from it, once or from several starts; the ridge may be chosen and the rows reweighted
-between runs; rules that do nothing may be pruned; what is left is frozen in the user's units. Each
-is a module of ``training``.
+solver runs from it, once or from several starts; the rows may be reweighted between runs; the rules
+are frozen in the user's units. Each is a module of ``training``.
 """
 
-import inspect
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
 from joblib import Parallel, delayed, effective_n_jobs
+from sklearn.base import BaseEstimator
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import ThreadpoolController
 
 from ._validation import warn_user
-from .antecedent import GridAntecedent
 from .model import TSKModel
-from .naming import default_term_names, given_term_names
+from .options import EarlyStopping, Huber, policy_of
 from .penalty import Penalty
 from .rows import Rows, check_scales
-from .solvers import SOLVERS, SolverResult
+from .solvers import SOLVERS, LeastSquares, SolverResult
 from .structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
 from .support import RuleSupport
 from .training import (
-    EarlyStopping,
-    Keeper,
     Learned,
     Learner,
     Printer,
+    ValidationLoss,
     hold_out,
     learn_from_starts,
     learn_robustly,
@@ -37,7 +34,6 @@ from .training import (
     resistant,
     rule_statistics,
     watch_all,
-    without_rules,
 )
 
 __all__ = ["Training", "TrainingData", "train"]
@@ -94,7 +90,6 @@ class Training:
     result: SolverResult
     start: Start
     redundant_rules: list[dict]
-    pruning: dict | None = None
     robust_weights: np.ndarray | None = None
     validation_losses: tuple[float, ...] | None = None
 
@@ -126,17 +121,14 @@ def _as_given(estimator, data, model) -> Training:
             f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}: with "
             "max_iter=0 the model is taken as it is."
         )
-    names = model.term_names
-    if estimator.term_names is not None:
-        names = given_term_names(model.antecedent, data.input_names, estimator.term_names)
+    policy, limit = policy_of(estimator.out_of_bounds)
     model = replace(
         model,
         initial_antecedent=model.antecedent,
         input_names=data.input_names,
         output_names=data.output_names,
-        term_names=names,
-        out_of_bounds=estimator.out_of_bounds,
-        max_extrapolation=estimator.max_extrapolation,
+        out_of_bounds=policy,
+        max_extrapolation=limit,
     )
     rows = Rows.standardised(data.X, data.y, data.sample_weight)
     # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
@@ -162,53 +154,46 @@ class _Trainer:
         self.rng = np.random.default_rng(request.seed)
         self.training, self.held_out = slice(None), None
         self.rows = data.rows()
-        if estimator.early_stopping:
+        self.stopping = _option(estimator.early_stopping, {True: EarlyStopping, False: None})
+        self.huber = _option(estimator.loss, {"huber": Huber, "squared_error": None})
+        if self.stopping is not None:
             self.training, validation = hold_out(
-                self.rows, estimator.validation_fraction, int(self.rng.integers(2**31 - 1))
+                self.rows, self.stopping.validation_fraction, int(self.rng.integers(2**31 - 1))
             )
             self.rows, every = data.rows(self.training), self.rows
             held_out = every.part(validation)
             self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
         self.size = SampleSize.of(self.rows)
         self.learner = Learner(
-            "lse" if estimator.max_iter == 0 else estimator.solver,
+            LeastSquares() if estimator.max_iter == 0 else _option(estimator.solver, SOLVERS),
             estimator.order,
             request.consequent_inputs,
             estimator.max_iter,
-            estimator.tol,
-            _solver_options(estimator),
             _ordered_map(estimator.n_jobs if estimator.n_init == 1 else 1),
         )
         self._counted = None
-        self.keeper = Keeper() if estimator.on_interrupt == "stop" else None
         self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
 
     def train(self) -> Training:
         report_constant(self.rows, self.data.input_names)
         weights = None
-        try:
-            if self.estimator.loss == "huber":
-                self.rows, weights = resistant(self.rows)
-                if self.held_out is not None:
-                    self.held_out = replace(self.held_out, targets=self.rows.targets)
-                learned, weights = learn_robustly(
-                    self._learn, self._start, self.rows, self.estimator.epsilon, weights
-                )
-            else:
-                learned = self._learn(self.rows, self._start(self.rows), None)
-            learned, redundant, pruning = self._prune(learned)
-            start, result = learned.start, learned.result
-            losses = learned.validation_losses if self.held_out is not None else None
-        except KeyboardInterrupt:
-            if self.keeper is None or self.keeper.best is None:
-                raise
-            start, result = self.keeper.end()
-            redundant, pruning, losses = self._redundant(result), None, None
+        if self.huber is not None:
+            self.rows, weights = resistant(self.rows)
+            if self.held_out is not None:
+                self.held_out = replace(self.held_out, targets=self.rows.targets)
+            learned, weights = learn_robustly(
+                self._learn, self._start, self.rows, self.huber.epsilon, weights
+            )
+        else:
+            learned = self._learn(self.rows, self._start(self.rows), None)
+        start, result = learned.start, learned.result
+        losses = learned.validation_losses if self.held_out is not None else None
+        redundant = redundant_rules(self._statistics(result.evaluation))
         self._report(start, result)
         model = self.freeze(start, result.evaluation)
         if weights is not None:
             weights = self.data.spread_over_rows(weights, self.training)
-        return Training(model, result, start, redundant, pruning, weights, losses)
+        return Training(model, result, start, redundant, weights, losses)
 
     def freeze(self, start, evaluation) -> TSKModel:
         """The model in the user's units."""
@@ -225,6 +210,7 @@ class _Trainer:
             coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
         trained = evaluation.antecedent.change_units(offset, scale)
         strongest = self._statistics(evaluation).strongest
+        policy, limit = policy_of(self.estimator.out_of_bounds)
         return TSKModel(
             antecedent=trained,
             initial_antecedent=antecedent.change_units(offset, scale),
@@ -236,8 +222,8 @@ class _Trainer:
             rule_weights=evaluation.masses,
             rule_rows=rows.n_rows * strongest,
             input_names=self.data.input_names,
-            out_of_bounds=self.estimator.out_of_bounds,
-            max_extrapolation=self.estimator.max_extrapolation,
+            out_of_bounds=policy,
+            max_extrapolation=limit,
             support=RuleSupport.of(
                 rows,
                 evaluation.antecedent,
@@ -249,17 +235,9 @@ class _Trainer:
 
     def _start(self, rows):
         start = self.request.start(rows, self.size)
-        if self.learner.solver != "varpro":
+        if not self.learner.solver.goes_on_from_tuning:
             # Where the evidence was sought, variable projection has moved the premises already.
             start = replace(start, displacement=None)
-        if self.estimator.term_names is not None:
-            antecedent = start.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
-            start = replace(
-                start,
-                term_names=given_term_names(
-                    antecedent, self.data.input_names, self.estimator.term_names
-                ),
-            )
         if self.printer is not None:
             candidates = start.candidates
             found = f"{len(candidates)} candidates compared, " if candidates else ""
@@ -289,13 +267,12 @@ class _Trainer:
         """One run of the solver, watched."""
         stopper = None
         if self.held_out is not None:
-            stopper = EarlyStopping(
+            stopper = ValidationLoss(
                 self.held_out,
                 self.request.consequent_inputs,
-                self.estimator.n_iter_no_change,
-                self.estimator.tol,
+                self.stopping.n_iter_no_change,
+                self.stopping.tol,
             )
-        keep = None if self.keeper is None else self.keeper.of(start)
         printer = self.printer if is_alone else None
         bridge = None
         if self.bridge is not None and is_alone:
@@ -303,7 +280,7 @@ class _Trainer:
             def bridge(n_iter, evaluation):
                 return self.bridge.task("iteration", self, start, evaluation)
 
-        watch = watch_all(stopper, keep, printer, bridge)
+        watch = watch_all(stopper, printer, bridge)
         learned = learner.run(rows, start, displacement, watch)
         if stopper is None:
             return learned
@@ -322,70 +299,30 @@ class _Trainer:
             return False
         return self.bridge.task("start", self, learned.start, result.evaluation)
 
-    def _redundant(self, result):
-        return redundant_rules(self._statistics(result.evaluation))
-
     def _statistics(self, evaluation):
         """How the rules fire at an evaluation; a pass over the rows, for the last one kept."""
         if self._counted is None or self._counted[0] is not evaluation:
             self._counted = evaluation, rule_statistics(self.rows, evaluation.antecedent)
         return self._counted[1]
 
-    def _prune(self, learned):
-        """The redundant rules, and the training without them where that is asked for."""
-        redundant = self._redundant(learned.result)
-        if not (self.estimator.prune and redundant):
-            return learned, redundant, None
-        rules = [entry["rule"] for entry in redundant]
-        trained = learned.result.evaluation.antecedent
-        left, terms = without_rules(trained, rules)
-        names = learned.start.term_names
-        if not names and isinstance(trained, GridAntecedent):
-            names = default_term_names(trained)
-        start = replace(
-            learned.start,
-            antecedent=left,
-            term_names=tuple(names[t] for t in terms) if names else (),
-        )
-        rows = learned.problem.rows
-        as_it_is = np.zeros(self.learner.premise(rows, start).size)
-        again = self._learn(rows, start, as_it_is)
-        pruning = {
-            "rules": redundant,
-            "loss_before": learned.result.evaluation.mean_squared_error,
-            "loss_after": again.result.evaluation.mean_squared_error,
-        }
-        initial, _ = without_rules(learned.start.antecedent, rules)
-        again = replace(again, start=replace(again.start, antecedent=initial))
-        return again, redundant, pruning
-
     def _report(self, start, result):
         estimator = self.estimator
         if result.converged or estimator.max_iter == 0:
             return
-        hint = "" if result.status == "interrupted" else "; increase max_iter or tol"
         warn_user(
             f"solver={estimator.solver!r} with {start.antecedent.n_rules} rules on "
-            f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}, tol={estimator.tol:g}: "
-            f"{result.message} The model is the best one found{hint}.",
+            f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}: {result.message} The model "
+            "is the best one found; increase max_iter or the solver's tol.",
             ConvergenceWarning,
         )
 
 
-def _solver_options(estimator):
-    """What the solver takes beyond what all take; ValueError for what it does not take."""
-    takes = inspect.signature(SOLVERS[estimator.solver]).parameters
-    options = {}
-    for name in ("step_size", "error_goal"):
-        value = getattr(estimator, name)
-        if value is not None and name not in takes:
-            raise ValueError(
-                f"{name}={value!r} means nothing to solver={estimator.solver!r}: leave it at None, "
-                "or use solver='hybrid' or 'gradient'."
-            )
-        if value is not None:
-            options[name] = value
-    return {} if estimator.max_iter == 0 else options
+def _option(given, by_word):
+    """The object that a word stands for, or that is given in its place; None for no object."""
+    if isinstance(given, BaseEstimator):
+        return given
+    of_word = by_word[given]
+    return None if of_word is None else of_word()
 
 
 def _ordered_map(n_jobs):

@@ -21,6 +21,12 @@ __all__ = [
     "HasMethods",
     "Interval",
     "StrOptions",
+    "check_parameters",
     "check_sample_weight",
     "fit_context",
 ]
+
+
+def check_parameters(estimator):
+    """Raise ValueError where a parameter is not what ``_parameter_constraints`` allow."""
+    estimator._validate_params()

@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from skanfis import ANFISRegressor
 from skanfis._anfis import _ordered_map
 from skanfis.exceptions import UnderdeterminedWarning
+from skanfis.solvers import VariableProjection
 from skanfis.structure.request import _labeller
 
 
@@ -89,7 +90,9 @@ def test_clusterer_with_weights_is_given_them(weighted):
 def test_clusters_are_sought_in_standardised_inputs_and_target():
     Remembers.seen = ()
     X, y = data()
-    ANFISRegressor(partition=Remembers(), tol=0.1).fit(X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0)
+    ANFISRegressor(partition=Remembers(), solver=VariableProjection(tol=0.1)).fit(
+        X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0
+    )
     (table,) = Remembers.seen
     expected = StandardScaler().fit_transform(np.column_stack([X, y]))
     order = np.lexsort(expected.T[::-1])
@@ -99,7 +102,7 @@ def test_clusters_are_sought_in_standardised_inputs_and_target():
 
 def test_clusterer_itself_is_left_as_it_was():
     clusterer = KMeans(n_clusters=3, n_init=1, random_state=0)
-    model = ANFISRegressor(partition=clusterer, tol=0.1).fit(*data())
+    model = ANFISRegressor(partition=clusterer, solver=VariableProjection(tol=0.1)).fit(*data())
     assert model.partition is clusterer
     assert not hasattr(clusterer, "labels_")
     assert model.n_rules_ == 3
@@ -108,9 +111,11 @@ def test_clusterer_itself_is_left_as_it_was():
 def test_pipeline_is_a_clusterer_too():
     X, y = data()
     kmeans = KMeans(n_clusters=3, n_init=1, random_state=0)
-    alone = ANFISRegressor(partition=kmeans, tol=0.1).fit(X, y)
+    alone = ANFISRegressor(partition=kmeans, solver=VariableProjection(tol=0.1)).fit(X, y)
     # On standardised data a scaler does nothing, but for rounding.
-    scaled = ANFISRegressor(partition=make_pipeline(StandardScaler(), kmeans), tol=0.1).fit(X, y)
+    scaled = ANFISRegressor(
+        partition=make_pipeline(StandardScaler(), kmeans), solver=VariableProjection(tol=0.1)
+    ).fit(X, y)
     assert_allclose(scaled.predict(X), alone.predict(X), rtol=0, atol=1e-8)
 
 
@@ -122,7 +127,9 @@ WEIGHTS = ("agreement_", "alpha_", "slope_alpha_", "stiffness_")
 
 def test_weights_given_are_obeyed():
     X, y = data()
-    model = ANFISRegressor(n_mfs=2, agreement=0.3, alpha=0.02, stiffness=1e-3).fit(X, y)
+    model = ANFISRegressor(
+        n_mfs=2, agreement=0.3, alpha=0.02, solver=VariableProjection(stiffness=1e-3)
+    ).fit(X, y)
     assert [getattr(model, name) for name in WEIGHTS] == [0.3, 0.02, 0.02, 1e-3]
     # One that is given leaves the others to be found.
     model = ANFISRegressor(n_mfs=2, agreement=0.3).fit(X, y)
@@ -150,7 +157,9 @@ def test_automatic_weights_count_rows_by_weight_and_not_distinct_ones():
 @pytest.mark.parametrize("n_rows", [11, 12])
 def test_fewer_distinct_rows_than_parameters_are_reported(n_rows, recwarn):
     X, y = data(n_rows)
-    ANFISRegressor(n_mfs=2, tol=0.5).fit(np.tile(X, (3, 1)), np.tile(y, 3))
+    ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5)).fit(
+        np.tile(X, (3, 1)), np.tile(y, 3)
+    )
     caught = [w for w in recwarn if w.category is UnderdeterminedWarning]
     assert len(caught) == (n_rows < 12)
     for warning in caught:
@@ -185,7 +194,7 @@ def test_one_thread_of_the_numerical_libraries_in_a_fit_and_then_as_many_as_befo
     two_blas_threads,
 ):
     CountsThreads.seen = ()
-    ANFISRegressor(partition=CountsThreads(), tol=0.5).fit(*data())
+    ANFISRegressor(partition=CountsThreads(), solver=VariableProjection(tol=0.5)).fit(*data())
     assert set(CountsThreads.seen[:-1]) == {1}
     assert blas_threads() == two_blas_threads
 
@@ -194,6 +203,6 @@ def test_data_are_not_written_to():
     X, y = data()
     weight = np.linspace(0.0, 1.0, len(y))
     before = X.copy(), y.copy(), weight.copy()
-    ANFISRegressor(n_mfs=2, tol=0.5).fit(X, y, weight).predict(X[1:] / 2)
+    ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5)).fit(X, y, weight).predict(X[1:] / 2)
     for array, copy in zip((X, y, weight), before, strict=True):
         assert_array_equal(array, copy)

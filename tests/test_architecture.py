@@ -25,7 +25,6 @@ KERNEL = [
     "naming",
     "support",
     "model",
-    "solvers",
 ]
 
 NUMERIC = ["numpy", "scipy"]
@@ -39,17 +38,24 @@ TABLE = {
     **{layer: (KERNEL[:place], NUMERIC) for place, layer in enumerate(KERNEL)},
     "_sklearn": ([], LEARNING),
     "_validation": (["_sklearn"], LEARNING),
+    "options": (["_sklearn", "model"], LEARNING),
+    "solvers": ([*KERNEL, "_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
-    "structure": ([*KERNEL, "_validation", "cluster"], [*NUMERIC, "sklearn"]),
-    "training": ([*KERNEL, "_validation", "structure"], LEARNING),
-    "_anfis": ([*KERNEL, "_sklearn", "_validation", "structure", "training"], LEARNING),
+    "structure": ([*KERNEL, "_validation", "solvers", "cluster"], [*NUMERIC, "sklearn"]),
+    "training": ([*KERNEL, "_validation", "solvers", "structure"], LEARNING),
+    "_anfis": (
+        [*KERNEL, "_sklearn", "_validation", "options", "solvers", "structure", "training"],
+        LEARNING,
+    ),
     "regressor": (
         [
             *KERNEL,
             "_sklearn",
             "_validation",
             "_notebook",
+            "options",
             "readable",
+            "solvers",
             "structure",
             "training",
             "_anfis",
@@ -70,6 +76,7 @@ TABLE = {
             "naming",
             "support",
             "model",
+            "options",
             "_validation",
         ],
         [*NUMERIC, "sklearn", "pandas", "onnx", "skl2onnx"],
@@ -77,7 +84,7 @@ TABLE = {
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
-        [PUBLIC, "exceptions", "inspection", "export", "datasets"],
+        [PUBLIC, "exceptions", "options", "inspection", "export", "datasets"],
         [*PLOTTING, "pandas", "allantools", "joblib"],
     ),
     PUBLIC: (["exceptions", "regressor"], []),

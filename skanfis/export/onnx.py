@@ -11,6 +11,7 @@ import operator
 import numpy as np
 
 from ..membership import MEMBERSHIPS
+from ..options import policy_of
 from ._constants import FLOOR, SMALLEST_LOG_SQUARE
 from ._graph import Graph
 from ._numbers import Numbers
@@ -85,9 +86,7 @@ def _convert(scope, node, container):
             f"{_OLDEST_OPSET} or newer."
         )
     estimator, given = node.raw_operator, node.inputs[0]
-    model = estimator.model_.with_out_of_bounds(
-        estimator.out_of_bounds, estimator.max_extrapolation
-    )
+    model = estimator.model_.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
     if model.out_of_bounds == "raise":
         raise ValueError(
             "out_of_bounds='raise' has no counterpart in ONNX, where no value makes a graph fail: "

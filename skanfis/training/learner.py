@@ -8,7 +8,7 @@ import numpy as np
 from ..objective import SeparableProblem
 from ..premise import Premise
 from ..rows import Rows
-from ..solvers import SOLVERS, SolverResult
+from ..solvers import Solver, SolverResult
 from ..structure import Start
 
 __all__ = ["Learned", "Learner"]
@@ -38,24 +38,18 @@ class Learner:
 
     Parameters
     ----------
-    solver : str
-        A key of ``SOLVERS``.
+    solver : Solver
     order : {0, 1}
     consequent_inputs : ndarray of int
-    max_iter, tol : int, float
-        When to stop.
-    options : dict
-        What this solver takes beyond what all take.
+    max_iter : int
     map_ordered : callable
         ``map`` or what stands in for it.
     """
 
-    solver: str
+    solver: Solver
     order: int
     consequent_inputs: np.ndarray
     max_iter: int
-    tol: float
-    options: dict
     map_ordered: Callable = map
 
     def run(self, rows: Rows, start: Start, displacement=None, watch=None) -> Learned:
@@ -64,15 +58,13 @@ class Learner:
         displacement = start.displacement if displacement is None else displacement
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
-        result = SOLVERS[self.solver](
+        result = self.solver.solve(
             problem,
             premise,
             max_iter=self.max_iter,
-            tol=self.tol,
             stiffness=start.penalty.stiffness,
             start=displacement,
             on_iteration=watch,
-            **self.options,
         )
         return Learned(start, problem, premise, result)
 

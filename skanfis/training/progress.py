@@ -1,15 +1,9 @@
-"""What watches a training from outside: a line of text, scikit-learn's callbacks, Ctrl-C."""
+"""What watches a training from outside: a line of text, scikit-learn's callbacks."""
 
 import sys
 import time
 
-import numpy as np
-
-from ..objective import Evaluation
-from ..solvers import SolverResult
-from ..structure import Start
-
-__all__ = ["CallbackBridge", "Keeper", "Printer", "watch_all"]
+__all__ = ["CallbackBridge", "Printer", "watch_all"]
 
 
 def watch_all(*watchers):
@@ -23,39 +17,6 @@ def watch_all(*watchers):
         return any(wishes)
 
     return watch
-
-
-class Keeper:
-    """Remembers the best point of the run in hand, for when it is interrupted.
-
-    Once ``is_ended``, runs in other threads end at their next iteration.
-    """
-
-    def __init__(self):
-        self.best: Evaluation | None = None
-        self.start: Start | None = None
-        self.losses: list[float] = []
-        self.is_ended = False
-
-    def of(self, start):
-        """A watcher of a run from a start; where its cost is another one, the old best goes."""
-        if self.start is not start:
-            self.start, self.best, self.losses = start, None, []
-
-        def watch(n_iter, evaluation):
-            self.losses.append(evaluation.mean_squared_error)
-            if self.best is None or evaluation.cost <= self.best.cost:
-                self.best = evaluation
-            return self.is_ended
-
-        return watch
-
-    def end(self):
-        """The start and the best point of the run in hand; other threads' runs end."""
-        self.is_ended = True
-        losses = np.array([self.losses[0], *self.losses])
-        result = SolverResult(self.best, losses, len(self.losses), "interrupted")
-        return self.start, result
 
 
 class Printer:

@@ -137,7 +137,7 @@ def _settle(learn, learned, rows, weights, epsilon):
             return learned, weights
     warn_user(
         f"loss='huber': the weights of the rows still change by {change:.2g} on average after "
-        f"{_MOST_ROUNDS} turns. Use fewer rules, or a larger epsilon.",
+        f"{_MOST_ROUNDS} turns. Use fewer rules, or loss=Huber(epsilon=...) with a larger one.",
         ConvergenceWarning,
     )
     return learned, weights

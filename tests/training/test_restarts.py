@@ -13,6 +13,7 @@ from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
+from skanfis.solvers import VariableProjection
 from skanfis.training import restarts
 
 from .. import oracles
@@ -63,7 +64,14 @@ def test_starts_lie_in_the_box_and_the_first_is_as_given():
 def test_the_best_start_is_kept():
     X, y = make_jang_sinc()
     losses = [
-        ANFISRegressor(n_mfs=4, n_init=n, random_state=3, agreement=0, alpha=1e-10, stiffness=0)
+        ANFISRegressor(
+            n_mfs=4,
+            n_init=n,
+            random_state=3,
+            agreement=0,
+            alpha=1e-10,
+            solver=VariableProjection(stiffness=0.0),
+        )
         .fit(X, y)
         .loss_curve_[-1]
         for n in (1, 8)
@@ -102,7 +110,9 @@ def test_it_is_kept_by_its_leave_one_out_error(n_jobs, monkeypatch):
 @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}])
 def test_number_of_workers_does_not_matter(settings):
     X, y = make_jang_three_input()[:2]
-    model = ANFISRegressor(mf="bell", n_init=4, tol=1e-2, random_state=0, **settings)
+    model = ANFISRegressor(
+        mf="bell", n_init=4, random_state=0, solver=VariableProjection(tol=1e-2), **settings
+    )
     one, two = (clone(model).set_params(n_jobs=n).fit(X, y) for n in (1, 2))
     assert_array_equal(one.loss_curve_, two.loss_curve_)
     assert_array_equal(one.consequents_, two.consequents_)
@@ -110,6 +120,6 @@ def test_number_of_workers_does_not_matter(settings):
 
 def test_random_state_decides_on_the_starts():
     X, y = make_jang_sinc()
-    model = ANFISRegressor(n_mfs=3, n_init=3, tol=1e-2)
+    model = ANFISRegressor(n_mfs=3, n_init=3, solver=VariableProjection(tol=1e-2))
     same = [clone(model).set_params(random_state=5).fit(X, y).consequents_ for _ in range(2)]
     assert_array_equal(*same)

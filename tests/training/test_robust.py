@@ -7,6 +7,8 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
+from skanfis.options import EarlyStopping, Huber
+from skanfis.solvers import VariableProjection
 from skanfis.training import robust
 
 
@@ -42,7 +44,7 @@ def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
     monkeypatch.setattr(robust, "_MOST_ROUNDS", 500)
     X, y, *_ = with_outliers(200)
     weight = np.random.default_rng(1).uniform(0.5, 2.0, 200) if weighted else None
-    model = ANFISRegressor(n_mfs=1, alpha=0.0, loss="huber", epsilon=epsilon)
+    model = ANFISRegressor(n_mfs=1, alpha=0.0, loss=Huber(epsilon))
     model.fit(X, y, sample_weight=weight)
     linear, weights = linear_huber(X, y, epsilon, weight)
     expected = [linear.intercept_, *linear.coef_]
@@ -55,7 +57,7 @@ def test_outliers_do_little(settings):
     X, y, truth, is_outlier = with_outliers()
     error = {}
     for loss in ("squared_error", "huber"):
-        model = ANFISRegressor(loss=loss, tol=1e-2, **settings).fit(X, y)
+        model = ANFISRegressor(loss=loss, solver=VariableProjection(tol=1e-2), **settings).fit(X, y)
         error[loss] = np.sqrt(np.mean((model.predict(X) - truth) ** 2))
     assert error["huber"] < 0.06
     assert error["huber"] < 0.2 * error["squared_error"]
@@ -65,7 +67,7 @@ def test_outliers_do_little(settings):
 
 def test_weights_are_one_or_fall_with_the_residual():
     X, y, *_ = with_outliers()
-    model = ANFISRegressor(n_mfs=[3, 1], loss="huber", epsilon=1.35).fit(X, y)
+    model = ANFISRegressor(n_mfs=[3, 1], loss=Huber(epsilon=1.35)).fit(X, y)
     residual = np.abs(y - model.predict(X))
     scale = np.median(residual) / 0.6744897501960817
     expected = np.minimum(1.0, 1.35 * scale / residual)
@@ -90,11 +92,13 @@ def test_several_outputs_share_their_weights():
 
 def test_rows_that_were_not_trained_on_have_no_weight():
     X, y, *_ = with_outliers(200)
-    model = ANFISRegressor(n_mfs=2, loss="huber", early_stopping=True, validation_fraction=0.25)
+    model = ANFISRegressor(n_mfs=2, loss="huber", early_stopping=EarlyStopping(0.25))
     assert np.isnan(model.fit(X, y).robust_weights_).sum() == 50
     weight = np.ones(200)
     weight[3] = 0.0
-    dropped = ANFISRegressor(n_mfs=2, loss="huber", tol=1e-2).fit(X, y, sample_weight=weight)
+    dropped = ANFISRegressor(n_mfs=2, loss="huber", solver=VariableProjection(tol=1e-2)).fit(
+        X, y, sample_weight=weight
+    )
     assert_array_equal(np.flatnonzero(np.isnan(dropped.robust_weights_)), [3])
 
 
