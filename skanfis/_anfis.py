@@ -6,14 +6,13 @@ are frozen in the user's units. Each is a module of ``training``.
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed, effective_n_jobs
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import ConvergenceWarning
-from threadpoolctl import ThreadpoolController
 
+from ._threads import map_in_threads, one_blas_thread
 from ._validation import warn_user
 from .model import TSKModel
 from .options import EarlyStopping, Huber, policy_of
@@ -106,9 +105,7 @@ def train(estimator, data: TrainingData, request: StructureRequest, bridge=None)
     bridge : CallbackBridge, optional
         To scikit-learn's callbacks.
     """
-    # One BLAS thread per worker: threads come from n_jobs, and sums do not depend on how many. One
-    # OpenMP thread for the small clusterings, which more would only slow down.
-    with _thread_pools().limit(limits=1):
+    with one_blas_thread():
         if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
             return _as_given(estimator, data, request.partition)
         return _Trainer(estimator, data, request, bridge).train()
@@ -140,12 +137,6 @@ def _as_given(estimator, data, model) -> Training:
     return Training(model, result, Start(model.antecedent, Penalty()), redundant)
 
 
-@lru_cache(maxsize=1)
-def _thread_pools():
-    """The process's thread pools; looking for them takes as long as a small fit."""
-    return ThreadpoolController()
-
-
 class _Trainer:
     """One training: the data, the settings, and who watches."""
 
@@ -169,7 +160,7 @@ class _Trainer:
             estimator.order,
             request.consequent_inputs,
             estimator.max_iter,
-            _ordered_map(estimator.n_jobs if estimator.n_init == 1 else 1),
+            map_in_threads(estimator.n_jobs if estimator.n_init == 1 else 1),
         )
         self._counted = None
         self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
@@ -323,17 +314,3 @@ def _option(given, by_word):
         return given
     of_word = by_word[given]
     return None if of_word is None else of_word()
-
-
-def _ordered_map(n_jobs):
-    """``map`` over worker threads, with the results in order."""
-    if effective_n_jobs(n_jobs) == 1:
-        return map
-
-    def map_ordered(function, items):
-        if len(items) == 1:
-            return map(function, items)
-        parallel = Parallel(n_jobs=n_jobs, backend="threading", return_as="generator")
-        return parallel(delayed(function)(item) for item in items)
-
-    return map_ordered

@@ -5,7 +5,8 @@ have more threads than cores, and sums whose last bits depend on how many.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
 from functools import lru_cache
 from threading import Lock
 
@@ -19,26 +20,39 @@ class _OneBlasThread:
     """BLAS at one thread from the first fit's beginning to the last one's end.
 
     The number is the whole process's. Fits in several Python threads overlap, and each by itself
-    would take the others' limit for the number to restore.
+    would take the others' limit for the number to restore, or end it for all. A thread of its own
+    sets the number and restores it: threadpoolctl, from 3.8 on, lets no other undo what one did.
     """
 
     def __init__(self) -> None:
-        self._lock, self._n_fits, self._limits = Lock(), 0, None
+        self._lock, self._n_fits = Lock(), 0
+        self._owner: ThreadPoolExecutor | None = None
+        self._limit = ExitStack()
 
-    def begin(self, blas: ThreadpoolController) -> None:
+    def begin(self) -> None:
         """One more fit."""
         with self._lock:
-            if self._n_fits == 0:
-                self._limits = blas.limit(limits=1)
             self._n_fits += 1
+            if self._n_fits == 1:
+                self._owner = ThreadPoolExecutor(1, thread_name_prefix="skanfis-blas")
+                self._owner.submit(self._set).result()
 
     def end(self) -> None:
         """One less."""
         with self._lock:
             self._n_fits -= 1
-            if self._n_fits == 0 and self._limits is not None:
-                self._limits.restore_original_limits()
-                self._limits = None
+            if self._n_fits == 0 and self._owner is not None:
+                self._owner.submit(self._limit.close).result()
+                self._owner.shutdown()
+                self._owner = None
+
+    def _set(self) -> None:
+        blas = _thread_pools().select(user_api="blas")
+        for library in blas.lib_controllers:
+            # A limit that the user has set in another thread would else stand.
+            if hasattr(library, "clear_controlling_thread"):
+                library.clear_controlling_thread(force=True)
+        self._limit.enter_context(blas.limit(limits=1))
 
 
 _one_blas_thread = _OneBlasThread()
@@ -46,18 +60,15 @@ _one_blas_thread = _OneBlasThread()
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """One thread of the numerical libraries, as long as this or another such context is open.
-
-    OpenMP's number belongs to the thread that sets it, and is set and restored in each: the small
-    clusterings of a search, which use it, would only be slower with more.
-    """
-    pools = _thread_pools()
-    with pools.select(user_api="openmp").limit(limits=1):
-        _one_blas_thread.begin(pools.select(user_api="blas"))
-        try:
+    """One thread of the numerical libraries, as long as this or another such context is open."""
+    try:
+        _one_blas_thread.begin()
+        # Of MKL and OpenMP the number belongs to the thread that sets it. What is the process's is
+        # one already, so that this changes nothing of it, nor its end.
+        with _thread_pools().limit(limits=1):
             yield
-        finally:
-            _one_blas_thread.end()
+    finally:
+        _one_blas_thread.end()
 
 
 @lru_cache(maxsize=1)

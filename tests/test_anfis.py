@@ -1,7 +1,5 @@
 """What all estimators share: workers, clusterers, what "auto" decides, and no side effects."""
 
-import time
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -9,10 +7,8 @@ from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from threadpoolctl import threadpool_info, threadpool_limits
 
 from skanfis import ANFISRegressor
-from skanfis._anfis import _ordered_map
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.solvers import VariableProjection
 from skanfis.structure.request import _labeller
@@ -22,28 +18,6 @@ def data(n_rows=120, n_inputs=2):
     rng = np.random.default_rng(0)
     X = rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
     return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
-
-
-# ------------------------------------------------------------------------------------------ workers
-
-
-@pytest.mark.parametrize("n_jobs", [None, 1, 2, 3])
-def test_results_come_in_order_whoever_is_done_first(n_jobs):
-    def slow_at_first(k):
-        time.sleep(0.01 * (k == 0))
-        return k**2
-
-    assert list(_ordered_map(n_jobs)(slow_at_first, list(range(20)))) == [k**2 for k in range(20)]
-
-
-def test_error_of_a_worker_reaches_the_caller():
-    def fails_at_five(k):
-        if k == 5:
-            raise FloatingPointError("five")
-        return k
-
-    with pytest.raises(FloatingPointError, match="five"):
-        list(_ordered_map(2)(fails_at_five, list(range(10))))
 
 
 # --------------------------------------------------------------------------------------- clusterers
@@ -168,35 +142,6 @@ def test_fewer_distinct_rows_than_parameters_are_reported(n_rows, recwarn):
 
 
 # ------------------------------------------------------------------------------------- side effects
-
-
-def blas_threads():
-    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
-
-
-@pytest.fixture
-def two_blas_threads():
-    """As on any machine; not as a context, which would keep other threads from setting limits."""
-    limits = threadpool_limits(2, user_api="blas")
-    yield blas_threads()
-    limits.restore_original_limits()
-
-
-class CountsThreads(Remembers):
-    """The same clusters; keeps how many threads the numerical libraries have meanwhile."""
-
-    def fit_predict(self, X, y=None):
-        type(self).seen = tuple(blas_threads())
-        return super().fit_predict(X)
-
-
-def test_one_thread_of_the_numerical_libraries_in_a_fit_and_then_as_many_as_before(
-    two_blas_threads,
-):
-    CountsThreads.seen = ()
-    ANFISRegressor(partition=CountsThreads(), solver=VariableProjection(tol=0.5)).fit(*data())
-    assert set(CountsThreads.seen[:-1]) == {1}
-    assert blas_threads() == two_blas_threads
 
 
 def test_data_are_not_written_to():

@@ -17,7 +17,7 @@ def test_loss_is_the_estimators(fitted):
     assert_array_equal(display.line_.get_ydata(), pipe[-1].loss_curve_)
     assert_array_equal(display.line_.get_xdata(), np.arange(len(pipe[-1].loss_curve_)))
     assert display.status == pipe[-1].status_
-    assert display.line_.get_label() == "varpro"
+    assert display.line_.get_label() == "VariableProjection"
     assert display.ax_.get_yscale() == "log"
 
 
