@@ -10,7 +10,6 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
-from ._anfis import TrainingData, train
 from ._notebook import RulesReprMixin
 from ._sklearn import (
     CallbackSupportMixin,
@@ -21,6 +20,7 @@ from ._sklearn import (
     check_sample_weight,
     fit_context,
 )
+from ._threads import one_blas_thread
 from ._validation import (
     bearable_weights,
     check_finite,
@@ -38,7 +38,7 @@ from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
 from .structure import StructureRequest, check_inputs
-from .training import CallbackBridge, model_without_rules
+from .training import Callbacks, TrainingData, fit_rules, model_without_rules
 
 __all__ = ["ANFISRegressor"]
 
@@ -352,28 +352,33 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                     check_parameters(option)
             data = self._check_training_data(X, y, sample_weight, groups)
             request = self._request(data.input_names)
-            bridge = None if context is None else self._bridge(context, X, y, sample_weight)
-            training = train(self, data, request, bridge)
+            callbacks = None
+            if context is not None:
+                metadata = None if sample_weight is None else {"sample_weight": sample_weight}
+                callbacks = Callbacks(self, context, {"X": X, "y": y, "metadata": metadata})
+                callbacks.begin()
+            with one_blas_thread():
+                fitted = fit_rules(self, data, request, callbacks)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
             self.__dict__ = before
             raise
-        self.model_ = training.model
-        self.n_iter_ = max(training.result.n_iter, 1)
-        self.loss_curve_ = training.result.loss_curve
-        self.status_ = training.result.message
-        penalty = training.start.penalty
+        self.model_ = fitted.model
+        self.n_iter_ = max(fitted.result.n_iter, 1)
+        self.loss_curve_ = fitted.result.loss_curve
+        self.status_ = fitted.result.message
+        penalty = fitted.start.penalty
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
-        self.structures_ = training.start.candidates
-        self.redundant_rules_ = training.redundant_rules
-        self.robust_weights_ = training.robust_weights
-        losses = training.validation_losses
+        self.structures_ = fitted.start.candidates
+        self.redundant_rules_ = fitted.redundant_rules
+        self.robust_weights_ = fitted.robust_weights
+        losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
         self._start_parameters = self._those_of_the_start()
-        if bridge is not None:
-            bridge.end(self.model_)
+        if callbacks is not None:
+            callbacks.end(self.model_)
         return self
 
     def predict(self, X):
@@ -634,17 +639,6 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 "rules are taken as they are (max_iter=0): leave it at None, or use solver='lse'."
             )
         return model
-
-    def _bridge(self, context, X, y, sample_weight):
-        """To scikit-learn's callbacks, which are given the data as the user gave them."""
-
-        def attributes(*state):
-            return {"model_": state[0] if len(state) == 1 else state[0].freeze(*state[1:])}
-
-        metadata = None if sample_weight is None else {"sample_weight": sample_weight}
-        bridge = CallbackBridge(self, context, {"X": X, "y": y, "metadata": metadata}, attributes)
-        bridge.begin()
-        return bridge
 
     def _check_training_data(self, X, y, sample_weight, groups):
         """The data, of all rows with weight."""

@@ -19,7 +19,13 @@ from ..model import TSKModel
 from ..rows import Rows
 from ..support import RuleSupport
 
-__all__ = ["model_without_rules", "redundant_rules", "rule_statistics", "without_rules"]
+__all__ = [
+    "RuleStatistics",
+    "model_without_rules",
+    "redundant_rules",
+    "rule_statistics",
+    "without_rules",
+]
 
 _READ_ROWS = 4096
 # A strength that is nowhere above this.

@@ -15,8 +15,8 @@ linear model that scikit-learn's HuberRegressor finds, beyond ten robust standar
 target's own scale is found with these weights. A grid of many rules would otherwise spend a rule on
 each outlier before it is known for one.
 
-Weights change between runs of the solver and not inside one, whose steps compare costs: they are
-costs of one and the same problem only so.
+Weights change between runs of the solver (``fit``) and not inside one, whose steps compare costs:
+they are costs of one and the same problem only so.
 """
 
 import warnings
@@ -26,10 +26,9 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
-from .._validation import warn_user
 from ..rows import column_statistics
 
-__all__ = ["huber_weights", "learn_robustly", "resistant"]
+__all__ = ["huber_weights", "resistant", "reweighted", "without_outliers"]
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
@@ -38,12 +37,8 @@ _FAR = 10.0
 _MOST_STEPS, _TIGHT = 1000, 1e-9
 # Digits of the first weights: more would only carry the minimiser's errors on.
 _DIGITS = 2
-_MOST_ROUNDS = 20
-_MOST_STARTS = 4
 # Rows of less weight have no part in where training starts.
 _OUTLIER = 0.5
-# Weights are settled when they change by less than this on average.
-_SETTLED = 1e-3
 
 
 def huber_weights(problem, evaluation, epsilon, sample_weight=None):
@@ -86,7 +81,7 @@ def resistant(rows):
     weights = np.maximum(np.round(weights, _DIGITS), 10.0**-_DIGITS)
     if (weights == 1.0).all():
         return rows, weights
-    targets = column_statistics(rows.y, _reweighted(rows, weights**2).sample_weight)
+    targets = column_statistics(rows.y, reweighted(rows, weights**2).sample_weight)
     return replace(rows, targets=targets), weights
 
 
@@ -99,62 +94,14 @@ def _weighted_median(values, weight):
     return 0.5 * float(values[order[middle]] + values[order[after]])
 
 
-def learn_robustly(learn, start, rows, epsilon, weights):
-    """Train and reweight until the weights settle.
-
-    ``learn(rows, start, displacement)`` trains, ``start(rows)`` gives a start; ``weights`` are
-    those of :func:`resistant`. The first start and what comes of it may have seen outliers: once
-    the weights are settled, training starts afresh, from a start that sees no row of less than
-    half its weight, and again for as long as that start comes out another one.
-
-    Returns
-    -------
-    learned : Learned
-    weights : ndarray of shape (n_rows,)
-        Of the last turn, 1 where a row counts in full.
-    """
-    learned = learn(_reweighted(rows, weights), start(_without_outliers(rows, weights)), None)
-    learned, weights = _settle(learn, learned, rows, weights, epsilon)
-    for turn in range(_MOST_STARTS):
-        again = start(_without_outliers(rows, weights))
-        if turn > 0 and _is_same(again, learned.start):
-            break
-        learned = learn(_reweighted(rows, weights), again, None)
-        learned, weights = _settle(learn, learned, rows, weights, epsilon)
-    return learned, weights
-
-
-def _settle(learn, learned, rows, weights, epsilon):
-    """Weights and fit in turns, at one structure."""
-    for _ in range(_MOST_ROUNDS):
-        before = weights
-        evaluation = learned.result.evaluation
-        weights = huber_weights(learned.problem, evaluation, epsilon, rows.sample_weight)
-        reweighted = _reweighted(rows, weights)
-        learned = learn(reweighted, learned.start, learned.displacement)
-        change = float(np.mean(np.abs(weights - before)))
-        if change < _SETTLED:
-            return learned, weights
-    warn_user(
-        f"loss='huber': the weights of the rows still change by {change:.2g} on average after "
-        f"{_MOST_ROUNDS} turns. Use fewer rules, or loss=Huber(epsilon=...) with a larger one.",
-        ConvergenceWarning,
-    )
-    return learned, weights
-
-
-def _reweighted(rows, weights):
+def reweighted(rows, weights):
+    """The rows with weights by Huber's loss, on top of their own."""
     own = rows.sample_weight
     return replace(rows, sample_weight=weights if own is None else own * weights)
 
 
-def _without_outliers(rows, weights):
+def without_outliers(rows, weights):
+    """The rows that have at least half of their weight; all of them where these are few."""
     kept = weights >= _OUTLIER
     # What is said of most rows is said of none.
     return rows.part(kept) if 2 * np.count_nonzero(kept) >= rows.n_rows else rows
-
-
-def _is_same(one, other):
-    """Whether two starts are of one size."""
-    sizes = [(s.antecedent.n_rules, s.antecedent.n_terms) for s in (one, other)]
-    return sizes[0] == sizes[1]

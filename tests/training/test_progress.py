@@ -42,7 +42,7 @@ class Recorder:
         if fitted_estimator is not None:
             self.errors.append(np.mean((fitted_estimator.predict(X) - y) ** 2) / np.var(y))
         self.metadata = metadata
-        return self.most is not None and self.tasks.count("iteration") >= self.most
+        return self.most is not None and len(self.tasks) >= self.most
 
 
 def test_verbose_writes_a_line_per_iteration(capsys):
@@ -85,6 +85,11 @@ class TestCallbacks:
         ANFISRegressor(n_mfs=2, n_init=3, n_jobs=2).set_callbacks(seen).fit(X, Y)
         assert seen.tasks == ["start"] * 3 + ["fit"]
         assert seen.max_subtasks is None
+
+    def test_wish_to_stop_is_honoured_between_starts(self):
+        seen = Recorder(most=2)
+        ANFISRegressor(n_mfs=2, n_init=5).set_callbacks(seen).fit(X, Y)
+        assert seen.tasks == ["start"] * 2 + ["fit"]
 
     def test_weights_are_passed_on(self):
         seen = Recorder()

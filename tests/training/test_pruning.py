@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
-from skanfis.training import redundant_rules, rule_statistics, without_rules
+from skanfis.training.pruning import redundant_rules, rule_statistics, without_rules
 
 from .. import oracles
 

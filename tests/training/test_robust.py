@@ -9,7 +9,7 @@ from sklearn.linear_model import LinearRegression
 from skanfis import ANFISRegressor
 from skanfis.options import EarlyStopping, Huber
 from skanfis.solvers import VariableProjection
-from skanfis.training import robust
+from skanfis.training import fit
 
 
 def with_outliers(n_rows=600, part=0.05, seed=0):
@@ -40,8 +40,8 @@ def linear_huber(X, y, epsilon, sample_weight=None):
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("epsilon", [1.0, 1.35, 3.0])
 def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
-    monkeypatch.setattr(robust, "_SETTLED", 1e-12)
-    monkeypatch.setattr(robust, "_MOST_ROUNDS", 500)
+    monkeypatch.setattr(fit, "_SETTLED", 1e-12)
+    monkeypatch.setattr(fit, "_MOST_TURNS", 500)
     X, y, *_ = with_outliers(200)
     weight = np.random.default_rng(1).uniform(0.5, 2.0, 200) if weighted else None
     model = ANFISRegressor(n_mfs=1, alpha=0.0, loss=Huber(epsilon))
@@ -125,7 +125,7 @@ def test_unit_weights_are_none(n_rows):
 
 
 def test_weights_that_do_not_settle_are_told(monkeypatch):
-    monkeypatch.setattr(robust, "_MOST_ROUNDS", 1)
+    monkeypatch.setattr(fit, "_MOST_TURNS", 1)
     X, y, *_ = with_outliers(200)
     with pytest.warns(ConvergenceWarning, match="weights of the rows still change"):
         ANFISRegressor(n_mfs=2, loss="huber").fit(X, y)

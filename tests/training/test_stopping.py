@@ -10,7 +10,7 @@ from skanfis import ANFISRegressor
 from skanfis.options import EarlyStopping
 from skanfis.rows import Rows
 from skanfis.solvers import SOLVERS, VariableProjection
-from skanfis.training import hold_out
+from skanfis.training.stopping import hold_out
 
 SETTINGS = {"early_stopping": True}
 # Weights that let rules learn the noise.

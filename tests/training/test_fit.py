@@ -1,4 +1,4 @@
-"""What all estimators share: workers, clusterers, what "auto" decides, and no side effects."""
+"""A whole fit: clusterers, what "auto" decides, and no side effects."""
 
 import numpy as np
 import pytest
