@@ -24,6 +24,7 @@ from ._threads import one_blas_thread
 from ._validation import (
     bearable_weights,
     check_finite,
+    content_digest,
     feature_indices,
     group_numbers,
     named_refusals,
@@ -609,8 +610,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         """The parameters that a start depends on, in a form that can be compared."""
         names = ("n_mfs", "partition", "mf", "premise_features")
         values = {name: getattr(self, name) for name in names}
-        # Models are themselves alone; all else says in words what it is.
-        return {k: id(v) if hasattr(v, "strengths") else repr(v) for k, v in values.items()}
+        # Models are their numbers, wherever they were pickled; all else says in words what it is.
+        return {
+            name: content_digest(getattr(value, "model_", value))
+            if hasattr(value, "strengths")
+            else repr(value)
+            for name, value in values.items()
+        }
 
     def _imported(self, names):
         """``partition``, with the model in place of the estimator that holds it."""

@@ -31,7 +31,14 @@ from ..support import RuleSupport
 from .progress import Callbacks, Printer, watch_all
 from .pruning import RuleStatistics, redundant_rules, rule_statistics
 from .restarts import displaced_starts, leave_one_out_error
-from .robust import huber_weights, resistant, reweighted, without_outliers
+from .robust import (
+    MANY_ROWS,
+    huber_weights,
+    resistant,
+    reweighted,
+    some_rows,
+    without_outliers,
+)
 from .stopping import ValidationLoss, hold_out
 
 __all__ = ["Fitted", "SolverRun", "TrainingData", "fit_rules"]
@@ -42,9 +49,8 @@ _MOST_TURNS = 20
 # Weights are settled when they change by less than this on average: a tenth of what the scale of
 # the residuals, a median of some hundred rows, is uncertain by.
 _SETTLED = 1e-3
-# Starts afresh with the weights that were settled: one that sees the outliers less, and one more
-# for the case that this one is of another size.
-_MOST_STARTS = 4
+# The first start, one that sees the outliers less, and further ones where that is of another size.
+_MOST_STARTS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,15 +231,7 @@ class _Fit:
     def run(self, rows: Rows, start: Start, displacement, is_alone=True) -> SolverRun:
         """One run of the solver, watched; the iterations of one among several are not told."""
         estimator = self.estimator
-        problem = SeparableProblem(
-            rows,
-            start.antecedent,
-            estimator.order,
-            start.penalty,
-            self.map_ordered,
-            self.request.consequent_inputs,
-        )
-        premise = _premise(rows, start)
+        problem, premise = self.problem(rows, start), _premise(rows, start)
         validation = None
         if self.held_out is not None:
             validation = ValidationLoss(
@@ -260,6 +258,17 @@ class _Fit:
         result = validation.restored(result)
         return SolverRun(start, problem, premise, result, tuple(validation.losses))
 
+    def problem(self, rows: Rows, start: Start) -> SeparableProblem:
+        """The least-squares problem at a start."""
+        return SeparableProblem(
+            rows,
+            start.antecedent,
+            self.estimator.order,
+            start.penalty,
+            self.map_ordered,
+            self.request.consequent_inputs,
+        )
+
     def robust_run(self, epsilon: float) -> tuple[SolverRun, np.ndarray]:
         """Runs and weights in turns, until the weights settle.
 
@@ -270,22 +279,36 @@ class _Fit:
         self.rows, weights = resistant(self.rows)
         if self.held_out is not None:
             self.held_out = replace(self.held_out, targets=self.rows.targets)
+        rows, n_starts = self.rows, _MOST_STARTS
+        if rows.n_rows > MANY_ROWS:
+            # Some rows show as well as all what a sound model leaves, and at a price that does not
+            # grow with their number. One start from there is then as good as several.
+            some = some_rows(rows.n_rows)
+            run, _ = self.robust_turns(rows.part(some), weights[some], epsilon, n_starts)
+            weights = huber_weights(
+                self.problem(rows, run.start), run.evaluation, epsilon, rows.sample_weight
+            )
+            n_starts = 1
+        return self.robust_turns(rows, weights, epsilon, n_starts)
+
+    def robust_turns(self, rows, weights, epsilon, n_starts):
+        """Starts, and from each of them turns of fit and weights until these settle."""
         run: SolverRun | None = None
-        for turn in range(_MOST_STARTS + 1):
-            start = self.start(without_outliers(self.rows, weights))
+        for turn in range(n_starts):
+            start = self.start(without_outliers(rows, weights))
             if run is not None and turn > 1 and _is_of_one_size(start, run.start):
                 break
-            run = self.best_run(reweighted(self.rows, weights), start)
-            run, weights = self.settled(run, weights, epsilon)
+            run = self.best_run(reweighted(rows, weights), start)
+            run, weights = self.settled(rows, run, weights, epsilon)
         assert run is not None
         return run, weights
 
-    def settled(self, run, weights, epsilon):
+    def settled(self, rows, run, weights, epsilon):
         """Weights and fit in turns, at one structure."""
         for _ in range(_MOST_TURNS):
-            before, own = weights, self.rows.sample_weight
+            before, own = weights, rows.sample_weight
             weights = huber_weights(run.problem, run.evaluation, epsilon, own)
-            run = self.run(reweighted(self.rows, weights), run.start, run.displacement)
+            run = self.run(reweighted(rows, weights), run.start, run.displacement)
             change = float(np.mean(np.abs(weights - before)))
             if change < _SETTLED:
                 return run, weights

@@ -28,10 +28,15 @@ from sklearn.linear_model import HuberRegressor
 
 from ..rows import column_statistics
 
-__all__ = ["huber_weights", "resistant", "reweighted", "without_outliers"]
+__all__ = ["MANY_ROWS", "huber_weights", "resistant", "reweighted", "some_rows", "without_outliers"]
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
+# Rows from which outliers are told where there are more: the median of so many residuals, and so
+# the scale, is good to one part in a hundred.
+MANY_ROWS = 20_000
+_SEED = 0
+_READ_ROWS = 4096
 # Of the linear model, robust standard deviations that no shape of a sound target leaves.
 _FAR = 10.0
 _MOST_STEPS, _TIGHT = 1000, 1e-9
@@ -53,28 +58,30 @@ def huber_weights(problem, evaluation, epsilon, sample_weight=None):
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
+def some_rows(n_rows):
+    """Which rows are looked at where there are many: drawn by a fixed seed, in order."""
+    if n_rows <= MANY_ROWS:
+        return slice(None)
+    return np.sort(np.random.default_rng(_SEED).choice(n_rows, MANY_ROWS, replace=False))
+
+
 def resistant(rows):
     """The rows with the target's scale as it is without what is far off, and their weights."""
     weights = np.ones(rows.n_rows)
-    Z, target, own = rows.read(slice(None))
-    sizes = np.zeros(rows.n_rows)
-    for values in target:
-        center = _weighted_median(values, own)
-        spread = _weighted_median(np.abs(values - center), own)
-        if spread == 0.0:
-            return rows, weights
-        linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
-        scaled = (values - center) / spread
-        with warnings.catch_warnings():
-            # A rough line will do.
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            try:
-                linear.fit(Z.T, scaled, sample_weight=own)
-            except ValueError:
-                return rows, weights
-        sizes += (scaled - linear.predict(Z.T)) ** 2
-    sizes = np.sqrt(sizes / len(target))
-    scale = _weighted_median(sizes, own) / _NORMAL_MEDIAN
+    some = rows.part(some_rows(rows.n_rows))
+    lines = _robust_lines(some)
+    if lines is None:
+        return rows, weights
+    sizes = np.empty(rows.n_rows)
+    for chunk in rows.chunks(_READ_ROWS):
+        for part in chunk:
+            Z, target, _ = rows.read(part)
+            squares = [
+                ((values - center) / spread - line.predict(Z.T)) ** 2
+                for values, (center, spread, line) in zip(target, lines, strict=True)
+            ]
+            sizes[part] = np.sqrt(np.mean(squares, axis=0))
+    scale = _weighted_median(sizes, rows.sample_weight) / _NORMAL_MEDIAN
     if scale == 0.0:
         return rows, weights
     weights = np.minimum(1.0, _FAR * scale / np.maximum(sizes, np.finfo(float).tiny))
@@ -83,6 +90,27 @@ def resistant(rows):
         return rows, weights
     targets = column_statistics(rows.y, reweighted(rows, weights**2).sample_weight)
     return replace(rows, targets=targets), weights
+
+
+def _robust_lines(rows):
+    """Centre, spread and scikit-learn's robust line of every output; None where there is none."""
+    Z, target, own = rows.read(slice(None))
+    lines = []
+    for values in target:
+        center = _weighted_median(values, own)
+        spread = _weighted_median(np.abs(values - center), own)
+        if spread == 0.0:
+            return None
+        linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
+        with warnings.catch_warnings():
+            # A rough line will do.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            try:
+                linear.fit(Z.T, (values - center) / spread, sample_weight=own)
+            except ValueError:
+                return None
+        lines.append((center, spread, linear))
+    return lines
 
 
 def _weighted_median(values, weight):

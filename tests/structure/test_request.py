@@ -1,5 +1,6 @@
 """Starts: imported rules, named partitions, mixed families, chosen features, warm starts."""
 
+import pickle
 from inspect import signature
 from itertools import pairwise
 
@@ -284,6 +285,15 @@ class TestWarmStart:
             model.set_params(n_mfs=3).fit(*data)
         model.set_params(warm_start=False).fit(*data)
         assert model.n_rules_ == 27
+
+    def test_a_model_is_known_by_what_it_holds(self, data, known):
+        solver = VariableProjection(tol=1e-1)
+        model = ANFISRegressor(partition=known, warm_start=True, solver=solver).fit(*data)
+        loaded = pickle.loads(pickle.dumps(model))
+        assert_array_equal(loaded.fit(*data).predict(data[0]), model.fit(*data).predict(data[0]))
+        loaded.set_params(partition=pickle.loads(pickle.dumps(known.model_))).fit(*data)
+        with pytest.raises(ValueError, match="but partition has been changed"):
+            loaded.set_params(partition=model.model_).fit(*data)
 
     def test_other_inputs_are_refused(self, data):
         X, y = data

@@ -9,7 +9,7 @@ from sklearn.linear_model import LinearRegression
 from skanfis import ANFISRegressor
 from skanfis.options import EarlyStopping, Huber
 from skanfis.solvers import VariableProjection
-from skanfis.training import fit
+from skanfis.training import fit, robust
 
 
 def with_outliers(n_rows=600, part=0.05, seed=0):
@@ -129,3 +129,19 @@ def test_weights_that_do_not_settle_are_told(monkeypatch):
     X, y, *_ = with_outliers(200)
     with pytest.warns(ConvergenceWarning, match="weights of the rows still change"):
         ANFISRegressor(n_mfs=2, loss="huber").fit(X, y)
+
+
+def test_of_many_rows_some_show_the_outliers_and_all_are_weighed(monkeypatch):
+    X, y, truth, is_outlier = with_outliers(1500)
+    whole = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, y)
+    monkeypatch.setattr(fit, "MANY_ROWS", 500)
+    monkeypatch.setattr(robust, "MANY_ROWS", 500)
+    model = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, y)
+    # What Huber's estimator asks for holds of all rows: the weights are those of the residuals.
+    residual = np.abs(y - model.predict(X))
+    scale = np.median(residual) / 0.6744897501960817
+    assert_allclose(model.robust_weights_, np.minimum(1.0, 1.35 * scale / residual), atol=0.02)
+    assert model.robust_weights_[is_outlier].max() < 0.1
+    # Other weights of the penalty by a little: far less than the noise of 0.1.
+    assert_allclose(model.predict(X), whole.predict(X), atol=0.01)
+    assert np.sqrt(np.mean((model.predict(X) - truth) ** 2)) < 0.02
