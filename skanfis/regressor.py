@@ -1,11 +1,13 @@
 """ANFISRegressor: the estimator."""
 
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
@@ -32,7 +34,7 @@ from ._validation import (
     refuse_lazy,
 )
 from .exceptions import OutOfBoundsWarning
-from .membership import MEMBERSHIPS, membership_families
+from .membership import MEMBERSHIPS, Membership, membership_families
 from .model import OUT_OF_BOUNDS, TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
@@ -268,26 +270,26 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
 
     def __init__(
         self,
-        n_mfs="auto",
+        n_mfs: str | int | ArrayLike = "auto",
         *,
-        partition="auto",
-        mf="gaussian",
-        premise_features=None,
-        consequent_features=None,
-        order=1,
-        loss="squared_error",
-        solver="varpro",
-        agreement="auto",
-        alpha="auto",
-        n_init=1,
-        max_iter=500,
-        early_stopping=False,
-        warm_start=False,
-        out_of_bounds="linear",
-        verbose=False,
-        random_state=None,
-        n_jobs=None,
-    ):
+        partition: Any = "auto",
+        mf: str | type[Membership] | Sequence[str | type[Membership]] = "gaussian",
+        premise_features: ArrayLike | None = None,
+        consequent_features: ArrayLike | None = None,
+        order: int = 1,
+        loss: str | Huber = "squared_error",
+        solver: str | Solver = "varpro",
+        agreement: str | float = "auto",
+        alpha: str | float = "auto",
+        n_init: int = 1,
+        max_iter: int = 500,
+        early_stopping: bool | EarlyStopping = False,
+        warm_start: bool = False,
+        out_of_bounds: str | LinearExtrapolation = "linear",
+        verbose: bool | int = False,
+        random_state: int | np.random.RandomState | None = None,
+        n_jobs: int | None = None,
+    ) -> None:
         self.n_mfs = n_mfs
         self.partition = partition
         self.mf = mf
@@ -313,7 +315,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         return tags
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y, sample_weight=None, groups=None):
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
+    ) -> Self:
         """Train the model.
 
         Parameters
@@ -382,7 +390,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             callbacks.end(self.model_)
         return self
 
-    def predict(self, X):
+    def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the target.
 
         Parameters
@@ -416,7 +424,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             )
         return outputs[:, 0] if self._single_output else outputs
 
-    def in_bounds(self, X):
+    def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in the range of the training data, input by input.
 
         Parameters
@@ -430,7 +438,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         return self.model_.in_bounds(X)
 
-    def coverage(self, X):
+    def coverage(self, X: ArrayLike) -> np.ndarray:
         """Tell how well the training data cover each row.
 
         The sum over rules of strength times support, where a rule's support is the number of
@@ -452,7 +460,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         return self.model_.coverage(X)
 
-    def strengths(self, X):
+    def strengths(self, X: ArrayLike) -> np.ndarray:
         """Tell how strongly each rule fires on each row, normalised.
 
         Parameters
@@ -468,7 +476,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         return self.model_.strengths(X)
 
-    def rename_terms(self, names):
+    def rename_terms(self, names: Sequence[str] | Mapping[str, Sequence[str]]) -> Self:
         """Give the terms other names, in the rules and wherever they are shown.
 
         Parameters
@@ -493,7 +501,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.model_ = replace(model, term_names=renamed)
         return self
 
-    def without_rules(self, rules=None):
+    def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:
         """Give the model without some of its rules, to go on from.
 
         What is left fires as before, in proportion. Its consequents were learnt beside those that
@@ -516,35 +524,35 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         model = self._fitted_model()
         if rules is None:
             rules = [entry["rule"] for entry in self.redundant_rules_]
-        return model_without_rules(model, rules)
+        return model_without_rules(model, np.asarray(rules, dtype=int))
 
     @property
-    def n_rules_(self):
+    def n_rules_(self) -> int:
         """Number of rules."""
         return self._fitted_model().n_rules
 
     @property
-    def rules_(self):
+    def rules_(self) -> np.ndarray:
         """The terms of each rule, as positions in ``memberships_``."""
         return self._fitted_model().antecedent.rule_terms
 
     @property
-    def memberships_(self):
+    def memberships_(self) -> list[dict]:
         """Every term after training, in the user's units."""
         return self._fitted_model().memberships()
 
     @property
-    def initial_memberships_(self):
+    def initial_memberships_(self) -> list[dict]:
         """Every term before training, in the user's units."""
         return self._fitted_model().memberships(trained=False)
 
     @property
-    def consequents_(self):
+    def consequents_(self) -> np.ndarray:
         """p0, p1, ..., pd of every rule, in the user's units."""
         consequents = self._fitted_model().consequents
         return consequents[:, :, 0] if self._single_output else consequents
 
-    def _fitted_model(self):
+    def _fitted_model(self) -> TSKModel:
         check_is_fitted(self)
         return self.model_
 
@@ -602,7 +610,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             names=names,
         )
 
-    def _solver(self):
+    def _solver(self) -> Solver:
         """The solver, by its word or as it is given."""
         return SOLVERS[self.solver]() if isinstance(self.solver, str) else self.solver
 

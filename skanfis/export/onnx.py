@@ -22,7 +22,7 @@ __all__ = ["register_onnx_converter"]
 _OLDEST_OPSET = 13
 
 
-def register_onnx_converter():
+def register_onnx_converter() -> None:
     """Teach skl2onnx to convert :class:`skanfis.ANFISRegressor`, alone or in a pipeline.
 
     After one call, ``skl2onnx.to_onnx`` and ``skl2onnx.convert_sklearn`` know the estimator. Inputs

@@ -1,5 +1,7 @@
 """The error during training."""
 
+from typing import Self
+
 import numpy as np
 
 from ..export._fold import last_step
@@ -48,14 +50,14 @@ class LossCurveDisplay:
     True
     """
 
-    def __init__(self, *, loss, validation_loss=None, name=None, status=None):
+    def __init__(self, *, loss, validation_loss=None, name=None, status=None) -> None:
         self.loss = loss
         self.validation_loss = validation_loss
         self.name = name
         self.status = status
 
     @classmethod
-    def from_estimator(cls, estimator, *, name=None, ax=None, **line_kw):
+    def from_estimator(cls, estimator, *, name=None, ax=None, **line_kw) -> Self:
         """Draw the training error of a fitted estimator.
 
         Parameters
@@ -86,7 +88,7 @@ class LossCurveDisplay:
         )
         return display.plot(ax=ax, **line_kw)
 
-    def plot(self, *, ax=None, **line_kw):
+    def plot(self, *, ax=None, **line_kw) -> Self:
         """Draw the curve.
 
         Parameters

@@ -111,7 +111,7 @@ def _grid_with(antecedent, terms):
     return replace(antecedent, groups=_groups_with(antecedent.groups, terms), counts=counts), terms
 
 
-def model_without_rules(model: TSKModel, rules: Sequence[int]) -> TSKModel:
+def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> TSKModel:
     """The model without some rules: those that are left fire as before, in proportion.
 
     ValueError where there is no such rule, or where none would be left.
