@@ -23,8 +23,10 @@ __all__ = [
     "warn_user",
 ]
 
+# Rows whose finiteness is looked up at once: some MB, where a sum has told that one is not finite.
 _READ_ROWS = 65_536
-# Exponent of two up to which weights are taken as they are.
+# Exponent of two up to which weights are taken as they are: products of two, and sums of as many
+# rows as there can be, stay within 2^1023.
 _FAR = 400
 
 

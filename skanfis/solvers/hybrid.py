@@ -35,6 +35,7 @@ from .result import SolverResult
 __all__ = ["Hybrid", "NaturalPremise", "Point", "StepSize", "descend", "hybrid"]
 
 _RISE, _FALL = 1.0, -1.0
+# His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
 _GROWTH, _SHRINKAGE = 1.1, 0.9
 _GROW_AFTER = [_FALL, _FALL, _FALL, _FALL]
 _SHRINK_AFTER = [_RISE, _FALL, _RISE, _FALL]

@@ -39,17 +39,16 @@ __all__ = ["VariableProjection", "trust_region_step", "varpro"]
 # one arrangement of the terms to another, and the bad minima are met that way.
 _FIRST_RADIUS = 0.3
 _LARGEST_RADIUS = 1.0
-# A step of this length changes no digit of the cost that can be told from rounding: its change is
-# of second order at a minimum.
+# Below this the decrease that a step promises is lost in the rounding of the cost.
 _SMALLEST_RADIUS = 1e-9
-# Of Nocedal and Wright: any decrease that is a decrease at all.
+# Nocedal and Wright's eta: as good as any decrease is taken.
 _ACCEPTED_RATIO = 1e-4
-# Steps up to this much longer than the radius count as on its edge.
+# Steps up to this much longer than the radius count as on its edge: the radius itself is a guess.
 _LENGTH_SLACK = 1.01
-# Newton's way to the radius takes three or four; rounding must not make it endless.
+# Newton's method converges quadratically here; the bound is for rounding alone.
 _MOST_NEWTON_STEPS = 50
-# Added to every curvature: this part of the largest, half the digits of a double being lost in a
-# curvature that is a difference; and this part of the cost, which a step of one must pay for.
+# Added to every curvature: this part of the largest, far above what rounding leaves where there is
+# none and far below what data give; and this part of the cost, which a step of one must pay for.
 _SMALLEST_CURVATURE = 1e-6
 _WORTH = 0.1
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.

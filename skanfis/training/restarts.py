@@ -14,9 +14,10 @@ import numpy as np
 
 __all__ = ["displaced_starts", "leave_one_out_error"]
 
-# Standard deviation of a start's displacements.
+# Standard deviation of a start's displacements: a third of a spacing, beyond which terms would swap
+# places and the start would be another structure.
 _SPREAD = 0.3
-# A row that a rule has to itself would have an error without bound.
+# A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
 _SMALLEST_FREEDOM = 1e-6
 
 

@@ -35,14 +35,18 @@ _NORMAL_MEDIAN = 0.6744897501960817
 # Rows from which outliers are told where there are more: the median of so many residuals, and so
 # the scale, is good to one part in a hundred.
 MANY_ROWS = 20_000
+# Any fixed one: the same data give the same model.
 _SEED = 0
+# Rows of one block, which stays in the processor's cache.
 _READ_ROWS = 4096
 # Of the linear model, robust standard deviations that no shape of a sound target leaves.
 _FAR = 10.0
+# Of its minimiser: so tight that the first weights do not depend on the order of the rows.
 _MOST_STEPS, _TIGHT = 1000, 1e-9
 # Digits of the first weights: more would only carry the minimiser's errors on.
 _DIGITS = 2
-# Rows of less weight have no part in where training starts.
+# Rows of less weight have no part in where training starts: by the default epsilon, those beyond
+# 2.7 standard deviations.
 _OUTLIER = 0.5
 
 

@@ -10,6 +10,7 @@ from ..structure.held_out import held_out_loss
 
 __all__ = ["ValidationLoss", "hold_out"]
 
+# Rows of one block, which stays in the processor's cache.
 _READ_ROWS = 4096
 
 
