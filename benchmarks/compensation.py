@@ -44,7 +44,7 @@ def search(estimator, grid, n_splits):
 
 def plain(choices, n_splits, prefix="anfisregressor__"):
     """The default example: scaling and an ANFIS."""
-    pipeline = make_pipeline(StandardScaler(), ANFISRegressor(warn_out_of_bounds=False))
+    pipeline = make_pipeline(StandardScaler(), ANFISRegressor())
     return search(pipeline, {f"{prefix}n_mfs": choices}, n_splits)
 
 
@@ -78,7 +78,7 @@ def law():
 def physics_and_anfis():
     """The law, and rules on output, time and thermal rate for what dies away after power-on."""
     left = make_column_transformer(("passthrough", ["output", "time", "thermal_rate"]))
-    rules = make_pipeline(left, ANFISRegressor(warn_out_of_bounds=False))
+    rules = make_pipeline(left, ANFISRegressor())
     compensator = ResidualRegressor(law(), rules, n_rounds=3)
     choices = [[1, 2, 1], [1, 3, 1], [2, 3, 1], [2, 2, 2]]
     return search(compensator, {"residual__anfisregressor__n_mfs": choices}, n_splits=4)
@@ -115,7 +115,7 @@ RIVALS = {
     f"Gaussian process ({_GP_ROWS} rows)": gaussian_process,
     "MLP, 64 + 64": perceptron,
     "gradient boosting": HistGradientBoostingRegressor,
-    "ANFIS as it comes": lambda: ANFISRegressor(warn_out_of_bounds=False),
+    "ANFIS as it comes": lambda: ANFISRegressor(),
     "scaling + ANFIS, terms by search": lambda: plain([2, [3, 2, 2, 2], [4, 2, 2, 2]], 4),
 }
 
@@ -230,22 +230,22 @@ def campaign_law():
 
 
 def campaign_compensator():
-    compensator = ResidualRegressor(campaign_law(), ANFISRegressor(warn_out_of_bounds=False))
+    compensator = ResidualRegressor(campaign_law(), ANFISRegressor())
     choices = [1, [2, 1], [3, 1], [4, 1], 2, [3, 2], [4, 2]]
     return search(compensator, {"residual__n_mfs": choices}, n_splits=10)
 
 
 def linear_anfis():
-    return ANFISRegressor(out_of_bounds="linear", warn_out_of_bounds=False)
+    return ANFISRegressor(out_of_bounds="linear")
 
 
 CAMPAIGN = {
     "arcsine law + ANFIS, terms by search": campaign_compensator,
     "arcsine law + ANFIS, 3 rules": lambda: ResidualRegressor(
-        campaign_law(), ANFISRegressor([3, 1], warn_out_of_bounds=False)
+        campaign_law(), ANFISRegressor([3, 1])
     ),
     "arcsine law": campaign_law,
-    "ANFIS as it comes": lambda: ANFISRegressor(warn_out_of_bounds=False),
+    "ANFIS as it comes": lambda: ANFISRegressor(),
     'ANFIS, out_of_bounds="linear"': linear_anfis,
     "scaling + ANFIS, terms by search": lambda: plain([2, [3, 2], [4, 2], [5, 2]], 10),
     "cubic": partial(polynomial, 3),

@@ -12,6 +12,7 @@ from sklearn.datasets import make_friedman1
 from sklearn.mixture import GaussianMixture
 
 from skanfis import ANFISRegressor
+from skanfis.solvers import VariableProjection
 
 from .gyro import SIGMA, make_surface
 from .report import Measure, Results, Row, Table
@@ -21,7 +22,7 @@ __all__ = ["run"]
 
 _N_TEST = 5000
 # What few or noisy rows ask for; "stiff" below.
-_STIFF = {"alpha": 1e-3, "stiffness": 1e-2}
+_STIFF = {"alpha": 1e-3, "solver": VariableProjection(stiffness=1e-2)}
 
 
 @dataclass(frozen=True)

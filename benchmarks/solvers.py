@@ -14,9 +14,11 @@ import numpy as np
 
 from skanfis import ANFISRegressor
 from skanfis.objective import SeparableProblem
+from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 from .gyro import SIGMA, make_surface, score
 from .jang import PROBLEMS
+from .lbfgs import LBFGS
 from .report import Measure, Results, Row, Table
 from .timing import side_by_side
 
@@ -26,10 +28,10 @@ _EPOCHS = 500
 _STEP_SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SETTINGS = {
     "varpro": {},
-    "varpro, tol=1e-6": {"tol": 1e-6},
+    "varpro, tol=1e-6": {"solver": VariableProjection(tol=1e-6)},
     "varpro, n_init=20": {"n_init": 20},
-    "lbfgs": {"solver": "lbfgs"},
-    "lbfgs, tol=1e-6": {"solver": "lbfgs", "tol": 1e-6, "max_iter": 5000},
+    "lbfgs": {"solver": LBFGS()},
+    "lbfgs, tol=1e-6": {"solver": LBFGS(tol=1e-6), "max_iter": 5000},
     "lse": {"solver": "lse"},
 }
 _ROUNDS = 3
@@ -80,7 +82,7 @@ def count_passes(function):
 
 def best_step(task, solver):
     """The settings of a descent, its first step being the best of several."""
-    every = [{"solver": solver, "step_size": size, "max_iter": _EPOCHS} for size in _STEP_SIZES]
+    every = [{"solver": solver(step_size=size), "max_iter": _EPOCHS} for size in _STEP_SIZES]
     losses = [task.fit(settings).loss_curve_.min() for settings in every]
     return every[int(np.argmin(losses))]
 
@@ -97,8 +99,8 @@ def until(settings, model, loss):
 def compare(task):
     """Lines of the table; passes and time to the common error, by solver."""
     settings = dict(_SETTINGS)
-    for solver in ("hybrid", "gradient"):
-        settings[solver] = best_step(task, solver)
+    for name, solver in (("hybrid", Hybrid), ("gradient", GradientDescent)):
+        settings[name] = best_step(task, solver)
     runs = {name: partial(task.fit, given) for name, given in settings.items()}
     counted = {name: count_passes(fit) for name, fit in runs.items()}
     goal = counted["hybrid"][1].loss_curve_.min()
@@ -108,7 +110,7 @@ def compare(task):
     reached = {name: (count_passes(fit)[0], seconds_to_goal[name]) for name, fit in short.items()}
     lines = []
     for name, (n_passes, model) in counted.items():
-        step = settings[name].get("step_size")
+        step = getattr(settings[name].get("solver"), "step_size", None)
         label = name if step is None else f"{name}, step_size={step:g}"
         cells = [*task.errors(model), model.n_iter_, n_passes, seconds[name]]
         missing = "" if "n_init" in settings[name] else "never"

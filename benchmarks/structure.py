@@ -57,7 +57,7 @@ def estimators():
     yield "MLP", lambda d: neural_network()
     yield "GradientBoosting", lambda d: boosting()
     yield "HistGradientBoosting", lambda d: histogram_boosting()
-    yield OURS, lambda d: ANFISRegressor(warn_out_of_bounds=False)
+    yield OURS, lambda d: ANFISRegressor()
 
 
 def tuned(model, grid):

@@ -188,7 +188,7 @@ def hold_out(campaign):
 
 def compensator():
     """A pipeline that learns the error; the names of the columns pass through its scaler."""
-    anfis = ANFISRegressor(out_of_bounds="nan", warn_out_of_bounds=False)
+    anfis = ANFISRegressor(out_of_bounds="nan")
     return make_pipeline(StandardScaler(), anfis).set_output(transform="pandas")
 
 
@@ -664,7 +664,7 @@ def models_of_paper():
     return {
         "mean": DummyRegressor(),
         "straight line": LinearRegression(),
-        "ANFIS, 6 x 6 rules": ANFISRegressor(n_mfs=[6, 6], warn_out_of_bounds=False),
+        "ANFIS, 6 x 6 rules": ANFISRegressor(n_mfs=[6, 6]),
     }
 
 

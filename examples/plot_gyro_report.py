@@ -39,7 +39,7 @@ thermal_rate = ThermalRate(30.0, time="time", run="run")
 log["dT/dt"] = thermal_rate.fit_transform(log[["time", "temperature", "run"]])
 X = log[["time", "temperature", "dT/dt", "output"]]
 
-anfis = ANFISRegressor([2, 2, 1, 4], out_of_bounds="nan", warn_out_of_bounds=False)
+anfis = ANFISRegressor([2, 2, 1, 4], out_of_bounds="nan")
 model = make_pipeline(StandardScaler(), anfis)
 predicted = np.empty(len(log))
 for train, test in LeaveOneGroupOut().split(X, groups=log["run"]):
@@ -93,7 +93,7 @@ at_rest = make_ofog(
 at_rest["dT/dt"] = thermal_rate.fit_transform(at_rest[["time", "temperature", "run"]])
 old = at_rest["run"] < 6
 inputs = at_rest[["time", "temperature", "dT/dt"]]
-bias_model = ANFISRegressor([2, 2, 1], warn_out_of_bounds=False)
+bias_model = ANFISRegressor([2, 2, 1], out_of_bounds="clip")
 bias_model = bias_model.fit(inputs[old], at_rest["error"][old])
 new = at_rest[~old]
 loop = HysteresisDisplay.from_estimator(

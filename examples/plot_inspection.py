@@ -23,6 +23,7 @@ from skanfis.inspection import (
     RuleContributionDisplay,
     readability,
 )
+from skanfis.solvers import VariableProjection
 
 # %%
 # The model
@@ -34,7 +35,9 @@ from skanfis.inspection import (
 
 data = make_ofog(n_devices=1, n_runs=12, random_state=0)
 X, error = data[["temperature", "rate"]], data["error"]
-model = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[2, 4], stiffness=1e-3))
+model = make_pipeline(
+    StandardScaler(), ANFISRegressor(n_mfs=[2, 4], solver=VariableProjection(stiffness=1e-3))
+)
 model.fit(X, error)
 print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X)).std():.3f} °/s")
 
@@ -85,7 +88,9 @@ MembershipDisplay.from_estimator(model, X)
 # The gyro warms fast only for a while after power-on. A full grid over temperature and its rate of
 # change has rules for which there are no data. They are hatched; what they say is extrapolation.
 
-warming = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], stiffness=0.1))
+warming = make_pipeline(
+    StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], solver=VariableProjection(stiffness=0.1))
+)
 warming.fit(data[["temperature", "temperature_rate", "rate"]], error)
 RuleActivationDisplay.from_estimator(warming)
 
@@ -124,8 +129,8 @@ RuleContributionDisplay.from_estimator(model, "rate", held={"temperature": 40.0}
 # The training error by iteration, of three solvers from the same start.
 
 figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
-for solver in ("varpro", "hybrid", "lbfgs"):
-    model.set_params(anfisregressor__solver=solver, anfisregressor__stiffness="auto")
+for solver in ("varpro", "hybrid", "gradient"):
+    model.set_params(anfisregressor__solver=solver)
     LossCurveDisplay.from_estimator(model.fit(X, error), ax=ax)
 ax.set_xscale("symlog")
 

@@ -7,6 +7,8 @@ compares it with ``predict`` in either precision. ``pip install "skanfis[onnx]"`
 :doc:`/onnx` says more.
 """
 
+import warnings
+
 import matplotlib.pyplot as plt
 import numpy as np
 import onnxruntime
@@ -16,12 +18,11 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
+from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.export import register_onnx_converter
 
 X, y = make_jang_sinc()
-pipeline = make_pipeline(
-    StandardScaler(), ANFISRegressor(n_mfs=4, out_of_bounds="linear", warn_out_of_bounds=False)
-)
+pipeline = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=4, out_of_bounds="linear"))
 pipeline.fit(X, y)
 
 # %%
@@ -52,7 +53,9 @@ sessions = {dtype: session(dtype) for dtype in (np.float64, np.float32)}
 
 line = np.linspace(-14.0, 14.0, 401)
 rows = np.column_stack([line, 0.3 * line])
-expected = pipeline.predict(rows)
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", OutOfBoundsWarning)
+    expected = pipeline.predict(rows)
 
 figure, (above, below) = plt.subplots(2, 1, figsize=(7, 5), sharex=True, layout="constrained")
 above.plot(line, expected, label="predict", linewidth=4, alpha=0.4)

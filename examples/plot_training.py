@@ -2,20 +2,19 @@
 How a model is trained
 ======================
 
-Four solvers on one problem; training that stops before it learns the noise; and a loss to which
+Three solvers on one problem; training that stops before it learns the noise; and a loss to which
 outliers do little. :doc:`/training` describes these options and the others, :doc:`/choosing` says
 which to choose.
 """
 
-import warnings
-
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn.exceptions import ConvergenceWarning
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.inspection import LossCurveDisplay
+from skanfis.options import EarlyStopping
+from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 # %%
 # Solvers
@@ -23,24 +22,16 @@ from skanfis.inspection import LossCurveDisplay
 #
 # Four terms on each of two inputs, from the same start. Variable projection has met the data to
 # four digits before Jang's hybrid rule, with the best size of its steps, has left the start. Plain
-# gradient descent on premises and consequents together gets almost nowhere. L-BFGS sees some of the
-# curvature and gets as far as Jang's rule: premises and consequents move together along a curved
-# valley, and without eliminating one of them it has to be followed step by step.
+# gradient descent on premises and consequents together gets almost nowhere: they move together
+# along a curved valley, and without eliminating one of them it has to be followed step by step.
 
 X, y = make_jang_sinc()
-SOLVERS = {
-    "varpro": {},
-    "hybrid": {"solver": "hybrid", "step_size": 0.003},
-    "gradient": {"solver": "gradient", "step_size": 0.1},
-    "lbfgs": {"solver": "lbfgs", "tol": 1e-6},
+solvers = {
+    "variable projection": VariableProjection(),
+    "Jang's hybrid rule": Hybrid(step_size=0.003),
+    "gradient descent": GradientDescent(step_size=0.1),
 }
-
-models = {}
-with warnings.catch_warnings():
-    # 500 iterations are not enough for L-BFGS, as the picture shows.
-    warnings.simplefilter("ignore", ConvergenceWarning)
-    for name, settings in SOLVERS.items():
-        models[name] = ANFISRegressor(n_mfs=4, **settings).fit(X, y)
+models = {name: ANFISRegressor(n_mfs=4, solver=s).fit(X, y) for name, s in solvers.items()}
 
 figure, panel = plt.subplots(figsize=(6, 3.5), layout="constrained")
 for name, model in models.items():
@@ -81,8 +72,11 @@ panels[0].set_ylabel("membership")
 rng = np.random.default_rng(7)
 x_noisy = rng.uniform(0.0, 10.0, (100, 1))
 y_noisy = np.sin(x_noisy[:, 0]) + 0.3 * rng.standard_normal(100)
-settings = {"n_mfs": 12, "early_stopping": True, "validation_fraction": 0.3, "tol": 1e-4}
-stopped = ANFISRegressor(**settings).fit(x_noisy, y_noisy)
+stopped = ANFISRegressor(
+    n_mfs=12,
+    solver=VariableProjection(tol=1e-4),
+    early_stopping=EarlyStopping(validation_fraction=0.3, tol=1e-4),
+).fit(x_noisy, y_noisy)
 
 figure, panel = plt.subplots(figsize=(6, 4), layout="constrained")
 LossCurveDisplay.from_estimator(stopped, ax=panel)

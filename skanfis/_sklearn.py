@@ -4,7 +4,10 @@ Every name here exists at the oldest and the newest supported version; what move
 is mended here and nowhere else.
 """
 
-from sklearn.base import _fit_context as fit_context
+from collections.abc import Callable
+from typing import TypeVar
+
+from sklearn.base import _fit_context
 from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
 from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
@@ -21,6 +24,20 @@ __all__ = [
     "HasMethods",
     "Interval",
     "StrOptions",
+    "check_parameters",
     "check_sample_weight",
     "fit_context",
 ]
+
+
+_Method = TypeVar("_Method", bound=Callable)
+
+
+def fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[_Method], _Method]:
+    """scikit-learn's frame around ``fit``; type checkers see the method as it is written."""
+    return _fit_context(prefer_skip_nested_validation=prefer_skip_nested_validation)
+
+
+def check_parameters(estimator):
+    """Raise ValueError where a parameter is not what ``_parameter_constraints`` allow."""
+    estimator._validate_params()

@@ -149,7 +149,8 @@ class SeparableProblem:
         self._weight = rows.total_weight
         _keep_freed_memory()
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
-        gram, _, _ = self._first_pass(antecedent, no_coefficients)
+        self._sums_at_start = self._first_pass(antecedent, no_coefficients)
+        gram = self._sums_at_start[0]
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
         self._common_line = CommonLine(self.local, self._extent(antecedent))
 
@@ -235,9 +236,15 @@ class SeparableProblem:
     def evaluate(self, parameters, reference=None):
         """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
-        if reference is None:
+        if reference is not None:
+            gram, slope, square = self._first_pass(antecedent, reference)
+        else:
             reference = np.zeros((self.n_columns, self.n_outputs))
-        gram, slope, square = self._first_pass(antecedent, reference)
+            gram, slope, square = self._sums_at_start
+            if np.array_equal(parameters, self.antecedent.parameters):
+                slope = slope.copy()  # it is changed below
+            else:
+                gram, slope, square = self._first_pass(antecedent, reference)
         disagreement = self.local.transform_gram(disagreement_matrix(gram, antecedent.n_rules))
         penalty = self.penalty_matrix(disagreement)
         masses = rule_masses(gram, antecedent.n_rules)

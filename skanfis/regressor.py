@@ -1,27 +1,32 @@
 """ANFISRegressor: the estimator."""
 
 import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from numbers import Integral, Real
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
-from ._anfis import TrainingData, train
 from ._notebook import RulesReprMixin
 from ._sklearn import (
     CallbackSupportMixin,
     HasMethods,
     Interval,
     StrOptions,
+    check_parameters,
     check_sample_weight,
     fit_context,
 )
+from ._threads import one_blas_thread
 from ._validation import (
     bearable_weights,
     check_finite,
+    content_digest,
     feature_indices,
     group_numbers,
     named_refusals,
@@ -29,12 +34,14 @@ from ._validation import (
     refuse_lazy,
 )
 from .exceptions import OutOfBoundsWarning
-from .membership import MEMBERSHIPS, TRIED_FAMILIES, membership_families
-from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
+from .membership import MEMBERSHIPS, TRIED_FAMILIES, Membership, membership_families
+from .model import OUT_OF_BOUNDS, TSKModel
+from .naming import given_term_names
+from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .readable import readability_of_rows
-from .solvers import SOLVERS
+from .solvers import SOLVERS, Solver
 from .structure import StructureRequest, check_inputs
-from .training import CallbackBridge
+from .training import Callbacks, TrainingData, fit_rules, model_without_rules
 
 __all__ = ["ANFISRegressor"]
 
@@ -83,33 +90,25 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         structure that Gaussians have found, or that is given, with each of the first six as well,
         for all inputs alike, and takes the one that promises the smallest error on new rows. Not
         looked at where ``partition`` is a model, which brings its own.
-    term_names : sequence of str or dict, default=None
-        Names of the terms, for every input alike or by input ``{"temperature": ["cold", "hot"]}``,
-        in ascending order on a grid, rule by rule otherwise. None: "low" to "high", NL to PL
-        (negative large to positive large) where there are six or seven, "near 21.3" for scattered
-        rules.
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
         None is all. With rules on temperature and consequents in rate alone, say, the scale factor
         is scheduled by temperature. What ``n_mfs`` gives terms to must be among the former.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
-    loss : {"squared_error", "huber"}, default="squared_error"
-        What is minimised. "huber" counts rows whose residual is beyond ``epsilon`` standard
-        deviations by its size and not its square: outliers in the target then do little.
-    epsilon : float, default=1.35
-        Where Huber's loss turns, in robust standard deviations of the residual; positive. The
-        smaller, the more robust; 1.35 loses 5 % of the efficiency where there are no outliers.
-    solver : {"varpro", "hybrid", "gradient", "lbfgs", "lse"}, default="varpro"
-        How the premises are learnt. "varpro": variable projection with trust-region Gauss-Newton
-        steps. "hybrid": Jang's rule, least squares forward and a gradient step of his own step size
-        backward [1]_. "gradient": gradient descent on premises and consequents together, as in
-        back-propagation. "lbfgs": the same by L-BFGS-B. "lse": premises stay as they start.
-    step_size : float, default=None
-        Length of the first step of "hybrid" and "gradient", positive; None is 0.01.
-    error_goal : float, default=None
-        "hybrid" and "gradient" stop at this root mean square error, in standard deviations of the
-        target.
+    loss : {"squared_error", "huber"} or Huber, default="squared_error"
+        What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: rows
+        far from the model count by the size of their residual and not its square, so that outliers
+        in the target do little.
+    solver : {"varpro", "hybrid", "gradient", "lse"} or Solver, default="varpro"
+        How the premises are learnt; an object of :mod:`skanfis.solvers` has settings of its own.
+        "varpro", :class:`~skanfis.solvers.VariableProjection`: trust-region Gauss-Newton steps;
+        its ``tol`` says when to stop, its ``stiffness`` holds the premises near their start.
+        "hybrid", :class:`~skanfis.solvers.Hybrid`: Jang's rule, least squares forward and a
+        gradient step of his own step size backward [1]_. "gradient",
+        :class:`~skanfis.solvers.GradientDescent`: on premises and consequents together, as in
+        back-propagation. "lse", :class:`~skanfis.solvers.LeastSquares`: premises stay as they
+        start.
     agreement : "auto" or float, default="auto"
         Weight of the penalty on rules that disagree where they fire together, zero or positive:
         agreement / 2 times the mean over rows of :math:`\sum_r \bar w_r (f_r - \hat y)^2`, in
@@ -122,45 +121,23 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         its value at its own centre and in its slopes, and of the slopes of that line. Of a single
         rule it is scikit-learn's ``Ridge``. "auto": departures and common line have a weight each,
         found by the evidence. At zero, a ridge at the level of rounding errors remains.
-    stiffness : "auto" or float, default="auto"
-        Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
-        of their displacements (in spacings of terms and logarithms of widths) is added likewise.
-        "auto": found by the evidence.
     n_init : int, default=1
         Number of starts, 1 or more: the partition's own, and others displaced from it at random.
         The model of the smallest leave-one-out error of the linear part is kept.
     max_iter : int, default=500
         Most iterations (epochs). With 0, premises stay as they start.
-    tol : float, default=1e-3
-        Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
-        or when the gradient says as much. Zero or positive.
-    early_stopping : bool, default=False
+    early_stopping : bool or EarlyStopping, default=False
         Whether to hold out rows, stop when the error on them falls no more, and keep the parameters
         of its minimum. With ``groups`` given to ``fit``, whole groups are held out.
-    validation_fraction : float, default=0.1
-        Part of the rows, or of the groups, that early stopping holds out; between 0 and 1.
-    n_iter_no_change : int, default=10
-        Early stopping ends after so many iterations in which the error on the rows held out has not
-        fallen by ``tol``, relatively.
+        :class:`~skanfis.options.EarlyStopping` says how many rows, and how patient to be.
     warm_start : bool, default=False
         Whether a further ``fit`` starts from the rules of the one before.
-    prune : bool, default=False
-        Whether to drop the rules that never fire or repeat another one, and train again without
-        them. They are reported in ``redundant_rules_`` in any case.
-    out_of_bounds : {"clip", "linear", "nan", "raise"}, default="linear"
+    out_of_bounds : {"linear", "clip", "nan", "raise"} or LinearExtrapolation, default="linear"
         What ``predict`` does with rows outside the range of the training data, input by input:
-        "clip" holds the value at the edge; "linear" goes on along the tangent there, as far as
-        ``max_extrapolation`` says, and holds the value reached; "nan" returns NaN; "raise" raises
+        "linear" warns, goes on along the tangent at the edge for half a standard deviation of the
+        input (:class:`~skanfis.options.LinearExtrapolation` for another distance), and holds the
+        value reached; "clip" holds the value at the edge; "nan" returns NaN; "raise" raises
         ValueError. It may be changed by ``set_params`` after training.
-    max_extrapolation : float, default=0.5
-        How far "linear" follows the tangent beyond the range of an input, in standard deviations of
-        that input in the training data: zero or positive; 0 is "clip", ``math.inf`` the tangent
-        without end. It may be changed by ``set_params`` after training.
-    warn_out_of_bounds : bool, default=True
-        Whether ``predict`` warns of such rows.
-    on_interrupt : {"raise", "stop"}, default="raise"
-        What Ctrl-C does during ``fit``: "raise" leaves the estimator as it was before; "stop" keeps
-        the best model so far, if there has been an iteration.
     verbose : bool, default=False
         Whether to write a line per iteration. scikit-learn's callbacks (``set_callbacks``) work
         from scikit-learn 1.9 on.
@@ -204,10 +181,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     redundant_rules_ : list of dict
         Rules that do nothing: "rule", its number; "reason", "never fires" (nowhere in the
         training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
-        rows); "weight", its part of the data's weight.
-    pruning_ : dict or None
-        With ``prune``, if there were redundant rules: "rules", those dropped by their numbers
-        before; "loss_before" and "loss_after", as in ``loss_curve_``.
+        rows); "weight", its part of the data's weight. ``without_rules`` drops them.
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
         With ``early_stopping``: as ``loss_curve_``, of the rows held out, from the first iteration.
     robust_weights_ : ndarray of shape (n_samples,) or None
@@ -227,16 +201,19 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     UnderdeterminedWarning
         If there are more consequent parameters than distinct training rows.
     OutOfBoundsWarning
-        From ``predict`` and ``score``; see ``out_of_bounds``.
+        From ``predict`` and ``score``, of rows that are extrapolated to: with
+        ``out_of_bounds="linear"``. "clip" and "nan" are answers that were asked for, as in
+        scikit-learn's IsotonicRegression, and are given without a word.
 
     Notes
     -----
     What is trained is not the sum of the rules alone: rules that fire on the same row pay for their
     disagreement (``agreement``), and every rule for its departure from the line that all have in
     common (``alpha``), so that each can be read by itself. Where these weights and the pull of the
-    premises (``stiffness``) are "auto", they are found by the evidence, the probability of the data
-    with all parameters averaged out [3]_, on at most 1,000 representative rows; with data that seem
-    free of noise, from two sides. ``readability_`` says how far the rules can be read.
+    premises (the solver's ``stiffness``) are "auto", they are found by the evidence, the
+    probability of the data with all parameters averaged out [3]_, on at most 1,000 representative
+    rows; with data that seem free of noise, from two sides. ``readability_`` says how far the rules
+    can be read.
 
     Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
     compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the
@@ -276,30 +253,18 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             HasMethods(["predict", "strengths"]),
         ],
         "mf": [StrOptions({"auto", *MEMBERSHIPS}), type, list, tuple, np.ndarray],
-        "term_names": [list, tuple, np.ndarray, dict, None],
         "premise_features": ["array-like", str, Integral, None],
         "consequent_features": ["array-like", str, Integral, None],
         "order": [Interval(Integral, 0, 1, closed="both")],
-        "loss": [StrOptions({"squared_error", "huber"})],
-        "epsilon": [Interval(Real, 0, None, closed="neither")],
-        "solver": [StrOptions(set(SOLVERS))],
-        "step_size": [Interval(Real, 0, None, closed="neither"), None],
-        "error_goal": [Interval(Real, 0, None, closed="left"), None],
+        "loss": [StrOptions({"squared_error", "huber"}), Huber],
+        "solver": [StrOptions(set(SOLVERS)), Solver],
         "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
         "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
         "n_init": [Interval(Integral, 1, None, closed="left")],
         "max_iter": [Interval(Integral, 0, None, closed="left")],
-        "tol": [Interval(Real, 0, None, closed="left")],
-        "early_stopping": ["boolean"],
-        "validation_fraction": [Interval(Real, 0, 1, closed="neither")],
-        "n_iter_no_change": [Interval(Integral, 1, None, closed="left")],
+        "early_stopping": ["boolean", EarlyStopping],
         "warm_start": ["boolean"],
-        "prune": ["boolean"],
-        "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS))],
-        "max_extrapolation": [Interval(Real, 0, np.inf, closed="both")],
-        "warn_out_of_bounds": ["boolean"],
-        "on_interrupt": [StrOptions({"raise", "stop"})],
+        "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
         "verbose": ["verbose"],
         "random_state": ["random_state"],
         "n_jobs": [Integral, None],
@@ -307,65 +272,41 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
 
     def __init__(
         self,
-        n_mfs="auto",
+        n_mfs: str | int | ArrayLike = "auto",
         *,
-        partition="auto",
-        mf="gaussian",
-        term_names=None,
-        premise_features=None,
-        consequent_features=None,
-        order=1,
-        loss="squared_error",
-        epsilon=1.35,
-        solver="varpro",
-        step_size=None,
-        error_goal=None,
-        agreement="auto",
-        alpha="auto",
-        stiffness="auto",
-        n_init=1,
-        max_iter=500,
-        tol=1e-3,
-        early_stopping=False,
-        validation_fraction=0.1,
-        n_iter_no_change=10,
-        warm_start=False,
-        prune=False,
-        out_of_bounds="linear",
-        max_extrapolation=MAX_EXTRAPOLATION,
-        warn_out_of_bounds=True,
-        on_interrupt="raise",
-        verbose=False,
-        random_state=None,
-        n_jobs=None,
-    ):
+        partition: Any = "auto",
+        mf: str | type[Membership] | Sequence[str | type[Membership]] = "gaussian",
+        premise_features: ArrayLike | None = None,
+        consequent_features: ArrayLike | None = None,
+        order: int = 1,
+        loss: str | Huber = "squared_error",
+        solver: str | Solver = "varpro",
+        agreement: str | float = "auto",
+        alpha: str | float = "auto",
+        n_init: int = 1,
+        max_iter: int = 500,
+        early_stopping: bool | EarlyStopping = False,
+        warm_start: bool = False,
+        out_of_bounds: str | LinearExtrapolation = "linear",
+        verbose: bool | int = False,
+        random_state: int | np.random.RandomState | None = None,
+        n_jobs: int | None = None,
+    ) -> None:
         self.n_mfs = n_mfs
         self.partition = partition
         self.mf = mf
-        self.term_names = term_names
         self.premise_features = premise_features
         self.consequent_features = consequent_features
         self.order = order
         self.loss = loss
-        self.epsilon = epsilon
         self.solver = solver
-        self.step_size = step_size
-        self.error_goal = error_goal
         self.agreement = agreement
         self.alpha = alpha
-        self.stiffness = stiffness
         self.n_init = n_init
         self.max_iter = max_iter
-        self.tol = tol
         self.early_stopping = early_stopping
-        self.validation_fraction = validation_fraction
-        self.n_iter_no_change = n_iter_no_change
         self.warm_start = warm_start
-        self.prune = prune
         self.out_of_bounds = out_of_bounds
-        self.max_extrapolation = max_extrapolation
-        self.warn_out_of_bounds = warn_out_of_bounds
-        self.on_interrupt = on_interrupt
         self.verbose = verbose
         self.random_state = random_state
         self.n_jobs = n_jobs
@@ -376,7 +317,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         return tags
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y, sample_weight=None, groups=None):
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
+    ) -> Self:
         """Train the model.
 
         Parameters
@@ -406,39 +353,46 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         """
         context = None
         if hasattr(self, "_skl_callbacks"):
-            is_single_run = self.n_init == 1 and self.loss != "huber"
-            most = max(self.max_iter, 1) if is_single_run and not self.prune else None
+            is_single_run = self.n_init == 1 and self.loss == "squared_error"
+            most = max(self.max_iter, 1) if is_single_run else None
             context = self._init_callback_context(max_subtasks=most)
         before = self.__dict__.copy()
         try:
+            for option in (self.solver, self.loss, self.early_stopping, self.out_of_bounds):
+                if isinstance(option, BaseEstimator):
+                    check_parameters(option)
             data = self._check_training_data(X, y, sample_weight, groups)
             request = self._request(data.input_names)
-            bridge = None if context is None else self._bridge(context, X, y, sample_weight)
-            training = train(self, data, request, bridge)
+            callbacks = None
+            if context is not None:
+                metadata = None if sample_weight is None else {"sample_weight": sample_weight}
+                callbacks = Callbacks(self, context, {"X": X, "y": y, "metadata": metadata})
+                callbacks.begin()
+            with one_blas_thread():
+                fitted = fit_rules(self, data, request, callbacks)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
             self.__dict__ = before
             raise
-        self.model_ = training.model
-        self.n_iter_ = max(training.result.n_iter, 1)
-        self.loss_curve_ = training.result.loss_curve
-        self.status_ = training.result.message
-        penalty = training.start.penalty
+        self.model_ = fitted.model
+        self.n_iter_ = max(fitted.result.n_iter, 1)
+        self.loss_curve_ = fitted.result.loss_curve
+        self.status_ = fitted.result.message
+        penalty = fitted.start.penalty
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
-        self.structures_ = training.start.candidates
-        self.redundant_rules_ = training.redundant_rules
-        self.pruning_ = training.pruning
-        self.robust_weights_ = training.robust_weights
-        losses = training.validation_losses
+        self.structures_ = fitted.start.candidates
+        self.redundant_rules_ = fitted.redundant_rules
+        self.robust_weights_ = fitted.robust_weights
+        losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
         self._start_parameters = self._those_of_the_start()
-        if bridge is not None:
-            bridge.end(self.model_)
+        if callbacks is not None:
+            callbacks.end(self.model_)
         return self
 
-    def predict(self, X):
+    def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the target.
 
         Parameters
@@ -457,13 +411,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         Warns
         -----
         OutOfBoundsWarning
-            If rows lie outside the training data, unless ``warn_out_of_bounds=False``.
+            With ``out_of_bounds="linear"``, if rows lie outside the training data.
         """
         X = self._check_inputs(X)
-        model = self.model_.with_out_of_bounds(self.out_of_bounds, self.max_extrapolation)
+        model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
         inside = model.in_bounds(X)
         outputs = model.predict(X, inside)
-        if self.warn_out_of_bounds and not inside.all():
+        if model.out_of_bounds == "linear" and not inside.all():
             message = model.describe_out_of_bounds(X)
             warnings.warn(
                 f"{message} Policy: {model.policy}.",
@@ -472,7 +426,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             )
         return outputs[:, 0] if self._single_output else outputs
 
-    def in_bounds(self, X):
+    def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in the range of the training data, input by input.
 
         Parameters
@@ -486,7 +440,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         return self.model_.in_bounds(X)
 
-    def coverage(self, X):
+    def coverage(self, X: ArrayLike) -> np.ndarray:
         """Tell how well the training data cover each row.
 
         The sum over rules of strength times support, where a rule's support is the number of
@@ -508,7 +462,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         return self.model_.coverage(X)
 
-    def strengths(self, X):
+    def strengths(self, X: ArrayLike) -> np.ndarray:
         """Tell how strongly each rule fires on each row, normalised.
 
         Parameters
@@ -524,33 +478,83 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         return self.model_.strengths(X)
 
+    def rename_terms(self, names: Sequence[str] | Mapping[str, Sequence[str]]) -> Self:
+        """Give the terms other names, in the rules and wherever they are shown.
+
+        Parameters
+        ----------
+        names : sequence of str or dict
+            One per term, for every input alike or by input, ``{"temperature": ["cold", "hot"]}``,
+            in the order of ``memberships_``; terms of other inputs get their default names: "low"
+            to "high", NL to PL (negative large to positive large) where there are six or seven,
+            "near 21.3" for scattered rules.
+
+        Returns
+        -------
+        self : ANFISRegressor
+
+        Raises
+        ------
+        ValueError
+            If there are more or fewer names than an input has terms, or one twice.
+        """
+        model = self._fitted_model()
+        renamed = given_term_names(model.antecedent, model.input_names, names)
+        self.model_ = replace(model, term_names=renamed)
+        return self
+
+    def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:
+        """Give the model without some of its rules, to go on from.
+
+        What is left fires as before, in proportion. Its consequents were learnt beside those that
+        are gone: ``ANFISRegressor(partition=model.without_rules()).fit(X, y)`` trains them again.
+
+        Parameters
+        ----------
+        rules : array-like of int, default=None
+            The numbers of the rules; None is those of ``redundant_rules_``.
+
+        Returns
+        -------
+        model : skanfis.model.TSKModel
+
+        Raises
+        ------
+        ValueError
+            If there is no such rule, or none would be left.
+        """
+        model = self._fitted_model()
+        if rules is None:
+            rules = [entry["rule"] for entry in self.redundant_rules_]
+        return model_without_rules(model, np.asarray(rules, dtype=int))
+
     @property
-    def n_rules_(self):
+    def n_rules_(self) -> int:
         """Number of rules."""
         return self._fitted_model().n_rules
 
     @property
-    def rules_(self):
+    def rules_(self) -> np.ndarray:
         """The terms of each rule, as positions in ``memberships_``."""
         return self._fitted_model().antecedent.rule_terms
 
     @property
-    def memberships_(self):
+    def memberships_(self) -> list[dict]:
         """Every term after training, in the user's units."""
         return self._fitted_model().memberships()
 
     @property
-    def initial_memberships_(self):
+    def initial_memberships_(self) -> list[dict]:
         """Every term before training, in the user's units."""
         return self._fitted_model().memberships(trained=False)
 
     @property
-    def consequents_(self):
+    def consequents_(self) -> np.ndarray:
         """p0, p1, ..., pd of every rule, in the user's units."""
         consequents = self._fitted_model().consequents
         return consequents[:, :, 0] if self._single_output else consequents
 
-    def _fitted_model(self):
+    def _fitted_model(self) -> TSKModel:
         check_is_fitted(self)
         return self.model_
 
@@ -561,11 +565,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _request(self, names):
         """What training starts from, with all names of columns and families resolved."""
         start, n_mfs = self._imported(names), self.n_mfs
-        weights = {
-            name: float(getattr(self, name))
-            for name in ("agreement", "alpha", "stiffness")
-            if not isinstance(getattr(self, name), str)
-        }
+        solver = self._solver()
+        given = {"agreement": self.agreement, "alpha": self.alpha, "stiffness": solver.stiffness}
+        weights = {k: float(weight) for k, weight in given.items() if not isinstance(weight, str)}
         if "alpha" in weights:
             weights["slope"] = weights["alpha"]
         if self.warm_start and hasattr(self, "_start_parameters"):
@@ -605,7 +607,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             premise_inputs=feature_indices(self.premise_features, names, "premise_features"),
             consequent_inputs=consequent if self.order == 1 else consequent[:0],
             weights=weights,
-            premises_move=self.solver != "lse" and self.max_iter > 0,
+            premises_move=solver.moves_premises and self.max_iter > 0,
             seed=seed,
             names=names,
             other_families=TRIED_FAMILIES[1:]
@@ -613,12 +615,21 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             else (),
         )
 
+    def _solver(self) -> Solver:
+        """The solver, by its word or as it is given."""
+        return SOLVERS[self.solver]() if isinstance(self.solver, str) else self.solver
+
     def _those_of_the_start(self):
         """The parameters that a start depends on, in a form that can be compared."""
         names = ("n_mfs", "partition", "mf", "premise_features")
         values = {name: getattr(self, name) for name in names}
-        # Models are themselves alone; all else says in words what it is.
-        return {k: id(v) if hasattr(v, "strengths") else repr(v) for k, v in values.items()}
+        # Models are their numbers, wherever they were pickled; all else says in words what it is.
+        return {
+            name: content_digest(getattr(value, "model_", value))
+            if hasattr(value, "strengths")
+            else repr(value)
+            for name, value in values.items()
+        }
 
     def _imported(self, names):
         """``partition``, with the model in place of the estimator that holds it."""
@@ -647,17 +658,6 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 "rules are taken as they are (max_iter=0): leave it at None, or use solver='lse'."
             )
         return model
-
-    def _bridge(self, context, X, y, sample_weight):
-        """To scikit-learn's callbacks, which are given the data as the user gave them."""
-
-        def attributes(*state):
-            return {"model_": state[0] if len(state) == 1 else state[0].freeze(*state[1:])}
-
-        metadata = None if sample_weight is None else {"sample_weight": sample_weight}
-        bridge = CallbackBridge(self, context, {"X": X, "y": y, "metadata": metadata}, attributes)
-        bridge.begin()
-        return bridge
 
     def _check_training_data(self, X, y, sample_weight, groups):
         """The data, of all rows with weight."""

@@ -15,6 +15,8 @@ from sklearn.exceptions import NotFittedError
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning, UnderdeterminedWarning
+from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
+from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 NAMES = ["time", "temperature", "rate"]
 N_ROWS = 60
@@ -345,13 +347,15 @@ def test_terms_asked_for_a_constant_column():
 
 def test_one_term_for_a_constant_column_is_as_it_should_be():
     with pytest.warns(ConstantInputWarning, match="'x1'"):
-        model = ANFISRegressor(n_mfs=[2, 1, 2], max_iter=50, tol=0.01).fit(flat(1), Y)
+        model = ANFISRegressor(
+            n_mfs=[2, 1, 2], max_iter=50, solver=VariableProjection(tol=0.01)
+        ).fit(flat(1), Y)
     assert model.n_rules_ == 4
 
 
 def test_constant_column_that_moves_later_changes_nothing():
     with pytest.warns(ConstantInputWarning, match="'x1'"):
-        model = ANFISRegressor(n_mfs=2, tol=0.1, warn_out_of_bounds=False).fit(flat(1), Y)
+        model = ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.1)).fit(flat(1), Y)
     for policy in ("clip", "linear"):
         frozen = model.model_.with_out_of_bounds(policy)
         assert_allclose(frozen.predict(flat(1, 99.0))[:, 0], model.predict(flat(1)), rtol=1e-12)
@@ -406,9 +410,10 @@ def test_few_distinct_rows_often_repeated():
     assert_allclose(model.predict(X[:5]), means, atol=1e-6 * np.ptp(targets))
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"partition": KMEANS}])
 def test_constant_target_is_predicted_everywhere(settings):
-    model = ANFISRegressor(warn_out_of_bounds=False, **settings).fit(X, np.full(N_ROWS, 7.1))
+    model = ANFISRegressor(**settings).fit(X, np.full(N_ROWS, 7.1))
     # Strengths sum to one but for rounding.
     assert_allclose(model.predict(2.0 * X - X.mean(axis=0)), 7.1, rtol=1e-14)
 
@@ -511,7 +516,7 @@ def test_more_rules_than_memory(n_inputs, settings, said):
 
 
 def test_limit_on_memory_is_that_of_scikit_learn():
-    settings = {"n_mfs": 4, "max_iter": 1, "tol": 1e9, "stiffness": 1e9}
+    settings = {"n_mfs": 4, "max_iter": 1, "solver": VariableProjection(tol=1e9, stiffness=1e9)}
     # 64 rules with 4 coefficients: a Gram matrix of 256 x 256 is half a MB, and there are several.
     with config_context(working_memory=1), refused(ValueError, "64 rules", "256", "1.05 MB"):
         ANFISRegressor(**settings).fit(X, Y)
@@ -547,12 +552,10 @@ def test_smaller_grid_is_suggested_only_where_it_fits():
         ("alpha", -1e-9, "[0.0, inf)"),
         ("alpha", np.nan, "[0.0, inf)"),
         ("alpha", "large", "'auto'"),
-        ("stiffness", -0.1, "[0.0, inf)"),
-        ("tol", -1e-4, "[0.0, inf)"),
-        ("tol", np.nan, "[0.0, inf)"),
+        ("loss", "absolute", "'huber'"),
+        ("early_stopping", 0.1, "'skanfis.options.EarlyStopping'"),
         ("max_iter", -1, "[0, inf)"),
         ("max_iter", 2.5, "[0, inf)"),
-        ("warn_out_of_bounds", "no", "'bool'"),
         ("random_state", "lucky", "RandomState"),
         ("n_jobs", 1.5, "'int'"),
     ],
@@ -622,7 +625,7 @@ def test_weights_that_cannot_be(sample_weight, said):
     ids=["y", "x", "columns in another order", "one column", "array", "other name"],
 )
 def test_fit_that_fails_leaves_the_model_as_it_was_or_none(second, targets):
-    model = ANFISRegressor(n_mfs=2, tol=0.1).fit(FRAME, Y)
+    model = ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.1)).fit(FRAME, Y)
     before = model.predict(FRAME)
     with pytest.raises(ValueError, match=r"NaN|inconsistent"):
         model.fit(second, targets)
@@ -635,8 +638,20 @@ def test_fit_that_fails_leaves_the_model_as_it_was_or_none(second, targets):
         model.predict(FRAME[["rate", "time", "temperature"]])
 
 
-@pytest.mark.parametrize("option", [{"step_size": 0.1}, {"error_goal": 0.01}])
-def test_option_of_another_solver(option):
-    (name,) = option
-    with refused(ValueError, f"{name}=", "solver='varpro'", "'hybrid'"):
-        ANFISRegressor(n_mfs=2, **option).fit(X, Y)
+@pytest.mark.parametrize(
+    ("parameter", "option", "wrong"),
+    [
+        ("solver", VariableProjection(tol=-1e-4), "tol"),
+        ("solver", VariableProjection(tol=np.nan), "tol"),
+        ("solver", Hybrid(stiffness=-0.1), "stiffness"),
+        ("solver", Hybrid(step_size=0.0), "step_size"),
+        ("solver", GradientDescent(error_goal=-1.0), "error_goal"),
+        ("loss", Huber(epsilon=0.0), "epsilon"),
+        ("early_stopping", EarlyStopping(validation_fraction=1.0), "validation_fraction"),
+        ("early_stopping", EarlyStopping(n_iter_no_change=0), "n_iter_no_change"),
+        ("out_of_bounds", LinearExtrapolation(-0.5), "max_extrapolation"),
+    ],
+)
+def test_option_whose_own_parameter_is_wrong(parameter, option, wrong):
+    with refused(ValueError, f"'{wrong}' parameter of {type(option).__name__}", "range"):
+        ANFISRegressor(n_mfs=2, **{parameter: option}).fit(X, Y)

@@ -6,7 +6,8 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
 from skanfis.membership import MEMBERSHIPS
-from skanfis.solvers import SOLVERS
+from skanfis.options import EarlyStopping, LinearExtrapolation
+from skanfis.solvers import SOLVERS, VariableProjection
 
 # The checks fit a few random rows, constant columns among them, and predict others. skanfis says
 # what is wrong with that; to the checks, and under this project's settings, a warning is an error.
@@ -43,10 +44,14 @@ def estimators():
     around = {
         # With weights of its own it passes through half of these few rows: which is chance.
         "huber": {"loss": "huber", "alpha": 0.01},
-        "early stopping": {"early_stopping": True, "validation_fraction": 0.3},
+        "early stopping": {"early_stopping": EarlyStopping(validation_fraction=0.3)},
         "restarts": {"n_init": 2},
-        "weights that are given": {"agreement": 0.1, "alpha": 0.01, "stiffness": 1e-3},
-        "pruning": {"prune": True},
+        "weights that are given": {
+            "agreement": 0.1,
+            "alpha": 0.01,
+            "solver": VariableProjection(stiffness=1e-3),
+        },
+        "another distance": {"out_of_bounds": LinearExtrapolation(1.0)},
         "nothing iterated": {"max_iter": 0},
     }
     for label, settings in around.items():

@@ -22,7 +22,7 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_jang_three_input, make_mackey_glass
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.membership import MEMBERSHIPS
-from skanfis.solvers import SOLVERS
+from skanfis.solvers import SOLVERS, VariableProjection
 from skanfis.structure import representative_rows
 
 TOLERANCE = 1e-6
@@ -217,7 +217,7 @@ def test_whole_weights_are_repeated_rows(case):
     assert np.abs(weighted.predict(case.X) - case.predictions).max() > 1e-5 * case.span
 
 
-GIVEN = {"agreement": 1e-3, "alpha": 1e-5, "stiffness": 1e-3}
+GIVEN = {"agreement": 1e-3, "alpha": 1e-5, "solver": VariableProjection(stiffness=1e-3)}
 
 
 def test_common_factor_of_the_weights_where_nothing_is_found_by_the_evidence(case):
@@ -334,7 +334,7 @@ def test_structure_that_is_chosen_by_itself(name):
 def test_every_family_and_solver(settings):
     X, y = gyro(200)
     weight = np.random.default_rng(2).integers(1, 5, len(y))
-    model = ANFISRegressor(max_iter=20, tol=1e-3, **settings)
+    model = ANFISRegressor(max_iter=20, **settings)
     plain = model.fit(X, y, weight).predict(X)
     order = np.random.default_rng(3).permutation(weight.sum())
     model.fit(np.repeat(X, weight, axis=0)[order], np.repeat(y, weight)[order])

@@ -14,6 +14,7 @@ from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import OUT_OF_BOUNDS, TargetRange, TSKModel
+from skanfis.solvers import VariableProjection
 from skanfis.support import RuleSupport
 
 from . import oracles
@@ -98,7 +99,7 @@ def around(frozen, rng, n=200):
 
 
 def fitted(X, y, **settings):
-    return ANFISRegressor(**({"tol": 1e-2} | settings)).fit(X, y)
+    return ANFISRegressor(**({"solver": VariableProjection(tol=1e-2)} | settings)).fit(X, y)
 
 
 @pytest.fixture(scope="module")

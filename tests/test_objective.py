@@ -380,3 +380,17 @@ def test_residuals_are_those_of_the_dense_design(case):
         if weight is not None:
             assert_array_equal(weight, case.rows.sample_weight[part])
     assert_allclose(found, expected, atol=1e-10)
+
+
+def test_rows_are_not_read_again_for_the_sums_at_the_start(case, monkeypatch):
+    problem = case.problem
+    start = problem.antecedent.parameters
+    expected = problem.evaluate(start, np.zeros((problem.n_columns, problem.n_outputs)))
+    monkeypatch.setattr(problem, "_sum_over_chunks", None)
+    for _ in range(2):
+        found = problem.evaluate(start)
+        assert_array_equal(found.coefficients, expected.coefficients)
+        assert (found.cost, found.mean_squared_error) == (
+            expected.cost,
+            expected.mean_squared_error,
+        )

@@ -16,6 +16,8 @@ PUBLIC_MODULES = [
     "skanfis.export",
     "skanfis.gyro",
     "skanfis.inspection",
+    "skanfis.options",
+    "skanfis.solvers",
 ]
 API_PAGE = Path(__file__).parents[1] / "docs" / "api.rst"
 

@@ -12,6 +12,7 @@ from sklearn.base import clone
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
+from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 SETTINGS = {
     "default": {},
@@ -20,15 +21,18 @@ SETTINGS = {
     "subtractive": {"partition": "subtractive"},
     "fcm": {"partition": "fcm"},
     "clusterer": {"partition": KMeans(4, random_state=0)},
-    "hybrid": {"n_mfs": 2, "solver": "hybrid", "max_iter": 20},
-    "gradient": {"n_mfs": 2, "solver": "gradient", "max_iter": 20},
-    "lbfgs": {"n_mfs": 2, "solver": "lbfgs"},
+    "hybrid": {"n_mfs": 2, "solver": Hybrid(tol=1e-2), "max_iter": 20},
+    "gradient": {"n_mfs": 2, "solver": GradientDescent(tol=1e-2), "max_iter": 20},
     "lse": {"n_mfs": 2, "solver": "lse"},
     "starts": {"n_mfs": 2, "n_init": 4},
     "huber": {"n_mfs": 2, "loss": "huber"},
     "early stopping": {"n_mfs": 3, "early_stopping": True},
-    "weights that are given": {"n_mfs": 3, "agreement": 0.1, "alpha": 0.01, "stiffness": 1e-3},
-    "pruning": {"n_mfs": 4, "prune": True},
+    "weights that are given": {
+        "n_mfs": 3,
+        "agreement": 0.1,
+        "alpha": 0.01,
+        "solver": VariableProjection(tol=1e-2, stiffness=1e-3),
+    },
 }
 # Enough for several chunks of rows, so that workers have something to share.
 N_ROWS = 9_000
@@ -43,12 +47,14 @@ def data(n_rows):
 def digest(name, n_rows=300, **more):
     """What a fit is, in short."""
     X, y = data(n_rows)
-    model = ANFISRegressor(**(SETTINGS[name] | {"tol": 1e-2, "warn_out_of_bounds": False} | more))
+    model = ANFISRegressor(**({"solver": VariableProjection(tol=1e-2)} | SETTINGS[name] | more))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         clone(model).fit(X, y)
         model.fit(X, y)
-    parts = [model.predict(X), model.consequents_, model.loss_curve_]
+        # Rows held out may be out of range.
+        predicted = model.predict(X)
+    parts = [predicted, model.consequents_, model.loss_curve_]
     return hashlib.sha256(b"".join(np.ascontiguousarray(part) for part in parts)).hexdigest()
 
 
@@ -71,7 +77,7 @@ def test_nothing_fitted_before_matters(name, elsewhere):
     assert digest(name) == elsewhere[name]
 
 
-@pytest.mark.parametrize("name", ["default", "grid of a given size", "lbfgs", "starts", "huber"])
+@pytest.mark.parametrize("name", ["default", "grid of a given size", "starts", "huber"])
 def test_number_of_workers_does_not_matter(name):
     settings = {"max_iter": 3}
     assert digest(name, N_ROWS, n_jobs=2, **settings) == digest(name, N_ROWS, **settings)

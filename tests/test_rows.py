@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, rows
 from skanfis.rows import Rows, column_statistics, fingerprint
+from skanfis.solvers import VariableProjection
 
 # Enough rows for several reads.
 N_ROWS = 2 * rows._READ_ROWS + 17
@@ -73,7 +74,7 @@ def test_row_without_weight_is_as_good_as_absent(rng):
     y = X @ [1.0, 2.0] + np.sin(X[:, 0])
     weight = np.append(rng.uniform(0.5, 1.0, 60), [0.0, 0.0])
     order = rng.permutation(62)
-    settings = {"n_mfs": 2, "tol": 0.1}
+    settings = {"n_mfs": 2, "solver": VariableProjection(tol=0.1)}
     whole = ANFISRegressor(**settings).fit(X[order], y[order], weight[order]).model_
     kept = order[order < 60]
     part = ANFISRegressor(**settings).fit(X[kept], y[kept], weight[kept]).model_

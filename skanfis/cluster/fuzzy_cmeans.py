@@ -30,7 +30,7 @@ all centres coincide from d = 5 on.
 
 import warnings
 from numbers import Integral, Real
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from scipy.spatial.distance import pdist, squareform
@@ -245,7 +245,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         n_init=3,
         init="k-means++",
         random_state=None,
-    ):
+    ) -> None:
         self.n_clusters = n_clusters
         self.m = m
         self.tol = tol
@@ -255,7 +255,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         self.random_state = random_state
 
     @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, sample_weight=None):
+    def fit(self, X, y=None, sample_weight=None) -> Self:
         """Find the centres.
 
         Parameters
@@ -301,7 +301,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         self._n_features_out = self.n_clusters
         return self
 
-    def predict(self, X):
+    def predict(self, X) -> Any:
         """Find the cluster of largest membership.
 
         Parameters
@@ -316,7 +316,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         check_is_fitted(self)
         return nearest(check_rows(self, X), self.cluster_centers_)
 
-    def transform(self, X):
+    def transform(self, X) -> Any:
         """Find the memberships.
 
         Parameters

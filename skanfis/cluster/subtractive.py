@@ -17,7 +17,7 @@ there is none.
 
 from math import isqrt
 from numbers import Integral, Real
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -173,7 +173,9 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         "max_clusters": [Interval(Integral, 1, None, closed="left"), None],
     }
 
-    def __init__(self, radius=0.5, *, squash=1.25, accept=0.5, reject=0.15, max_clusters=None):
+    def __init__(
+        self, radius=0.5, *, squash=1.25, accept=0.5, reject=0.15, max_clusters=None
+    ) -> None:
         self.radius = radius
         self.squash = squash
         self.accept = accept
@@ -181,7 +183,7 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         self.max_clusters = max_clusters
 
     @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, sample_weight=None):
+    def fit(self, X, y=None, sample_weight=None) -> Self:
         """Find the clusters.
 
         Parameters
@@ -222,7 +224,7 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         self.labels_ = self._labels(X)
         return self
 
-    def predict(self, X):
+    def predict(self, X) -> Any:
         """Find the nearest centre.
 
         Parameters

@@ -1,6 +1,7 @@
 """A seeded simulator of thermal runs of open-loop fiber-optic gyros on a rate table."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -48,7 +49,7 @@ def make_ofog(
     device_spread=1.0,
     coefficients=None,
     random_state=None,
-):
+) -> Any:
     r"""Simulate thermal runs of open-loop fiber-optic gyros on a rate table (regression).
 
     Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the

@@ -29,6 +29,7 @@ from sklearn.utils.validation import check_is_fitted
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
+from ..options import policy_of
 
 __all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
 
@@ -247,8 +248,9 @@ def _model_of(label, estimator):
             f"estimator must be or end in an ANFIS estimator; {_describe(label, estimator)} has no "
             "rules."
         )
-    policy = getattr(estimator, "out_of_bounds", model.out_of_bounds)
-    return model.with_out_of_bounds(policy, getattr(estimator, "max_extrapolation", None))
+    if not hasattr(estimator, "out_of_bounds"):
+        return model
+    return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 
 
 def _describe(label, step):

@@ -88,7 +88,7 @@ _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 _ROUNDING = 1e-6
 
 
-def export_json(estimator):
+def export_json(estimator) -> str:
     """Give a trained model as JSON text, exact to the last bit.
 
     Parameters
@@ -165,7 +165,7 @@ def export_json(estimator):
     return _laid_out(document)
 
 
-def write_json(estimator, path):
+def write_json(estimator, path) -> None:
     """Write a trained model to a JSON file, as :func:`export_json` gives it.
 
     Parameters
@@ -199,7 +199,7 @@ def write_json(estimator, path):
     Path(path).write_text(export_json(estimator), encoding="utf-8", newline="\n")
 
 
-def read_json(path):
+def read_json(path) -> TSKModel:
     """Read a model that :func:`write_json` has written; no pickle, nothing is ever run.
 
     Parameters

@@ -11,6 +11,7 @@ import operator
 import numpy as np
 
 from ..membership import MEMBERSHIPS
+from ..options import policy_of
 from ._constants import FLOOR, SMALLEST_LOG_SQUARE
 from ._graph import Graph
 from ._numbers import Numbers
@@ -21,7 +22,7 @@ __all__ = ["register_onnx_converter"]
 _OLDEST_OPSET = 13
 
 
-def register_onnx_converter():
+def register_onnx_converter() -> None:
     """Teach skl2onnx to convert :class:`skanfis.ANFISRegressor`, alone or in a pipeline.
 
     After one call, ``skl2onnx.to_onnx`` and ``skl2onnx.convert_sklearn`` know the estimator. Inputs
@@ -85,9 +86,7 @@ def _convert(scope, node, container):
             f"{_OLDEST_OPSET} or newer."
         )
     estimator, given = node.raw_operator, node.inputs[0]
-    model = estimator.model_.with_out_of_bounds(
-        estimator.out_of_bounds, estimator.max_extrapolation
-    )
+    model = estimator.model_.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
     if model.out_of_bounds == "raise":
         raise ValueError(
             "out_of_bounds='raise' has no counterpart in ONNX, where no value makes a graph fail: "

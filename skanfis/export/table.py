@@ -1,6 +1,7 @@
 """Rules, memberships and the explanation of predictions as pandas tables."""
 
 from numbers import Real
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,9 @@ from ._reading import (
 __all__ = ["explain", "memberships_table", "rules_table"]
 
 
-def rules_table(estimator, *, about="origin", sort_by="rule", max_rules=None, min_weight=0.0):
+def rules_table(
+    estimator, *, about="origin", sort_by="rule", max_rules=None, min_weight=0.0
+) -> Any:
     """Tabulate the rules: what they ask, how much of the data they hold for, what they say.
 
     Parameters
@@ -96,7 +99,7 @@ def _terms_by_input(model):
     }
 
 
-def memberships_table(estimator, *, trained=True):
+def memberships_table(estimator, *, trained=True) -> Any:
     """Tabulate the membership functions.
 
     Parameters
@@ -137,7 +140,7 @@ def memberships_table(estimator, *, trained=True):
     return table.rename_axis(index="term")
 
 
-def explain(estimator, X, *, min_strength=0.0):
+def explain(estimator, X, *, min_strength=0.0) -> Any:
     """Tell for each row which rules fired, by how much, and what each contributed.
 
     Parameters

@@ -33,7 +33,7 @@ def export_text(
     show_terms=True,
     feature_names=None,
     output_names=None,
-):
+) -> str:
     """Write the rules as IF-THEN sentences in the units of the data.
 
     The sentences and the terms' parameters are the whole model: the output is the mean of the

@@ -11,6 +11,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from .. import ANFISRegressor
+from ..exceptions import OutOfBoundsWarning
+from ..options import LinearExtrapolation
 from ._ask import ask
 from ._glitches import find_glitches
 from ._split import Split
@@ -25,7 +27,7 @@ from .physics import OpenLoopArcsineRegressor
 __all__ = ["MAX_EXTRAPOLATION", "Calibration", "Recipe", "calibrate"]
 
 # That of the estimator.
-MAX_EXTRAPOLATION = ANFISRegressor().max_extrapolation
+MAX_EXTRAPOLATION = LinearExtrapolation().max_extrapolation
 
 # For comparing structures; what neighbours in time say twice is left out.
 _SEARCH_ROWS = 6_000
@@ -163,11 +165,12 @@ def _what_is_worse(before, after, inside):
 def make_estimator(recipe, choice):
     """The estimator of a recipe; ``choice`` is the degree of the law and the numbers of terms."""
     degree, terms = choice
+    outside = recipe.outside
     anfis = ANFISRegressor(
         "auto" if terms is None else list(terms),
-        out_of_bounds=recipe.outside,
-        max_extrapolation=recipe.max_extrapolation,
-        warn_out_of_bounds=False,
+        out_of_bounds=LinearExtrapolation(recipe.max_extrapolation)
+        if outside == "linear"
+        else outside,
         n_jobs=recipe.n_jobs,
     )
     pipeline = make_pipeline(StandardScaler(), anfis)
@@ -238,7 +241,10 @@ def _errors_of_fold(make, X, target, train, test):
     low, high = X.iloc[train].min(), X.iloc[train].max()
     tested = X.iloc[test]
     inside = ((tested >= low) & (tested <= high)).all(axis=1).to_numpy()
-    errors = estimator.predict(tested) - target[test]
+    with warnings.catch_warnings():
+        # Rows out of range are told by ``inside``.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
+        errors = estimator.predict(tested) - target[test]
     return errors, inside & np.isfinite(errors)
 
 

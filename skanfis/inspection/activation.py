@@ -1,5 +1,7 @@
 """Which rules the data speak for, and which cells of the rule base are empty."""
 
+from typing import Self
+
 import numpy as np
 
 from ..export._fold import fold, fold_with_rows
@@ -61,7 +63,7 @@ class RuleActivationDisplay:
 
     def __init__(
         self, *, weights, rows, rules, labels_down, labels_across, inputs_down, inputs_across
-    ):
+    ) -> None:
         self.weights = weights
         self.rows = rows
         self.rules = rules
@@ -71,7 +73,7 @@ class RuleActivationDisplay:
         self.inputs_across = inputs_across
 
     @classmethod
-    def from_estimator(cls, estimator, X=None, *, colormap="Blues", ax=None):
+    def from_estimator(cls, estimator, X=None, *, colormap="Blues", ax=None) -> Self:
         """Draw the activation of the rules of a fitted estimator.
 
         Parameters
@@ -107,7 +109,7 @@ class RuleActivationDisplay:
             rows = np.bincount(strengths.argmax(axis=1), minlength=model.n_rules)
         return cls(**_layout(model, weights, rows)).plot(colormap=colormap, ax=ax)
 
-    def plot(self, *, colormap="Blues", ax=None):
+    def plot(self, *, colormap="Blues", ax=None) -> Self:
         """Draw the map.
 
         Parameters

@@ -1,6 +1,7 @@
 """What each rule contributes to the prediction along one input."""
 
 from numbers import Real
+from typing import Self
 
 import numpy as np
 
@@ -86,7 +87,7 @@ class RuleContributionDisplay:
         input_name,
         output_name,
         held,
-    ):
+    ) -> None:
         self.grid = grid
         self.contributions = contributions
         self.baseline = baseline
@@ -110,7 +111,7 @@ class RuleContributionDisplay:
         max_rules=6,
         colormap="viridis",
         ax=None,
-    ):
+    ) -> Self:
         """Draw the contributions of the rules of a fitted estimator.
 
         Parameters
@@ -169,7 +170,7 @@ class RuleContributionDisplay:
         )
         return display.plot(max_rules=max_rules, colormap=colormap, ax=ax)
 
-    def plot(self, *, max_rules=6, colormap="viridis", ax=None):
+    def plot(self, *, max_rules=6, colormap="viridis", ax=None) -> Self:
         """Draw the contributions.
 
         Parameters

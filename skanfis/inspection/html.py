@@ -26,7 +26,7 @@ _WIDTH, _HEIGHT = 130, 34
 _POINTS = 61
 
 
-def rules_html(estimator, *, max_rules=10, precision=4):
+def rules_html(estimator, *, max_rules=10, precision=4) -> str:
     """Write the rules as HTML, the weightiest first, with pictures of the terms.
 
     Parameters

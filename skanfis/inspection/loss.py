@@ -1,5 +1,7 @@
 """The error during training."""
 
+from typing import Self
+
 import numpy as np
 
 from ..export._fold import last_step
@@ -42,20 +44,20 @@ class LossCurveDisplay:
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import LossCurveDisplay
     >>> X, y = make_jang_sinc()
-    >>> model = ANFISRegressor(n_mfs=3, stiffness=0.0).fit(X, y)
+    >>> model = ANFISRegressor(n_mfs=3).fit(X, y)
     >>> display = LossCurveDisplay.from_estimator(model)
     >>> bool(display.loss[-1] < display.loss[0])
     True
     """
 
-    def __init__(self, *, loss, validation_loss=None, name=None, status=None):
+    def __init__(self, *, loss, validation_loss=None, name=None, status=None) -> None:
         self.loss = loss
         self.validation_loss = validation_loss
         self.name = name
         self.status = status
 
     @classmethod
-    def from_estimator(cls, estimator, *, name=None, ax=None, **line_kw):
+    def from_estimator(cls, estimator, *, name=None, ax=None, **line_kw) -> Self:
         """Draw the training error of a fitted estimator.
 
         Parameters
@@ -81,12 +83,12 @@ class LossCurveDisplay:
         display = cls(
             loss=np.asarray(loss),
             validation_loss=getattr(last, "validation_loss_curve_", None),
-            name=getattr(last, "solver", None) if name is None else name,
+            name=_solver_of(last) if name is None else name,
             status=getattr(last, "status_", None),
         )
         return display.plot(ax=ax, **line_kw)
 
-    def plot(self, *, ax=None, **line_kw):
+    def plot(self, *, ax=None, **line_kw) -> Self:
         """Draw the curve.
 
         Parameters
@@ -124,3 +126,9 @@ class LossCurveDisplay:
         if self.name is not None:
             self.ax_.legend(frameon=False)
         return self
+
+
+def _solver_of(estimator):
+    """The solver's word, or the class of the object that is given in its place."""
+    solver = getattr(estimator, "solver", None)
+    return solver if solver is None or isinstance(solver, str) else type(solver).__name__

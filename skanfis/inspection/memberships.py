@@ -1,6 +1,6 @@
 """Membership functions before and after training, over the data."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -64,7 +64,7 @@ class MembershipDisplay:
     ('low', 'medium', 'high')
     """
 
-    def __init__(self, *, inputs):
+    def __init__(self, *, inputs) -> None:
         self.inputs = inputs
 
     @classmethod
@@ -79,7 +79,7 @@ class MembershipDisplay:
         show_before=True,
         colormap="viridis",
         ax=None,
-    ):
+    ) -> Self:
         """Draw the memberships of a fitted estimator.
 
         Parameters
@@ -121,7 +121,7 @@ class MembershipDisplay:
         display = cls(inputs=[_terms_on(model, j, n_points, rows, bins) for j in chosen])
         return display.plot(ax=ax, show_before=show_before, colormap=colormap)
 
-    def plot(self, *, show_before=True, colormap="viridis", ax=None):
+    def plot(self, *, show_before=True, colormap="viridis", ax=None) -> Self:
         """Draw the memberships.
 
         Parameters

@@ -1,5 +1,7 @@
 """Whether the rules of a fitted estimator can be read one by one: in figures, and as a picture."""
 
+from typing import Self
+
 import numpy as np
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
@@ -26,7 +28,7 @@ _BLUE, _RED = "#0072b2", "#c1272d"
 _HALF_BAND, _ROOM_FOR_INPUT = 0.36, 1.1
 
 
-def readability(estimator, X, y=None, *, sample_weight=None):
+def readability(estimator, X, y=None, *, sample_weight=None) -> Readability:
     r"""Measure whether the rules can be read one by one, and say what speaks against it.
 
     The model is the mean of its rules by their strengths, :math:`\hat y = \sum_r w_r f_r`. Nothing
@@ -178,7 +180,7 @@ class ReadabilityDisplay:
     ((4, 201), (121,))
     """
 
-    def __init__(self, *, readability, memberships, predictions, alone, output):
+    def __init__(self, *, readability, memberships, predictions, alone, output) -> None:
         self.readability = readability
         self.memberships = memberships
         self.predictions = predictions
@@ -198,7 +200,7 @@ class ReadabilityDisplay:
         max_rows=2000,
         colormap="Blues",
         ax=None,
-    ):
+    ) -> Self:
         """Draw how the rules of a fitted estimator can be read.
 
         Parameters
@@ -242,7 +244,7 @@ class ReadabilityDisplay:
         )
         return display.plot(colormap=colormap, ax=ax)
 
-    def plot(self, *, colormap="Blues", ax=None):
+    def plot(self, *, colormap="Blues", ax=None) -> Self:
         """Draw the picture.
 
         Parameters

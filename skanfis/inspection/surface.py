@@ -1,5 +1,7 @@
 """The prediction over two inputs, the rest held."""
 
+from typing import Self
+
 import numpy as np
 
 from ..export._fold import fold, fold_with_rows
@@ -64,7 +66,7 @@ class ResponseSurfaceDisplay:
 
     def __init__(
         self, *, xx0, xx1, response, coverage, input_names, output_name, held, points=None
-    ):
+    ) -> None:
         self.xx0 = xx0
         self.xx1 = xx1
         self.response = response
@@ -87,7 +89,7 @@ class ResponseSurfaceDisplay:
         plot_method="contourf",
         colormap="viridis",
         ax=None,
-    ):
+    ) -> Self:
         """Draw the prediction of a fitted estimator over the range of two inputs.
 
         Parameters
@@ -147,7 +149,7 @@ class ResponseSurfaceDisplay:
         )
         return display.plot(plot_method=plot_method, colormap=colormap, ax=ax)
 
-    def plot(self, *, plot_method="contourf", colormap="viridis", ax=None):
+    def plot(self, *, plot_method="contourf", colormap="viridis", ax=None) -> Self:
         """Draw the surface.
 
         Parameters

@@ -52,7 +52,7 @@ class Membership(ABC):
 
     @staticmethod
     @abstractmethod
-    def value(x, theta):
+    def value(x, theta) -> np.ndarray:
         """mu(x) by the textbook formula: the oracle of the rest.
 
         For real and complex ``theta``, analytic in it between the corners that the formula has, so

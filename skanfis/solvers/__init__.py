@@ -1,18 +1,29 @@
-"""Solvers find the premises: functions of a problem, a premise and a stopping rule."""
+"""Solvers find the premises: small objects with the settings that are theirs alone.
 
-from .gradient import gradient
-from .hybrid import hybrid
-from .lbfgs import lbfgs
-from .lse import lse
+A string such as ``ANFISRegressor(solver="hybrid")`` stands for the object with its defaults.
+"""
+
+from .base import Solver
+from .gradient import GradientDescent
+from .hybrid import Hybrid
+from .lse import LeastSquares
 from .result import SolverResult
-from .varpro import varpro
+from .varpro import VariableProjection
 
-__all__ = ["SOLVERS", "SolverResult", "gradient", "hybrid", "lbfgs", "lse", "varpro"]
+__all__ = [
+    "SOLVERS",
+    "GradientDescent",
+    "Hybrid",
+    "LeastSquares",
+    "Solver",
+    "SolverResult",
+    "VariableProjection",
+]
 
+# The words for them, as parameters have them.
 SOLVERS = {
-    "varpro": varpro,
-    "hybrid": hybrid,
-    "gradient": gradient,
-    "lbfgs": lbfgs,
-    "lse": lse,
+    "varpro": VariableProjection,
+    "hybrid": Hybrid,
+    "gradient": GradientDescent,
+    "lse": LeastSquares,
 }

@@ -15,14 +15,18 @@ of step suits all of them. It is here for comparison with what it is the ancesto
 """
 
 from dataclasses import dataclass
+from numbers import Real
+from typing import ClassVar
 
 import numpy as np
 
+from .._sklearn import Interval, StrOptions
 from ..objective import JointGradient
+from .base import Solver
 from .hybrid import NaturalPremise, Point, descend
 from .lse import lse
 
-__all__ = ["gradient"]
+__all__ = ["GradientDescent", "gradient"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +103,7 @@ def gradient(
         The epoch of the lowest cost; the loss curve has all of them.
     """
     if not premise.size:
-        return lse(problem, premise, max_iter=max_iter, tol=tol, on_iteration=on_iteration)
+        return lse(problem, premise, on_iteration=on_iteration)
     return descend(
         _FreeConsequents(problem, premise, stiffness),
         np.zeros(premise.size) if start is None else start,
@@ -109,3 +113,75 @@ def gradient(
         step_size=step_size,
         error_goal=error_goal,
     )
+
+
+class GradientDescent(Solver):
+    """Back-propagation: steepest descent on premises and consequents together.
+
+    Parameters
+    ----------
+    step_size : float, default=0.01
+        Length of the first step, in standardised units; positive.
+    error_goal : float, default=None
+        Stop at this root mean square error, in standard deviations of the target; zero or positive.
+        None: all ``max_iter`` epochs are run.
+    tol : float, default=1e-3
+        Stop where the projected gradient is zero for all that ``tol`` can tell. Zero or positive.
+    stiffness : "auto" or float, default="auto"
+        Pull of the premises to their start, zero or positive; see
+        :class:`~skanfis.solvers.VariableProjection`.
+
+    See Also
+    --------
+    skanfis.ANFISRegressor : Takes it as ``solver``.
+
+    References
+    ----------
+    .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
+       on Systems, Man, and Cybernetics 23 (1993) 665-685.
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import GridSearchCV
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_three_input
+    >>> from skanfis.solvers import GradientDescent
+    >>> X, y = make_jang_three_input()[:2]
+    >>> model = ANFISRegressor(n_mfs=2, solver=GradientDescent(), max_iter=20, out_of_bounds="clip")
+    >>> search = GridSearchCV(model, {"solver__step_size": [0.001, 0.1]}, cv=3).fit(X, y)
+    >>> search.best_params_
+    {'solver__step_size': 0.1}
+    """
+
+    _parameter_constraints: ClassVar[dict] = {
+        "step_size": [Interval(Real, 0, None, closed="neither")],
+        "error_goal": [Interval(Real, 0, None, closed="left"), None],
+        "tol": [Interval(Real, 0, None, closed="left")],
+        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+    }
+
+    def __init__(
+        self,
+        *,
+        step_size: float = 0.01,
+        error_goal: float | None = None,
+        tol: float = 1e-3,
+        stiffness: str | float = "auto",
+    ):
+        self.step_size = step_size
+        self.error_goal = error_goal
+        self.tol = tol
+        self.stiffness = stiffness
+
+    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+        return gradient(
+            problem,
+            premise,
+            max_iter=max_iter,
+            tol=self.tol,
+            stiffness=stiffness,
+            start=start,
+            on_iteration=on_iteration,
+            step_size=self.step_size,
+            error_goal=self.error_goal,
+        )

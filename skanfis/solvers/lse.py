@@ -1,21 +1,22 @@
 """Least squares alone: the premises stay where they start, the consequents are solved for once."""
 
+from typing import ClassVar
+
 import numpy as np
 
+from .base import Solver
 from .result import SolverResult
 
-__all__ = ["lse"]
+__all__ = ["LeastSquares", "lse"]
 
 
-def lse(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None):
+def lse(problem, premise, *, start=None, on_iteration=None):
     """Solve for the consequents.
 
     Parameters
     ----------
     problem : SeparableProblem
     premise : Premise
-    max_iter, tol, stiffness : object
-        Not used: the one solve is exact, and nothing moves.
     start : ndarray of shape (premise.size,), optional
         Displacements of the premises, inside the box; zero if not given.
     on_iteration : callable, optional
@@ -32,3 +33,27 @@ def lse(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iterat
         on_iteration(1, evaluation)
     loss_curve = np.full(2, evaluation.mean_squared_error)
     return SolverResult(evaluation, loss_curve, 1, "no_premise")
+
+
+class LeastSquares(Solver):
+    """Least squares alone: the premises stay as they start, the consequents are solved for once.
+
+    See Also
+    --------
+    skanfis.ANFISRegressor : Takes it as ``solver``.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.solvers import LeastSquares
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=4, solver=LeastSquares()).fit(X, y)
+    >>> model.memberships_ == model.initial_memberships_
+    True
+    """
+
+    moves_premises: ClassVar[bool] = False
+
+    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+        return lse(problem, premise, start=start, on_iteration=on_iteration)

@@ -14,7 +14,6 @@ MESSAGES = {
     "step": "No step decreases the cost any further at this precision.",
     "max_iter": "max_iter was reached before the cost settled or the error met its goal.",
     "stopped": "Early stopping or a callback asked for the end.",
-    "interrupted": "The user interrupted the training.",
     "as_given": "Nothing was learnt: the rules are as they were given.",
     "error_goal": "The root mean square error is as small as error_goal.",
     "epochs": "All max_iter epochs were run: this rule stops of itself at an error_goal only.",
@@ -24,17 +23,36 @@ MESSAGES = {
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The best point found and how the solver came to it."""
+    """The best point found and how the solver came to it.
 
-    evaluation: Evaluation | None  # None where nothing was trained
-    loss_curve: np.ndarray  # mean squared error of the standardised target, start first
+    Parameters
+    ----------
+    evaluation : skanfis.objective.Evaluation or None
+        The problem at the best point; None where nothing was trained.
+    loss_curve : ndarray of shape (n_iter + 1,)
+        Mean squared error of the standardised target, at the start and after every iteration.
+    n_iter : int
+        Iterations run.
+    status : str
+        Why it stopped, a key of ``skanfis.solvers.result.MESSAGES``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.solvers import SolverResult
+    >>> SolverResult(None, np.array([0.4, 0.1]), 1, "max_iter").converged
+    False
+    """
+
+    evaluation: Evaluation | None
+    loss_curve: np.ndarray
     n_iter: int
-    status: str  # a key of MESSAGES
+    status: str
 
     @property
     def converged(self):
         """Whether the solver stopped of its own accord."""
-        return self.status not in ("max_iter", "interrupted")
+        return self.status != "max_iter"
 
     @property
     def message(self):

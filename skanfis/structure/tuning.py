@@ -23,7 +23,7 @@ from ..objective import Evaluation, SeparableProblem
 from ..penalty import Penalty
 from ..premise import Premise
 from ..rows import Rows
-from ..solvers import varpro
+from ..solvers.varpro import varpro
 from .sample import effective_weight, search_sample
 from .start import Start
 

@@ -1,25 +1,14 @@
-"""Training, a piece at a time: a run of the solver, and what is done around runs."""
+"""Training: one fit in a straight line (``fit``), and what it uses on the way."""
 
-from .learner import Learned, Learner
-from .progress import CallbackBridge, Keeper, Printer, watch_all
-from .pruning import redundant_rules, rule_statistics, without_rules
-from .restarts import learn_from_starts
-from .robust import learn_robustly, resistant
-from .stopping import EarlyStopping, hold_out
+from .fit import Fitted, SolverRun, TrainingData, fit_rules
+from .progress import Callbacks
+from .pruning import model_without_rules
 
 __all__ = [
-    "CallbackBridge",
-    "EarlyStopping",
-    "Keeper",
-    "Learned",
-    "Learner",
-    "Printer",
-    "hold_out",
-    "learn_from_starts",
-    "learn_robustly",
-    "redundant_rules",
-    "resistant",
-    "rule_statistics",
-    "watch_all",
-    "without_rules",
+    "Callbacks",
+    "Fitted",
+    "SolverRun",
+    "TrainingData",
+    "fit_rules",
+    "model_without_rules",
 ]

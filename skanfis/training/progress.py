@@ -1,15 +1,9 @@
-"""What watches a training from outside: a line of text, scikit-learn's callbacks, Ctrl-C."""
+"""What watches a training from outside: a line of text, scikit-learn's callbacks."""
 
 import sys
 import time
 
-import numpy as np
-
-from ..objective import Evaluation
-from ..solvers import SolverResult
-from ..structure import Start
-
-__all__ = ["CallbackBridge", "Keeper", "Printer", "watch_all"]
+__all__ = ["Callbacks", "Printer", "watch_all"]
 
 
 def watch_all(*watchers):
@@ -25,94 +19,72 @@ def watch_all(*watchers):
     return watch
 
 
-class Keeper:
-    """Remembers the best point of the run in hand, for when it is interrupted.
-
-    Once ``is_ended``, runs in other threads end at their next iteration.
-    """
-
-    def __init__(self):
-        self.best: Evaluation | None = None
-        self.start: Start | None = None
-        self.losses: list[float] = []
-        self.is_ended = False
-
-    def of(self, start):
-        """A watcher of a run from a start; where its cost is another one, the old best goes."""
-        if self.start is not start:
-            self.start, self.best, self.losses = start, None, []
-
-        def watch(n_iter, evaluation):
-            self.losses.append(evaluation.mean_squared_error)
-            if self.best is None or evaluation.cost <= self.best.cost:
-                self.best = evaluation
-            return self.is_ended
-
-        return watch
-
-    def end(self):
-        """The start and the best point of the run in hand; other threads' runs end."""
-        self.is_ended = True
-        losses = np.array([self.losses[0], *self.losses])
-        result = SolverResult(self.best, losses, len(self.losses), "interrupted")
-        return self.start, result
-
-
 class Printer:
     """Writes a line after every iteration to the standard output, as verbose does elsewhere."""
 
     def __init__(self, name):
         self._name, self._start = name, time.perf_counter()
 
-    def note(self, text):
-        """Write a line of one's own."""
+    def tell_start(self, start):
+        """Write what the structure and the weights are."""
+        penalty, n_candidates = start.penalty, len(start.candidates)
+        found = f"{n_candidates} candidates compared, " if n_candidates else ""
+        self._write(
+            f"{found}{start.antecedent.n_rules} rules, agreement {penalty.agreement:.3g}, "
+            f"alpha {penalty.alpha:.3g}, stiffness {penalty.stiffness:.3g}"
+        )
+
+    def tell_run(self, result):
+        """Write how one of several runs has ended."""
+        loss = result.evaluation.mean_squared_error
+        self._write(f"a start: loss {loss:.6g} after {result.n_iter} iterations")
+
+    def _write(self, text):
         sys.stdout.write(f"[{self._name}] {text}\n")
         sys.stdout.flush()
 
     def __call__(self, n_iter, evaluation):
         seconds = time.perf_counter() - self._start
         loss = evaluation.mean_squared_error
-        self.note(f"iteration {n_iter}: loss {loss:.6g}, {seconds:.1f} s")
+        self._write(f"iteration {n_iter}: loss {loss:.6g}, {seconds:.1f} s")
         return False
 
 
-class CallbackBridge:
-    """Tells scikit-learn's callbacks of every iteration, and passes their wish to stop on.
+class Callbacks:
+    """scikit-learn's callbacks: told of every iteration or start, and asked whether to go on.
 
     Parameters
     ----------
-    estimator : estimator
-        With ``_init_callback_context`` where this scikit-learn has callbacks.
+    estimator : ANFISRegressor
     context : sklearn.callback.CallbackContext
         Of the fit.
     data : dict
-        "X", "y" and "metadata", as callbacks are given them.
-    attributes : callable
-        The fitted attributes of the estimator at an evaluation.
+        "X", "y" and "metadata", as the user gave them.
     """
 
-    def __init__(self, estimator, context, data, attributes):
+    def __init__(self, estimator, context, data):
         self.estimator, self.context, self.data = estimator, context, data
-        self.attributes = attributes
 
     def begin(self):
         """Tell of the beginning of the fit."""
         self.context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
 
-    def task(self, name, *state):
-        """Tell of a task that has just ended; whether a callback wants to stop."""
+    def task(self, name, make_model):
+        """Tell of a task that has just ended; whether a callback wants to stop.
+
+        ``make_model`` makes the model as it is then, if a callback asks for it.
+        """
         context = self.context.subcontext(task_name=name)
         context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
+        return self._end(context, make_model)
+
+    def end(self, model):
+        """Tell of the end of the fit."""
+        self._end(self.context, lambda: model)
+
+    def _end(self, context, make_model):
         return context.call_on_fit_task_end(
             estimator=self.estimator,
-            reconstruction_attributes=lambda: self.attributes(*state),
-            **self.data,
-        )
-
-    def end(self, *state):
-        """Tell of the end of the fit."""
-        self.context.call_on_fit_task_end(
-            estimator=self.estimator,
-            reconstruction_attributes=lambda: self.attributes(*state),
+            reconstruction_attributes=lambda: {"model_": make_model()},
             **self.data,
         )

@@ -5,22 +5,35 @@ hundred. It *repeats* another where their strengths are in proportion on all row
 their mean products over the rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one.
 They then have one consequent between them, however it is divided. Of two that repeat one another
 the stronger one stays.
+
+:func:`model_without_rules` leaves rules out of a frozen model, for training to go on from there.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TermGroup
+from ..model import TSKModel
 from ..rows import Rows
+from ..support import RuleSupport
 
-__all__ = ["redundant_rules", "rule_statistics", "without_rules"]
+__all__ = [
+    "RuleStatistics",
+    "model_without_rules",
+    "redundant_rules",
+    "rule_statistics",
+    "without_rules",
+]
 
+# Rows of one block: strengths of some dozen rules stay in the processor's cache.
 _READ_ROWS = 4096
-# A strength that is nowhere above this.
+# A strength that is nowhere above this: what the rule says moves no prediction by more than a
+# hundredth of its difference from the others.
 _NEVER = 0.01
-# Cosine of the strengths of two rules over all rows.
+# Cosine of the strengths of two rules over all rows: an angle of less than a degree, which no
+# consequents could be told apart by.
 _ALIKE = 0.9999
 
 
@@ -63,7 +76,7 @@ def redundant_rules(statistics: RuleStatistics):
     return [{"rule": int(r), "reason": found[r], "weight": float(weight[r])} for r in sorted(found)]
 
 
-def without_rules(antecedent: Antecedent, rules: Sequence[int]):
+def without_rules(antecedent: Antecedent, rules: Sequence[int] | np.ndarray):
     """The rule base without some rules, and the terms that are left, by position.
 
     A grid stays a grid where whole terms go; else its rules are listed one by one. Terms that no
@@ -99,3 +112,41 @@ def _grid_with(antecedent, terms):
     terms = terms[np.isin(inputs[terms], left[numbers > 1])]
     counts = tuple(int(np.sum(inputs[terms] == j)) for j in dict.fromkeys(inputs[terms]))
     return replace(antecedent, groups=_groups_with(antecedent.groups, terms), counts=counts), terms
+
+
+def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> TSKModel:
+    """The model without some rules: those that are left fire as before, in proportion.
+
+    ValueError where there is no such rule, or where none would be left.
+    """
+    numbers = np.unique(np.asarray(rules, dtype=int))
+    unknown = numbers[(numbers < 0) | (numbers >= model.n_rules)]
+    if unknown.size:
+        raise ValueError(
+            f"rules has {unknown[0]}, but the model has {model.n_rules} rules, of the numbers 0 to "
+            f"{model.n_rules - 1}."
+        )
+    if numbers.size == 0:
+        return model
+    if numbers.size == model.n_rules:
+        raise ValueError(f"rules names all {model.n_rules} rules: one at least must be left.")
+    kept = np.setdiff1d(np.arange(model.n_rules), numbers)
+    antecedent, terms = without_rules(model.antecedent, numbers)
+    weights = model.rule_weights[kept]
+    return replace(
+        model,
+        antecedent=antecedent,
+        initial_antecedent=without_rules(model.initial_antecedent, numbers)[0],
+        coefficients=model.coefficients[kept],
+        rule_weights=weights / weights.sum(),
+        rule_rows=model.rule_rows[kept],
+        support=_support_of(model.support, kept),
+        term_names=tuple(model.term_names[t] for t in terms),
+    )
+
+
+def _support_of(support, rules):
+    """The support of some of the rules."""
+    if support is None:
+        return None
+    return RuleSupport(*(getattr(support, field.name)[rules] for field in fields(support)))

@@ -11,13 +11,13 @@ of two minima that meet the data alike, it prefers the one whose rules each rest
 """
 
 import numpy as np
-from joblib import Parallel, delayed
 
-__all__ = ["displaced_starts", "learn_from_starts", "leave_one_out_error"]
+__all__ = ["displaced_starts", "leave_one_out_error"]
 
-# Standard deviation of a start's displacements.
+# Standard deviation of a start's displacements: a third of a spacing, beyond which terms would swap
+# places and the start would be another structure.
 _SPREAD = 0.3
-# A row that a rule has to itself would have an error without bound.
+# A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
 _SMALLEST_FREEDOM = 1e-6
 
 
@@ -37,27 +37,3 @@ def leave_one_out_error(problem, evaluation):
         squares = np.sum((residual / np.maximum(1.0 - leverage, _SMALLEST_FREEDOM)) ** 2, axis=0)
         total += squares.sum() if weight is None else weight @ squares
     return total / problem.rows.total_weight
-
-
-def learn_from_starts(learn, premise, first, n_starts, rng, n_jobs, on_start=None):
-    """The best of several runs, ``learn(displacement)``, whatever the number of workers.
-
-    A single start is the run from it. Workers are threads: the passes over the data release
-    Python's lock. ``on_start(learned)`` is told of every run in order, and what is true ends them.
-    """
-    if n_starts == 1 or premise.size == 0:
-        return learn(None)
-    starts = displaced_starts(premise, first, n_starts, rng)
-    parallel = Parallel(n_jobs=n_jobs, backend="threading", return_as="generator")
-    best, smallest = None, np.inf
-    for error, learned in parallel(delayed(_with_error)(learn, start) for start in starts):
-        if best is None or error < smallest:
-            best, smallest = learned, error
-        if on_start is not None and on_start(learned):
-            break
-    return best
-
-
-def _with_error(learn, start):
-    learned = learn(start)
-    return leave_one_out_error(learned.problem, learned.result.evaluation), learned

@@ -8,8 +8,9 @@ from sklearn.model_selection import GroupShuffleSplit
 from ..rows import Rows, fingerprint
 from ..structure.held_out import held_out_loss
 
-__all__ = ["EarlyStopping", "hold_out"]
+__all__ = ["ValidationLoss", "hold_out"]
 
+# Rows of one block, which stays in the processor's cache.
 _READ_ROWS = 4096
 
 
@@ -32,9 +33,9 @@ def hold_out(rows: Rows, validation_fraction, seed):
         training = validation = np.empty(0, dtype=int)
     if min(training.size, validation.size) < 2:
         raise ValueError(
-            f"early_stopping=True with validation_fraction={validation_fraction} leaves "
+            f"early_stopping with validation_fraction={validation_fraction} leaves "
             f"{training.size} rows to train on and {validation.size} to hold out, of {what}: "
-            "at least 2 of each are needed. Change validation_fraction, or use "
+            "at least 2 of each are needed. Use EarlyStopping(validation_fraction=...), or "
             "early_stopping=False."
         )
     return training, validation
@@ -49,7 +50,7 @@ def _equal_rows(rows):
     return numbers
 
 
-class EarlyStopping:
+class ValidationLoss:
     """Watches a run: the mean squared error of held-out rows after every iteration.
 
     Parameters

@@ -18,6 +18,7 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.export import read_fis, write_fis
 from skanfis.membership import MEMBERSHIPS
+from skanfis.solvers import VariableProjection
 
 from .rule_bases import MODELS, rows_of
 
@@ -126,7 +127,11 @@ def difference(outputs, model, rows):
 def trained(mf):
     """A model of Jang's sinc, off centre, and rows within its box."""
     X, y = make_jang_sinc()
-    model = ANFISRegressor(n_mfs=3, mf=mf, max_iter=20, tol=0.0).fit(X + 3.0, y).model_
+    model = (
+        ANFISRegressor(n_mfs=3, mf=mf, max_iter=20, solver=VariableProjection(tol=0.0))
+        .fit(X + 3.0, y)
+        .model_
+    )
     rows = np.random.default_rng(0).uniform(model.minimum, model.maximum, (N_ROWS, 2))
     return model, rows
 

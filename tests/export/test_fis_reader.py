@@ -11,6 +11,7 @@ from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from skanfis.export import read_fis, write_fis
 from skanfis.export.fis.reader import parse_fis
+from skanfis.solvers import VariableProjection
 
 from .fis_files import BY_HAND, with_line
 from .mutations import mutated, seeds
@@ -376,7 +377,9 @@ def test_training_goes_on_from_a_file_and_back(rules, tmp_path, rng):
     X = rng.uniform(0.0, 4.0, (200, 2))
     y = np.sin(X[:, 0]) * X[:, 1]
     weights = {"agreement": 1e-3, "alpha": 1e-6}
-    estimator = ANFISRegressor(partition=prior, stiffness=1e-3, **weights).fit(X, y)
+    estimator = ANFISRegressor(
+        partition=prior, solver=VariableProjection(stiffness=1e-3), **weights
+    ).fit(X, y)
     write_fis(estimator, tmp_path / "trained.fis")
     trained = read_fis(tmp_path / "trained.fis")
     assert type(trained.antecedent) is type(prior.antecedent)

@@ -87,7 +87,7 @@ def around(X, n_rows=400):
 
 
 def regressor(**settings):
-    return ANFISRegressor(**({"solver": "lse", "warn_out_of_bounds": False} | settings))
+    return ANFISRegressor(**({"solver": "lse"} | settings))
 
 
 def assert_same_predictions(estimator, X, full_scale):

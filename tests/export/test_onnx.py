@@ -15,6 +15,7 @@ from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.export import register_onnx_converter
 from skanfis.export._fold import fold
+from skanfis.options import LinearExtrapolation
 
 from .every_model import CASES, full_scale, print_differences, rows, size_of_sum
 
@@ -36,8 +37,6 @@ def holding(model):
     """A fitted regressor with this model in it."""
     estimator = ANFISRegressor(
         out_of_bounds=model.out_of_bounds,
-        max_extrapolation=model.max_extrapolation,
-        warn_out_of_bounds=False,
     )
     g = np.random.default_rng(0)
     y = g.normal(size=(20, model.n_outputs))
@@ -104,7 +103,7 @@ PIPELINES = {
 def test_pipeline_answers_as_predict(kind, n_outputs, dtype, tolerance):
     scaler, settings = PIPELINES[kind]
     X, y = surface(n_outputs=n_outputs)
-    pipeline = make_pipeline(clone(scaler), ANFISRegressor(warn_out_of_bounds=False, **settings))
+    pipeline = make_pipeline(clone(scaler), ANFISRegressor(**settings))
     pipeline.fit(X, y)
     Z = (X.mean(axis=0) + 1.3 * (X - X.mean(axis=0))).astype(dtype)
     found, wanted = answers(pipeline, Z), pipeline.predict(Z.astype(float)).reshape(len(Z), -1)
@@ -143,13 +142,13 @@ def test_row_that_is_not_finite_gives_nan(policy):
 
 def test_policy_is_that_of_the_estimator_at_conversion():
     X, y = surface()
-    estimator = ANFISRegressor(n_mfs=2, warn_out_of_bounds=False).fit(X, y)
+    estimator = ANFISRegressor(n_mfs=2).fit(X, y)
     Z = X.max(axis=0, keepdims=True) * 1.5
     estimator.set_params(out_of_bounds="clip")
     held = answers(estimator, Z)
     estimator.set_params(out_of_bounds="linear")
     for limit in (0.0, 0.3, np.inf):
-        estimator.set_params(max_extrapolation=limit)
+        estimator.set_params(out_of_bounds=LinearExtrapolation(limit))
         way = abs(answers(estimator, Z)[0, 0] - held[0, 0])
         assert (way > 0.02) == (limit > 0.0)
         np.testing.assert_allclose(answers(estimator, Z)[:, 0], estimator.predict(Z))

@@ -127,10 +127,12 @@ def test_status_is_that_of_the_exported_c(log):
 def with_physics(log, **parameters):
     """Law and rules; the rules on chosen columns, in another order than the inputs."""
     shell = GyroCompensator(None, INPUTS, predicts="rate", scale_factor=FACTOR)
-    parameters = {"temperature": "temperature", "warn_out_of_bounds": False} | parameters
+    parameters = {
+        "temperature": "temperature",
+    } | parameters
     law = OpenLoopArcsineRegressor("output", **parameters)
     chosen = make_column_transformer((StandardScaler(), ["output", "time"]))
-    rules = make_pipeline(chosen, ANFISRegressor([1, 2], warn_out_of_bounds=False))
+    rules = make_pipeline(chosen, ANFISRegressor([1, 2]))
     model = ResidualRegressor(law, rules).fit(shell.features(log), log["rate"])
     return GyroCompensator(model, INPUTS, predicts="rate", scale_factor=FACTOR)
 

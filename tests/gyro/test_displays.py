@@ -240,7 +240,7 @@ def test_a_group_without_an_answer_stands_at_the_top():
 def compensator(rng):
     X = pd.DataFrame({"temperature": rng.uniform(0, 50, 500), "output": rng.uniform(-9, 9, 500)})
     y = X["output"] ** 2
-    return make_pipeline(StandardScaler(), ANFISRegressor(2, warn_out_of_bounds=False)).fit(X, y), X
+    return make_pipeline(StandardScaler(), ANFISRegressor(2)).fit(X, y), X
 
 
 def test_coverage_mask_is_that_of_the_estimator(compensator):
@@ -262,7 +262,7 @@ def test_coverage_mask_is_that_of_the_estimator(compensator):
 
 def test_coverage_holds_other_inputs(rng):
     X = pd.DataFrame(rng.uniform(size=(200, 3)), columns=["time", "temperature", "output"])
-    model = ANFISRegressor(1, warn_out_of_bounds=False).fit(X, X["time"])
+    model = ANFISRegressor(1).fit(X, X["time"])
     within = CoverageDisplay.from_estimator(model, X)
     beyond = CoverageDisplay.from_estimator(model, X, others={"time": 9.0})
     assert within.inside.any()

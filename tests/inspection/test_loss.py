@@ -6,6 +6,7 @@ from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.inspection import LossCurveDisplay
+from skanfis.solvers import VariableProjection
 
 from .drawing import A_GRID, drawn, plt
 
@@ -16,7 +17,7 @@ def test_loss_is_the_estimators(fitted):
     assert_array_equal(display.line_.get_ydata(), pipe[-1].loss_curve_)
     assert_array_equal(display.line_.get_xdata(), np.arange(len(pipe[-1].loss_curve_)))
     assert display.status == pipe[-1].status_
-    assert display.line_.get_label() == "varpro"
+    assert display.line_.get_label() == "VariableProjection"
     assert display.ax_.get_yscale() == "log"
 
 
@@ -36,7 +37,7 @@ def test_a_model_alone_has_no_loss_curve():
 def test_rows_held_out_are_a_dashed_line_of_the_same_colour():
     X = np.random.default_rng(0).uniform(-3, 3, (80, 1))
     # With weights that are given the premises have not been moved before the run begins.
-    given = {"agreement": 0.01, "alpha": 1e-6, "stiffness": 1e-5}
+    given = {"agreement": 0.01, "alpha": 1e-6, "solver": VariableProjection(stiffness=1e-5)}
     model = ANFISRegressor(n_mfs=3, early_stopping=True, random_state=0, **given)
     model.fit(X, np.sin(X[:, 0]))
     display = drawn(LossCurveDisplay.from_estimator(model))
@@ -45,4 +46,4 @@ def test_rows_held_out_are_a_dashed_line_of_the_same_colour():
     assert line.get_xdata()[0] == 1
     assert line.get_xdata()[-1] <= len(model.loss_curve_)
     assert (line.get_linestyle(), line.get_color()) == ("--", display.line_.get_color())
-    assert line.get_label() == "varpro, rows held out"
+    assert line.get_label() == "VariableProjection, rows held out"

@@ -39,7 +39,7 @@ def test_estimators_around_the_model_speak_of_their_own_units(fitted):
     found = readability(pipe, X, y)
     assert_same(found, expected)
     assert list(found.terms["input"]) == ["kelvin"] * 3 + ["rate"] * 2
-    anfis = ANFISRegressor(n_mfs=2, solver="lse", warn_out_of_bounds=False)
+    anfis = ANFISRegressor(n_mfs=2, solver="lse")
     search = GridSearchCV(make_pipeline(StandardScaler(), anfis), {})
     scaled = TransformedTargetRegressor(search, transformer=MinMaxScaler()).fit(X, y)
     inner = scaled.regressor_.best_estimator_

@@ -25,7 +25,7 @@ def test_one_regression_on_all_residuals(rng, kind, weighted, order, penalty):
     antecedent = start_of(kind, rows)
     premise = Premise.of(antecedent, *oracles.box(rows))
     problem = SeparableProblem(rows, antecedent, order, penalty)
-    result = lse(problem, premise, max_iter=1, tol=0.0)
+    result = lse(problem, premise)
     dense = oracles.DenseProblem(rows, antecedent, order, penalty)
     matrix = dense.residual_matrix(antecedent.parameters)
     line = LinearRegression(fit_intercept=False).fit(matrix, dense.right_side(len(matrix)))
@@ -37,7 +37,7 @@ def test_nothing_moves(rng):
     antecedent = start_of("grid", rows)
     premise = Premise.of(antecedent, *oracles.box(rows))
     problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-6))
-    result = lse(problem, premise, max_iter=50, tol=1e-6, stiffness=1.0)
+    result = lse(problem, premise)
     assert result.n_iter == 1
     assert result.converged
     assert result.loss_curve[0] == result.loss_curve[1] == result.evaluation.mean_squared_error
@@ -45,5 +45,5 @@ def test_nothing_moves(rng):
     assert_array_equal(parameters, premise.parameters(np.zeros(premise.size)))
     assert_allclose(parameters, antecedent.parameters, rtol=1e-14, atol=1e-14)
     start = 0.1 * rng.normal(size=premise.size)
-    moved = lse(problem, premise, max_iter=50, tol=1e-6, start=start)
+    moved = lse(problem, premise, start=start)
     assert_array_equal(moved.evaluation.antecedent.parameters, premise.parameters(start))

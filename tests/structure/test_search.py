@@ -11,9 +11,8 @@ from sklearn.linear_model import LinearRegression
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
 from skanfis.membership import TRIED_FAMILIES
+from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
-
-QUIET = {"warn_out_of_bounds": False}
 
 
 def inputs(rng, n_rows=400, n_inputs=3):
@@ -29,7 +28,7 @@ def test_linear_truth_gets_next_to_a_linear_model(rng):
     # A criterion by error lets a rule more pass where it does no harm; the plane stays a plane.
     X = inputs(rng)
     y = X @ [1.0, -2.0, 0.5] + 0.1 * rng.standard_normal(400)
-    model = ANFISRegressor(**QUIET).fit(X, y)
+    model = ANFISRegressor().fit(X, y)
     assert model.n_rules_ == 1
     assert_allclose(
         model.consequents_[:, 1:], np.tile([1.0, -2.0, 0.5], (model.n_rules_, 1)), atol=0.1
@@ -64,7 +63,9 @@ def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
 def test_expected_error_of_the_linear_model_is_the_final_prediction_error(rng):
     X = inputs(rng)
     y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(400)
-    model = ANFISRegressor(partition="grid", agreement=0.0, alpha=0.0, stiffness=0.0).fit(X, y)
+    model = ANFISRegressor(
+        partition="grid", agreement=0.0, alpha=0.0, solver=VariableProjection(stiffness=0.0)
+    ).fit(X, y)
     linear = next(c for c in model.structures_ if c["structure"] == "grid [1, 1, 1]")
     design = np.column_stack([np.ones(400), X])
     residual = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
@@ -78,7 +79,7 @@ def test_expected_error_is_that_on_new_rows(rng):
         return X, np.sin(3.0 * X[:, 0]) + X[:, 0] * X[:, 1] + 0.2 * rng.standard_normal(n)
 
     X, y = surface(500)
-    model = ANFISRegressor(**QUIET).fit(X, y)
+    model = ANFISRegressor().fit(X, y)
     X_new, y_new = surface(20_000)
     found = np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std()
     # 500 rows tell a standard deviation to 3 %; twice that.
@@ -93,7 +94,9 @@ def test_what_is_given_is_not_searched_for(rng):
     assert {c["alpha"] for c in model.structures_} == {3e-5}
     assert len({c["stiffness"] for c in model.structures_}) > 1
     assert len({c["agreement"] for c in model.structures_}) > 1
-    model = ANFISRegressor(agreement=0.3, alpha=3e-5, stiffness=0.01).fit(X, y)
+    model = ANFISRegressor(
+        agreement=0.3, alpha=3e-5, solver=VariableProjection(stiffness=0.01)
+    ).fit(X, y)
     assert (model.agreement_, model.alpha_, model.stiffness_) == (0.3, 3e-5, 0.01)
     assert {c["stiffness"] for c in model.structures_} == {0.01}
     assert {c["agreement"] for c in model.structures_} == {0.3}
@@ -159,7 +162,7 @@ def test_more_noise_never_gives_more_rules(rng, partition):
     X = inputs(rng, 300, 2)
     truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(300)
     found = [
-        ANFISRegressor(partition=partition, **QUIET).fit(X, truth + s * noise).n_rules_
+        ANFISRegressor(partition=partition).fit(X, truth + s * noise).n_rules_
         for s in (0.02, 0.3, 3.0, 30.0)
     ]
     assert found == sorted(found, reverse=True)
@@ -171,7 +174,7 @@ def test_repeated_rows_are_weighted_rows(rng):
     X = inputs(rng, 120)
     y = np.sin(3.0 * X[:, 0]) + 0.5 * rng.standard_normal(120)
     times = rng.integers(1, 4, 120)
-    often, heavy = ANFISRegressor(**QUIET), ANFISRegressor(**QUIET)
+    often, heavy = ANFISRegressor(), ANFISRegressor()
     often.fit(np.repeat(X, times, axis=0), np.repeat(y, times))
     heavy.fit(X, y, sample_weight=times)
     for one, other in zip(often.structures_, heavy.structures_, strict=True):
@@ -187,7 +190,7 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
     check = np.linspace(-1.0, 1.0, 200)[:, None]
     errors = [
         np.sqrt(np.mean((m.predict(check) - np.tanh(3.0 * check[:, 0])) ** 2))
-        for m in (ANFISRegressor(**QUIET).fit(X, y) for X in (levels, jittered))
+        for m in (ANFISRegressor().fit(X, y) for X in (levels, jittered))
     ]
     assert errors[0] < 0.03
     assert_allclose(errors[0], errors[1], rtol=0.05)
@@ -229,7 +232,7 @@ def test_screened_inputs_hold_those_that_matter(monkeypatch):
         return list(kept)
 
     monkeypatch.setattr(search.StructureSearch, "_screened", noting)
-    model = ANFISRegressor(partition="grid", **QUIET).fit(X, y)
+    model = ANFISRegressor(partition="grid").fit(X, y)
     assert len(kept) == search._MOST_GROWING < 40
     assert {0, 1, 2} <= set(kept)
     with_terms = {int(term["input"].removeprefix("x")) for term in model.memberships_}
@@ -240,7 +243,7 @@ def test_screened_inputs_hold_those_that_matter(monkeypatch):
 def test_no_more_terms_than_values(rng):
     X = np.column_stack([rng.integers(0, 2, 400), rng.integers(0, 3, 400), rng.uniform(size=400)])
     y = np.sin(9.0 * X[:, 2]) + 2.0 * X[:, 0] * X[:, 1] ** 2 + 0.05 * rng.standard_normal(400)
-    model = ANFISRegressor(partition="grid", order=0, **QUIET).fit(X, y)
+    model = ANFISRegressor(partition="grid", order=0).fit(X, y)
     tried = [
         [int(c) for c in line["structure"].removeprefix("grid [").removesuffix("]").split(",")]
         for line in model.structures_
@@ -265,7 +268,7 @@ def test_terms_of_a_default_fit_mean_something(rng, draw, partition):
     scale = X.std(axis=0)
     y = np.tanh(2.0 * X[:, 0] / scale[0]) + 0.5 * np.sin(2.0 * X[:, 1] / scale[1])
     y += 0.1 * rng.standard_normal(300)
-    model = ANFISRegressor(partition=partition, **QUIET).fit(X, y)
+    model = ANFISRegressor(partition=partition).fit(X, y)
     terms = model.memberships_
     assert len(terms) > 1
     for j in range(3):
@@ -284,7 +287,7 @@ def gaussian(x, term):
 
 def test_too_few_rows_for_anything_but_a_line(rng):
     X = np.array([[0.0], [1.0], [2.0], [3.0]])
-    model = ANFISRegressor(**QUIET).fit(X, 2.0 * X[:, 0] + 1.0)
+    model = ANFISRegressor().fit(X, 2.0 * X[:, 0] + 1.0)
     assert_allclose(model.predict([[0.5], [2.5]]), [2.0, 6.0], rtol=1e-2)
 
 
@@ -317,7 +320,6 @@ def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     X_new, y_new, _ = runs(40, seed=1)
     errors = []
     for model in (alone, grouped):
-        model.set_params(warn_out_of_bounds=False)
         errors.append(np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std())
     assert_allclose(grouped.structures_[0]["held_out_error"], errors[1], rtol=0.5)
     assert alone.structures_[0]["expected_error"] < 0.5 * errors[0]
@@ -367,9 +369,9 @@ def piecewise_linear(rng, n_rows=600):
 def test_family_is_that_of_the_truth_where_it_is_asked_for(rng):
     X, y = piecewise_linear(rng)
     settings = {"order": 0, "n_mfs": 5}
-    model = ANFISRegressor(mf="auto", **settings, **QUIET).fit(X, y)
+    model = ANFISRegressor(mf="auto", **settings).fit(X, y)
     assert model.model_.antecedent.groups[0].family.name == "triangular"
-    gaussian = ANFISRegressor(**settings, **QUIET).fit(X, y)
+    gaussian = ANFISRegressor(**settings).fit(X, y)
     left, of_gaussians = 1.0 - model.score(X, y), 1.0 - gaussian.score(X, y)
     assert left < 1e-3
     assert left < 0.5 * of_gaussians
@@ -377,8 +379,8 @@ def test_family_is_that_of_the_truth_where_it_is_asked_for(rng):
 
 def test_searched_structure_is_tried_with_every_family(rng):
     X, y = piecewise_linear(rng)
-    model = ANFISRegressor(partition="grid", mf="auto", **QUIET).fit(X, y)
-    best = ANFISRegressor(partition="grid", **QUIET).fit(X, y).structures_[0]
+    model = ANFISRegressor(partition="grid", mf="auto").fit(X, y)
+    best = ANFISRegressor(partition="grid").fit(X, y).structures_[0]
     found = {line["structure"]: line["expected_error"] for line in model.structures_}
     families = [f"{best['structure']}, {family.name}" for family in TRIED_FAMILIES[1:]]
     assert set(families) <= set(found)

@@ -9,6 +9,7 @@ from sklearn import config_context
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
+from skanfis.solvers import VariableProjection
 from skanfis.structure import GridSize, size, term_counts
 from skanfis.structure.size import RuleBaseSize
 
@@ -76,7 +77,9 @@ def test_size_of_a_grid_is_that_of_its_matrices():
 def test_size_of_a_grid_is_not_far_from_what_training_takes(rng):
     X = rng.normal(size=(1000, 3))
     y = np.sin(X[:, 0]) + rng.normal(size=1000)
-    estimator = ANFISRegressor(n_mfs=6, order=1, alpha=1e-3, stiffness=1.0, tol=0.5)
+    estimator = ANFISRegressor(
+        n_mfs=6, order=1, alpha=1e-3, solver=VariableProjection(stiffness=1.0, tol=0.5)
+    )
     tracemalloc.start()
     try:
         estimator.fit(X, y)
@@ -187,5 +190,7 @@ def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, 
 def test_clusters_that_fit_pass_in_silence(rng):
     X = rng.normal(size=(300, 2))
     with config_context(working_memory=1):
-        model = ANFISRegressor(partition=KMeans(3, random_state=0), tol=0.1).fit(X, X[:, 0] ** 2)
+        model = ANFISRegressor(
+            partition=KMeans(3, random_state=0), solver=VariableProjection(tol=0.1)
+        ).fit(X, X[:, 0] ** 2)
     assert model.n_rules_ <= 3

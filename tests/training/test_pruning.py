@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
-from skanfis.training import redundant_rules, rule_statistics, without_rules
+from skanfis.training.pruning import redundant_rules, rule_statistics, without_rules
 
 from .. import oracles
 
@@ -92,29 +92,35 @@ def gap(seed=0, n_rows=400):
     return X, np.where(clump, X[:, 0], -X[:, 1]) + 0.05 * g.normal(size=n_rows)
 
 
-def test_empty_cells_are_reported_and_pruned_with_the_loss_measured():
+def test_empty_cells_are_reported_and_can_be_left_out():
     X, y = gap()
-    settings = {"n_mfs": 4, "solver": "lse", "alpha": 1e-8}
-    whole = ANFISRegressor(**settings).fit(X, y)
-    pruned = ANFISRegressor(prune=True, **settings).fit(X, y)
+    settings = {"solver": "lse", "alpha": 1e-8}
+    whole = ANFISRegressor(n_mfs=4, **settings).fit(X, y)
     # Terms 0 and 1 of one input never meet terms 2 and 3 of the other.
     empty = [4 * i + j for i in range(4) for j in range(4) if (i < 2) != (j < 2)]
     assert [r["rule"] for r in whole.redundant_rules_] == empty
     assert {r["reason"] for r in whole.redundant_rules_} == {"never fires"}
-    assert whole.pruning_ is None
+    left = whole.without_rules()
+    kept = np.setdiff1d(np.arange(16), empty)
+    before = whole.model_.strengths(X)[:, kept]
+    assert_allclose(left.strengths(X), before / before.sum(axis=1, keepdims=True), atol=1e-12)
+    assert_array_equal(left.consequents, whole.model_.consequents[kept])
+    assert left.term_names == ("very low", "low", "high", "very high") * 2
+    assert_allclose(left.rule_weights.sum(), 1.0)
+    # Rules that never fire have no say, and those that are left speak for the same rows.
+    assert_allclose(left.predict(X)[:, 0], whole.predict(X), atol=0.05)
+    assert_allclose(left.coverage(X), whole.coverage(X), atol=0.01)
+    pruned = ANFISRegressor(partition=left, **settings).fit(X, y)
     assert pruned.n_rules_ == 8
-    assert [r["rule"] for r in pruned.pruning_["rules"]] == empty
-    loss = np.mean((pruned.predict(X) - y) ** 2) / np.var(y)
-    assert_allclose(pruned.pruning_["loss_after"], loss, rtol=1e-6)
-    assert_allclose(pruned.pruning_["loss_before"], whole.loss_curve_[-1], rtol=1e-6)
-    assert_allclose(loss, whole.loss_curve_[-1], rtol=1e-2)
-    assert pruned.model_.term_names == ("very low", "low", "high", "very high") * 2
-    assert pruned.initial_memberships_ == whole.initial_memberships_
-    assert_allclose(pruned.predict(X), whole.predict(X), atol=0.05)
+    assert_allclose(pruned.loss_curve_[-1], whole.loss_curve_[-1], rtol=1e-2)
 
 
-def test_pruning_without_need_changes_nothing():
+def test_rules_that_are_not_there_are_refused():
     X, y = gap()
-    one, other = (ANFISRegressor(n_mfs=[2, 1], prune=prune).fit(X, y) for prune in (False, True))
-    assert other.pruning_ is None
-    assert_array_equal(one.predict(X), other.predict(X))
+    model = ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(X, y)
+    assert model.redundant_rules_ == []
+    assert model.without_rules() is model.model_
+    with pytest.raises(ValueError, match="rules has 2, but the model has 2 rules"):
+        model.without_rules([2])
+    with pytest.raises(ValueError, match="names all 2 rules: one at least must be left"):
+        model.without_rules([0, 1])

@@ -7,7 +7,9 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
-from skanfis.training import robust
+from skanfis.options import EarlyStopping, Huber
+from skanfis.solvers import VariableProjection
+from skanfis.training import fit, robust
 
 
 def with_outliers(n_rows=600, part=0.05, seed=0):
@@ -38,11 +40,11 @@ def linear_huber(X, y, epsilon, sample_weight=None):
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("epsilon", [1.0, 1.35, 3.0])
 def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
-    monkeypatch.setattr(robust, "_SETTLED", 1e-12)
-    monkeypatch.setattr(robust, "_MOST_ROUNDS", 500)
+    monkeypatch.setattr(fit, "_SETTLED", 1e-12)
+    monkeypatch.setattr(fit, "_MOST_TURNS", 500)
     X, y, *_ = with_outliers(200)
     weight = np.random.default_rng(1).uniform(0.5, 2.0, 200) if weighted else None
-    model = ANFISRegressor(n_mfs=1, alpha=0.0, loss="huber", epsilon=epsilon)
+    model = ANFISRegressor(n_mfs=1, alpha=0.0, loss=Huber(epsilon))
     model.fit(X, y, sample_weight=weight)
     linear, weights = linear_huber(X, y, epsilon, weight)
     expected = [linear.intercept_, *linear.coef_]
@@ -55,7 +57,7 @@ def test_outliers_do_little(settings):
     X, y, truth, is_outlier = with_outliers()
     error = {}
     for loss in ("squared_error", "huber"):
-        model = ANFISRegressor(loss=loss, tol=1e-2, **settings).fit(X, y)
+        model = ANFISRegressor(loss=loss, solver=VariableProjection(tol=1e-2), **settings).fit(X, y)
         error[loss] = np.sqrt(np.mean((model.predict(X) - truth) ** 2))
     assert error["huber"] < 0.06
     assert error["huber"] < 0.2 * error["squared_error"]
@@ -65,7 +67,7 @@ def test_outliers_do_little(settings):
 
 def test_weights_are_one_or_fall_with_the_residual():
     X, y, *_ = with_outliers()
-    model = ANFISRegressor(n_mfs=[3, 1], loss="huber", epsilon=1.35).fit(X, y)
+    model = ANFISRegressor(n_mfs=[3, 1], loss=Huber(epsilon=1.35)).fit(X, y)
     residual = np.abs(y - model.predict(X))
     scale = np.median(residual) / 0.6744897501960817
     expected = np.minimum(1.0, 1.35 * scale / residual)
@@ -90,11 +92,13 @@ def test_several_outputs_share_their_weights():
 
 def test_rows_that_were_not_trained_on_have_no_weight():
     X, y, *_ = with_outliers(200)
-    model = ANFISRegressor(n_mfs=2, loss="huber", early_stopping=True, validation_fraction=0.25)
+    model = ANFISRegressor(n_mfs=2, loss="huber", early_stopping=EarlyStopping(0.25))
     assert np.isnan(model.fit(X, y).robust_weights_).sum() == 50
     weight = np.ones(200)
     weight[3] = 0.0
-    dropped = ANFISRegressor(n_mfs=2, loss="huber", tol=1e-2).fit(X, y, sample_weight=weight)
+    dropped = ANFISRegressor(n_mfs=2, loss="huber", solver=VariableProjection(tol=1e-2)).fit(
+        X, y, sample_weight=weight
+    )
     assert_array_equal(np.flatnonzero(np.isnan(dropped.robust_weights_)), [3])
 
 
@@ -121,7 +125,23 @@ def test_unit_weights_are_none(n_rows):
 
 
 def test_weights_that_do_not_settle_are_told(monkeypatch):
-    monkeypatch.setattr(robust, "_MOST_ROUNDS", 1)
+    monkeypatch.setattr(fit, "_MOST_TURNS", 1)
     X, y, *_ = with_outliers(200)
     with pytest.warns(ConvergenceWarning, match="weights of the rows still change"):
         ANFISRegressor(n_mfs=2, loss="huber").fit(X, y)
+
+
+def test_of_many_rows_some_show_the_outliers_and_all_are_weighed(monkeypatch):
+    X, y, truth, is_outlier = with_outliers(1500)
+    whole = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, y)
+    monkeypatch.setattr(fit, "MANY_ROWS", 500)
+    monkeypatch.setattr(robust, "MANY_ROWS", 500)
+    model = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, y)
+    # What Huber's estimator asks for holds of all rows: the weights are those of the residuals.
+    residual = np.abs(y - model.predict(X))
+    scale = np.median(residual) / 0.6744897501960817
+    assert_allclose(model.robust_weights_, np.minimum(1.0, 1.35 * scale / residual), atol=0.02)
+    assert model.robust_weights_[is_outlier].max() < 0.1
+    # Other weights of the penalty by a little: far less than the noise of 0.1.
+    assert_allclose(model.predict(X), whole.predict(X), atol=0.01)
+    assert np.sqrt(np.mean((model.predict(X) - truth) ** 2)) < 0.02

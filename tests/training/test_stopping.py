@@ -7,12 +7,15 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
+from skanfis.options import EarlyStopping
 from skanfis.rows import Rows
-from skanfis.training import hold_out
+from skanfis.solvers import SOLVERS, VariableProjection
+from skanfis.training.stopping import hold_out
 
-SETTINGS = {"early_stopping": True, "warn_out_of_bounds": False}
+SETTINGS = {"early_stopping": True}
 # Weights that let rules learn the noise.
-LOOSE = {"agreement": 0.0, "alpha": 1e-6, "stiffness": 0.0, **SETTINGS}
+FREE = {"agreement": 0.0, "alpha": 1e-6, "solver": VariableProjection(stiffness=0.0)}
+LOOSE = FREE | SETTINGS
 
 
 def overfitting(n_rows=150, seed=0):
@@ -41,7 +44,9 @@ def test_best_parameters_are_restored():
 @pytest.mark.parametrize("patience", [2, 5])
 def test_it_ends_after_so_many_iterations_without_change(patience):
     X, y = overfitting()
-    model = ANFISRegressor(n_mfs=4, n_iter_no_change=patience, tol=1e-6, **LOOSE)
+    stopping = EarlyStopping(n_iter_no_change=patience, tol=1e-6)
+    free = FREE | {"solver": VariableProjection(tol=1e-6, stiffness=0.0)}
+    model = ANFISRegressor(n_mfs=4, early_stopping=stopping, **free)
     losses = model.fit(X, y).validation_loss_curve_
     counted, without = np.inf, 0
     ends = []
@@ -52,10 +57,11 @@ def test_it_ends_after_so_many_iterations_without_change(patience):
     assert model.loss_curve_.shape == (model.n_iter_ + 1,)
 
 
-@pytest.mark.parametrize("solver", ["varpro", "hybrid", "gradient", "lbfgs", "lse"])
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_can_be_stopped(solver):
     X, y = overfitting()
-    model = ANFISRegressor(n_mfs=3, solver=solver, max_iter=60, n_iter_no_change=3, **SETTINGS)
+    stopping = EarlyStopping(n_iter_no_change=3)
+    model = ANFISRegressor(n_mfs=3, solver=solver, max_iter=60, early_stopping=stopping)
     assert model.fit(X, y).validation_loss_curve_.size == model.n_iter_
 
 
@@ -124,6 +130,6 @@ def test_equal_rows_are_on_one_side():
 )
 def test_too_few_rows_to_hold_out(n_rows, groups, fraction, what):
     X = np.random.default_rng(0).normal(size=(n_rows, 1))
-    model = ANFISRegressor(n_mfs=1, validation_fraction=fraction, **SETTINGS)
+    model = ANFISRegressor(n_mfs=1, early_stopping=EarlyStopping(fraction))
     with pytest.raises(ValueError, match=f"validation_fraction={fraction} leaves .* of {what}"):
         model.fit(X, X[:, 0], groups=groups)

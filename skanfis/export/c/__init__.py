@@ -43,7 +43,9 @@ class CCode:
     cost: CCost
 
 
-def export_c(estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1):
+def export_c(
+    estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1
+) -> CCode:
     """Write a trained model as C: one header and one source file.
 
     The function ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row

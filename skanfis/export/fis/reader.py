@@ -21,7 +21,7 @@ _MOST_TERMS = 10_000
 _MOST_RULES = 100_000
 
 
-def read_fis(path, *, input_names=None):
+def read_fis(path, *, input_names=None) -> TSKModel:
     r"""Read a Sugeno system from a .fis file of MATLAB, Octave or fuzzylite.
 
     The file is data: it is parsed strictly, and no part of it is ever run. What it may hold:

@@ -34,7 +34,7 @@ _WORDS = {
 _N_POINTS = 1000
 
 
-def export_fis(estimator):
+def export_fis(estimator) -> str:
     r"""Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average. Its membership functions are
@@ -128,7 +128,7 @@ def export_fis(estimator):
     return text
 
 
-def write_fis(estimator, path):
+def write_fis(estimator, path) -> None:
     """Write a trained model to a .fis file, as :func:`export_fis` gives it.
 
     Parameters

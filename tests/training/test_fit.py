@@ -1,6 +1,4 @@
-"""What all estimators share: workers, clusterers, what "auto" decides, and no side effects."""
-
-import time
+"""A whole fit: clusterers, what "auto" decides, and no side effects."""
 
 import numpy as np
 import pytest
@@ -9,11 +7,10 @@ from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from threadpoolctl import threadpool_info, threadpool_limits
 
 from skanfis import ANFISRegressor
-from skanfis._anfis import _ordered_map
 from skanfis.exceptions import UnderdeterminedWarning
+from skanfis.solvers import VariableProjection
 from skanfis.structure.request import _labeller
 
 
@@ -21,28 +18,6 @@ def data(n_rows=120, n_inputs=2):
     rng = np.random.default_rng(0)
     X = rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
     return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
-
-
-# ------------------------------------------------------------------------------------------ workers
-
-
-@pytest.mark.parametrize("n_jobs", [None, 1, 2, 3])
-def test_results_come_in_order_whoever_is_done_first(n_jobs):
-    def slow_at_first(k):
-        time.sleep(0.01 * (k == 0))
-        return k**2
-
-    assert list(_ordered_map(n_jobs)(slow_at_first, list(range(20)))) == [k**2 for k in range(20)]
-
-
-def test_error_of_a_worker_reaches_the_caller():
-    def fails_at_five(k):
-        if k == 5:
-            raise FloatingPointError("five")
-        return k
-
-    with pytest.raises(FloatingPointError, match="five"):
-        list(_ordered_map(2)(fails_at_five, list(range(10))))
 
 
 # --------------------------------------------------------------------------------------- clusterers
@@ -89,7 +64,9 @@ def test_clusterer_with_weights_is_given_them(weighted):
 def test_clusters_are_sought_in_standardised_inputs_and_target():
     Remembers.seen = ()
     X, y = data()
-    ANFISRegressor(partition=Remembers(), tol=0.1).fit(X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0)
+    ANFISRegressor(partition=Remembers(), solver=VariableProjection(tol=0.1)).fit(
+        X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0
+    )
     (table,) = Remembers.seen
     expected = StandardScaler().fit_transform(np.column_stack([X, y]))
     order = np.lexsort(expected.T[::-1])
@@ -99,7 +76,7 @@ def test_clusters_are_sought_in_standardised_inputs_and_target():
 
 def test_clusterer_itself_is_left_as_it_was():
     clusterer = KMeans(n_clusters=3, n_init=1, random_state=0)
-    model = ANFISRegressor(partition=clusterer, tol=0.1).fit(*data())
+    model = ANFISRegressor(partition=clusterer, solver=VariableProjection(tol=0.1)).fit(*data())
     assert model.partition is clusterer
     assert not hasattr(clusterer, "labels_")
     assert model.n_rules_ == 3
@@ -108,9 +85,11 @@ def test_clusterer_itself_is_left_as_it_was():
 def test_pipeline_is_a_clusterer_too():
     X, y = data()
     kmeans = KMeans(n_clusters=3, n_init=1, random_state=0)
-    alone = ANFISRegressor(partition=kmeans, tol=0.1).fit(X, y)
+    alone = ANFISRegressor(partition=kmeans, solver=VariableProjection(tol=0.1)).fit(X, y)
     # On standardised data a scaler does nothing, but for rounding.
-    scaled = ANFISRegressor(partition=make_pipeline(StandardScaler(), kmeans), tol=0.1).fit(X, y)
+    scaled = ANFISRegressor(
+        partition=make_pipeline(StandardScaler(), kmeans), solver=VariableProjection(tol=0.1)
+    ).fit(X, y)
     assert_allclose(scaled.predict(X), alone.predict(X), rtol=0, atol=1e-8)
 
 
@@ -122,7 +101,9 @@ WEIGHTS = ("agreement_", "alpha_", "slope_alpha_", "stiffness_")
 
 def test_weights_given_are_obeyed():
     X, y = data()
-    model = ANFISRegressor(n_mfs=2, agreement=0.3, alpha=0.02, stiffness=1e-3).fit(X, y)
+    model = ANFISRegressor(
+        n_mfs=2, agreement=0.3, alpha=0.02, solver=VariableProjection(stiffness=1e-3)
+    ).fit(X, y)
     assert [getattr(model, name) for name in WEIGHTS] == [0.3, 0.02, 0.02, 1e-3]
     # One that is given leaves the others to be found.
     model = ANFISRegressor(n_mfs=2, agreement=0.3).fit(X, y)
@@ -150,7 +131,9 @@ def test_automatic_weights_count_rows_by_weight_and_not_distinct_ones():
 @pytest.mark.parametrize("n_rows", [11, 12])
 def test_fewer_distinct_rows_than_parameters_are_reported(n_rows, recwarn):
     X, y = data(n_rows)
-    ANFISRegressor(n_mfs=2, tol=0.5).fit(np.tile(X, (3, 1)), np.tile(y, 3))
+    ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5)).fit(
+        np.tile(X, (3, 1)), np.tile(y, 3)
+    )
     caught = [w for w in recwarn if w.category is UnderdeterminedWarning]
     assert len(caught) == (n_rows < 12)
     for warning in caught:
@@ -161,39 +144,10 @@ def test_fewer_distinct_rows_than_parameters_are_reported(n_rows, recwarn):
 # ------------------------------------------------------------------------------------- side effects
 
 
-def blas_threads():
-    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
-
-
-@pytest.fixture
-def two_blas_threads():
-    """As on any machine; not as a context, which would keep other threads from setting limits."""
-    limits = threadpool_limits(2, user_api="blas")
-    yield blas_threads()
-    limits.restore_original_limits()
-
-
-class CountsThreads(Remembers):
-    """The same clusters; keeps how many threads the numerical libraries have meanwhile."""
-
-    def fit_predict(self, X, y=None):
-        type(self).seen = tuple(blas_threads())
-        return super().fit_predict(X)
-
-
-def test_one_thread_of_the_numerical_libraries_in_a_fit_and_then_as_many_as_before(
-    two_blas_threads,
-):
-    CountsThreads.seen = ()
-    ANFISRegressor(partition=CountsThreads(), tol=0.5).fit(*data())
-    assert set(CountsThreads.seen[:-1]) == {1}
-    assert blas_threads() == two_blas_threads
-
-
 def test_data_are_not_written_to():
     X, y = data()
     weight = np.linspace(0.0, 1.0, len(y))
     before = X.copy(), y.copy(), weight.copy()
-    ANFISRegressor(n_mfs=2, tol=0.5).fit(X, y, weight).predict(X[1:] / 2)
+    ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5)).fit(X, y, weight).predict(X[1:] / 2)
     for array, copy in zip((X, y, weight), before, strict=True):
         assert_array_equal(array, copy)

@@ -19,11 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-from ..objective import Evaluation
-from .lse import lse
-from .result import SolverResult
+from skanfis.objective import Evaluation
+from skanfis.solvers import LeastSquares, Solver, SolverResult
 
-__all__ = ["lbfgs"]
+__all__ = ["LBFGS"]
 
 # Steps that the quasi-Newton matrix remembers. On Jang's problems and a gyro-like surface, 1,000
 # iterations with 40 got further than 2,000 with SciPy's 10.
@@ -114,31 +113,27 @@ class _Progress:
             raise StopIteration
 
 
-def lbfgs(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None):
-    """Minimise the joint cost over premises and consequents.
+class LBFGS(Solver):
+    """L-BFGS-B on the joint cost over premises and consequents.
 
     Parameters
     ----------
-    problem : SeparableProblem
-    premise : Premise
-    max_iter : int
-        Most iterations.
-    tol : float
+    tol : float, default=1e-3
         Stop when the relative decrease of the cost over ten iterations is below ``tol``.
-    stiffness : float
-        Weight of the pull of the premises to their start.
-    start : ndarray of shape (premise.size,), optional
-        Displacements to start from, inside the box; zero if not given.
-    on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every iteration; what is true ends the training. The
-        evaluation has no factor.
-
-    Returns
-    -------
-    SolverResult
+    stiffness : "auto" or float, default="auto"
     """
-    if not premise.size:
-        return lse(problem, premise, max_iter=max_iter, tol=tol, on_iteration=on_iteration)
+
+    def __init__(self, *, tol=1e-3, stiffness="auto"):
+        self.tol = tol
+        self.stiffness = stiffness
+
+    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+        if not premise.size:
+            return LeastSquares().solve(problem, premise, max_iter=1, on_iteration=on_iteration)
+        return _minimised(problem, premise, max_iter, self.tol, stiffness, start, on_iteration)
+
+
+def _minimised(problem, premise, max_iter, tol, stiffness, start, on_iteration):
     cost_of = _JointCost(problem, premise, stiffness)
     first = cost_of.at(cost_of.start(np.zeros(premise.size) if start is None else start))
     progress = _Progress(cost_of, first, tol, on_iteration)

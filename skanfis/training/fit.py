@@ -1,0 +1,440 @@
+"""One fit, from checked data to the frozen model, in the order in which things happen.
+
+1. Rows are held out, where training is to stop early (``stopping``).
+2. With Huber's loss, what is far off is found before there is any model (``robust``).
+3. ``structure`` gives a start: the rules, the weights of the penalty, where the premises stand.
+4. A solver runs from there, or from several starts, of which the best is kept (``restarts``).
+5. With Huber's loss the rows are weighted anew by what that left, and 3 and 4 repeated.
+6. The model is frozen in the user's units, and rules that do nothing are listed (``pruning``).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from sklearn.base import BaseEstimator
+from sklearn.exceptions import ConvergenceWarning
+
+from .._threads import map_in_threads
+from .._validation import warn_user
+from ..model import TargetRange, TSKModel
+from ..objective import Evaluation, SeparableProblem
+from ..options import EarlyStopping, Huber, policy_of
+from ..penalty import Penalty
+from ..premise import Premise
+from ..rows import Rows, check_scales
+from ..solvers import SOLVERS, LeastSquares, Solver, SolverResult
+from ..structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
+from ..support import RuleSupport
+from .progress import Callbacks, Printer, watch_all
+from .pruning import RuleStatistics, redundant_rules, rule_statistics
+from .restarts import displaced_starts, leave_one_out_error
+from .robust import (
+    MANY_ROWS,
+    huber_weights,
+    resistant,
+    reweighted,
+    some_rows,
+    without_outliers,
+)
+from .stopping import ValidationLoss, hold_out
+
+__all__ = ["Fitted", "SolverRun", "TrainingData", "fit_rules"]
+
+# Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
+# them, and what has not after these goes to and fro.
+_MOST_TURNS = 20
+# Weights are settled when they change by less than this on average: a tenth of what the scale of
+# the residuals, a median of some hundred rows, is uncertain by.
+_SETTLED = 1e-3
+# The first start, one that sees the outliers less, and further ones where that is of another size.
+_MOST_STARTS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """Validated data.
+
+    Parameters
+    ----------
+    X : ndarray of shape (n_rows, n_inputs)
+    y : ndarray of shape (n_rows, n_outputs)
+    sample_weight : ndarray of shape (n_rows,) or None
+        Positive.
+    groups : ndarray of shape (n_rows,) or None
+    input_names, output_names : sequence of str
+    kept : ndarray of bool of shape (n_given_rows,), optional
+        Which of the rows given have weight and are here, if not all.
+    """
+
+    X: np.ndarray
+    y: np.ndarray
+    sample_weight: np.ndarray | None
+    groups: np.ndarray | None
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    kept: np.ndarray | None = None
+
+    def rows(self, indices=slice(None)):
+        """Some of the rows, on scales of their own."""
+        weight = None if self.sample_weight is None else self.sample_weight[indices]
+        groups = None if self.groups is None else self.groups[indices]
+        rows = Rows.standardised(self.X[indices], self.y[indices], weight, groups)
+        check_scales(rows.inputs, rows.targets, self.input_names, self.output_names)
+        return rows
+
+    def spread_over_rows(self, values, indices):
+        """Values of some rows as values of all rows given, NaN elsewhere."""
+        every = np.full(self.X.shape[0], np.nan)
+        every[indices] = values
+        if self.kept is None:
+            return every
+        given = np.full(self.kept.size, np.nan)
+        given[self.kept] = every
+        return given
+
+
+@dataclass(frozen=True, eq=False)
+class SolverRun:
+    """One run of the solver: where it began, what it worked on, where it ended."""
+
+    start: Start
+    problem: SeparableProblem
+    premise: Premise
+    result: SolverResult
+    validation_losses: tuple[float, ...] | None = None
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """The problem at the best point."""
+        assert self.result.evaluation is not None
+        return self.result.evaluation
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Where the premises are, from their start."""
+        return self.premise.displacement(self.evaluation.antecedent.parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """What a fit leaves behind."""
+
+    model: TSKModel
+    result: SolverResult
+    start: Start
+    redundant_rules: list[dict]
+    robust_weights: np.ndarray | None = None
+    validation_losses: tuple[float, ...] | None = None
+
+
+def fit_rules(
+    estimator: Any,
+    data: TrainingData,
+    request: StructureRequest,
+    callbacks: Callbacks | None = None,
+) -> Fitted:
+    """Fit the rules of an estimator, whose parameters say how, to data.
+
+    Parameters
+    ----------
+    estimator : ANFISRegressor
+    data : TrainingData
+    request : StructureRequest
+    callbacks : Callbacks, optional
+        scikit-learn's.
+    """
+    if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
+        return _as_given(estimator, data, request.partition)
+    fit = _Fit(estimator, data, request, callbacks)
+    report_constant(fit.rows, data.input_names)
+    weights = None
+    if fit.huber is None:
+        run = fit.best_run(fit.rows, fit.start(fit.rows))
+    else:
+        run, weights = fit.robust_run(fit.huber.epsilon)
+        weights = data.spread_over_rows(weights, fit.trained_on)
+    fit.warn_unless_converged(run)
+    statistics = rule_statistics(fit.rows, run.evaluation.antecedent)
+    return Fitted(
+        fit.frozen(run.start, run.evaluation, statistics),
+        run.result,
+        run.start,
+        redundant_rules(statistics),
+        weights,
+        run.validation_losses,
+    )
+
+
+class _Fit:
+    """What every step of one fit needs: the rows, what was asked for, and who watches."""
+
+    def __init__(self, estimator, data, request, callbacks):
+        self.estimator, self.data, self.request = estimator, data, request
+        self.callbacks = callbacks
+        self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
+        self.solver: Solver = _object_for(estimator.solver, SOLVERS)
+        if estimator.max_iter == 0:
+            self.solver = LeastSquares()
+        self.huber = _object_for(estimator.loss, {"huber": Huber, "squared_error": None})
+        self.stopping = _object_for(estimator.early_stopping, {True: EarlyStopping, False: None})
+        self.rng = np.random.default_rng(request.seed)
+        # Workers share the starts, or else the rows.
+        self.map_ordered = map_in_threads(estimator.n_jobs if estimator.n_init == 1 else 1)
+        self.rows, self.trained_on, self.held_out = data.rows(), slice(None), None
+        if self.stopping is not None:
+            seed = int(self.rng.integers(2**31 - 1))
+            fraction = self.stopping.validation_fraction
+            self.trained_on, validation = hold_out(self.rows, fraction, seed)
+            held_out, self.rows = self.rows.part(validation), data.rows(self.trained_on)
+            self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
+        self.size = SampleSize.of(self.rows)
+
+    def start(self, rows: Rows) -> Start:
+        """Where a run begins: rules, weights of the penalty, and the premises so far."""
+        start = self.request.start(rows, self.size)
+        if not self.solver.goes_on_from_tuning:
+            start = replace(start, displacement=None)
+        if self.printer is not None:
+            self.printer.tell_start(start)
+        return start
+
+    def best_run(self, rows: Rows, start: Start) -> SolverRun:
+        """The run from a start, or the best from several: of the least leave-one-out error.
+
+        Workers are threads: passes over the data release Python's lock.
+        """
+        n_init = self.estimator.n_init
+        premise = _premise(rows, start)
+        if n_init == 1 or premise.size == 0:
+            return self.run(rows, start, start.displacement)
+        displacements = displaced_starts(premise, start.displacement, n_init, self.rng)
+        parallel = Parallel(self.estimator.n_jobs, backend="threading", return_as="generator")
+        best, smallest = None, np.inf
+        for run, error in parallel(
+            delayed(self.run_and_error)(rows, start, displacement) for displacement in displacements
+        ):
+            if best is None or error < smallest:
+                best, smallest = run, error
+            if self.tell_run(run):
+                break
+        assert best is not None
+        return best
+
+    def run_and_error(self, rows, start, displacement):
+        """One of several runs, and by what it is judged."""
+        run = self.run(rows, start, displacement, is_alone=False)
+        return run, leave_one_out_error(run.problem, run.evaluation)
+
+    def run(self, rows: Rows, start: Start, displacement, is_alone=True) -> SolverRun:
+        """One run of the solver, watched; the iterations of one among several are not told."""
+        estimator = self.estimator
+        problem, premise = self.problem(rows, start), _premise(rows, start)
+        validation = None
+        if self.held_out is not None:
+            validation = ValidationLoss(
+                self.held_out,
+                self.request.consequent_inputs,
+                self.stopping.n_iter_no_change,
+                self.stopping.tol,
+            )
+        watchers: list[Callable | None] = [validation]
+        if is_alone:
+            watchers += [self.printer, self.iteration_watcher(start)]
+        if displacement is not None:
+            displacement = np.clip(displacement, premise.lower, premise.upper)
+        result = self.solver.solve(
+            problem,
+            premise,
+            max_iter=estimator.max_iter,
+            stiffness=start.penalty.stiffness,
+            start=displacement,
+            on_iteration=watch_all(*watchers),
+        )
+        if validation is None:
+            return SolverRun(start, problem, premise, result)
+        result = validation.restored(result)
+        return SolverRun(start, problem, premise, result, tuple(validation.losses))
+
+    def problem(self, rows: Rows, start: Start) -> SeparableProblem:
+        """The least-squares problem at a start."""
+        return SeparableProblem(
+            rows,
+            start.antecedent,
+            self.estimator.order,
+            start.penalty,
+            self.map_ordered,
+            self.request.consequent_inputs,
+        )
+
+    def robust_run(self, epsilon: float) -> tuple[SolverRun, np.ndarray]:
+        """Runs and weights in turns, until the weights settle.
+
+        The first start and what comes of it may have seen outliers: once the weights are settled,
+        training starts afresh, from a start that sees no row of less than half its weight, and
+        again for as long as that start comes out another one.
+        """
+        self.rows, weights = resistant(self.rows)
+        if self.held_out is not None:
+            self.held_out = replace(self.held_out, targets=self.rows.targets)
+        rows, n_starts = self.rows, _MOST_STARTS
+        if rows.n_rows > MANY_ROWS:
+            # Some rows show as well as all what a sound model leaves, and at a price that does not
+            # grow with their number. One start from there is then as good as several.
+            some = some_rows(rows.n_rows)
+            run, _ = self.robust_turns(rows.part(some), weights[some], epsilon, n_starts)
+            weights = huber_weights(
+                self.problem(rows, run.start), run.evaluation, epsilon, rows.sample_weight
+            )
+            n_starts = 1
+        return self.robust_turns(rows, weights, epsilon, n_starts)
+
+    def robust_turns(self, rows, weights, epsilon, n_starts):
+        """Starts, and from each of them turns of fit and weights until these settle."""
+        run: SolverRun | None = None
+        for turn in range(n_starts):
+            start = self.start(without_outliers(rows, weights))
+            if run is not None and turn > 1 and _is_of_one_size(start, run.start):
+                break
+            run = self.best_run(reweighted(rows, weights), start)
+            run, weights = self.settled(rows, run, weights, epsilon)
+        assert run is not None
+        return run, weights
+
+    def settled(self, rows, run, weights, epsilon):
+        """Weights and fit in turns, at one structure."""
+        for _ in range(_MOST_TURNS):
+            before, own = weights, rows.sample_weight
+            weights = huber_weights(run.problem, run.evaluation, epsilon, own)
+            run = self.run(reweighted(rows, weights), run.start, run.displacement)
+            change = float(np.mean(np.abs(weights - before)))
+            if change < _SETTLED:
+                return run, weights
+        warn_user(
+            f"loss='huber': the weights of the rows still change by {change:.2g} on average after "
+            f"{_MOST_TURNS} turns. Use fewer rules, or loss=Huber(epsilon=...) with a larger one.",
+            ConvergenceWarning,
+        )
+        return run, weights
+
+    def iteration_watcher(self, start):
+        """What tells scikit-learn's callbacks of every iteration; None where there are none."""
+        if self.callbacks is None:
+            return None
+        callbacks = self.callbacks
+
+        def watch(n_iter, evaluation):
+            return callbacks.task("iteration", lambda: self.frozen(start, evaluation))
+
+        return watch
+
+    def tell_run(self, run):
+        """Tell of one of several runs; whether a callback wants to stop."""
+        if self.printer is not None:
+            self.printer.tell_run(run.result)
+        if self.callbacks is None:
+            return False
+        return self.callbacks.task("start", lambda: self.frozen(run.start, run.evaluation))
+
+    def warn_unless_converged(self, run):
+        """Warn where the solver would have gone on."""
+        estimator, result = self.estimator, run.result
+        if result.converged or estimator.max_iter == 0:
+            return
+        warn_user(
+            f"solver={estimator.solver!r} with {run.start.antecedent.n_rules} rules on "
+            f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}: {result.message} The model "
+            "is the best one found; increase max_iter or the solver's tol.",
+            ConvergenceWarning,
+        )
+
+    def frozen(
+        self, start: Start, evaluation: Evaluation, statistics: RuleStatistics | None = None
+    ) -> TSKModel:
+        """The model in the user's units; ``statistics`` of its rules, if they are at hand."""
+        rows, trained = self.rows, evaluation.antecedent
+        offset, scale = rows.inputs.offset, rows.inputs.scale
+        statistics = rule_statistics(rows, trained) if statistics is None else statistics
+        slopes = self.request.consequent_inputs
+        n_coefficients = 1 + int(np.sum(~rows.inputs.is_constant[slopes]))
+        policy, limit = policy_of(self.estimator.out_of_bounds)
+        return TSKModel(
+            antecedent=trained.change_units(offset, scale),
+            initial_antecedent=start.antecedent.change_units(offset, scale),
+            coefficients=self.coefficients(evaluation),
+            reference=offset,
+            spread=scale,
+            minimum=rows.inputs.minimum,
+            maximum=rows.inputs.maximum,
+            rule_weights=evaluation.masses,
+            rule_rows=rows.n_rows * statistics.strongest,
+            input_names=self.data.input_names,
+            out_of_bounds=policy,
+            max_extrapolation=limit,
+            support=RuleSupport.of(rows, trained, n_coefficients).change_units(offset, scale),
+            term_names=start.term_names,
+            output_names=self.data.output_names,
+            target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
+        )
+
+    def coefficients(self, evaluation):
+        """The consequents about the inputs' means, in the user's units."""
+        rows, n_rules = self.rows, evaluation.antecedent.n_rules
+        n_outputs = rows.y.shape[1]
+        solved = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
+        solved[:, 0] += rows.targets.offset
+        if self.estimator.order == 0:
+            return solved
+        inputs, scale = self.request.consequent_inputs, rows.inputs.scale
+        coefficients = np.zeros((n_rules, 1 + scale.size, n_outputs))
+        coefficients[:, 0] = solved[:, 0]
+        coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
+        return coefficients
+
+
+def _as_given(estimator, data, model) -> Fitted:
+    """The imported model itself, with its error on the data."""
+    if model.n_outputs != data.y.shape[1]:
+        raise ValueError(
+            f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}: with "
+            "max_iter=0 the model is taken as it is."
+        )
+    policy, limit = policy_of(estimator.out_of_bounds)
+    model = replace(
+        model,
+        initial_antecedent=model.antecedent,
+        input_names=data.input_names,
+        output_names=data.output_names,
+        out_of_bounds=policy,
+        max_extrapolation=limit,
+    )
+    rows = Rows.standardised(data.X, data.y, data.sample_weight)
+    # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
+    answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
+    residual = (data.y - answering.predict(data.X)) / rows.targets.scale
+    loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
+    redundant = redundant_rules(rule_statistics(rows, imported_antecedent(model, rows)))
+    result = SolverResult(None, np.full(2, loss), 0, "as_given")
+    return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
+
+
+def _object_for(given, by_word):
+    """The object that a word stands for, or that is given in its place; None for no object."""
+    if isinstance(given, BaseEstimator):
+        return given
+    of_word = by_word[given]
+    return None if of_word is None else of_word()
+
+
+def _premise(rows: Rows, start: Start) -> Premise:
+    """What moves at a start, within the box of the data."""
+    low, high = rows.inputs.box
+    return Premise.of(start.antecedent, low, high, start.is_free)
+
+
+def _is_of_one_size(one: Start, other: Start) -> bool:
+    """Whether two starts have as many rules and terms."""
+    sizes = [(s.antecedent.n_rules, s.antecedent.n_terms) for s in (one, other)]
+    return sizes[0] == sizes[1]
