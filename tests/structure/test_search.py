@@ -309,6 +309,7 @@ def runs(n_runs=6, n_rows=120, seed=0):
     return np.column_stack([temperature, rate]), y, run
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     X, y, run = runs()
     alone, grouped = (ANFISRegressor().fit(X, y, groups=groups) for groups in (None, run))
