@@ -40,6 +40,7 @@ TABLE = {
     "_sklearn": ([], LEARNING),
     "_validation": (["_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
+    "bounds": ([*KERNEL, "export"], NUMERIC),
     "structure": ([*KERNEL, "_validation", "cluster"], [*NUMERIC, "sklearn"]),
     "training": ([*KERNEL, "_validation", "structure"], LEARNING),
     "_anfis": ([*KERNEL, "_sklearn", "_validation", "structure", "training"], LEARNING),

@@ -11,6 +11,7 @@ import skanfis
 
 PUBLIC_MODULES = [
     "skanfis",
+    "skanfis.bounds",
     "skanfis.cluster",
     "skanfis.datasets",
     "skanfis.export",
