@@ -17,6 +17,7 @@ from threadpoolctl import ThreadpoolController
 
 from ._validation import warn_user
 from .antecedent import GridAntecedent
+from .constraints import Wishes, constrained
 from .model import TSKModel
 from .naming import default_term_names, given_term_names
 from .penalty import Penalty
@@ -57,6 +58,8 @@ class TrainingData:
     input_names, output_names : sequence of str
     kept : ndarray of bool of shape (n_given_rows,), optional
         Which of the rows given have weight and are here, if not all.
+    wishes : Wishes, optional
+        What is known of the target, in the user's units.
     """
 
     X: np.ndarray
@@ -66,6 +69,7 @@ class TrainingData:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     kept: np.ndarray | None = None
+    wishes: Wishes | None = None
 
     def rows(self, indices=slice(None)):
         """Some of the rows, on scales of their own."""
@@ -97,6 +101,7 @@ class Training:
     pruning: dict | None = None
     robust_weights: np.ndarray | None = None
     validation_losses: tuple[float, ...] | None = None
+    constraints: dict | None = None
 
 
 def train(estimator, data: TrainingData, request: StructureRequest, bridge=None) -> Training:
@@ -197,32 +202,39 @@ class _Trainer:
             else:
                 learned = self._learn(self.rows, self._start(self.rows), None)
             learned, redundant, pruning = self._prune(learned)
-            start, result = learned.start, learned.result
+            start, result, problem = learned.start, learned.result, learned.problem
             losses = learned.validation_losses if self.held_out is not None else None
         except KeyboardInterrupt:
             if self.keeper is None or self.keeper.best is None:
                 raise
             start, result = self.keeper.end()
             redundant, pruning, losses = self._redundant(result), None, None
+            problem = self.learner.problem(self.rows, start)
         self._report(start, result)
         model = self.freeze(start, result.evaluation)
+        kept = None
+        if self.data.wishes is not None:
+            model, result, kept = self._constrained(model, start, result, problem)
         if weights is not None:
             weights = self.data.spread_over_rows(weights, self.training)
-        return Training(model, result, start, redundant, pruning, weights, losses)
+        return Training(model, result, start, redundant, pruning, weights, losses, kept)
+
+    def _constrained(self, model, start, result, problem):
+        """The nearest model that keeps what is known, its result, and a report."""
+        evaluation = result.evaluation
+        if evaluation.normal is None:
+            # Found by descent: the consequents are solved for first.
+            evaluation = problem.evaluate(evaluation.antecedent.parameters)
+        model, evaluation, report = constrained(
+            model, evaluation, problem, self.data.wishes, self._in_user_units
+        )
+        return model, replace(result, evaluation=evaluation), report
 
     def freeze(self, start, evaluation) -> TSKModel:
         """The model in the user's units."""
         rows, antecedent = self.rows, start.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
-        n_rules, n_outputs = antecedent.n_rules, rows.y.shape[1]
-        solved = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
-        solved[:, 0] += rows.targets.offset
-        coefficients = solved
-        if self.estimator.order == 1:
-            inputs = self.request.consequent_inputs
-            coefficients = np.zeros((n_rules, 1 + offset.size, n_outputs))
-            coefficients[:, 0] = solved[:, 0]
-            coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
+        coefficients = self._in_user_units(evaluation.coefficients)
         trained = evaluation.antecedent.change_units(offset, scale)
         strongest = self._statistics(evaluation).strongest
         return TSKModel(
@@ -246,6 +258,21 @@ class _Trainer:
             term_names=start.term_names,
             output_names=self.data.output_names,
         )
+
+    def _in_user_units(self, coefficients):
+        """Coefficients of the frozen model from those on [1, z]."""
+        inputs, targets = self.rows.inputs, self.rows.targets
+        n_outputs = targets.scale.size
+        consequent = self.request.consequent_inputs
+        n_basis = 1 + consequent.size if self.estimator.order == 1 else 1
+        solved = coefficients.reshape(-1, n_basis, n_outputs) * targets.scale
+        solved[:, 0] += targets.offset
+        if self.estimator.order == 0:
+            return solved
+        found = np.zeros((len(solved), 1 + inputs.scale.size, n_outputs))
+        found[:, 0] = solved[:, 0]
+        found[:, 1 + consequent] = solved[:, 1:] / inputs.scale[consequent, None]
+        return found
 
     def _start(self, rows):
         start = self.request.start(rows, self.size)

@@ -28,6 +28,7 @@ from ._validation import (
     positive_weights,
     refuse_lazy,
 )
+from .constraints import FixedPoint, OutputLimits, Wishes
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
 from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
@@ -92,6 +93,14 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         is scheduled by temperature. What ``n_mfs`` gives terms to must be among the former.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
+    monotonic_cst : array-like of shape (n_features,) or (n_outputs, n_features) or dict, default=None
+        What is known of the target: 1 where it does not fall as the feature rises, -1 where it does
+        not rise, 0 where nothing is known; or these by the features' names. Held by the
+        predictions everywhere, by the policy out of bounds at the time of the fit, and proven; see
+        Notes.
+    constraints : list of OutputLimits and FixedPoint, default=None
+        More that is known: limits of the output, and values at points; see
+        :mod:`skanfis.constraints`. In the units of X as it comes here, behind any scaler.
     loss : {"squared_error", "huber"}, default="squared_error"
         What is minimised. "huber" counts rows whose residual is beyond ``epsilon`` standard
         deviations by its size and not its square: outliers in the target then do little.
@@ -203,6 +212,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         Rules that do nothing: "rule", its number; "reason", "never fires" (nowhere in the
         training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
         rows); "weight", its part of the data's weight.
+    constraints_ : dict or None
+        With ``monotonic_cst`` or ``constraints``: "certified", whether it is proven that all of them
+        hold; "loss_before" and "loss_after", as in ``loss_curve_``; "margin", by which they are held
+        at points, in standard deviations of the target and the inputs; "rows", the number of these
+        points; "boxes", of boxes that the proofs took.
     pruning_ : dict or None
         With ``prune``, if there were redundant rules: "rules", those dropped by their numbers
         before; "loss_before" and "loss_after", as in ``loss_curve_``.
@@ -219,7 +233,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     Warns
     -----
     ConvergenceWarning
-        If ``max_iter`` was reached first.
+        If ``max_iter`` was reached first; if constraints hold at all points that were looked at but
+        were not proven to hold between them.
     ConstantInputWarning
         If an input is constant in the training data; it gets no terms and no slope.
     UnderdeterminedWarning
@@ -235,6 +250,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     premises (``stiffness``) are "auto", they are found by the evidence, the probability of the data
     with all parameters averaged out [3]_, on at most 1,000 representative rows; with data that seem
     free of noise, from two sides. ``readability_`` says how far the rules can be read.
+
+    Constraints (``monotonic_cst``, ``constraints``) are kept by the consequents: the premises are
+    learnt without them, then the nearest consequents that keep them are found, and bounds on the
+    model (:mod:`skanfis.bounds`) prove that they hold at every point, not only at training rows.
 
     Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
     compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the
@@ -278,6 +297,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         "premise_features": ["array-like", str, Integral, None],
         "consequent_features": ["array-like", str, Integral, None],
         "order": [Interval(Integral, 0, 1, closed="both")],
+        "monotonic_cst": ["array-like", dict, None],
+        "constraints": [list, tuple, OutputLimits, FixedPoint, None],
         "loss": [StrOptions({"squared_error", "huber"})],
         "epsilon": [Interval(Real, 0, None, closed="neither")],
         "solver": [StrOptions(set(SOLVERS))],
@@ -313,6 +334,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         premise_features=None,
         consequent_features=None,
         order=1,
+        monotonic_cst=None,
+        constraints=None,
         loss="squared_error",
         epsilon=1.35,
         solver="varpro",
@@ -344,6 +367,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.premise_features = premise_features
         self.consequent_features = consequent_features
         self.order = order
+        self.monotonic_cst = monotonic_cst
+        self.constraints = constraints
         self.loss = loss
         self.epsilon = epsilon
         self.solver = solver
@@ -427,6 +452,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.structures_ = training.start.candidates
         self.redundant_rules_ = training.redundant_rules
         self.pruning_ = training.pruning
+        self.constraints_ = training.constraints
         self.robust_weights_ = training.robust_weights
         losses = training.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
@@ -631,6 +657,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
             )
         check_inputs(model, names, "partition")
+        if self.max_iter == 0 and (self.monotonic_cst is not None or self.constraints is not None):
+            raise ValueError(
+                "monotonic_cst and constraints mean nothing where imported rules are taken as they "
+                "are (max_iter=0): leave them at None, or use solver='lse'."
+            )
         if self.premise_features is not None:
             raise ValueError(
                 f"premise_features={self.premise_features!r} means nothing to imported rules, "
@@ -687,7 +718,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
             groups = None if groups is None else groups[keep]
         names = tuple(map(str, self._input_names()))
-        return TrainingData(X, targets, sample_weight, groups, names, output_names, keep)
+        wishes = Wishes.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
+        return TrainingData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
 
     def _check_inputs(self, X):
         check_is_fitted(self)

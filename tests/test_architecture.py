@@ -41,15 +41,20 @@ TABLE = {
     "_validation": (["_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
     "bounds": ([*KERNEL, "export"], NUMERIC),
+    "constraints": ([*KERNEL, "_validation", "bounds"], [*NUMERIC, "sklearn"]),
     "structure": ([*KERNEL, "_validation", "cluster"], [*NUMERIC, "sklearn"]),
     "training": ([*KERNEL, "_validation", "structure"], LEARNING),
-    "_anfis": ([*KERNEL, "_sklearn", "_validation", "structure", "training"], LEARNING),
+    "_anfis": (
+        [*KERNEL, "_sklearn", "_validation", "constraints", "structure", "training"],
+        LEARNING,
+    ),
     "regressor": (
         [
             *KERNEL,
             "_sklearn",
             "_validation",
             "_notebook",
+            "constraints",
             "readable",
             "structure",
             "training",
