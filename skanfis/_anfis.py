@@ -17,7 +17,8 @@ from threadpoolctl import ThreadpoolController
 
 from ._validation import warn_user
 from .antecedent import GridAntecedent
-from .constraints import Wishes, constrained
+from .constraints.exchange import constrained
+from .constraints.wishes import Wishes
 from .model import TSKModel
 from .naming import default_term_names, given_term_names
 from .penalty import Penalty
@@ -225,9 +226,10 @@ class _Trainer:
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = problem.evaluate(evaluation.antecedent.parameters)
-        model, evaluation, report = constrained(
+        evaluation, report = constrained(
             model, evaluation, problem, self.data.wishes, self._in_user_units
         )
+        model = replace(model, coefficients=self._in_user_units(evaluation.coefficients))
         return model, replace(result, evaluation=evaluation), report
 
     def freeze(self, start, evaluation) -> TSKModel:

@@ -28,7 +28,8 @@ from ._validation import (
     positive_weights,
     refuse_lazy,
 )
-from .constraints import FixedPoint, OutputLimits, Wishes
+from .constraints import FixedPoint, OutputLimits
+from .constraints.wishes import Wishes
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, membership_families
 from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
@@ -93,11 +94,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         is scheduled by temperature. What ``n_mfs`` gives terms to must be among the former.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
-    monotonic_cst : array-like of shape (n_features,) or (n_outputs, n_features) or dict, default=None
+    monotonic_cst : array-like of shape (n_features,) or dict, default=None
         What is known of the target: 1 where it does not fall as the feature rises, -1 where it does
-        not rise, 0 where nothing is known; or these by the features' names. Held by the
-        predictions everywhere, by the policy out of bounds at the time of the fit, and proven; see
-        Notes.
+        not rise, 0 where nothing is known; or these by the features' names; of several outputs also
+        a row for each, (n_outputs, n_features). Kept by the predictions all over the range of the
+        training data, and proven; see Notes.
     constraints : list of OutputLimits and FixedPoint, default=None
         More that is known: limits of the output, and values at points; see
         :mod:`skanfis.constraints`. In the units of X as it comes here, behind any scaler.
@@ -213,10 +214,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
         rows); "weight", its part of the data's weight.
     constraints_ : dict or None
-        With ``monotonic_cst`` or ``constraints``: "certified", whether it is proven that all of them
-        hold; "loss_before" and "loss_after", as in ``loss_curve_``; "margin", by which they are held
-        at points, in standard deviations of the target and the inputs; "rows", the number of these
-        points; "boxes", of boxes that the proofs took.
+        With ``monotonic_cst`` or ``constraints``: "certified", whether it is proven that they all
+        hold; "loss_before" and "loss_after", as in ``loss_curve_``; "margin", by which they are
+        held at points, in standard deviations of the target and the inputs; "rows", the number of
+        these points; "boxes", of boxes that the proofs took.
     pruning_ : dict or None
         With ``prune``, if there were redundant rules: "rules", those dropped by their numbers
         before; "loss_before" and "loss_after", as in ``loss_curve_``.
@@ -251,9 +252,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     with all parameters averaged out [3]_, on at most 1,000 representative rows; with data that seem
     free of noise, from two sides. ``readability_`` says how far the rules can be read.
 
-    Constraints (``monotonic_cst``, ``constraints``) are kept by the consequents: the premises are
-    learnt without them, then the nearest consequents that keep them are found, and bounds on the
-    model (:mod:`skanfis.bounds`) prove that they hold at every point, not only at training rows.
+    Constraints (``monotonic_cst``, ``constraints``) are kept by the consequents, the solution of a
+    convex quadratic programme at the premises that were learnt without them. Bounds on the model
+    (:mod:`skanfis.bounds`) prove that they hold at every point in the range of the training data,
+    not only at rows; with ``out_of_bounds="clip"`` then everywhere.
 
     Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
     compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the

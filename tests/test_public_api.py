@@ -13,6 +13,7 @@ PUBLIC_MODULES = [
     "skanfis",
     "skanfis.bounds",
     "skanfis.cluster",
+    "skanfis.constraints",
     "skanfis.datasets",
     "skanfis.export",
     "skanfis.gyro",

@@ -5,7 +5,6 @@ nearest consequents that keep them are sought (``program``), and the bounds of `
 prove that they are kept everywhere (``exchange``).
 """
 
-from .exchange import constrained
-from .wishes import FixedPoint, OutputLimits, Wishes
+from .wishes import FixedPoint, OutputLimits
 
-__all__ = ["FixedPoint", "OutputLimits", "Wishes", "constrained"]
+__all__ = ["FixedPoint", "OutputLimits"]

@@ -21,7 +21,7 @@ from scipy.optimize import nnls
 
 from ..consequent import NormalFactor
 
-__all__ = ["Infeasible", "nearest"]
+__all__ = ["InfeasibleError", "nearest"]
 
 # A minimum below this is zero; rows are of length one.
 _ZERO = 1e-10
@@ -29,19 +29,19 @@ _ZERO = 1e-10
 _DEPENDENT = 1e-10
 
 
-class Infeasible(Exception):
-    """No consequents keep the constraints; ``by_equalities`` says whether these alone cannot be."""
+class InfeasibleError(Exception):
+    """No consequents keep the constraints; ``by_equalities``: not even the equalities alone."""
 
     def __init__(self, by_equalities):
         super().__init__()
-        self.by_equalities = by_equalities
+        self.by_equalities, self.output = by_equalities, 0
 
 
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
-    """Local coefficients (n_columns,) nearest to ``start`` with E u = e and G u >= h.
+    """The local coefficients nearest to ``start`` with E u = e and G u >= h, (n_columns,).
 
     ``equal`` and ``at_least`` are (n, n_columns), ``equal_to`` and ``least`` (n,). Raises
-    :class:`Infeasible` where there are none.
+    :class:`InfeasibleError` where there are none.
     """
     base, toward = np.empty((start.size, 0)), np.empty(0)
     if equal.size:
@@ -53,7 +53,7 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     # What equalities decide, or nothing can change: met, or not to be met.
     fixed = length <= _DEPENDENT * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
     if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
-        raise Infeasible(False)
+        raise InfeasibleError(False)
     multipliers = np.zeros(least.size)
     kept = ~fixed
     if (short[kept] > 0.0).any():
@@ -69,7 +69,7 @@ def _particular(columns, right_side):
     sizes = np.abs(np.diagonal(triangle))
     dependent = sizes <= _DEPENDENT * sizes.max(initial=0.0)
     if dependent.any() or columns.shape[1] > columns.shape[0]:
-        raise Infeasible(True)
+        raise InfeasibleError(True)
     return orthonormal, solve_triangular(triangle, right_side, trans="T")
 
 
@@ -82,5 +82,5 @@ def _least_distance(columns, short):
     multipliers, distance = nnls(rows, target, maxiter=30 * max(rows.shape))
     rest = 1.0 - (short / scale) @ multipliers
     if distance <= _ZERO or rest <= _ZERO**2:
-        raise Infeasible(False)
+        raise InfeasibleError(False)
     return scale * multipliers / rest

@@ -133,8 +133,8 @@ class Wishes:
             for other in np.flatnonzero(is_above & (self.values[:, k] < value)):
                 raise ValueError(
                     f"monotonic_cst and constraints contradict one another: output {k} is fixed to "
-                    f"{value:g} at {one}, and to {self.values[other, k]:g} at {self.points[other]}, "
-                    "where it must not be less."
+                    f"{value:g} at {one}, and to {self.values[other, k]:g} at "
+                    f"{self.points[other]}, where it must not be less."
                 )
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import nnls
 
 from skanfis.consequent import NormalFactor
-from skanfis.constraints.program import Infeasible, nearest
+from skanfis.constraints.program import InfeasibleError, nearest
 
 N = 8
 
@@ -45,12 +45,12 @@ def test_what_cannot_be_met_is_told_apart(rng):
     matrix, start, *_ = a_problem(rng, 0, 0)
     factor, row = NormalFactor(matrix), rng.normal(size=(1, N))
     none, nothing = np.empty((0, N)), np.empty(0)
-    with pytest.raises(Infeasible) as failure:
+    with pytest.raises(InfeasibleError) as failure:
         nearest(factor, start, none, nothing, np.vstack([row, -row]), np.array([1.0, -0.9]))
     assert not failure.value.by_equalities
-    with pytest.raises(Infeasible) as failure:
+    with pytest.raises(InfeasibleError) as failure:
         nearest(factor, start, np.vstack([row, row]), np.array([1.0, 2.0]), none, nothing)
     assert failure.value.by_equalities
     # What an equality decides cannot be asked to be otherwise.
-    with pytest.raises(Infeasible):
+    with pytest.raises(InfeasibleError):
         nearest(factor, start, row, np.array([1.0]), row, np.array([1.1]))
