@@ -148,6 +148,12 @@ class NormalFactor:
         """L^-1 times right_side, so that (.)' (.) is the quadratic form of the inverse."""
         return linalg.solve_triangular(self._lower, right_side, lower=True, check_finite=False)
 
+    def back_solve(self, right_side):
+        """L'^-1 times right_side."""
+        return linalg.solve_triangular(
+            self._lower, right_side, lower=True, trans="T", check_finite=False
+        )
+
     def log_determinant(self):
         """log |G + P|."""
         return 2.0 * float(np.sum(np.log(np.diagonal(self._lower))))

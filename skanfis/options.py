@@ -111,8 +111,9 @@ class LinearExtrapolation(BaseEstimator):
     max_extrapolation : float, default=0.5
         How far the tangent is followed beyond the range of an input, in standard deviations of that
         input in the training data: zero or positive. The value reached there is held. 0 holds the
-        value at the edge, as "clip" does; ``math.inf`` is the tangent without end. Outputs are held as
-        many standard deviations of the target, or half a one where that is more, beyond its range.
+        value at the edge, as "clip" does; ``math.inf`` is the tangent without end. Outputs are
+        held as many standard deviations of the target, or half a one where that is more, beyond
+        its range.
 
     See Also
     --------

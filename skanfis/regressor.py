@@ -33,6 +33,8 @@ from ._validation import (
     positive_weights,
     refuse_lazy,
 )
+from .constraints import FixedPoint, OutputLimits
+from .constraints.wishes import Wishes
 from .exceptions import OutOfBoundsWarning
 from .membership import MEMBERSHIPS, TRIED_FAMILIES, Membership, membership_families
 from .model import OUT_OF_BOUNDS, TSKModel
@@ -96,6 +98,14 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         is scheduled by temperature. What ``n_mfs`` gives terms to must be among the former.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
+    monotonic_cst : array-like of shape (n_features,) or dict, default=None
+        What is known of the target: 1 where it does not fall as the feature rises, -1 where it does
+        not rise, 0 where nothing is known; or these by the features' names; of several outputs also
+        a row for each, (n_outputs, n_features). Kept by the predictions all over the range of the
+        training data, and proven; see Notes.
+    constraints : list of OutputLimits and FixedPoint, default=None
+        More that is known: limits of the output, and values at points; see
+        :mod:`skanfis.constraints`. In the units of X as it comes here, behind any scaler.
     loss : {"squared_error", "huber"} or Huber, default="squared_error"
         What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: rows
         far from the model count by the size of their residual and not its square, so that outliers
@@ -182,6 +192,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         Rules that do nothing: "rule", its number; "reason", "never fires" (nowhere in the
         training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
         rows); "weight", its part of the data's weight. ``without_rules`` drops them.
+    constraints_ : dict or None
+        With ``monotonic_cst`` or ``constraints``: "certified", whether it is proven that they all
+        hold; "loss_before" and "loss_after", as in ``loss_curve_``; "margin", by which they are
+        held at points, in standard deviations of the target and the inputs; "rows", the number of
+        these points; "boxes", of boxes that the proofs took.
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
         With ``early_stopping``: as ``loss_curve_``, of the rows held out, from the first iteration.
     robust_weights_ : ndarray of shape (n_samples,) or None
@@ -195,7 +210,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     Warns
     -----
     ConvergenceWarning
-        If ``max_iter`` was reached first.
+        If ``max_iter`` was reached first; if constraints hold at all points that were looked at but
+        were not proven to hold between them.
     ConstantInputWarning
         If an input is constant in the training data; it gets no terms and no slope.
     UnderdeterminedWarning
@@ -214,6 +230,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     probability of the data with all parameters averaged out [3]_, on at most 1,000 representative
     rows; with data that seem free of noise, from two sides. ``readability_`` says how far the rules
     can be read.
+
+    Constraints (``monotonic_cst``, ``constraints``) are kept by the consequents, the solution of a
+    convex quadratic programme at the premises that were learnt without them. Bounds on the model
+    (:mod:`skanfis.bounds`) prove that they hold at every point in the range of the training data,
+    not only at rows; with ``out_of_bounds="clip"`` then everywhere.
 
     Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
     compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the
@@ -256,6 +277,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         "premise_features": ["array-like", str, Integral, None],
         "consequent_features": ["array-like", str, Integral, None],
         "order": [Interval(Integral, 0, 1, closed="both")],
+        "monotonic_cst": ["array-like", dict, None],
+        "constraints": [list, tuple, OutputLimits, FixedPoint, None],
         "loss": [StrOptions({"squared_error", "huber"}), Huber],
         "solver": [StrOptions(set(SOLVERS)), Solver],
         "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
@@ -279,6 +302,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         premise_features: ArrayLike | None = None,
         consequent_features: ArrayLike | None = None,
         order: int = 1,
+        monotonic_cst: ArrayLike | dict | None = None,
+        constraints: Any = None,
         loss: str | Huber = "squared_error",
         solver: str | Solver = "varpro",
         agreement: str | float = "auto",
@@ -298,6 +323,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.premise_features = premise_features
         self.consequent_features = consequent_features
         self.order = order
+        self.monotonic_cst = monotonic_cst
+        self.constraints = constraints
         self.loss = loss
         self.solver = solver
         self.agreement = agreement
@@ -383,6 +410,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
         self.structures_ = fitted.start.candidates
         self.redundant_rules_ = fitted.redundant_rules
+        self.constraints_ = fitted.constraints
         self.robust_weights_ = fitted.robust_weights
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
@@ -647,6 +675,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
             )
         check_inputs(model, names, "partition")
+        if self.max_iter == 0 and (self.monotonic_cst is not None or self.constraints is not None):
+            raise ValueError(
+                "monotonic_cst and constraints mean nothing where imported rules are taken as they "
+                "are (max_iter=0): leave them at None, or use solver='lse'."
+            )
         if self.premise_features is not None:
             raise ValueError(
                 f"premise_features={self.premise_features!r} means nothing to imported rules, "
@@ -692,7 +725,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
             groups = None if groups is None else groups[keep]
         names = tuple(map(str, self._input_names()))
-        return TrainingData(X, targets, sample_weight, groups, names, output_names, keep)
+        wishes = Wishes.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
+        return TrainingData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
 
     def _check_inputs(self, X):
         check_is_fitted(self)

@@ -42,9 +42,11 @@ TABLE = {
     "options": (["_sklearn", "model"], LEARNING),
     "solvers": ([*KERNEL, "_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
+    "bounds": ([*KERNEL, "export"], NUMERIC),
+    "constraints": ([*KERNEL, "_validation", "bounds"], [*NUMERIC, "sklearn"]),
     "structure": ([*KERNEL, "_validation", "solvers", "cluster"], [*NUMERIC, "sklearn"]),
     "training": (
-        [*KERNEL, "_threads", "_validation", "options", "solvers", "structure"],
+        [*KERNEL, "_threads", "_validation", "constraints", "options", "solvers", "structure"],
         LEARNING,
     ),
     "regressor": (
@@ -55,6 +57,7 @@ TABLE = {
             "_validation",
             "_notebook",
             "options",
+            "constraints",
             "readable",
             "solvers",
             "structure",

@@ -11,7 +11,9 @@ import skanfis
 
 PUBLIC_MODULES = [
     "skanfis",
+    "skanfis.bounds",
     "skanfis.cluster",
+    "skanfis.constraints",
     "skanfis.datasets",
     "skanfis.export",
     "skanfis.gyro",

@@ -19,6 +19,8 @@ from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
+from ..constraints.exchange import constrained
+from ..constraints.wishes import Wishes
 from ..model import TargetRange, TSKModel
 from ..objective import Evaluation, SeparableProblem
 from ..options import EarlyStopping, Huber, policy_of
@@ -67,6 +69,8 @@ class TrainingData:
     input_names, output_names : sequence of str
     kept : ndarray of bool of shape (n_given_rows,), optional
         Which of the rows given have weight and are here, if not all.
+    wishes : Wishes, optional
+        What is known of the target, in the user's units.
     """
 
     X: np.ndarray
@@ -76,6 +80,7 @@ class TrainingData:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     kept: np.ndarray | None = None
+    wishes: Wishes | None = None
 
     def rows(self, indices=slice(None)):
         """Some of the rows, on scales of their own."""
@@ -128,6 +133,7 @@ class Fitted:
     redundant_rules: list[dict]
     robust_weights: np.ndarray | None = None
     validation_losses: tuple[float, ...] | None = None
+    constraints: dict | None = None
 
 
 def fit_rules(
@@ -158,13 +164,17 @@ def fit_rules(
         weights = data.spread_over_rows(weights, fit.trained_on)
     fit.warn_unless_converged(run)
     statistics = rule_statistics(fit.rows, run.evaluation.antecedent)
+    model, result, kept = fit.frozen(run.start, run.evaluation, statistics), run.result, None
+    if data.wishes is not None:
+        model, result, kept = fit.constrained(model, run)
     return Fitted(
-        fit.frozen(run.start, run.evaluation, statistics),
-        run.result,
+        model,
+        result,
         run.start,
         redundant_rules(statistics),
         weights,
         run.validation_losses,
+        kept,
     )
 
 
@@ -363,7 +373,7 @@ class _Fit:
         return TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),
-            coefficients=self.coefficients(evaluation),
+            coefficients=self.in_user_units(evaluation.coefficients),
             reference=offset,
             spread=scale,
             minimum=rows.inputs.minimum,
@@ -379,19 +389,34 @@ class _Fit:
             target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
         )
 
-    def coefficients(self, evaluation):
-        """The consequents about the inputs' means, in the user's units."""
-        rows, n_rules = self.rows, evaluation.antecedent.n_rules
-        n_outputs = rows.y.shape[1]
-        solved = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
-        solved[:, 0] += rows.targets.offset
+    def constrained(self, model, run):
+        """The nearest model that keeps what is known, its result, and a report."""
+        evaluation = run.evaluation
+        if evaluation.normal is None:
+            # Found by descent: the consequents are solved for first.
+            evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
+        evaluation, report = constrained(
+            model, evaluation, run.problem, self.data.wishes, self.in_user_units
+        )
+        model = replace(model, coefficients=self.in_user_units(evaluation.coefficients))
+        if not self.data.wishes.are_kept_within(model.output_limits):
+            # What is asked for lies beyond what was seen: it goes before.
+            model = replace(model, target=None)
+        return model, replace(run.result, evaluation=evaluation), report
+
+    def in_user_units(self, coefficients):
+        """Consequents about the inputs' means, from those on [1, z] of standardised data."""
+        inputs, targets = self.rows.inputs, self.rows.targets
+        slopes = self.request.consequent_inputs
+        n_basis = 1 + slopes.size if self.estimator.order == 1 else 1
+        solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
+        solved[:, 0] += targets.offset
         if self.estimator.order == 0:
             return solved
-        inputs, scale = self.request.consequent_inputs, rows.inputs.scale
-        coefficients = np.zeros((n_rules, 1 + scale.size, n_outputs))
-        coefficients[:, 0] = solved[:, 0]
-        coefficients[:, 1 + inputs] = solved[:, 1:] / scale[inputs, None]
-        return coefficients
+        found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
+        found[:, 0] = solved[:, 0]
+        found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
+        return found
 
 
 def _as_given(estimator, data, model) -> Fitted:

@@ -1,0 +1,10 @@
+"""Certain bounds: what a model can say on a box of inputs, proven.
+
+:func:`bounds` encloses every prediction, :func:`gradient_bounds` every slope by one input, and
+:func:`monotonicity` proves that predictions rise or fall with an input. ``enclosure`` has the
+formulas, ``search`` the branch and bound.
+"""
+
+from .certified import Bounds, bounds, gradient_bounds, monotonicity
+
+__all__ = ["Bounds", "bounds", "gradient_bounds", "monotonicity"]

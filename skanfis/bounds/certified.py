@@ -1,0 +1,322 @@
+"""Bounds of predictions and of their slopes over a box: what a user calls."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from ..model import TSKModel
+from .box import held_box, input_index, read_box
+from .enclosure import Enclosure
+from .search import largest
+from .terms import is_known
+
+__all__ = ["Bounds", "bounds", "gradient_bounds", "monotonicity"]
+
+# Rows that are looked at first: the corners, of few inputs, and some between.
+_CORNERS = 6
+_POINTS = 512
+# Of slopes, the strip beyond the edge in which they are zero, as part of the range.
+_BEYOND = 1e-3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Bounds:
+    """What outputs, or slopes, lie between on a box.
+
+    Parameters
+    ----------
+    lower, upper : ndarray of shape (n_outputs,)
+        Nothing in the box is below, or above.
+    lowest, highest : ndarray of shape (n_outputs,)
+        Values that are taken in the box: the true extremes lie between ``lower`` and ``lowest``,
+        and between ``highest`` and ``upper``.
+    at_lowest, at_highest : ndarray of shape (n_outputs, n_inputs)
+        Where these are taken.
+    box : ndarray of shape (n_inputs, 2)
+        Of the inputs, low and high.
+    n_boxes : int
+        Boxes that were looked at.
+    converged : bool
+        Whether ``tol`` was reached, for every output.
+    input_names, output_names : tuple of str
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.bounds import bounds
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> X, y = make_jang_sinc()
+    >>> found = bounds(ANFISRegressor(n_mfs=4).fit(X, y))
+    >>> bool(found.lower[0] <= y.min() + 1e-3 and y.max() - 1e-3 <= found.upper[0])
+    True
+    >>> found.converged
+    True
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    at_lowest: np.ndarray
+    at_highest: np.ndarray
+    box: np.ndarray
+    n_boxes: int
+    converged: bool
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+
+    @property
+    def tightness(self):
+        """The larger gap of either side, as part of ``highest - lowest``, (n_outputs,)."""
+        gap = np.maximum(self.upper - self.highest, self.lowest - self.lower)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(gap > 0.0, gap / (self.highest - self.lowest), 0.0)
+
+    @property
+    def magnitude(self):
+        """What no absolute value in the box is above, (n_outputs,)."""
+        return np.maximum(np.abs(self.lower), np.abs(self.upper))
+
+    def __repr__(self):
+        parts = [
+            f"{name} in [{low:.6g}, {high:.6g}]"
+            for name, low, high in zip(self.output_names, self.lower, self.upper, strict=True)
+        ]
+        return f"Bounds({'; '.join(parts)})"
+
+
+def bounds(model, box=None, *, tol=0.01, max_boxes=200_000):
+    """Enclose every prediction of a model over a box of inputs.
+
+    The enclosure is proven: by interval arithmetic on the rules, refined by branch and bound, with
+    room for every rounding error. It is one of the model, in range and beyond it by its policy
+    there; it says nothing of how far the model is from the truth.
+
+    Parameters
+    ----------
+    model : fitted estimator or TSKModel
+        An ANFIS estimator, or a Pipeline of scalers that ends in one, a TransformedTargetRegressor
+        or a search over these, as :func:`~skanfis.export.export_c` takes them.
+    box : array-like of shape (n_inputs, 2) or dict, default=None
+        Low and high of every input, in the units of X; or {name: (low, high)}, the other inputs in
+        the range of the training data. None is that range. Ends may be infinite where predictions
+        change no more: always, but with ``out_of_bounds="linear"`` and an infinite
+        ``max_extrapolation``.
+    tol : float, default=0.01
+        The bounds and values that are taken are to be no further apart than this part of the range
+        of the output in the box; zero or positive.
+    max_boxes : int, default=200_000
+        Boxes to look at for each bound, at the most; 1 or more. The bounds hold wherever this ends.
+
+    Returns
+    -------
+    bounds : Bounds
+        ``converged`` and ``tightness`` say how tight they are. With ``out_of_bounds`` "nan" and
+        "raise" they are those of the rows in range, where there are predictions.
+
+    Raises
+    ------
+    ValueError
+        If the box is none; if nothing bounds the model on it; if a family of memberships is not
+        one of the package, whose ranges are known.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.bounds import bounds
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> found = bounds(model, {"x0": (-1.0, 1.0), "x1": (-1.0, 1.0)}, tol=0.001)
+    >>> print(f"{found.lower[0]:.2f} {found.upper[0]:.2f}")
+    0.71 1.00
+    """
+    model, box = _checked(model, box, tol, max_boxes)
+    low, high = held_box(box, model)
+    cuts = np.stack([model.minimum, model.maximum], axis=1)
+    X = _first_points(low, high)
+    found = []
+    for k in range(model.n_outputs):
+        sides = [Enclosure(model, k, sign) for sign in (-1.0, 1.0)]
+        values = sides[1].predict(X)
+        spread = float(np.ptp(values))
+        ends = []
+        for side in sides:
+            own = side.sign * values
+            top = int(own.argmax())
+            tolerance = max(tol * spread, _resolution(side.values, X[top]))
+            start = X[top], float(own[top])
+            ends.append(largest(side.values, low, high, tolerance, max_boxes, cuts, start))
+        found.append(ends)
+    return _gathered(found, box, model, model.output_names)
+
+
+def gradient_bounds(model, feature, box=None, *, tol=0.01, max_boxes=200_000):
+    """Enclose the slope of the predictions by one input over a box of inputs.
+
+    Proven as in :func:`bounds`. The slope is that of what the model predicts, beyond the range of
+    the training data too: of the tangent there, and zero where the value is held. Where it jumps,
+    as between straight flanks and at the edge of the range, the slopes from all sides count.
+
+    Parameters
+    ----------
+    model : fitted estimator or TSKModel
+        As in :func:`bounds`.
+    feature : str or int
+        The input, by name or position.
+    box : array-like of shape (n_inputs, 2) or dict, default=None
+        As in :func:`bounds`.
+    tol : float, default=0.01
+        Bounds and slopes that are taken are to be no further apart than this part of the largest
+        absolute slope; zero or positive.
+    max_boxes : int, default=200_000
+        Boxes to look at for each bound, at the most; 1 or more.
+
+    Returns
+    -------
+    bounds : Bounds
+        Of the slope, in units of the output per unit of the input.
+
+    Raises
+    ------
+    ValueError
+        As :func:`bounds` does; if ``feature`` is no input.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.bounds import gradient_bounds
+    >>> x = np.linspace(-1.0, 1.0, 200)[:, None]
+    >>> model = ANFISRegressor(n_mfs=3).fit(x, np.tanh(2.0 * x[:, 0]))
+    >>> slope = gradient_bounds(model, "x0")
+    >>> bool(slope.lower[0] > 0.0 and slope.upper[0] < 2.2)
+    True
+    """
+    model, box = _checked(model, box, tol, max_boxes)
+    j = input_index(feature, model, "feature")
+    low, high = held_box(box, model, _BEYOND)
+    cuts = np.stack([model.minimum, model.maximum], axis=1)
+    X = _first_points(low, high)
+    found = []
+    for k in range(model.n_outputs):
+        sides = [_slope_of(model, k, sign, j) for sign in (-1.0, 1.0)]
+        first = [side(X.T, X.T)[2] for side in sides]
+        largest_size = max(float(np.max(np.abs(values))) for values in first)
+        ends = []
+        for side, values in zip(sides, first, strict=True):
+            top = int(values.argmax())
+            tolerance = max(tol * largest_size, _resolution(side, X[top]))
+            start = X[top], float(values[top])
+            ends.append(largest(side, low, high, tolerance, max_boxes, cuts, start))
+        found.append(ends)
+    name = model.input_names[j]
+    return _gathered(found, box, model, tuple(f"d {y} / d {name}" for y in model.output_names))
+
+
+def monotonicity(model, feature, box=None, *, max_boxes=200_000):
+    """Prove that the predictions rise, or fall, with one input all over a box.
+
+    Parameters
+    ----------
+    model : fitted estimator or TSKModel
+        As in :func:`bounds`.
+    feature : str or int
+        The input, by name or position.
+    box : array-like of shape (n_inputs, 2) or dict, default=None
+        As in :func:`bounds`.
+    max_boxes : int, default=200_000
+        Boxes to look at for each proof, at the most; 1 or more.
+
+    Returns
+    -------
+    sign : ndarray of int of shape (n_outputs,)
+        1: no prediction falls as the input rises, all else held; -1: none rises; 0: neither has
+        been proven, because it is not so, or is so by less than rounding errors, or would take more
+        boxes. Of an output that does not change with the input it is 1.
+
+    Raises
+    ------
+    ValueError
+        As :func:`gradient_bounds` does.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.bounds import monotonicity
+    >>> x = np.linspace(-1.0, 1.0, 200)[:, None]
+    >>> model = ANFISRegressor(n_mfs=3).fit(x, np.tanh(2.0 * x[:, 0]))
+    >>> monotonicity(model, "x0")
+    array([1])
+    """
+    model, box = _checked(model, box, 0.0, max_boxes)
+    j = input_index(feature, model, "feature")
+    low, high = held_box(box, model, _BEYOND)
+    cuts = np.stack([model.minimum, model.maximum], axis=1)
+    signs = np.zeros(model.n_outputs, dtype=int)
+    for k in range(model.n_outputs):
+        for sign in (1, -1):
+            slope = _slope_of(model, k, -float(sign), j)
+            found = largest(slope, low, high, 0.0, max_boxes, cuts, until=0.0)
+            if found.bound <= 0.0:
+                signs[k] = sign
+                break
+    return signs
+
+
+def _slope_of(model, output, sign, j):
+    enclosure = Enclosure(model, output, sign)
+    return lambda low, high: enclosure.slope(low, high, j)
+
+
+def _checked(model, box, tol, max_boxes):
+    """The frozen model in the user's units, and the box."""
+    if not isinstance(model, TSKModel):
+        # What reads estimators stands above the models that training proves things of.
+        from ..export._fold import fold
+
+        model = fold(model)
+    for group in model.antecedent.groups:
+        if not is_known(group.family):
+            raise ValueError(
+                f"The ranges of {group.family.name!r} memberships are not known: bounds can be "
+                "proven for the families of skanfis.membership alone."
+            )
+    if not (np.ndim(tol) == 0 and tol >= 0.0):
+        raise ValueError(f"tol={tol!r} must be zero or positive.")
+    if not (np.ndim(max_boxes) == 0 and max_boxes >= 1):
+        raise ValueError(f"max_boxes={max_boxes!r} must be 1 or more.")
+    return model, read_box(box, model)
+
+
+def _first_points(low, high):
+    """Rows of the box to begin with."""
+    unit = qmc.Halton(low.size, scramble=False).random(_POINTS)
+    if low.size <= _CORNERS:
+        corners = np.indices((2,) * low.size).reshape(low.size, -1).T
+        unit = np.vstack([corners, unit])
+    return np.clip(low + unit * (high - low), low, high)
+
+
+def _resolution(evaluate, point):
+    """What bound and value are apart at a point: rounding, beneath which no bound can go."""
+    bound, _, attained, _ = evaluate(point[:, None], point[:, None])
+    return 8.0 * float(bound[0] - attained[0])
+
+
+def _gathered(found, box, model, output_names):
+    lowest, highest = (tuple(ends[side] for ends in found) for side in (0, 1))
+    return Bounds(
+        lower=np.array([-one.bound for one in lowest]),
+        upper=np.array([one.bound for one in highest]),
+        lowest=np.array([-one.attained for one in lowest]),
+        highest=np.array([one.attained for one in highest]),
+        at_lowest=np.array([one.point for one in lowest]),
+        at_highest=np.array([one.point for one in highest]),
+        box=box,
+        n_boxes=sum(one.n_boxes for ends in found for one in ends),
+        converged=all(one.converged for ends in found for one in ends),
+        input_names=model.input_names,
+        output_names=output_names,
+    )

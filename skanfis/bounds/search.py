@@ -1,0 +1,116 @@
+"""Branch and bound over boxes, many at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Found", "largest"]
+
+# Boxes that are split at once: enough to keep NumPy busy, few enough not to run ahead of what the
+# next bound would have discarded.
+_BATCH = 1024
+
+
+@dataclass(frozen=True)
+class Found:
+    """The largest value over a box: between ``attained``, at ``point``, and ``bound``."""
+
+    bound: float
+    attained: float
+    point: np.ndarray
+    n_boxes: int
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Boxes:
+    """Boxes (n_inputs, n_boxes), their bounds, and what splitting along each input promises."""
+
+    low: np.ndarray
+    high: np.ndarray
+    bound: np.ndarray
+    gain: np.ndarray
+
+    def of(self, chosen):
+        return _Boxes(
+            self.low[:, chosen], self.high[:, chosen], self.bound[chosen], self.gain[:, chosen]
+        )
+
+    def with_others(self, others):
+        return _Boxes(
+            np.concatenate([self.low, others.low], axis=1),
+            np.concatenate([self.high, others.high], axis=1),
+            np.concatenate([self.bound, others.bound]),
+            np.concatenate([self.gain, others.gain], axis=1),
+        )
+
+    @property
+    def is_point(self):
+        """Which cannot be split any more."""
+        least = 4.0 * np.spacing(np.maximum(np.abs(self.low), np.abs(self.high)))
+        return (self.high - self.low <= least).all(axis=0)
+
+    def halves(self, cuts):
+        """Both halves of every box, along the input that promises most."""
+        k = np.arange(self.low.shape[1])
+        width = self.high - self.low
+        gain = np.where(np.isfinite(self.gain), self.gain, np.finfo(float).max) * (width > 0.0)
+        gain = np.where((gain > 0.0).any(axis=0), gain, width)
+        j = gain.argmax(axis=0)
+        start, stop = self.low[j, k], self.high[j, k]
+        at = start + 0.5 * (stop - start)
+        for cut in cuts[j].T:
+            at = np.where((start < cut) & (cut < stop), cut, at)
+        left, right = self.high.copy(), self.low.copy()
+        left[j, k] = right[j, k] = at
+        low, high = np.concatenate([self.low, right], axis=1), np.concatenate([left, self.high], 1)
+        return low, high
+
+
+def largest(
+    evaluate: Callable, low, high, tolerance, max_boxes, cuts, first=None, until=None
+) -> Found:
+    """Enclose the largest value that a function takes on a box.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Of boxes (n_inputs, n_boxes) as two arrays; gives bounds, points, values attained there,
+        and what splitting along each input promises.
+    low, high : ndarray of shape (n_inputs,)
+        The box, finite.
+    tolerance : float
+        How far bound and value may be apart.
+    max_boxes : int
+        Boxes to look at, at the most.
+    cuts : ndarray of shape (n_inputs, 2)
+        Where a box is cut first: the ends of the range of the training data.
+    first : (point, value), optional
+        A value that is attained.
+    until : float, optional
+        It is enough to know whether the largest value is above this.
+    """
+    where, best = (low, -np.inf) if first is None else first
+    lows, highs = low[:, None].astype(float), high[:, None].astype(float)
+    n_boxes, discarded, waiting = 0, -np.inf, None
+    while True:
+        bound, points, attained, gain = evaluate(lows, highs)
+        n_boxes += bound.size
+        top = int(np.argmax(attained))
+        if attained[top] > best:
+            best, where = float(attained[top]), points[:, top].copy()
+        found = _Boxes(lows, highs, bound, gain)
+        waiting = found if waiting is None else waiting.with_others(found)
+        enough = best + tolerance if until is None else max(best + tolerance, until)
+        done = (waiting.bound <= enough) | waiting.is_point
+        discarded = max(discarded, np.max(waiting.bound[done], initial=-np.inf))
+        waiting = waiting.of(~done)
+        is_decided = until is not None and best > until
+        if waiting.bound.size == 0 or n_boxes >= max_boxes or is_decided:
+            break
+        order = np.argsort(-waiting.bound, kind="stable")
+        lows, highs = waiting.of(order[:_BATCH]).halves(cuts)
+        waiting = waiting.of(order[_BATCH:])
+    bound = max(discarded, np.max(waiting.bound, initial=-np.inf), best)
+    return Found(float(bound), best, where, n_boxes, bool(bound <= enough))

@@ -1,0 +1,160 @@
+r"""What normalised strengths can be on a box, and what a mean with them as weights can be.
+
+Strengths are products of shares, one of each factor, and the shares of a factor are a softmax,
+nu_k = exp(l_k) / sum_s exp(l_s), of sums l_k of log mu (see ``antecedent``). Two enclosures of each
+share are intersected:
+
+* from the ranges of all l_k, with all others at their worst,
+
+    exp(l_k) / (exp(l_k) + sum over s != k of exp(L_s)) <= nu_k <= ... ,
+
+* by the mean value theorem: with a_kj = d l_k / dx_j and D_kj = a_kj - sum_s nu_s a_sj,
+
+    d log nu_k / dx_j = D_kj ,   |log nu_k(x) - log nu_k(m)| <= sum_j max |D_kj| |x_j - m_j| .
+
+A mean sum_k nu_k v_k with v_k <= V_k is a linear function of shares in their intervals [p, q] that
+sum to one. By weak duality any number t gives an upper bound of it,
+
+    t + sum_k max(p_k (V_k - t), q_k (V_k - t)) ,
+
+because sum_k nu_k (V_k - t) + t does not depend on t; the least over t is the exact optimum of the
+linear programme, and t = sum_k nu_k(m) V_k, which is taken, is next to it. Of a grid the inputs are
+averaged over one after the other.
+"""
+
+import itertools
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..antecedent import Antecedent, GridAntecedent
+from .terms import EPS, TermRanges, ranges
+
+__all__ = ["Factor", "Shares", "factors", "largest_mean", "smallest_mean", "term_ranges"]
+
+_ROUNDINGS = 16.0
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """Shares that sum to one: which terms each is made of, on which inputs.
+
+    ``terms`` holds, for every input that the shares depend on, positions of terms (n_shares, n)
+    whose log mu add up; the number of all terms stands for none.
+    """
+
+    terms: dict[int, np.ndarray]
+
+    def total(self, by_term):
+        """Sums over each share's terms, (n_shares, n_boxes); ``by_term`` ends in a row of zeros."""
+        return sum(by_term[places].sum(axis=1) for places in self.terms.values())
+
+    def along(self, by_term):
+        """The same along each input: dict of (n_shares, n_boxes)."""
+        return {j: by_term[places].sum(axis=1) for j, places in self.terms.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """The shares of one factor in every box, (n_shares, n_boxes) each."""
+
+    middle: np.ndarray  # at the middle of the box
+    low: np.ndarray
+    high: np.ndarray
+    error: np.ndarray  # of the logarithm of a share as it is computed, at most
+    departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
+    curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
+
+
+def factors(antecedent: Antecedent):
+    """The factors of a rule base, in the order of its rules."""
+    inputs = np.concatenate([group.inputs for group in antecedent.groups] or [np.empty(0, int)])
+    if isinstance(antecedent, GridAntecedent):
+        edges = np.cumsum([0, *antecedent.counts])
+        spans = [np.arange(i, j) for i, j in itertools.pairwise(edges)]
+        return [Factor({int(inputs[span[0]]): span[:, None]}) for span in spans]
+    table = antecedent.rule_terms
+    of = np.append(inputs, -1)[table]
+    used = np.unique(of[table >= 0])
+    found = {int(j): np.where((of == j) & (table >= 0), table, inputs.size) for j in used}
+    # Most rules have one term of an input: columns that hold none of it go.
+    terms = {j: places[:, (places < inputs.size).any(axis=0)] for j, places in found.items()}
+    return [Factor(terms)]
+
+
+def term_ranges(antecedent: Antecedent, low, high):
+    """Ranges of all terms over boxes (n_inputs, n_boxes), with a row of zeros at the end."""
+    parts = [ranges(group, low, high) for group in antecedent.groups]
+    nothing = np.zeros((1, low.shape[1]))
+
+    def stacked(name):
+        return np.concatenate([*(getattr(part, name) for part in parts), nothing])
+
+    return TermRanges(**{field.name: stacked(field.name) for field in fields(TermRanges)})
+
+
+def enclosed(factor: Factor, terms: TermRanges, log_mu, half):
+    """The :class:`Shares` of a factor; ``log_mu`` at the middles, ``half`` the boxes' widths."""
+    low, high = factor.total(terms.low), factor.total(terms.high)
+    error = factor.total(terms.error)
+    middle = factor.total(log_mu)
+    middle = np.exp(middle - middle.max(axis=0))
+    middle /= middle.sum(axis=0)
+    least, most = _by_range(low, high)
+    slopes_low, slopes_high = factor.along(terms.slope_low), factor.along(terms.slope_high)
+    slack = EPS * (_ROUNDINGS + least.shape[0])
+    for _ in range(2):
+        shares = Shares(middle, least, most, error, {}, {})
+        departure = _departures(shares, slopes_low, slopes_high)
+        # The mean error of all counts for each: the sum of the softmax.
+        common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
+        each = error + common + slack
+        size = sum(np.maximum(np.abs(a), np.abs(b)) * half[j] for j, (a, b) in departure.items())
+        radius = size + 4.0 * each
+        least = np.fmax(least, middle * np.exp(-radius))
+        most = np.fmin(most, middle * np.exp(radius))
+    curve_low, curve_high = factor.along(terms.curve_low), factor.along(terms.curve_high)
+    curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
+    return Shares(middle, least, most, each, departure, curvature)
+
+
+def _by_range(low, high):
+    """Shares from the ranges of their logarithms alone."""
+    top = high.max(axis=0)
+    down, up = np.exp(low - top), np.exp(high - top)
+    n = down.shape[0]
+    slack = (n + _ROUNDINGS) * EPS
+    others_up, others_down = up.sum(axis=0) - up, down.sum(axis=0) - down
+    # What the subtraction has lost counts as being there.
+    least = down / (down + np.maximum(others_up, 0.0) + 2.0 * slack * up.sum(axis=0))
+    spare = np.maximum(others_down - 2.0 * slack * down.sum(axis=0), 0.0)
+    most = np.minimum(up / (up + spare) * (1.0 + slack), 1.0)
+    # Of a share that no box can give a strength to, nothing is left: 0 / 0.
+    return np.nan_to_num(least * (1.0 - slack), nan=0.0), np.nan_to_num(most, nan=1.0)
+
+
+def _departures(shares, slopes_low, slopes_high):
+    found = {}
+    for j, high in slopes_high.items():
+        low = slopes_low[j]
+        mean_low, mean_high = smallest_mean(low, [shares]), largest_mean(high, [shares])
+        slack = 4.0 * _ROUNDINGS * EPS * np.maximum(np.abs(low), np.abs(high))
+        common = slack.max(axis=0, initial=0.0, where=shares.high > EPS) + EPS * (
+            shares.high * np.maximum(np.abs(low), np.abs(high))
+        ).sum(axis=0) * (_ROUNDINGS + low.shape[0])
+        found[j] = low - mean_high - slack - common, high - mean_low + slack + common
+    return found
+
+
+def largest_mean(values, every):
+    """Upper bound of the mean of ``values`` (n_shares, ..., n_boxes) under all factors' shares."""
+    for shares in reversed(every):
+        middle = (shares.middle * values).sum(axis=-2)
+        off = values - middle[..., None, :]
+        values = middle + np.where(off > 0.0, shares.high * off, shares.low * off).sum(axis=-2)
+    return values if every else values[0]
+
+
+def smallest_mean(values, every):
+    """Lower bound of the same."""
+    return -largest_mean(-values, every)

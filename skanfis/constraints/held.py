@@ -1,0 +1,186 @@
+"""Demands on the outputs, held at points: rows of linear constraints on the consequents."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import TSKModel
+from .program import InfeasibleError, nearest
+from .wishes import Wishes
+
+__all__ = ["Demand", "Held", "Solved", "demands"]
+
+# The step of a slope, in standard deviations of the input.
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Demand:
+    """An inequality on one output: of its slope by ``input``, or, where that is None, its value.
+
+    sign times it must be at least sign times ``limit``.
+    """
+
+    output: int
+    sign: float
+    input: int | None
+    limit: float
+    name: str
+
+
+def demands(wishes: Wishes, model: TSKModel):
+    """The inequalities among the wishes, output by output."""
+    found = []
+    for k, name in enumerate(model.output_names):
+        for j, sign in enumerate(wishes.signs[k]):
+            if sign and model.minimum[j] < model.maximum[j]:
+                what = f"monotonic_cst={sign} of {name!r} by {model.input_names[j]!r}"
+                found.append(Demand(k, float(sign), j, 0.0, what))
+        for sign, limit in ((1.0, wishes.lower[k]), (-1.0, wishes.upper[k])):
+            if np.isfinite(limit):
+                found.append(Demand(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Consequents that keep what is held, at some premises.
+
+    ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included.
+    """
+
+    local: np.ndarray
+    cost: float
+
+
+class Held:
+    """Points at which demands are held, and the consequents that do so at any premises.
+
+    Parameters
+    ----------
+    model : TSKModel
+        In the user's units; its range is where points lie.
+    problem : SeparableProblem
+    wishes : Wishes
+    margin : float
+        By which demands are held, in standard deviations of target and input.
+    """
+
+    def __init__(self, model: TSKModel, problem, wishes: Wishes, margin: float):
+        self.model, self.problem, self.wishes = model, problem, wishes
+        self.demands, self.margin = demands(wishes, model), margin
+        # Of each demand, points in standardised inputs: where a slope ends, and where it begins.
+        nothing = np.empty((0, model.n_inputs))
+        self.after, self.before = ([nothing] * len(self.demands) for _ in range(2))
+
+    @property
+    def n_rows(self):
+        """Number of points held."""
+        return sum(len(points) for points in self.after)
+
+    def standardised(self, X):
+        """Points in standardised inputs."""
+        inputs = self.problem.rows.inputs
+        return (X - inputs.offset) / inputs.scale
+
+    def steps(self, X, j):
+        """A small step along j at each point, to both sides of it: a slope may jump there.
+
+        The points before and after, in the range, and the step.
+        """
+        step = _STEP * self.model.spread[j]
+        low, high = self.model.minimum[j], self.model.maximum[j] - step
+        before = np.repeat(X, 2, axis=0)
+        before[1::2, j] -= step
+        before[:, j] = np.clip(before[:, j], low, high)
+        after = before.copy()
+        after[:, j] += step
+        return before, after, step
+
+    def hold(self, place, X):
+        """Hold a demand at these points too."""
+        if not len(X):
+            return
+        j = self.demands[place].input
+        before, after = X[:0], X
+        if j is not None:
+            before, after, _ = self.steps(X, j)
+        self.after[place] = np.vstack([self.after[place], self.standardised(after)])
+        self.before[place] = np.vstack([self.before[place], self.standardised(before)])
+
+    def solve(self, evaluation, chosen=None) -> Solved:
+        """The nearest consequents; ``chosen`` demands alone, if given."""
+        columns = self._columns(evaluation.antecedent)
+        normal, problem = evaluation.normal, self.problem
+        local, targets = normal.coefficients.copy(), problem.rows.targets
+        equal = self._in_local(self._at(columns, self.standardised(self.wishes.points)))
+        values = (self.wishes.values - targets.offset) / targets.scale
+        places = range(len(self.demands)) if chosen is None else chosen
+        for k in range(problem.n_outputs):
+            own = [p for p in places if self.demands[p].output == k]
+            rows, least = self._rows(columns, own)
+            try:
+                local[:, k] = nearest(
+                    normal.factor, normal.coefficients[:, k], equal, values[:, k], rows, least
+                )
+            except InfeasibleError as failure:
+                failure.output = k
+                raise
+        change = local - normal.coefficients
+        added = 0.5 * float(np.sum(change * ((normal.gram + normal.penalty) @ change)))
+        return Solved(local, evaluation.cost + added)
+
+    def _rows(self, columns, places):
+        """Local rows of the demands of one output, and what they must be at least."""
+        targets, n_columns = self.problem.rows.targets, self.problem.n_columns
+        rows, least = [np.empty((0, n_columns))], [np.empty(0)]
+        for p in places:
+            demand = self.demands[p]
+            found, size, limit = self._at(columns, self.after[p]), 1.0, 0.0
+            if demand.input is None:
+                limit = (demand.limit - targets.offset[demand.output]) / targets.scale[
+                    demand.output
+                ]
+            else:
+                found = (found - self._at(columns, self.before[p])) / _STEP
+                # Where no consequents have much of a slope, none is asked for.
+                size = np.minimum(np.abs(found).sum(axis=1), 1.0)
+            rows.append(self._in_local(demand.sign * found))
+            least.append(np.full(len(found), demand.sign * limit) + self.margin * size)
+        return np.vstack(rows), np.concatenate(least)
+
+    def _columns(self, antecedent):
+        """A model whose outputs are the columns of the design, in standardised inputs."""
+        problem = self.problem
+        n_rules, n_basis, n_inputs = antecedent.n_rules, problem.n_basis, self.model.n_inputs
+        unit = np.eye(problem.n_columns).reshape(n_rules, n_basis, -1)
+        coefficients = unit
+        if problem.order == 1:
+            coefficients = np.zeros((n_rules, 1 + n_inputs, problem.n_columns))
+            coefficients[:, 0] = unit[:, 0]
+            coefficients[:, 1 + problem.consequent_inputs] = unit[:, 1:]
+        low, high = problem.rows.inputs.box
+        return replace(
+            self.model,
+            antecedent=antecedent,
+            initial_antecedent=antecedent,
+            coefficients=coefficients,
+            reference=np.zeros(n_inputs),
+            spread=np.ones(n_inputs),
+            minimum=low,
+            maximum=high,
+            support=None,
+            out_of_bounds="clip",
+            output_names=tuple(map(str, range(problem.n_columns))),
+        )
+
+    def _at(self, columns, Z):
+        """Columns of the design at points, (n_points, n_columns)."""
+        return columns.predict(Z) if len(Z) else np.empty((0, self.problem.n_columns))
+
+    def _in_local(self, rows):
+        """Rows (n, n_columns) by local coefficients from those by global ones."""
+        if not len(rows):
+            return rows
+        # In place, on a copy.
+        return self.problem.local.transform_rows(np.array(rows.T, order="C")).T

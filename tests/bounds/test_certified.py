@@ -1,0 +1,222 @@
+"""Bounds over a whole box: closed forms, brute force, policies, pipelines, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import minimize
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MinMaxScaler, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import TermGroup
+from skanfis.bounds import bounds, gradient_bounds, monotonicity
+from skanfis.membership import Gaussian
+from skanfis.options import LinearExtrapolation
+from skanfis.solvers import VariableProjection
+
+from ..export.every_model import CASES
+from ..export.rule_bases import MODELS, OFFSET, SCALE
+
+pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+ONE_RULE = MODELS["one rule, order 1, 2 outputs"].with_out_of_bounds("linear", 0.5)
+
+
+def whole_box(model, part=0.3):
+    """The range, and part of its width to every side."""
+    beyond = part * (model.maximum - model.minimum)
+    return np.stack([model.minimum - beyond, model.maximum + beyond], axis=1)
+
+
+def a_fit(rng, **params):
+    X = rng.uniform([-20.0, -100.0], [60.0, 100.0], (200, 2))
+    y = 1e-3 * X[:, 1] * (1.0 + 0.01 * X[:, 0]) + 0.1 * np.sin(X[:, 0] / 15.0)
+    return X, y, ANFISRegressor(n_mfs=3, max_iter=5, solver=VariableProjection(tol=0.1), **params)
+
+
+def test_one_rule_is_bounded_by_its_corners():
+    box = np.stack([OFFSET - SCALE, OFFSET + SCALE], axis=1)
+    found = bounds(ONE_RULE, box)
+    slopes = ONE_RULE.coefficients[0, 1:]
+    middle = ONE_RULE.coefficients[0, 0] + (OFFSET - ONE_RULE.reference) @ slopes
+    half = SCALE @ np.abs(slopes)
+    assert_allclose(found.lower, middle - half, rtol=1e-8)
+    assert_allclose(found.upper, middle + half, rtol=1e-8)
+    assert_allclose(found.magnitude, np.abs(middle) + half, rtol=1e-8)
+    slope = gradient_bounds(ONE_RULE, "rate", box)
+    assert_allclose([slope.lower, slope.upper], [slopes[2], slopes[2]], rtol=1e-9)
+    assert_allclose(monotonicity(ONE_RULE, 2, box), np.sign(slopes[2]))
+
+
+def test_two_rules_of_order_zero_are_a_sigmoid():
+    """w = s(k (x - c)) of two Gaussians of one width: the bounds are its values at the ends."""
+    model = MODELS["scattered, order 0, 1 outputs"]
+    theta = np.zeros((2, 2))
+    theta[0] = OFFSET[0] + np.array([-1.0, 1.0]) * SCALE[0]
+    theta[1] = np.log(SCALE[0])
+    group = TermGroup(Gaussian, np.zeros(2, dtype=int), theta)
+    antecedent = replace(model.antecedent, groups=(group,), n_premise_inputs=1)
+    model = replace(
+        model,
+        antecedent=antecedent,
+        coefficients=np.array([2.0, 5.0]).reshape(2, 1, 1),
+        term_names=("a", "b"),
+    )
+    z = np.array([-0.7, 0.4])
+    found = bounds(model, {"time": tuple(OFFSET[0] + SCALE[0] * z)}, tol=1e-6)
+    assert_allclose([found.lower[0], found.upper[0]], 2.0 + 3.0 / (1.0 + np.exp(-2.0 * z)), 1e-6)
+    slope = gradient_bounds(model, "time", tol=1e-4)
+    assert_allclose(slope.upper, 3.0 * 0.25 * 2.0 / SCALE[0], rtol=2e-4)
+    assert monotonicity(model, "time") == 1
+    assert monotonicity(replace(model, coefficients=-model.coefficients), "time") == -1
+
+
+@pytest.mark.parametrize("number", [3, 26, 78, 130, 152])
+def test_bounds_are_tight(number):
+    model = CASES[number].model.with_out_of_bounds("linear", 0.4)
+    box = whole_box(model)
+    found = bounds(model, box, max_boxes=5000)
+    rng = np.random.default_rng(number)
+    y = model.predict(rng.uniform(box[:, 0], box[:, 1], (5000, 3)))
+    assert (found.lower <= y.min(axis=0)).all()
+    assert (y.max(axis=0) <= found.upper).all()
+    width = found.upper - found.lower
+    assert found.converged
+    assert (found.tightness <= 0.01 + 1e-9).all()
+    assert (width <= 1.021 * (found.highest - found.lowest)).all()
+    for rows, taken in ((found.at_lowest, found.lowest), (found.at_highest, found.highest)):
+        assert ((box[:, 0] <= rows) & (rows <= box[:, 1])).all()
+        assert_allclose(np.diagonal(model.predict(rows)), taken, rtol=1e-12)
+
+
+def test_an_optimiser_finds_nothing_beyond():
+    model = CASES[1].model.with_out_of_bounds("linear", 0.4)
+    box = whole_box(model)
+    found = bounds(model, box, tol=1e-3)
+    rng = np.random.default_rng(0)
+    for k, side in ((0, 1.0), (2, -1.0)):
+
+        def cost(u, k=k, side=side):
+            x = box[:, 0] + u * (box[:, 1] - box[:, 0])
+            return -side * model.predict(x[None])[0, k]
+
+        starts = rng.uniform(size=(5, 3))
+        best = min(
+            minimize(cost, start, bounds=[(0.0, 1.0)] * 3, method="L-BFGS-B").fun
+            for start in starts
+        )
+        bound = found.upper[k] if side > 0.0 else -found.lower[k]
+        spread = found.highest[k] - found.lowest[k]
+        assert -0.0011 * spread < -best - bound <= 0.0
+
+
+@pytest.mark.parametrize("n_mfs", [[1, 6, 6], [4, 3, 3]])
+def test_a_gyro_like_model_takes_few_boxes(n_mfs):
+    rng = np.random.default_rng(0)
+    X = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (500, 3))
+    y = 0.05 * np.exp(-X[:, 0] / 600.0) - 4e-4 * X[:, 2] * (X[:, 1] - 20.0)
+    model = ANFISRegressor(
+        n_mfs=n_mfs, max_iter=3, solver=VariableProjection(tol=1.0), agreement=0.01, alpha=0.01
+    ).fit(X, y)
+    found = bounds(model)
+    assert found.converged
+    assert found.n_boxes < 3000
+
+
+def test_the_box_is_held_where_the_policy_holds(rng):
+    X, y, estimator = a_fit(rng)
+    estimator.fit(X, y)
+    without_end = [(-np.inf, np.inf)] * 2
+    found = bounds(estimator, without_end)
+    rows = rng.uniform([-200.0, -900.0], [300.0, 900.0], (5000, 2))
+    predicted = estimator.predict(rows)
+    assert found.lower[0] <= predicted.min()
+    assert predicted.max() <= found.upper[0]
+    assert predicted.max() > found.highest[0] - 0.02 * np.ptp(predicted)
+    for policy in ("clip", "nan", "raise"):
+        held = bounds(estimator.set_params(out_of_bounds=policy), without_end)
+        assert_allclose(
+            [held.lower, held.upper], [bounds(estimator).lower, bounds(estimator).upper]
+        )
+        assert held.upper < found.upper
+    estimator.set_params(out_of_bounds=LinearExtrapolation(np.inf))
+    with pytest.raises(ValueError, match=r"'x0', and the model goes on along its tangent without"):
+        bounds(estimator, without_end)
+
+
+def test_slopes_beyond_the_range_are_those_of_the_policy(rng):
+    X, y, estimator = a_fit(rng)
+    estimator.fit(X, y)
+    top = X[:, 1].max()
+    assert gradient_bounds(estimator, "x1", {"x1": (top + 1.0, top + 2.0)}).lower[0] > 0.0
+    away = gradient_bounds(estimator, "x1", {"x1": (top + 1e3, top + 2e3)})
+    assert_allclose([away.lower, away.upper], 0.0, atol=1e-15)
+    # Held at the edge the output never falls with the rate, whatever comes after.
+    estimator.set_params(out_of_bounds="clip")
+    everywhere = {"x1": (-np.inf, np.inf)}
+    assert gradient_bounds(estimator, "x1", everywhere).lower[0] == 0.0
+    assert monotonicity(estimator, "x1", everywhere) == 1
+
+
+def test_scalers_are_folded_in(rng):
+    X, y, estimator = a_fit(rng)
+    whole = TransformedTargetRegressor(
+        make_pipeline(StandardScaler(), MinMaxScaler(), estimator), transformer=StandardScaler()
+    ).fit(X, 1e3 * y + 7e4)
+    found = bounds(whole, tol=1e-3)
+    rows = rng.uniform(X.min(axis=0), X.max(axis=0), (20_000, 2))
+    predicted = whole.predict(rows)
+    assert found.lower[0] <= predicted.min()
+    assert predicted.max() <= found.upper[0]
+    assert_allclose([found.lower[0], found.upper[0]], [predicted.min(), predicted.max()], rtol=3e-3)
+    assert repr(found).startswith("Bounds(y in [")
+
+
+def test_the_limit_on_boxes_leaves_bounds_that_hold():
+    model = CASES[40].model.with_out_of_bounds("clip")
+    rough, fine = bounds(model, max_boxes=1), bounds(model, tol=1e-4)
+    assert not rough.converged
+    assert rough.tightness[0] > 0.01
+    assert rough.lower < fine.lower
+    assert fine.upper < rough.upper
+
+
+def test_a_constant_is_bounded_by_itself():
+    model = replace(ONE_RULE, coefficients=np.full((1, 1, 1), 3.0), output_names=("y",))
+    found = bounds(model)
+    assert_allclose([found.lower[0], found.upper[0]], 3.0, rtol=1e-12)
+    assert monotonicity(model, "rate") == 1
+
+
+@pytest.mark.parametrize(
+    ("box", "message"),
+    [
+        ([(0.0, 1.0)], r"one \(low, high\) for each of the 3 inputs .*shape \(1, 2\)"),
+        ({"speed": (0.0, 1.0)}, r"box names 'speed', which is no input .*'rate', at positions 0"),
+        ({"rate": (1.0, 0.0)}, r"box has \(1, 0\) for 'rate': low must not be above high"),
+        ({"rate": (np.nan, 0.0)}, "neither may be NaN"),
+        ({"rate": 1.0}, "must be two numbers"),
+    ],
+)
+def test_what_is_no_box_is_refused(box, message):
+    with pytest.raises(ValueError, match=message):
+        bounds(ONE_RULE, box)
+
+
+def test_what_cannot_be_bounded_is_refused():
+    with pytest.raises(ValueError, match=r"'rate', outside the range .* predicts nothing there"):
+        bounds(ONE_RULE.with_out_of_bounds("nan"), {"rate": (5.0, 6.0)})
+    with pytest.raises(ValueError, match="tol=-1 must be zero or positive"):
+        bounds(ONE_RULE, tol=-1)
+    with pytest.raises(ValueError, match="max_boxes=0 must be 1 or more"):
+        bounds(ONE_RULE, max_boxes=0)
+
+    class Own(Gaussian):
+        name = "own"
+
+    model = CASES[0].model
+    groups = tuple(replace(group, family=Own) for group in model.antecedent.groups)
+    with pytest.raises(ValueError, match="The ranges of 'own' memberships are not known"):
+        bounds(replace(model, antecedent=replace(model.antecedent, groups=groups)))

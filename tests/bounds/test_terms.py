@@ -1,0 +1,102 @@
+"""Ranges of log memberships, slopes and curvatures against what they are at many places."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from skanfis.antecedent import TermGroup
+from skanfis.bounds.terms import is_known, ranges
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
+
+N_TERMS, N_BOXES = 5, 200
+
+
+def a_group(rng, family):
+    centers, spacing = rng.normal(size=N_TERMS), rng.uniform(0.3, 2.0, N_TERMS)
+    theta = family.start(centers, spacing, 0.6)
+    theta[1:] += 0.5 * rng.normal(size=theta[1:].shape)
+    if family is Bell:
+        # Some have a cusp at the centre: 2b < 1.
+        theta[2, :2] = np.log([0.4, 0.6])
+    return TermGroup(family, np.zeros(N_TERMS, dtype=int), theta)
+
+
+def boxes(rng, group):
+    """Of all sizes; half of them about a corner of a term."""
+    width = 10.0 ** rng.uniform(-6.0, 0.5, N_BOXES)
+    low = 2.0 * rng.normal(size=N_BOXES)
+    numbers = group.family.natural(group.theta)
+    corners = [numbers[0]]
+    for sign in (-1.0, 1.0):
+        corners += [numbers[0] + sign * row for row in numbers[1:]]
+        if len(numbers) == 4:
+            corners += [numbers[0] + sign * (0.5 * numbers[3] + row) for row in numbers[1:3]]
+    half = N_BOXES // 2
+    low[:half] = rng.choice(np.ravel(corners), half) - width[:half] * rng.uniform(size=half)
+    return low[None], (low + width)[None]
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=MEMBERSHIPS)
+def test_ranges_hold(family, rng):
+    group = a_group(rng, family)
+    low, high = boxes(rng, group)
+    found = ranges(group, low, high)
+    places = low + np.vstack([np.linspace(0.0, 1.0, 101)[:, None], rng.uniform(size=(60, 1))]) * (
+        high - low
+    )
+    for x in np.minimum(places, high):
+        log_mu, gradient = family.log_value_and_gradient(np.tile(x, (N_TERMS, 1)), group.theta)
+        assert (found.low <= log_mu).all()
+        assert (log_mu <= found.high).all()
+        assert (found.slope_low <= -gradient[0]).all()
+        assert (-gradient[0] <= found.slope_high).all()
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=MEMBERSHIPS)
+def test_ranges_of_curvature_hold(family, rng):
+    group = a_group(rng, family)
+    low, high = boxes(rng, group)
+    found = ranges(group, low, high)
+    is_bounded = np.isfinite(found.curve_low)
+    assert is_bounded.any() or family.name not in ("gaussian", "bell", "two_sided_gaussian")
+
+    def slope(x):
+        return -family.log_value_and_gradient(np.tile(x, (N_TERMS, 1)), group.theta)[1][0]
+
+    steps = np.linspace(0.0, 1.0, 30)[:, None]
+    at = [slope(x) for x in low + steps * (high - low)]
+    for before, after in itertools.pairwise(at):
+        # What a slope has changed by is its mean curvature.
+        width = (high - low) / (len(steps) - 1)
+        curve = (after - before) / width
+        slack = 1e-6 * np.abs(curve) + 1e-12 * np.abs(after) / width + 1e-9
+        # 2b < 1: the slope jumps at the centre.
+        assert ((found.curve_low <= curve + slack) | ~is_bounded).all()
+        assert ((curve - slack <= found.curve_high) | ~is_bounded).all()
+
+
+@pytest.mark.parametrize("name", ["gaussian", "two_sided_gaussian", "triangular", "trapezoidal"])
+def test_ranges_are_no_wider_than_they_must(name, rng):
+    family = MEMBERSHIPS[name]
+    group = a_group(rng, family)
+    low = rng.normal(size=(1, 50))
+    found = ranges(group, low, low + 0.3)
+    x = low + np.linspace(0.0, 0.3, 1000)[:, None]
+    log_mu, gradient = family.log_value_and_gradient(np.tile(x.ravel(), (N_TERMS, 1)), group.theta)
+    log_mu = log_mu.reshape(N_TERMS, 1000, 50)
+    np.testing.assert_allclose(found.low, log_mu.min(axis=1), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.high, log_mu.max(axis=1), atol=1e-3)
+    slopes = -gradient[0].reshape(N_TERMS, 1000, 50)
+    width = found.slope_high - found.slope_low
+    seen = slopes.max(axis=1) - slopes.min(axis=1)
+    # A foot is steeper than any row will find.
+    assert (width[width < 100.0] <= 1.05 * seen[width < 100.0] + 1e-9).all()
+
+
+def test_a_family_of_one_s_own_is_not_known():
+    class Own(Gaussian):
+        name = "own"
+
+    assert is_known(Gaussian)
+    assert not is_known(Own)
