@@ -16,6 +16,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
 from skanfis import ANFISRegressor
+from skanfis.bounds import bounds
 from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c
 from skanfis.export._fold import fold
@@ -145,6 +146,46 @@ def test_trained_model_answers_as_predict(kind, n_outputs, tmp_path):
         scale = np.maximum(full_scale(wanted), size_of_sum(fold(estimator), Z))
         assert (np.abs(found - wanted) / scale).max() < tolerance
         assert set(status) == {BITS["IN_RANGE"], BITS["OUT_OF_RANGE"]}
+
+
+@needs_compiler
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
+def test_outputs_are_held_between_limits(dtype, std, tmp_path):
+    X, y = surface(n_outputs=2)
+    estimator = ANFISRegressor(n_mfs=2, max_iter=5, tol=1.0).fit(X, y)
+    Z = around(X, np.float32 if dtype == "float" else float)
+    expected = estimator.predict(Z.astype(float))
+    limits = np.quantile(expected, [0.2, 0.7], axis=0).T
+    settings = {"name": "m", "dtype": dtype, "std": std, "min_coverage": None}
+    code = export_c(estimator, saturate=limits, **settings)
+    found, _ = answers_of(code, Z, tmp_path, 2, std)
+    assert ((limits[:, 0] <= found) & (found <= limits[:, 1])).all()
+    held = np.clip(expected, *limits.T)
+    assert (np.abs(found - held) <= 1e-5 * np.abs(expected).max(axis=0)).all()
+    assert np.mean(found != found[0]) > 0.4
+    free = export_c(estimator, **settings)
+    assert code.cost.table_bytes == free.cost.table_bytes + limits.size * Z.itemsize
+    # Proven limits change nothing in the box. Every answer above came after the self-test.
+    proven = bounds(estimator, np.stack([Z.min(axis=0), Z.max(axis=0)], axis=1))
+    sound = export_c(estimator, saturate=proven, **settings)
+    assert np.array_equal(
+        answers_of(sound, Z, tmp_path, 2, std)[0], answers_of(free, Z, tmp_path, 2, std)[0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("saturate", "message"),
+    [
+        ([(0.0, 1.0)] * 2, r"each of the 1 outputs, .* array of shape \(2, 2\)"),
+        ([(1.0, 0.0)], "must be finite, each low below its high"),
+        ([(0.0, np.inf)], "must be finite, each low below its high"),
+    ],
+)
+def test_what_are_no_limits_is_refused(saturate, message):
+    estimator = ANFISRegressor(n_mfs=1).fit(*surface())
+    with pytest.raises(ValueError, match=message):
+        export_c(estimator, name="m", saturate=saturate)
 
 
 @needs_compiler

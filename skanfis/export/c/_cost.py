@@ -103,6 +103,7 @@ def table_bytes(numbers, code):
     real += [terms.constants for terms in numbers.terms]
     real += [numbers.inverse_spread, numbers.support] if code.judges_coverage else []
     real += [numbers.reach] if code.has_limit else []
+    real += [] if code.limits is None else [code.limits]
     positions = [numbers.term_inputs] if numbers.n_terms else []
     positions += [] if numbers.rule_terms is None else [numbers.rule_terms]
     positions += [numbers.slope_inputs] if code.selects_slopes else []

@@ -61,7 +61,7 @@ int $name_self_test(void);
 """
 
 
-def header(model, numbers, dialect, cost, min_coverage):
+def header(model, numbers, dialect, cost, min_coverage, limits=None):
     """The header, whose first comment says what the model is and what it costs."""
     lines = [
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
@@ -76,6 +76,10 @@ def header(model, numbers, dialect, cost, min_coverage):
     lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
     lines += ["Outputs y:"]
     lines += [f"  [{k}] {comment(name)}" for k, name in enumerate(model.output_names)]
+    if limits is not None:
+        held = zip(model.output_names, limits, strict=True)
+        told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in held)
+        lines += ["", f"Outputs are held between limits: {told}."]
     lines += precision_lines(model, numbers)
     lines += [
         "",
