@@ -14,6 +14,7 @@ ON_REQUEST = (
     "compensation",
     "solvers",
     "partitions",
+    "certain",
     "structure",
     "real_sets",
     "battery",

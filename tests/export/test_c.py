@@ -16,12 +16,14 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
 from skanfis import ANFISRegressor
+from skanfis.bounds import bounds
 from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c
 from skanfis.export._fold import fold
 from skanfis.export.c._header import BITS
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
+from skanfis.solvers import VariableProjection
 
 from ..oracles import random_grid
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
@@ -145,6 +147,46 @@ def test_trained_model_answers_as_predict(kind, n_outputs, tmp_path):
         scale = np.maximum(full_scale(wanted), size_of_sum(fold(estimator), Z))
         assert (np.abs(found - wanted) / scale).max() < tolerance
         assert set(status) == {BITS["IN_RANGE"], BITS["OUT_OF_RANGE"]}
+
+
+@needs_compiler
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
+def test_outputs_are_held_between_limits(dtype, std, tmp_path):
+    X, y = surface(n_outputs=2)
+    estimator = ANFISRegressor(n_mfs=2, max_iter=5, solver=VariableProjection(tol=1.0)).fit(X, y)
+    Z = around(X, np.float32 if dtype == "float" else float)
+    expected = estimator.predict(Z.astype(float))
+    limits = np.quantile(expected, [0.2, 0.7], axis=0).T
+    proven = bounds(estimator, np.stack([Z.min(axis=0), Z.max(axis=0)], axis=1))
+    codes = [
+        export_c(estimator, name=name, dtype=dtype, std=std, min_coverage=None, saturate=saturate)
+        for name, saturate in (("free", None), ("held", limits), ("sound", proven))
+    ]
+    # Every answer comes after the self-test.
+    free, found, sound = (y for y, _ in evaluate_all(codes, Z, tmp_path, std, [2, 2, 2]))
+    assert (limits[:, 0] <= found).all()
+    assert (found <= limits[:, 1]).all()
+    held = np.clip(expected, *limits.T)
+    assert (np.abs(found - held) <= 1e-5 * np.abs(expected).max(axis=0)).all()
+    assert np.mean(found != free) > 0.4
+    assert codes[1].cost.table_bytes == codes[0].cost.table_bytes + limits.size * Z.itemsize
+    # Proven limits change nothing in the box.
+    assert np.array_equal(sound, free)
+
+
+@pytest.mark.parametrize(
+    ("saturate", "message"),
+    [
+        ([(0.0, 1.0)] * 2, r"each of the 1 outputs, .* array of shape \(2, 2\)"),
+        ([(1.0, 0.0)], "must be finite, each low below its high"),
+        ([(0.0, np.inf)], "must be finite, each low below its high"),
+    ],
+)
+def test_what_are_no_limits_is_refused(saturate, message):
+    estimator = ANFISRegressor(n_mfs=1).fit(*surface())
+    with pytest.raises(ValueError, match=message):
+        export_c(estimator, name="m", saturate=saturate)
 
 
 @needs_compiler

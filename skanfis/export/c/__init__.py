@@ -8,6 +8,7 @@ from ._cost import CCost, cost
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._header import BITS, header
+from ._saturation import read_limits
 from ._self_test import known_answers, self_test
 from ._source import Source
 
@@ -44,7 +45,14 @@ class CCode:
 
 
 def export_c(
-    estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1
+    estimator,
+    path=None,
+    *,
+    name=None,
+    dtype="double",
+    std="c99",
+    min_coverage=0.1,
+    saturate=None,
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
@@ -75,6 +83,11 @@ def export_c(
         leaves that out of status, code and tables, most of which it may take: the support of a rule
         is 2 + n + n (n + 1) / 2 numbers for n inputs. It is left out too where the rules have never
         seen data, as those read from a .fis file.
+    saturate : Bounds or array-like of shape (n_outputs, 2), default=None
+        Limits between which every output is held, low and high: those that
+        :func:`skanfis.bounds.bounds` has proven for the box that is specified, or others. Within
+        proven limits nothing changes, until an input beyond the box, or a fault of the hardware,
+        would give more. None holds nothing.
 
     Returns
     -------
@@ -120,12 +133,13 @@ def export_c(
         min_coverage = None
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(model, dialect.dtype)
-    body = Source(numbers, dialect, model.out_of_bounds, min_coverage)
-    answers = known_answers(model, numbers, min_coverage, BITS)
+    limits = read_limits(saturate, numbers)
+    body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)
+    answers = known_answers(model, numbers, min_coverage, BITS, limits)
     price = cost(numbers, body)
     code = CCode(
         name,
-        header(model, numbers, dialect, price, min_coverage),
+        header(model, numbers, dialect, price, min_coverage, limits),
         body.text(f"{stem}.h") + self_test(answers, dialect),
         price,
     )

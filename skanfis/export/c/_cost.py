@@ -105,6 +105,7 @@ def table_bytes(numbers, code):
     real += [numbers.reach] if code.has_limit else []
     if numbers.output_low is not None:
         real += [numbers.output_low, numbers.output_high]
+    real += [] if code.limits is None else [code.limits]
     positions = [numbers.term_inputs] if numbers.n_terms else []
     positions += [] if numbers.rule_terms is None else [numbers.rule_terms]
     positions += [numbers.slope_inputs] if code.selects_slopes else []

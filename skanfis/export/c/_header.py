@@ -61,7 +61,7 @@ int $name_self_test(void);
 """
 
 
-def header(model, numbers, dialect, cost, min_coverage):
+def header(model, numbers, dialect, cost, min_coverage, limits=None):
     """The header, whose first comment says what the model is and what it costs."""
     lines = [
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
@@ -75,10 +75,12 @@ def header(model, numbers, dialect, cost, min_coverage):
     box = zip(model.input_names, numbers.low, numbers.high, strict=True)
     lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
     lines += ["Outputs y, and what they are held within:"]
-    limits = zip(model.output_names, *model.output_limits, strict=True)
-    lines += [
-        f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in enumerate(limits)
-    ]
+    held = zip(model.output_names, *model.output_limits, strict=True)
+    lines += [f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in enumerate(held)]
+    if limits is not None:
+        ends = zip(model.output_names, limits, strict=True)
+        told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in ends)
+        lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += precision_lines(model, numbers)
     lines += [
         "",

@@ -88,11 +88,12 @@ def self_test(answers, dialect):
     )
 
 
-def known_answers(model, numbers, min_coverage, bits):
+def known_answers(model, numbers, min_coverage, bits, limits=None):
     """Rows, outputs, status and the tolerance of every output.
 
     Half of the rows lie in the box, the others up to half its width beyond; the first two are its
-    corners. Rows so near to the coverage asked for that rounding decides are left out.
+    corners. Rows so near to the coverage asked for that rounding decides are left out. Outputs are
+    held between ``limits``, if there are any.
     """
     model = as_held(model, numbers)
     points = qmc.Halton(model.n_inputs, scramble=False).random(4 * ROWS)
@@ -115,6 +116,8 @@ def known_answers(model, numbers, min_coverage, bits):
     chosen = np.flatnonzero(sure)[:ROWS]
     policy = "linear" if model.out_of_bounds == "linear" else "clip"
     y = model.with_out_of_bounds(policy).predict(Z[chosen])
+    if limits is not None:
+        y = np.clip(y, *limits.T.astype(float))
     y = np.where((status[chosen] & bits["NO_OUTPUT"]).astype(bool)[:, None], 0.0, y)
     tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z[chosen], y)
     return X[chosen], y.astype(numbers.dtype), status[chosen], tolerance.astype(numbers.dtype)

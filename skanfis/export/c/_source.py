@@ -147,6 +147,16 @@ _INPUTS = """
 """
 
 
+_SATURATE = """
+        /* Not (y < low): NaN, of a fault, fails every comparison. */
+        if (!(y[o] >= $name_limits[o][0])) {
+            y[o] = $name_limits[o][0];
+        } else if (y[o] > $name_limits[o][1]) {
+            y[o] = $name_limits[o][1];
+        }
+"""
+
+
 def rejection(policy, std):
     """Template of the macro REJECT."""
     return _REJECT_NAN if policy == "nan" and std == "c99" else _REJECT_UNTOUCHED
@@ -176,16 +186,16 @@ class Source:
     """The functions and tables of a .c file, without its self-test.
 
     ``policy`` is that of the model for rows outside the box, ``min_coverage`` the coverage below
-    which a row is uncovered, or None; ``is_part`` whether the main function is for others in the
-    same file.
+    which a row is uncovered, or None; ``limits`` are those between which outputs are held, or None;
+    ``is_part`` whether the main function is for others in the same file.
     """
 
-    def __init__(self, numbers, dialect, policy, min_coverage, *, is_part=False):
+    def __init__(self, numbers, dialect, policy, min_coverage, *, is_part=False, limits=None):
         is_constant = not numbers.n_terms and not numbers.slope_inputs.size
         # The tangent of a constant is the constant; one of no length is its start.
         is_held = is_constant or (numbers.reach is not None and not numbers.reach.any())
         self.policy = "clip" if is_held and policy == "linear" else policy
-        self.numbers, self.min_coverage = numbers, min_coverage
+        self.numbers, self.min_coverage, self.limits = numbers, min_coverage, limits
         self.dialect = dialect
         self.linkage = "static " if is_part else ""
         # int has 16 bits at least.
@@ -268,6 +278,9 @@ class Source:
         if self.judges_coverage:
             tables.append("/* Of each rule: share, radius, centre, rows of the factor. */")
             tables.append(self.table(real, "support", numbers.support))
+        if self.limits is not None:
+            tables.append("/* Between which every output is held. */")
+            tables.append(self.table(real, "limits", self.limits))
         tables.append(self.table(real, "offset", numbers.offset))
         tables.append("/* Of each rule and output: a value, then a slope per input. */")
         tables.append(self.table(real, "consequents", numbers.coefficients))
@@ -382,6 +395,7 @@ class Source:
             "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
             "        y[o] = $name_offset[o] + sum[o];",
             *([_HOLD.strip("\n")] if numbers.output_low is not None else []),
+            *([] if self.limits is None else [_SATURATE.strip("\n")]),
             "    }",
             "    return status;",
             "}",
