@@ -12,6 +12,7 @@ from ._figures_of_merit import figures_of_merit
 __all__ = ["gyro_report"]
 
 _NAN = float("nan")
+_RATE_UNITS = {"deg/s": 1.0, "deg/h": 3600.0}  # of each in 1 deg/s
 
 
 def gyro_report(
@@ -31,6 +32,7 @@ def gyro_report(
     allan=False,
     confidence_level=0.95,
     n_resamples=200,
+    rate_unit=None,
     random_state=None,
 ):
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
@@ -73,6 +75,9 @@ def gyro_report(
         Of the intervals, in (0, 1).
     n_resamples : int, default=200
         Number of resamples of the bootstrap, zero (no intervals) or more.
+    rate_unit : {"deg/s", "deg/h"}, default=None
+        Unit of every figure that is a rate, or a rate per something; None leaves to each the unit
+        that is usual: deg/s for residuals, deg/h for biases.
     random_state : int, RandomState instance or None, default=None
         Seed of the bootstrap; an int makes the intervals reproducible.
 
@@ -134,6 +139,10 @@ def gyro_report(
     labels = _labels(columns["rate"].size, run=run, groups=groups, inside=inside)
     full_scale = np.abs(columns["rate"]).max() if full_scale is None else full_scale
     _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples)
+    if rate_unit not in (None, *_RATE_UNITS):
+        raise ValueError(
+            f"rate_unit={rate_unit!r} must be one of {', '.join(_RATE_UNITS)}, or None."
+        )
     given = set(columns) | {name for name in ("run",) if labels[name] is not None}
     figures = [
         figure
@@ -157,7 +166,20 @@ def gyro_report(
     report = pd.DataFrame(lines, columns=["group", "figure", "unit", *VALUES, "note"])
     if after is None:
         report = report.drop(columns=VALUES[3:])
+    if rate_unit is not None:
+        report = _in_unit(report, rate_unit)
     report.attrs["resampled"] = resampled
+    return report
+
+
+def _in_unit(report, rate_unit):
+    """The report with every rate in one unit."""
+    values = [name for name in VALUES if name in report]
+    for other, size in _RATE_UNITS.items():
+        of_other = report["unit"].str.startswith(other)
+        report.loc[of_other, values] *= _RATE_UNITS[rate_unit] / size
+        units = rate_unit + report.loc[of_other, "unit"].str.removeprefix(other)
+        report.loc[of_other, "unit"] = units
     return report
 
 

@@ -102,6 +102,22 @@ def test_figures_without_their_input_are_left_out(log):
     ]
 
 
+@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
+def test_one_unit_for_every_rate(log, unit):
+    usual, one = figures(report_of(log, *ALL)), figures(report_of(log, *ALL, rate_unit=unit))
+    per_second = {"deg/s": 1.0, "deg/h": HOUR}
+    for name, line in usual.iterrows():
+        own = line["unit"][:5]
+        if own not in per_second:
+            assert one.loc[name, "unit"] == line["unit"]
+            continue
+        assert one.loc[name, "unit"] == unit + line["unit"][5:]
+        factor = per_second[unit] / per_second[own]
+        expected = factor * line[VALUES].astype(float)
+        np.testing.assert_allclose(one.loc[name, VALUES].astype(float), expected, rtol=1e-12)
+    assert set(one["unit"].str[:5]) == {unit, "", "ppm", "ppm o", "ppm/d"}
+
+
 def test_before_alone(log):
     report = gyro_report(log["rate"], log["before"], random_state=0, n_resamples=0)
     assert list(report.columns) == ["group", "figure", "unit", *VALUES[:3], "note"]
@@ -240,6 +256,7 @@ def test_allan_deviation_is_read(rng):
         ({"averaging_times": (10.0, -1.0)}, "averaging_times=.* must be positive"),
         ({"confidence_level": 95}, "confidence_level=95 must lie between 0 and 1"),
         ({"n_resamples": -1}, "n_resamples=-1"),
+        ({"rate_unit": "deg"}, "rate_unit='deg' must be one of deg/s, deg/h"),
         ({"allan": True}, "allan=True needs the column time"),
     ],
 )

@@ -1,0 +1,106 @@
+"""Limits of a specification, as they are typed, and whether a figure of merit keeps them.
+
+bias=5deg/h             the size of the bias is at most 5 deg/h
+bias=-2:5deg/h          it lies from -2 to 5 deg/h
+reduction_factor=10     it is 10 or more: of this figure more is better
+residual_rms=:0.01deg/s it is at most 0.01 deg/s
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+from ._figures_of_merit import figures_of_merit
+
+__all__ = ["RATE_UNITS", "Limit", "parse_limit"]
+
+RATE_UNITS = {"deg/s": 1.0, "deg/h": 3600.0}  # of each in 1 deg/s
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_FORM = re.compile(rf"(?P<low>{_NUMBER})?(?P<colon>:)?(?P<high>{_NUMBER})?(?P<unit>[^\d.:+-].*)?")
+_SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
+# Of these more is better.
+_AT_LEAST = ("reduction_factor",)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """From ``low`` to ``high``, both kept; ``text`` is what was typed, ``unit`` that of both."""
+
+    figure: str
+    low: float
+    high: float
+    unit: str
+    text: str
+
+    def is_kept(self, value, unit):
+        """Whether a figure in ``unit`` keeps the limit; None where it is NaN."""
+        if math.isnan(value):
+            return None
+        value = value * per_unit(unit, self.unit)
+        return self.low <= value <= self.high
+
+
+def parse_limit(text):
+    """A limit such as ``bias=5deg/h``; ValueError where it is none."""
+    figure, equals, typed = text.partition("=")
+    if not equals or figure not in _UNITS:
+        raise ValueError(
+            f"{text!r} must be FIGURE=LIMIT, with a figure of merit of: {', '.join(_UNITS)}."
+        )
+    found = _FORM.fullmatch(typed.strip())
+    if found is None or (found["low"] is None and found["high"] is None):
+        raise ValueError(
+            f"{text!r}: {typed!r} must be a number, or LOW:HIGH of which one may be missing, and a "
+            f"unit, as in {figure}=-2:5{_UNITS[figure]}."
+        )
+    low, high = _ends(text, figure, found)
+    return Limit(figure, low, high, _unit(text, figure, found["unit"]), typed.strip())
+
+
+def per_unit(unit, other):
+    """How many of ``other`` are one ``unit``: both rates, or rates per the same."""
+    for name, size in RATE_UNITS.items():
+        for new, other_size in RATE_UNITS.items():
+            if unit.startswith(name) and other.startswith(new):
+                return other_size / size
+    return 1.0
+
+
+def _ends(text, figure, found):
+    low, high = (None if found[end] is None else float(found[end]) for end in ("low", "high"))
+    if found["colon"]:
+        low, high = -math.inf if low is None else low, math.inf if high is None else high
+        if not low <= high:
+            raise ValueError(f"{text!r}: the lower limit {low:g} is above the upper one, {high:g}.")
+        return low, high
+    if high is not None:
+        raise ValueError(f"{text!r}: two numbers need a colon between them, as in -2:5.")
+    if low < 0:
+        raise ValueError(f"{text!r}: one number limits the size, and must be zero or positive.")
+    return (low, math.inf) if figure in _AT_LEAST else (-low, low)
+
+
+def _unit(text, figure, typed):
+    usual = _UNITS[figure]
+    typed = "" if typed is None else typed.strip()
+    for sign, name in _SPELLINGS:
+        typed = typed.replace(sign, name)
+    is_rate = any(usual.startswith(name) for name in RATE_UNITS)
+    known = [name + usual[len(name) :] for name in RATE_UNITS] if is_rate else [usual, ""]
+    if usual.startswith("ppm"):
+        known.append(usual.partition(" ")[0])
+    if typed not in known:
+        wanted = " or ".join(filter(None, known))
+        raise ValueError(
+            f"{text!r}: {figure} is in {wanted}; found {typed!r}."
+            if wanted
+            else f"{text!r}: {figure} has no unit; found {typed!r}."
+        )
+    return typed if is_rate else usual
+
+
+_UNITS = {
+    figure.name: figure.unit
+    for figure in figures_of_merit(1.0, 1.0, averaging_times=(10.0, 100.0), allan=True)
+}
