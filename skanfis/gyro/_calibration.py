@@ -93,8 +93,8 @@ class Calibration:
 
     def cautions_in(self, unit, per_unit=1.0):
         """The same, with errors in another unit, of which ``per_unit`` are 1 deg/s."""
-        errors = [per_unit * (rate - self.rate) for rate in (self.before, self.after)]
-        return [*_what_is_worse(*errors, self.inside, unit), *self.glitches]
+        before, after = (per_unit * (rate - self.rate) for rate in (self.before, self.after))
+        return [*_what_is_worse(before, after, self.inside, unit), *self.glitches]
 
 
 def calibrate(log, split, recipe, tell, name_row="row {}".format):

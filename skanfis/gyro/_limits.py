@@ -33,12 +33,9 @@ class Limit:
     unit: str
     text: str
 
-    def is_kept(self, value, unit):
-        """Whether a figure in ``unit`` keeps the limit; None where it is NaN."""
-        if math.isnan(value):
-            return None
-        value = value * per_unit(unit, self.unit)
-        return self.low <= value <= self.high
+    def keeps(self, value):
+        """Whether a value in the limit's unit keeps it."""
+        return bool(self.low <= value <= self.high)
 
 
 def parse_limit(text):
@@ -68,13 +65,13 @@ def per_unit(unit, other):
 
 
 def _ends(text, figure, found):
-    low, high = (None if found[end] is None else float(found[end]) for end in ("low", "high"))
+    low = -math.inf if found["low"] is None else float(found["low"])
+    high = math.inf if found["high"] is None else float(found["high"])
     if found["colon"]:
-        low, high = -math.inf if low is None else low, math.inf if high is None else high
         if not low <= high:
             raise ValueError(f"{text!r}: the lower limit {low:g} is above the upper one, {high:g}.")
         return low, high
-    if high is not None:
+    if found["high"] is not None:
         raise ValueError(f"{text!r}: two numbers need a colon between them, as in -2:5.")
     if low < 0:
         raise ValueError(f"{text!r}: one number limits the size, and must be zero or positive.")

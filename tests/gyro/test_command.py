@@ -47,7 +47,9 @@ def log():
 @pytest.fixture
 def no_report(monkeypatch):
     """Leave out the report, which takes longer than all else together."""
-    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda calibration, title: title)
+    monkeypatch.setattr(
+        "skanfis.gyro.command.report_page", lambda calibration, title, dossier: title
+    )
 
 
 @pytest.fixture(scope="module")

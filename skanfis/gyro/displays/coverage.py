@@ -226,7 +226,7 @@ class CoverageDisplay:
         Returns
         -------
         tables : dict of str to DataFrame
-            "coverage" at each point, and "cells" with the number of their rows, the empty ones too.
+            "points" with their coverage, and "cells" with their number of rows, the empty ones too.
         """
         x, y = (values.ravel() for values in np.meshgrid(self.x, self.y))
         points = {
@@ -238,7 +238,7 @@ class CoverageDisplay:
         }
         edges = dict(zip(self.names, (self.x_edges, self.y_edges), strict=True))
         return {
-            "coverage": pd.DataFrame(points),
+            "points": pd.DataFrame(points),
             "cells": cells_table(edges, {"rows": self.counts}),
         }
 
