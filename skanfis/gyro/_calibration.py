@@ -108,13 +108,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     X = features(log, recipe.inputs, recipe.time_constant)
     before = log["output"].to_numpy() / factor
     error = before - log["rate"].to_numpy()
-    glitches = [
-        f"{name_row(glitch.row)}: {glitch.reason} is supported by no other row; if it is a glitch, "
-        "drop this row and calibrate again."
-        for glitch in find_glitches(log, error)
-    ]
-    for sentence in glitches:
-        tell(f"warning: {sentence}")
+    glitches = _glitches(log, error, name_row, tell)
     rate = log["rate"].to_numpy()
     target = rate if recipe.physics else error
     rng = np.random.default_rng(0)
@@ -123,28 +117,12 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     folds = [(some_rows(train, recipe.fit_rows, X, rng), test) for train, test in split.folds]
     structures = [fold.structure for fold in fold_choices or [choice] * len(folds)]
     predicted, inside = _held_out(X, target, folds, structures, recipe, split.kind, tell)
-    if not (inside & np.isfinite(predicted)).any():
-        raise LogError(
-            f"the compensator could not be checked: every row lies outside the range of the rows "
-            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
-            "overlap in temperature, rate and time."
-        )
+    _check_in_range(inside & np.isfinite(predicted), split)
     rows = some_rows(np.arange(len(X)), recipe.fit_rows, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows))
     tell(f"fitting to {rows.size:,} rows")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        estimator = make_estimator(recipe, choice.structure).fit(X.iloc[rows], target[rows])
-    compensator = GyroCompensator(
-        estimator,
-        recipe.inputs,
-        predicts="rate" if recipe.physics else "error",
-        scale_factor=factor,
-        output_unit=recipe.output_unit,
-        time_constant=recipe.time_constant,
-        min_coverage=recipe.min_coverage,
-    )
+    compensator, caught = _fit(X.iloc[rows], target[rows], recipe, choice, factor)
     after = compensator.compensate(before, predicted)
     return Calibration(
         recipe=recipe,
@@ -160,9 +138,30 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
         simpler=simpler,
         verdict=_judge(simpler, after, rate, inside & np.isfinite(after), split),
         n_fit_rows=rows.size,
-        warnings=sorted({str(warning.message) for warning in caught}),
+        warnings=caught,
         glitches=glitches,
     )
+
+
+def _glitches(log, error, name_row, tell):
+    """A sentence on each row that no other supports."""
+    sentences = [
+        f"{name_row(glitch.row)}: {glitch.reason} is supported by no other row; if it is a glitch, "
+        "drop this row and calibrate again."
+        for glitch in find_glitches(log, error)
+    ]
+    for sentence in sentences:
+        tell(f"warning: {sentence}")
+    return sentences
+
+
+def _check_in_range(answered, split):
+    if not answered.any():
+        raise LogError(
+            f"the compensator could not be checked: every row lies outside the range of the rows "
+            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
+            "overlap in temperature, rate and time."
+        )
 
 
 def _judge(simpler, after, rate, rows, split):
@@ -170,6 +169,23 @@ def _judge(simpler, after, rate, rows, split):
     rates = {each.name: each.after for each in simpler if each.after is not None} | {MODEL: after}
     errors = {name: (compensated - rate)[rows] for name, compensated in rates.items()}
     return judge(errors, split.labels[rows])
+
+
+def _fit(X, target, recipe, choice, factor):
+    """The compensator, and what its fit warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        estimator = make_estimator(recipe, choice.structure).fit(X, target)
+    compensator = GyroCompensator(
+        estimator,
+        recipe.inputs,
+        predicts="rate" if recipe.physics else "error",
+        scale_factor=factor,
+        output_unit=recipe.output_unit,
+        time_constant=recipe.time_constant,
+        min_coverage=recipe.min_coverage,
+    )
+    return compensator, sorted({str(warning.message) for warning in caught})
 
 
 def _what_is_worse(before, after, inside, unit):

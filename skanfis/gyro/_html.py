@@ -10,7 +10,14 @@ from ._style_sheet import STYLE
 __all__ = ["Page"]
 
 _DOTS_PER_INCH = 160
-_COLUMNS_OF_WORDS = ("unit", "result", "entry", "SHA-256")
+# Of columns that are not numbers.
+_KINDS = {
+    "unit": "text",
+    "required": "text",
+    "result": "text long",
+    "entry": "text long",
+    "SHA-256": "text hash",
+}
 _JUDGEMENTS = ("pass", "fail", "not measured")
 
 
@@ -58,7 +65,7 @@ class Page:
         A cell is a string, or a pair of strings, the second of less weight. A cell "pass" or "fail"
         is coloured.
         """
-        kinds = [' class="text"' if name in _COLUMNS_OF_WORDS else "" for name in head]
+        kinds = [f' class="{_KINDS[name]}"' if name in _KINDS else "" for name in head]
         title = f"<caption>{_text(caption)}</caption>" if caption else ""
         header = "".join(
             f'<th scope="col"{kind}>{_text(name)}</th>'
@@ -84,8 +91,10 @@ class Page:
         self._parts.append('<div class="figures">')
         for picture in pictures:
             source = f"data:image/png;base64,{_base64(_png(picture.figure))}"
+            width, height = picture.figure.get_size_inches()
+            kind = ' class="tall"' if height > width else ""
             self._parts.append(
-                f'<figure><img alt="{_text(picture.alt)}" src="{source}">'
+                f'<figure{kind}><img alt="{_text(picture.alt)}" src="{source}">'
                 f"<figcaption>{_text(picture.caption)}"
             )
             for name, text in picture.files.items():

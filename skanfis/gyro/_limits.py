@@ -8,7 +8,7 @@ residual_rms=:0.01deg/s it is at most 0.01 deg/s
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ._figures_of_merit import figures_of_merit
 
@@ -37,6 +37,11 @@ class Limit:
         """Whether a value in the limit's unit keeps it."""
         return bool(self.low <= value <= self.high)
 
+    def in_unit(self, unit):
+        """The same limit in another unit of rates."""
+        factor = _per_unit(self.unit, unit)
+        return replace(self, low=factor * self.low, high=factor * self.high, unit=unit)
+
 
 def parse_limit(text):
     """A limit such as ``bias=5deg/h``; ValueError where it is none."""
@@ -55,7 +60,7 @@ def parse_limit(text):
     return Limit(figure, low, high, _unit(text, figure, found["unit"]), typed.strip())
 
 
-def per_unit(unit, other):
+def _per_unit(unit, other):
     """How many of ``other`` are one ``unit``: both rates, or rates per the same."""
     for name, size in RATE_UNITS.items():
         for new, other_size in RATE_UNITS.items():

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._limits import Limit, per_unit
+from ._limits import Limit
 
 __all__ = ["Check", "check_limits"]
 
 
 @dataclass(frozen=True)
 class Check:
-    """A limit, the figure after compensation in its unit, and whether that keeps it.
+    """A limit and the figure after compensation, in one unit, and whether that keeps it.
 
     ``is_kept`` is None where the figure could not be measured, which is no pass. ``remark`` says so
     of an interval that reaches over the limit: the next log may say otherwise.
@@ -43,8 +43,8 @@ def _check(limit, lines):
     if limit.figure not in lines.index:
         return Check(limit, float("nan"), None, "the log does not give this figure")
     line = lines.loc[limit.figure]
-    factor = per_unit(line["unit"], limit.unit)
-    value, low, high = (factor * line[name] for name in ("after", "after_low", "after_high"))
+    limit = limit.in_unit(line["unit"])
+    value, low, high = (line[name] for name in ("after", "after_low", "after_high"))
     if np.isnan(value):
         return Check(limit, value, None, line["note"])
     is_kept = limit.keeps(value)

@@ -45,6 +45,8 @@ th, td { text-align: right; padding: 5px 12px; border-bottom: 1px solid var(--li
   white-space: nowrap; vertical-align: top; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; }
 th.text, td.text { text-align: left; }
+td.hash { font: .82em ui-monospace, SFMono-Regular, Menlo, Consolas, monospace; }
+td.long { white-space: normal; min-width: 14em; }
 td span { color: var(--soft); }
 thead th { border-bottom: 2px solid var(--ink); font-weight: 600; }
 tbody tr:hover { background: var(--ground); }
@@ -68,10 +70,12 @@ footer { color: var(--soft); font-size: .85rem; }
   .banner, .cards, .cards div, figure, .warn { break-inside: avoid; }
   .cards { grid-template-columns: repeat(4, 1fr); gap: 6pt; } .cards div { padding: 6pt 8pt; }
   .figures { display: block; } figure { margin: 0 0 12pt; }
-  figure img { width: auto; max-width: 100%; max-height: 215mm; margin: 0 auto; }
+  figure img { width: auto; max-width: 100%; max-height: 108mm; margin: 0 auto; }
+  figure.tall img { max-height: 215mm; }
   a.data { display: none; }
   .scroll { overflow: visible; } table { font-size: 8pt; max-width: 100%; }
-  th, td { padding: 2.5pt 6pt; white-space: normal; overflow-wrap: anywhere; }
+  th, td { padding: 2.5pt 6pt; white-space: normal; overflow-wrap: break-word; }
+  th.hash, td.hash { overflow-wrap: anywhere; font-size: 7pt; }
   thead { display: table-header-group; } tr { break-inside: avoid; }
   /* What a click opens on a screen stands open on paper; long lines are wrapped, not cut. */
   details::details-content { display: block; content-visibility: visible; block-size: auto; }

@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import joblib
+import numpy as np
 import pandas as pd
 
 from ..export import export_c
@@ -14,9 +15,9 @@ from ._dossier import dossier_of
 from ._options import PROGRAM, make_parser
 from ._split import choose_split
 from ._staging import Staging
-from ._summary import summary, summary_of_rows
+from ._summary import errors_and_verdict
 from .c_code import export_c_physics
-from .compensator import INPUTS, GyroCompensator
+from .compensator import INPUTS, STATUS, GyroCompensator
 from .html_report import report_page, rules_text
 from .log import (
     LogError,
@@ -107,7 +108,7 @@ def _calibrate(options, tell):
         staging.publish()
     for message in calibration.warnings:
         tell(f"warning: {message}")
-    _say(summary(calibration, folder))
+    _say(_summary(calibration, folder))
     tell("done, but see the warnings" if calibration.cautions else "done")
     return DONE
 
@@ -172,7 +173,7 @@ def _apply(options, tell):
         # Twelve digits are beyond any gyro, and short beside the seventeen of a double.
         table.to_csv(staging.path / target.name, index=False, float_format="%.12g")
         staging.publish()
-    _say(summary_of_rows(log, compensated, compensator, target))
+    _say(_summary_of_rows(log, compensated, compensator, target))
     tell("done")
     return DONE
 
@@ -329,6 +330,41 @@ def _write(calibration, options, folder):
 def _title(logs):
     names = [Path(log).name for log in logs]
     return printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
+
+
+def _summary(calibration, folder):
+    lines = errors_and_verdict(calibration)
+    lines += [
+        f"check          {calibration.split.sentence}",
+        f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
+        *(f"WARNING        {sentence}" for sentence in calibration.cautions),
+    ]
+    return lines
+
+
+def _summary_of_rows(log, compensated, compensator, target):
+    flagged = compensated["status"].to_numpy() != 0
+    lines = [f"written        {target}: {len(log):,} rows, {flagged.sum():,} flagged"]
+    for name, bit in STATUS.items():
+        count = int(np.count_nonzero(compensated["status"].to_numpy() & bit))
+        if count:
+            lines.append(f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}")
+    if "rate" in log:
+        for label, rows in (("all is well", ~flagged), ("flagged", flagged)):
+            before, after = (
+                (compensated[name] - log["rate"]).to_numpy()[rows]
+                for name in ("rate_indicated", "rate_compensated")
+            )
+            if np.isfinite(after).any():
+                lines.append(
+                    f"RMS error      {_rms(before[np.isfinite(after)]):.4g} deg/s before, "
+                    f"{_rms(after[np.isfinite(after)]):.4g} after ({label})"
+                )
+    return lines
+
+
+def _rms(errors):
+    return float(np.sqrt(np.mean(errors**2))) if errors.size else float("nan")
 
 
 def _pairs(texts, option):

@@ -7,6 +7,13 @@ from .words import law_table
 __all__ = ["formula_of", "instead"]
 
 _DIGITS = ".9g"
+# How to get all files for it.
+_COMMANDS = {
+    "straight line": "The command writes its files, C code included, with --terms {ones}: a single "
+    "rule is a straight line.",
+    "arcsine law": "The command writes its files, C code included, with --physics --terms {ones}: "
+    "to the law it adds a single rule, which is a straight line.",
+}
 
 
 def instead(page, results):
@@ -26,6 +33,8 @@ def instead(page, results):
         "deg/s, inputs in the units of the range of the calibration below."
     )
     page.preformatted(formula_of(calibration, name), "What to compute", is_open=True)
+    if name in _COMMANDS:
+        page.paragraph(_COMMANDS[name].format(ones=",".join("1" for _ in calibration.X)))
 
 
 def formula_of(calibration, name):

@@ -41,7 +41,7 @@ def _specification(page, results):
     lines = [
         (
             check.words,
-            signs(check.limit.text),
+            (_in_words(check.limit), _as_typed(check.limit)),
             figures(check.value) if np.isfinite(check.value) else "–",
             signs(check.limit.unit),
             (check.result, check.remark),
@@ -49,7 +49,7 @@ def _specification(page, results):
         for check in results.checks
     ]
     page.table(
-        ("figure", "limit", "after", "unit", "result"),
+        ("figure", "required", "after", "unit", "result"),
         lines,
         "After compensation by the fuzzy rules, on the held-out rows in range",
     )
@@ -76,3 +76,17 @@ def _by_group(page, results):
     errors = (f"RMS before [{unit}]", f"RMS after [{unit}]", f"peak after [{unit}]")
     page.heading(f"By held-out {kind}")
     page.table((kind, "rows", "out of range", *errors, "reduction"), lines)
+
+
+def _in_words(limit):
+    low, high = (figures(end) for end in (limit.low, limit.high))
+    if limit.low == -limit.high:
+        return f"size at most {high}"
+    if np.isinf(limit.high):
+        return f"at least {low}"
+    return f"at most {high}" if np.isinf(limit.low) else f"{low} to {high}"
+
+
+def _as_typed(limit):
+    """Where it was typed in another unit than the report's."""
+    return f"({signs(limit.text)})" if not limit.text.endswith(limit.unit) else ""

@@ -135,9 +135,9 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
             values = getattr(self, name)
             for rate, ppm, middle, color in zip(self.rate, values, middles, colors, strict=True):
                 known = np.isfinite(ppm)
+                label = f"{middle:.0f} °C"
                 # The line is broken at rest.
                 for side in (rate < 0, rate > 0):
-                    label = f"{middle:.0f} °C" if side[-1] or not (rate[known] > 0).any() else None
                     axes.plot(
                         rate[known & side],
                         ppm[known & side],
