@@ -10,6 +10,7 @@ from ._style_sheet import STYLE
 __all__ = ["Page"]
 
 _DOTS_PER_INCH = 160
+_MOST_ROWS_ON_A_PAGE = 25
 # Of columns that are not numbers.
 _KINDS = {
     "unit": "text",
@@ -71,6 +72,8 @@ class Page:
             f'<th scope="col"{kind}>{_text(name)}</th>'
             for name, kind in zip(head, kinds, strict=True)
         )
+        # Longer ones break between pages.
+        short = " short" if len(rows) <= _MOST_ROWS_ON_A_PAGE else ""
         lines = [
             "<tr>"
             + "".join(
@@ -80,7 +83,8 @@ class Page:
             for row in rows
         ]
         self._parts += [
-            f'<div class="scroll" tabindex="0"><table>{title}<thead><tr>{header}</tr></thead>',
+            f'<div class="scroll{short}" tabindex="0"><table>{title}',
+            f"<thead><tr>{header}</tr></thead>",
             "<tbody>",
             *lines,
             "</tbody></table></div>",

@@ -67,7 +67,7 @@ footer { color: var(--soft); font-size: .85rem; }
   body { background: none; font-size: 10pt; } main { max-width: none; padding: 0; }
   section { border: 0; padding: 0; margin: 0 0 14pt; }
   h1, h2, h3 { break-after: avoid; } p { orphans: 3; widows: 3; }
-  .banner, .cards, .cards div, figure, .warn { break-inside: avoid; }
+  .banner, .cards, .cards div, figure, .warn, .short { break-inside: avoid; }
   .cards { grid-template-columns: repeat(4, 1fr); gap: 6pt; } .cards div { padding: 6pt 8pt; }
   .figures { display: block; } figure { margin: 0 0 12pt; }
   figure img { width: auto; max-width: 100%; max-height: 108mm; margin: 0 auto; }

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ._headline import headline
+from ._reading import readability_of
 
 __all__ = ["errors_and_verdict"]
 
@@ -25,7 +26,10 @@ def errors_and_verdict(calibration):
             "flagged"
         )
     title, reason = headline(calibration, "deg/s")
-    return [*lines, f"VERDICT        {title}. {reason.replace('°', 'deg')}"]
+    lines.append(f"VERDICT        {title}. {reason.replace('°', 'deg')}")
+    if findings := readability_of(calibration).findings:
+        lines.append(f"rules          not fit to be read one by one. {findings[0]}")
+    return lines
 
 
 def _rms(errors):

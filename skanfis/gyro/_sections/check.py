@@ -52,6 +52,15 @@ def _on_choices(calibration):
 
 def _contest(page, results):
     verdict = results.calibration.verdict
+    page.heading("Beside simpler compensations")
+    page.paragraph(
+        "On the same folds, the same held-out rows in range and the same inputs. What this model "
+        "is better by is the ratio of RMS errors, as the geometric mean over "
+        f"{held_out_groups(results.calibration)}, with its 95 % interval by Student's t. "
+        "Recommended is the simplest that no more elaborate one beats decisively: with an interval "
+        "above 1.02.",
+        kind="soft",
+    )
     lines = []
     for name, error in verdict.rms.items():
         factor = verdict.rms[NOTHING] / error if error else float("inf")
@@ -72,10 +81,6 @@ def _contest(page, results):
             "result",
         ),
         lines,
-        "Beside simpler compensations: the same folds, the same held-out rows in range, the same "
-        f"inputs. The last factor is the geometric mean over {held_out_groups(results.calibration)}"
-        " of the ratio of RMS errors, with its 95 % interval by Student's t. Recommended is the "
-        "simplest that no more elaborate one beats with an interval above 1.02",
     )
     for simple in results.calibration.simpler:
         if simple.missing:

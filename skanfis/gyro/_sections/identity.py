@@ -25,9 +25,6 @@ def identity(page, results):
     if dossier.files:
         lines = [(file.name, f"{file.n_bytes:,}", file.sha256) for file in dossier.files]
         page.table(("file of the log", "bytes", "SHA-256"), lines)
-    if dossier.options:
-        text = "\n".join(f"{name}: {value}" for name, value in dossier.options)
-        page.preformatted(text, "Options")
     page.paragraph(
         f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s.",
         kind="soft",

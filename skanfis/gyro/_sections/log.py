@@ -1,4 +1,4 @@
-"""The log: its size, ranges and scale factor."""
+"""The log: its size, ranges and scale factor; and the options of the command."""
 
 from .._units import SIGNALS
 from .words import unit_of
@@ -10,7 +10,7 @@ def log(page, results):
     """What the calibration was made from."""
     calibration = results.calibration
     rows = results.log
-    page.section("The log")
+    page.section("The log and the options")
     lines = [("rows", f"{len(rows):,}", "")]
     for name in ("run", "device"):
         if name in rows:
@@ -26,3 +26,6 @@ def log(page, results):
         unit = f"{calibration.recipe.output_unit} per °/s"
         lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
     page.table(("quantity", "value", "unit"), lines)
+    if results.dossier.options:
+        text = "\n".join(f"{name}: {value}" for name, value in results.dossier.options)
+        page.preformatted(text, "Options of the command")
