@@ -11,10 +11,9 @@ import re
 from dataclasses import dataclass, replace
 
 from ._figures_of_merit import figures_of_merit
+from ._rate_units import RATE_UNITS, in_rate_unit, rate_unit_of
 
-__all__ = ["RATE_UNITS", "Limit", "parse_limit"]
-
-RATE_UNITS = {"deg/s": 1.0, "deg/h": 3600.0}  # of each in 1 deg/s
+__all__ = ["Limit", "parse_limit"]
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _FORM = re.compile(rf"(?P<low>{_NUMBER})?(?P<colon>:)?(?P<high>{_NUMBER})?(?P<unit>[^\d.:+-].*)?")
@@ -38,8 +37,9 @@ class Limit:
         return bool(self.low <= value <= self.high)
 
     def in_unit(self, unit):
-        """The same limit in another unit of rates."""
-        factor = _per_unit(self.unit, unit)
+        """The same limit in another unit, of rates where this is one."""
+        wanted = rate_unit_of(unit)
+        factor = 1.0 if wanted is None else in_rate_unit(self.unit, wanted)[1]
         return replace(self, low=factor * self.low, high=factor * self.high, unit=unit)
 
 
@@ -58,15 +58,6 @@ def parse_limit(text):
         )
     low, high = _ends(text, figure, found)
     return Limit(figure, low, high, _unit(text, figure, found["unit"]), typed.strip())
-
-
-def _per_unit(unit, other):
-    """How many of ``other`` are one ``unit``: both rates, or rates per the same."""
-    for name, size in RATE_UNITS.items():
-        for new, other_size in RATE_UNITS.items():
-            if unit.startswith(name) and other.startswith(new):
-                return other_size / size
-    return 1.0
 
 
 def _ends(text, figure, found):
@@ -88,8 +79,8 @@ def _unit(text, figure, typed):
     typed = "" if typed is None else typed.strip()
     for sign, name in _SPELLINGS:
         typed = typed.replace(sign, name)
-    is_rate = any(usual.startswith(name) for name in RATE_UNITS)
-    known = [name + usual[len(name) :] for name in RATE_UNITS] if is_rate else [usual, ""]
+    is_rate = rate_unit_of(usual) is not None
+    known = [in_rate_unit(usual, name)[0] for name in RATE_UNITS] if is_rate else [usual, ""]
     if usual.startswith("ppm"):
         known.append(usual.partition(" ")[0])
     if typed not in known:

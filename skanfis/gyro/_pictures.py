@@ -136,15 +136,9 @@ def draw_allan(results):
     """None where there is a reason against it."""
     if results.why_no_allan:
         return None
-    rows = results.in_whole_runs
     figure, axes = _panels(1)
-    display = AllanDisplay.from_predictions(
-        *(rates[rows] for rates in _rates(results)),
-        unit=results.unit,
-        sampling_interval=results.interval,
-        run=None if results.run is None else results.run[rows],
-        ax=axes,
-    )
+    before, after = results.allan_curves
+    display = AllanDisplay(before=before, after=after).plot(axes, unit=results.unit)
     caption = "Allan deviation of the error, over the runs that are in range from end to end."
     alt = "Allan deviation before and after"
     return Picture(figure, alt, caption, _files("allan-deviation", display.tables()))

@@ -8,9 +8,10 @@ import pandas as pd
 
 from ._dossier import Dossier
 from ._figures_of_merit import FIGURES_OF_ALLAN
+from ._rate_units import in_rate_unit
 from ._reading import readability_of
 from ._specification import check_limits
-from .allan import ROWS_PER_TIME
+from .allan import ROWS_PER_TIME, allan_coefficients, allan_deviation
 from .compensator import features
 from .displays._style import PER_UNIT, SYMBOL, figures
 from .report import gyro_report
@@ -98,21 +99,33 @@ class Results:
         return found
 
     def _merit_of_allan(self):
-        """N, B and K of the runs that are in range from end to end."""
+        """Lines of N, B and K, read off the curves that are drawn."""
+        read = [
+            allan_coefficients(curve["averaging_time"], curve["deviation"])
+            for curve in self.allan_curves
+        ]
+        lines = []
+        for name, usual in FIGURES_OF_ALLAN.items():
+            unit, factor = in_rate_unit(usual, self.unit)
+            line = {"group": "all", "figure": name, "unit": unit}
+            notes = []
+            for side, found in zip(("before", "after"), read, strict=True):
+                value = getattr(found, name)
+                line[side] = np.nan if value is None else factor * value
+                if value is None:
+                    notes.append(f"{side}: {found.notes[name]}")
+            lines.append(line | {"note": "; ".join(notes)})
+        return pd.DataFrame(lines)
+
+    @cached_property
+    def allan_curves(self):
+        """Before and after, over the runs that are in range from end to end."""
         rows = self.in_whole_runs
-        table = gyro_report(
-            self.rate[rows],
-            self.calibration.before[rows],
-            self.after[rows],
-            time=self.time[rows],
-            run=None if self.run is None else self.run[rows],
-            full_scale=1.0,
-            averaging_times=(),
-            allan=True,
-            n_resamples=0,
-            rate_unit=self.unit,
-        )
-        return table[table["figure"].isin(FIGURES_OF_ALLAN)]
+        run = None if self.run is None else self.run[rows]
+        return [
+            allan_deviation((rates - self.rate)[rows], self.interval, run=run)
+            for rates in (self.before, self.after)
+        ]
 
     @property
     def has_few_groups(self):

@@ -8,11 +8,11 @@ from . import metrics
 from ._bootstrap import VALUES, Bootstrap, units_to_resample
 from ._columns import check_column, check_labels
 from ._figures_of_merit import figures_of_merit
+from ._rate_units import RATE_UNITS, in_rate_unit
 
 __all__ = ["gyro_report"]
 
 _NAN = float("nan")
-_RATE_UNITS = {"deg/s": 1.0, "deg/h": 3600.0}  # of each in 1 deg/s
 
 
 def gyro_report(
@@ -139,9 +139,9 @@ def gyro_report(
     labels = _labels(columns["rate"].size, run=run, groups=groups, inside=inside)
     full_scale = np.abs(columns["rate"]).max() if full_scale is None else full_scale
     _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples)
-    if rate_unit not in (None, *_RATE_UNITS):
+    if rate_unit not in (None, *RATE_UNITS):
         raise ValueError(
-            f"rate_unit={rate_unit!r} must be one of {', '.join(_RATE_UNITS)}, or None."
+            f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
         )
     given = set(columns) | {name for name in ("run",) if labels[name] is not None}
     figures = [
@@ -175,12 +175,8 @@ def gyro_report(
 def _in_unit(report, rate_unit):
     """The report with every rate in one unit."""
     values = [name for name in VALUES if name in report]
-    for other, size in _RATE_UNITS.items():
-        of_other = report["unit"].str.startswith(other)
-        report.loc[of_other, values] *= _RATE_UNITS[rate_unit] / size
-        units = rate_unit + report.loc[of_other, "unit"].str.removeprefix(other)
-        report.loc[of_other, "unit"] = units
-    return report
+    units, factors = zip(*(in_rate_unit(unit, rate_unit) for unit in report["unit"]), strict=True)
+    return report.assign(unit=units, **report[values].mul(np.array(factors), axis=0))
 
 
 def _columns(**columns):

@@ -38,6 +38,7 @@ def test_what_may_be_typed(text, low, high, unit):
         ("bias", "must be FIGURE=LIMIT, with a figure of merit of: residual_rms"),
         ("drift=5deg/h", "must be FIGURE=LIMIT"),
         ("bias=5", "bias is in deg/s or deg/h; found ''"),
+        ("angle_random_walk=1deg/h", r"is in deg/sqrt\(h\); found 'deg/h'"),
         ("bias=5ppm", "bias is in deg/s or deg/h; found 'ppm'"),
         ("bias=five", "must be a number, or LOW:HIGH"),
         ("bias=:deg/h", "must be a number, or LOW:HIGH"),
