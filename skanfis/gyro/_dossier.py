@@ -64,7 +64,7 @@ def dossier_of(options):
     told = [
         (name.replace("_", "-"), _shown(value))
         for name, value in sorted(vars(options).items())
-        if value not in (None, False, [], "")
+        if value is not None and value is not False and value not in ([], "")
     ]
     return Dossier(
         made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),

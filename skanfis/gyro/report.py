@@ -152,12 +152,7 @@ def gyro_report(
     random_state = check_random_state(random_state)
     lines, resampled = [], {}
     for group, rows in _parts(labels["groups"], refused.size):
-        part = {name: column[rows] for name, column in columns.items()}
-        part |= {
-            name: label[rows]
-            for name, label in (("run", labels["run"]), ("inside", labels["inside"]))
-            if label is not None
-        }
+        part = _part(rows, columns, labels)
         counts, part = _without_refused(part, refused[rows])
         units, resampled[group] = units_to_resample(part)
         draws = random_state.randint(2**31 - 1)
@@ -225,6 +220,13 @@ def _parts(groups, n_rows):
     if groups is not None:
         for rows in metrics.rows_by_run(groups, n_rows, at_least=1):
             yield groups[rows[0]], rows
+
+
+def _part(rows, columns, labels):
+    """The columns of some rows, and the labels that figures need."""
+    part = {name: column[rows] for name, column in columns.items()}
+    needed = {name: labels[name] for name in ("run", "inside")}
+    return part | {name: label[rows] for name, label in needed.items() if label is not None}
 
 
 def _without_refused(part, refused):

@@ -92,14 +92,24 @@ def test_an_interval_over_the_limit_is_said(low, high, is_sure):
 def test_the_dossier_has_the_files_as_they_are(tmp_path):
     content = bytes(range(256)) * 5000
     (tmp_path / "a b.csv").write_bytes(content)
-    typed = ["--serial", "7", "--operator", "Ö", "--limits", "bias=5deg/h", "--report-unit=deg/h"]
+    typed = [
+        "--min-coverage",
+        "0",
+        "--serial",
+        "7",
+        "--operator",
+        "Ö",
+        "--limits",
+        "bias=5deg/h",
+        "--report-unit=deg/h",
+    ]
     dossier = dossier_of(make_parser().parse_args([str(tmp_path / "a b.csv"), *typed]))
     (file,) = dossier.files
     assert (file.name, file.n_bytes) == ("a b.csv", len(content))
     assert file.sha256 == hashlib.sha256(content).hexdigest()
     assert (dossier.serial, dossier.operator, dossier.unit) == ("7", "Ö", "deg/h")
     assert dossier.limits == (parse_limit("bias=5deg/h"),)
-    assert ("limits", "bias=5deg/h") in dossier.options
+    assert {("limits", "bias=5deg/h"), ("min-coverage", "0.0")} <= set(dossier.options)
 
 
 def test_a_bad_limit_is_told_in_one_line(capsys):

@@ -23,8 +23,8 @@ NO_DATA = "#e9e9e6"
 SYMBOL = {"deg/s": "°/s", "deg/h": "°/h"}
 PER_UNIT = {"deg/s": 1.0, "deg/h": 3600.0}
 
-_FEW_DECADES, _MOST_DECADES = 2, 8
-_SHORTEST, _LONGEST = 1e-4, 1e7
+_FEWEST_MARKS, _MOST_DECADES = 3, 8
+_WHOLE, _LONGEST = 100.0, 1e7
 
 
 def make_axes(ax, n_axes, size, **options):
@@ -62,26 +62,29 @@ def figures(value):
 
 
 def mark_decades(axis, low, high):
-    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.02, 0.05, 0.1, not powers of ten.
+    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten.
 
-    At 1, 2 and 5 of each decade where the values span few decades, else at whole decades.
+    At whole decades, or where that makes fewer than three marks at 1, 2 and 5 of each, or at all
+    nine.
     """
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
     first, last = (int(np.floor(np.log10(value))) for value in (low, high))
-    n_decades = last - first + 1
-    marks = (1, 2, 5) if n_decades <= _FEW_DECADES else (1,)
-    every = -(-n_decades // _MOST_DECADES)
-    places = [m * 10.0**d for d in range(first, last + 2, every) for m in marks]
-    shown = [place for place in places if 0.9 * low <= place <= 1.1 * high]
-    axis.set_major_locator(FixedLocator(shown or [low, high]))
+    every = -(-(last - first + 1) // _MOST_DECADES)
+    shown: list[float] = []
+    for digits in ((1,), (1, 2, 5), range(1, 10)):
+        places = [m * 10.0**d for d in range(first, last + 2, every) for m in digits]
+        shown = [place for place in places if low <= place <= high]
+        if len(shown) >= _FEWEST_MARKS:
+            break
+    axis.set_major_locator(FixedLocator(shown if len(shown) > 1 else [low, high]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
     axis.set_minor_formatter(NullFormatter())
 
 
 def plain(value):
-    """A mark of an axis without an exponent, where zeros do not hide its size."""
-    return f"{value:,.6g}" if _SHORTEST <= value < _LONGEST else f"{value:.3g}"
+    """A mark of an axis, three digits, without an exponent where zeros do not hide its size."""
+    return f"{value:,.0f}" if _WHOLE <= value < _LONGEST else f"{value:.3g}"
 
 
 def symmetric_limit(values, share=0.995):
