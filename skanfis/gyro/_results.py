@@ -100,21 +100,16 @@ class Results:
 
     def _merit_of_allan(self):
         """Lines of N, B and K, read off the curves that are drawn."""
-        read = [
-            allan_coefficients(curve["averaging_time"], curve["deviation"])
-            for curve in self.allan_curves
-        ]
         lines = []
         for name, usual in FIGURES_OF_ALLAN.items():
             unit, factor = in_rate_unit(usual, self.unit)
-            line = {"group": "all", "figure": name, "unit": unit}
-            notes = []
-            for side, found in zip(("before", "after"), read, strict=True):
-                value = getattr(found, name)
-                line[side] = np.nan if value is None else factor * value
-                if value is None:
-                    notes.append(f"{side}: {found.notes[name]}")
-            lines.append(line | {"note": "; ".join(notes)})
+            line = {"group": "all", "figure": name, "unit": unit, "note": ""}
+            for side, curve in zip(("before", "after"), self.allan_curves, strict=True):
+                value, reason = _read_off(curve, name)
+                line[side] = factor * value
+                if reason:
+                    line["note"] += f"{'; ' if line['note'] else ''}{side}: {reason}"
+            lines.append(line)
         return pd.DataFrame(lines)
 
     @cached_property
@@ -191,6 +186,17 @@ class Results:
         """Whether the temperature both rises and falls."""
         rates = self.temperature_rate
         return rates is not None and rates.min() < -_CLEARLY < _CLEARLY < rates.max()
+
+
+def _read_off(curve, name):
+    """A coefficient of an Allan curve and "", or NaN and why there is none."""
+    try:
+        read = allan_coefficients(curve["averaging_time"], curve["deviation"])
+    except ValueError as error:
+        # Of a curve of too few points to have a slope, which is drawn all the same.
+        return np.nan, str(error)
+    value = getattr(read, name)
+    return (np.nan, read.notes[name]) if value is None else (value, "")
 
 
 def rules_of(calibration):

@@ -7,6 +7,9 @@ of Student's t for the mean of log(s_g / e_g) over the groups, at 95 %. "Decisiv
 interval lies above 1.02, the gain that a fuzzy term must bring too, and that the RMS over all rows
 falls by more than this.
 
+The groups are taken for independent, though the models of different folds share training rows: the
+interval is a little too narrow.
+
 A mean of logarithms, because a group that is ten times larger than the others would decide a mean
 of squares alone; the RMS over all rows besides, because one bad group would hardly show in a mean
 of logarithms.
