@@ -78,7 +78,20 @@ class Results:
     @cached_property
     def merit(self):
         """Figures of merit of all rows in range, and of each group where there are few."""
-        table = gyro_report(
+        whole = self._report(random_state=0)
+        parts = [whole]
+        if self.has_few_groups:
+            # Their intervals, which would take the longest of all, are not shown.
+            groups = self._report(groups=self.calibration.split.labels, n_resamples=0)
+            parts.append(groups[groups["group"] != "all"])
+        if not self.why_no_allan:
+            parts.append(self._merit_of_allan())
+        table = pd.concat(parts, ignore_index=True)
+        table.attrs = whole.attrs
+        return table
+
+    def _report(self, **options):
+        return gyro_report(
             self.rate,
             self.calibration.before,
             self.after,
@@ -86,17 +99,11 @@ class Results:
             temperature_rate=self.temperature_rate,
             time=self.time,
             run=self.run,
-            groups=self.calibration.split.labels if self.has_few_groups else None,
             # At rest there is no scale factor; any full scale will do.
             full_scale=np.abs(self.rate).max() or 1.0,
             rate_unit=self.unit,
-            random_state=0,
+            **options,
         )
-        if self.why_no_allan:
-            return table
-        found = pd.concat([table, self._merit_of_allan()], ignore_index=True)
-        found.attrs = table.attrs
-        return found
 
     def _merit_of_allan(self):
         """Lines of N, B and K, read off the curves that are drawn."""
