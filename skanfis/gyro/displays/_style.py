@@ -23,8 +23,8 @@ NO_DATA = "#e9e9e6"
 SYMBOL = {"deg/s": "°/s", "deg/h": "°/h"}
 PER_UNIT = {"deg/s": 1.0, "deg/h": 3600.0}
 
-_FEWEST_MARKS, _MOST_DECADES = 3, 8
-_WHOLE, _LONGEST = 100.0, 1e7
+_LEAST_ROOM = 0.14  # between two marks, as a part of the axis
+_WHOLE, _LONGEST = 100.0, 1e6
 
 
 def make_axes(ax, n_axes, size, **options):
@@ -64,20 +64,19 @@ def figures(value):
 def mark_decades(axis, low, high):
     """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten.
 
-    At whole decades, or where that makes fewer than three marks at 1, 2 and 5 of each, or at all
-    nine.
+    Whole decades first, then 2 and 5 of each, then the others, as far as there is room between.
     """
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
-    first, last = (int(np.floor(np.log10(value))) for value in (low, high))
-    every = -(-(last - first + 1) // _MOST_DECADES)
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    room = _LEAST_ROOM * np.log(high / low)
     shown: list[float] = []
-    for digits in ((1,), (1, 2, 5), range(1, 10)):
-        places = [m * 10.0**d for d in range(first, last + 2, every) for m in digits]
-        shown = [place for place in places if low <= place <= high]
-        if len(shown) >= _FEWEST_MARKS:
-            break
-    axis.set_major_locator(FixedLocator(shown if len(shown) > 1 else [low, high]))
+    for digit in (1, 2, 5, 3, 4, 6, 7, 8, 9):
+        for place in (digit * 10.0**decade for decade in decades):
+            is_free = all(abs(np.log(place / other)) >= room for other in shown)
+            if low <= place <= high and is_free:
+                shown.append(place)
+    axis.set_major_locator(FixedLocator(sorted(shown) if len(shown) > 1 else [low, high]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
     axis.set_minor_formatter(NullFormatter())
 
