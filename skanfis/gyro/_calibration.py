@@ -2,38 +2,30 @@
 
 import warnings
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import pandas as pd
-from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from .. import ANFISRegressor
-from ..exceptions import OutOfBoundsWarning
 from ..options import LinearExtrapolation
 from ._ask import ask
+from ._choice import Choice, choose, choose_in_folds, some_rows
 from ._glitches import find_glitches
+from ._models import make_estimator
+from ._simpler import Simpler, simpler_compensations
 from ._split import Split
-from ._structure import grow_terms, held_out_rms
 from ._units import SIGNALS
+from ._verdict import Verdict, judge
 from .compensator import GyroCompensator, features
-from .compose import ResidualRegressor
 from .log import LogError
 from .metrics import scale_factor
-from .physics import OpenLoopArcsineRegressor
 
-__all__ = ["MAX_EXTRAPOLATION", "Calibration", "Recipe", "calibrate"]
+__all__ = ["MAX_EXTRAPOLATION", "MODEL", "Calibration", "Recipe", "calibrate"]
 
 # That of the estimator.
 MAX_EXTRAPOLATION = LinearExtrapolation().max_extrapolation
 
-# For comparing structures; what neighbours in time say twice is left out.
-_SEARCH_ROWS = 6_000
-# Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
-_ROUNDS = 3
-_BASELINES = {"straight line": 1, "cubic polynomial": 3}
+# Its name in a verdict.
+MODEL = "this model"
 
 
 @dataclass(frozen=True)
@@ -61,8 +53,11 @@ class Calibration:
     """A compensator, and what was found out about it.
 
     ``before`` and ``after`` are the indicated rate and the held-out compensated one of every row,
-    ``inside`` whether the row was in the bounds of the model that had not seen it. ``warnings`` are
-    those of the fit; ``cautions`` say why the compensator should not be used as it is.
+    ``inside`` whether the row was in the bounds of the model that had not seen it. The model's
+    structure is ``choice``; those of the models that were held out are ``fold_choices``, each
+    chosen from its fold's training rows, or None where nothing was chosen. ``simpler`` are
+    compensations without rules, judged with the model by ``verdict`` on the rows in range.
+    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     """
 
     recipe: Recipe
@@ -73,17 +68,33 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    terms: tuple[int, ...] | None
-    tried: list
-    baselines: dict
+    choice: Choice
+    fold_choices: list[Choice] | None
+    simpler: list[Simpler]
+    verdict: Verdict
     n_fit_rows: int
     warnings: list
-    cautions: list
+    glitches: list
 
     @property
     def rate(self):
         """True rate of every row [deg/s]."""
         return self.log["rate"].to_numpy()
+
+    @property
+    def in_range(self):
+        """Rows that were in the bounds of a model new to them, and have its answer."""
+        return self.inside & np.isfinite(self.after)
+
+    @property
+    def cautions(self):
+        """Sentences that say why the compensator should not be used as it is; rates in deg/s."""
+        return self.cautions_in("deg/s")
+
+    def cautions_in(self, unit, per_unit=1.0):
+        """The same, with errors in another unit, of which ``per_unit`` are 1 deg/s."""
+        before, after = (per_unit * (rate - self.rate) for rate in (self.before, self.after))
+        return [*_what_is_worse(before, after, self.inside, unit), *self.glitches]
 
 
 def calibrate(log, split, recipe, tell, name_row="row {}".format):
@@ -97,38 +108,21 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     X = features(log, recipe.inputs, recipe.time_constant)
     before = log["output"].to_numpy() / factor
     error = before - log["rate"].to_numpy()
-    glitches = [
-        f"{name_row(glitch.row)}: {glitch.reason} is supported by no other row; if it is a glitch, "
-        "drop this row and calibrate again."
-        for glitch in find_glitches(log, error)
-    ]
-    for sentence in glitches:
-        tell(f"warning: {sentence}")
-    target = log["rate"].to_numpy() if recipe.physics else error
+    glitches = _glitches(log, error, name_row, tell)
+    rate = log["rate"].to_numpy()
+    target = rate if recipe.physics else error
     rng = np.random.default_rng(0)
-    chosen, tried, baselines = _search(X, target, error, split, recipe, rng, tell)
-    make = partial(make_estimator, recipe, chosen)
-    predicted, inside = _held_out(make, X, target, split, recipe, rng, tell)
-    if not (inside & np.isfinite(predicted)).any():
-        raise LogError(
-            f"the compensator could not be checked: every row lies outside the range of the rows "
-            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
-            "overlap in temperature, rate and time."
-        )
-    rows = _some(np.arange(len(X)), recipe.fit_rows, X, rng)
+    choice = choose(X, target, split.folds, recipe, rng, tell)
+    fold_choices = choose_in_folds(X, target, split.folds, recipe, tell)
+    folds = [(some_rows(train, recipe.fit_rows, X, rng), test) for train, test in split.folds]
+    structures = [fold.structure for fold in fold_choices or [choice] * len(folds)]
+    predicted, inside = _held_out(X, target, folds, structures, recipe, split.kind, tell)
+    _check_in_range(inside & np.isfinite(predicted), split)
+    rows = some_rows(np.arange(len(X)), recipe.fit_rows, X, rng)
+    tell("comparing with simpler compensations")
+    simpler = list(simpler_compensations(X, rate, before, folds, rows))
     tell(f"fitting to {rows.size:,} rows")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        estimator = make().fit(X.iloc[rows], target[rows])
-    compensator = GyroCompensator(
-        estimator,
-        recipe.inputs,
-        predicts="rate" if recipe.physics else "error",
-        scale_factor=factor,
-        output_unit=recipe.output_unit,
-        time_constant=recipe.time_constant,
-        min_coverage=recipe.min_coverage,
-    )
+    compensator, caught = _fit(X.iloc[rows], target[rows], recipe, choice, factor)
     after = compensator.compensate(before, predicted)
     return Calibration(
         recipe=recipe,
@@ -139,16 +133,62 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
         before=before,
         after=after,
         inside=inside,
-        terms=chosen[1],
-        tried=tried,
-        baselines=baselines,
+        choice=choice,
+        fold_choices=fold_choices,
+        simpler=simpler,
+        verdict=_judge(simpler, after, rate, inside & np.isfinite(after), split),
         n_fit_rows=rows.size,
-        warnings=sorted({str(warning.message) for warning in caught}),
-        cautions=[*_what_is_worse(error, after - log["rate"].to_numpy(), inside), *glitches],
+        warnings=caught,
+        glitches=glitches,
     )
 
 
-def _what_is_worse(before, after, inside):
+def _glitches(log, error, name_row, tell):
+    """A sentence on each row that no other supports."""
+    sentences = [
+        f"{name_row(glitch.row)}: {glitch.reason} is supported by no other row; if it is a glitch, "
+        "drop this row and calibrate again."
+        for glitch in find_glitches(log, error)
+    ]
+    for sentence in sentences:
+        tell(f"warning: {sentence}")
+    return sentences
+
+
+def _check_in_range(answered, split):
+    if not answered.any():
+        raise LogError(
+            f"the compensator could not be checked: every row lies outside the range of the rows "
+            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
+            "overlap in temperature, rate and time."
+        )
+
+
+def _judge(simpler, after, rate, rows, split):
+    """The verdict on the rows that the model answered in range: the same rows for all."""
+    rates = {each.name: each.after for each in simpler if each.after is not None} | {MODEL: after}
+    errors = {name: (compensated - rate)[rows] for name, compensated in rates.items()}
+    return judge(errors, split.labels[rows])
+
+
+def _fit(X, target, recipe, choice, factor):
+    """The compensator, and what its fit warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        estimator = make_estimator(recipe, choice.structure).fit(X, target)
+    compensator = GyroCompensator(
+        estimator,
+        recipe.inputs,
+        predicts="rate" if recipe.physics else "error",
+        scale_factor=factor,
+        output_unit=recipe.output_unit,
+        time_constant=recipe.time_constant,
+        min_coverage=recipe.min_coverage,
+    )
+    return compensator, sorted({str(warning.message) for warning in caught})
+
+
+def _what_is_worse(before, after, inside, unit):
     """Sentences about the held-out rows, in range and out of it, that are better left alone."""
     for rows, where in ((inside, "in range"), (~inside, "out of range")):
         answered = rows & np.isfinite(after)
@@ -158,107 +198,18 @@ def _what_is_worse(before, after, inside):
         if became > was:
             yield (
                 f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
-                f"{became:.4g} deg/s RMS."
+                f"{became:.4g} {unit} RMS."
             )
 
 
-def make_estimator(recipe, choice):
-    """The estimator of a recipe; ``choice`` is the degree of the law and the numbers of terms."""
-    degree, terms = choice
-    outside = recipe.outside
-    anfis = ANFISRegressor(
-        "auto" if terms is None else list(terms),
-        out_of_bounds=LinearExtrapolation(recipe.max_extrapolation)
-        if outside == "linear"
-        else outside,
-        n_jobs=recipe.n_jobs,
-    )
-    pipeline = make_pipeline(StandardScaler(), anfis)
-    if not recipe.physics:
-        return pipeline
-    knows_lag = {"temperature", "temperature_rate"} <= set(recipe.inputs)
-    law = OpenLoopArcsineRegressor(
-        "output",
-        "temperature" if "temperature" in recipe.inputs else None,
-        # The lag of the thermometer is part of the law where it can be known.
-        temperature_rate="temperature_rate" if knows_lag else None,
-        amplitude_degree=degree,
-        bias_degree=degree,
-        out_of_bounds=recipe.outside,
-        warn_out_of_bounds=False,
-    )
-    return ResidualRegressor(law, pipeline, n_rounds=_ROUNDS)
-
-
-def _search(X, target, error, split, recipe, rng, tell):
-    """The choice for :func:`make_estimator`, all that was tried, and the baselines' errors."""
-    folds = [
-        (_some(train, _SEARCH_ROWS, X, rng), _some(test, _SEARCH_ROWS, X, rng))
-        for train, test in split.folds
-    ]
-
-    def score(terms, degree=1):
-        make = partial(make_estimator, recipe, (degree, terms))
-        return held_out_rms(partial(_errors_of_fold, make, X, target), folds)
-
-    baselines = {
-        name: held_out_rms(partial(_errors_of_fold, partial(_polynomial, d), X, error), folds)
-        for name, d in _BASELINES.items()
-    }
-    degree = 1
-    if recipe.physics:
-        linear = (1,) * len(recipe.inputs)
-        degree = min((1, 2), key=lambda d: score(linear, d))
-        tell(f"law of the open loop with coefficients of degree {degree} in temperature")
-    if recipe.terms == "auto":
-        return (degree, None), [(None, score(None, degree))], baselines
-    if recipe.terms != "search":
-        return (degree, recipe.terms), [(recipe.terms, score(recipe.terms, degree))], baselines
-    tell(f"choosing the terms on {len(folds)} folds of {folds[0][0].size:,} rows")
-    terms, tried = grow_terms(
-        partial(score, degree=degree), len(recipe.inputs), recipe.max_rules, tell
-    )
-    return (degree, tuple(terms)), tried, baselines
-
-
-def _held_out(make, X, target, split, recipe, rng, tell):
+def _held_out(X, target, folds, structures, recipe, kind, tell):
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
     with warnings.catch_warnings():
         # The final fit warns of the same.
         warnings.simplefilter("ignore")
-        for number, (train, test) in enumerate(split.folds, start=1):
-            tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
-            rows = _some(train, recipe.fit_rows, X, rng)
-            estimator = make().fit(X.iloc[rows], target[rows])
+        for number, ((train, test), structure) in enumerate(zip(folds, structures, strict=True), 1):
+            tell(f"checking by held-out {kind}: fold {number} of {len(folds)}")
+            estimator = make_estimator(recipe, structure).fit(X.iloc[train], target[train])
             predicted[test] = estimator.predict(X.iloc[test])
             inside[test] = ask(estimator, "in_bounds", X.iloc[test])
     return predicted, inside
-
-
-def _errors_of_fold(make, X, target, train, test):
-    """Errors of the test rows, and which of them are in the range of the training rows."""
-    estimator = make().fit(X.iloc[train], target[train])
-    low, high = X.iloc[train].min(), X.iloc[train].max()
-    tested = X.iloc[test]
-    inside = ((tested >= low) & (tested <= high)).all(axis=1).to_numpy()
-    with warnings.catch_warnings():
-        # Rows out of range are told by ``inside``.
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
-        errors = estimator.predict(tested) - target[test]
-    return errors, inside & np.isfinite(errors)
-
-
-def _polynomial(degree):
-    return make_pipeline(
-        StandardScaler(), PolynomialFeatures(degree, include_bias=False), LinearRegression()
-    )
-
-
-def _some(rows, n_rows, X, rng):
-    """At most so many of the rows in their order, with those at the ends of every input's range."""
-    if rows.size <= n_rows:
-        return rows
-    values = X.to_numpy()[rows]
-    ends = np.concatenate([values.argmin(axis=0), values.argmax(axis=0)])
-    chosen = rng.choice(rows.size, n_rows, replace=False)
-    return rows[np.unique(np.concatenate([chosen, ends]))]

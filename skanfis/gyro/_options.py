@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 from ._calibration import MAX_EXTRAPOLATION
+from ._dossier import add_report_options
 from ._split import KINDS
 from ._units import units_of
 from .compensator import INPUTS
@@ -184,6 +185,7 @@ def make_parser():
         help="what to hold out in the check; by default (auto) devices where there are three or "
         "more, else runs, and rate levels where these could be learnt by heart",
     )
+    add_report_options(parser)
     output = parser.add_argument_group("output")
     output.add_argument(
         "--apply",

@@ -3,13 +3,14 @@
 The figures are not pyplot's: no screen is asked for, and none stays open.
 """
 
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from ..inspection import MembershipDisplay
 from ._results import rules_of
-from .allan import ROWS_PER_TIME
 from .displays import (
     AllanDisplay,
     CoverageDisplay,
@@ -20,19 +21,23 @@ from .displays import (
     ScaleFactorErrorDisplay,
 )
 
-__all__ = ["PICTURES", "Picture", "draw_coverage", "draw_memberships", "why_no_allan"]
+__all__ = ["PICTURES", "Picture", "draw_coverage", "draw_memberships"]
 
-_UNEVEN = 0.01
+_FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
 _MOST_ROWS_SHOWN = 20_000
 _MOST_LINES = 30
 
 
 class Picture(NamedTuple):
-    """A matplotlib figure, what it shows for those who cannot see it, and its caption."""
+    """A matplotlib figure, what it shows for those who cannot see it, and its caption.
+
+    ``files`` are the data behind it, text in CSV by the name of a file.
+    """
 
     figure: Any
     alt: str
     caption: str
+    files: dict[str, str]
 
 
 def draw_error_by_time(results):
@@ -40,7 +45,7 @@ def draw_error_by_time(results):
     if results.time is None:
         return None
     figure, axes = _panels(2)
-    ErrorDisplay.from_predictions(
+    display = ErrorDisplay.from_predictions(
         *_rates(results),
         position=results.since_power_on,
         position_label="time since power-on [s]",
@@ -48,12 +53,13 @@ def draw_error_by_time(results):
         ax=axes,
     )
     caption = "Error against time. Bands reach from the smallest to the largest error."
-    return Picture(figure, "Error against time, before and after", caption)
+    alt = "Error against time, before and after"
+    return Picture(figure, alt, caption, _files("error-by-time", display.tables()))
 
 
 def draw_error_by_temperature(results):
     figure, axes = _panels(2)
-    ErrorDisplay.from_predictions(
+    display = ErrorDisplay.from_predictions(
         *_rates(results),
         position=results.temperature,
         position_label="temperature [°C]",
@@ -61,7 +67,8 @@ def draw_error_by_temperature(results):
         ax=axes,
     )
     alt = "Error against temperature, before and after"
-    return Picture(figure, alt, "Error against temperature.")
+    files = _files("error-by-temperature", display.tables())
+    return Picture(figure, alt, "Error against temperature.", files)
 
 
 def draw_scale_factor_error(results):
@@ -69,12 +76,12 @@ def draw_scale_factor_error(results):
     if np.ptp(results.rate) == 0:
         return None
     figure, axes = _panels(2)
-    ScaleFactorErrorDisplay.from_predictions(
+    display = ScaleFactorErrorDisplay.from_predictions(
         *_rates(results), temperature=results.temperature, ax=axes
     )
     alt = "Scale-factor error against rate at three temperatures, before and after"
     caption = "Scale-factor error against rate, in three bands of temperature."
-    return Picture(figure, alt, caption)
+    return Picture(figure, alt, caption, _files("scale-factor-error", display.tables()))
 
 
 def draw_hysteresis(results):
@@ -82,10 +89,11 @@ def draw_hysteresis(results):
     if not results.warms_and_cools:
         return None
     figure, axes = _panels(2)
-    HysteresisDisplay.from_predictions(
+    display = HysteresisDisplay.from_predictions(
         *_rates(results),
         temperature=results.temperature,
         temperature_rate=results.temperature_rate,
+        unit=results.unit,
         ax=axes,
     )
     alt = "Bias against temperature, warming and cooling apart, before and after"
@@ -93,7 +101,7 @@ def draw_hysteresis(results):
         "Bias while warming and while cooling; what depends on the rate is taken off, other than "
         "in the table. Temperature alone cannot close a loop."
     )
-    return Picture(figure, alt, caption)
+    return Picture(figure, alt, caption, _files("hysteresis", display.tables()))
 
 
 def draw_surface(results):
@@ -101,7 +109,7 @@ def draw_surface(results):
     if np.ptp(results.rate) == 0:
         return None
     figure = _figure(7.0, 3.4)
-    ResidualSurfaceDisplay.from_predictions(
+    display = ResidualSurfaceDisplay.from_predictions(
         *_rates(results),
         temperature=results.temperature,
         unit=results.unit,
@@ -109,54 +117,31 @@ def draw_surface(results):
     )
     alt = "Mean residual and number of rows over temperature and rate"
     caption = "What is left over temperature and rate (left), and where there are data (right)."
-    return Picture(figure, alt, caption)
+    return Picture(figure, alt, caption, _files("residual-surface", display.tables()))
 
 
 def draw_groups(results):
     groups = results.calibration.split.labels
     n_lines = min(np.unique(groups.astype(str)).size, _MOST_LINES)
     figure, axes = _panels(1, height=1.6 + 0.2 * n_lines)
-    GroupResidualDisplay.from_predictions(
+    display = GroupResidualDisplay.from_predictions(
         *_rates(results), groups=groups, unit=results.unit, ax=axes
     )
     alt = "RMS error of every held-out group, before and after"
-    return Picture(figure, alt, "Every held-out group, the worst at the top.")
+    files = _files("held-out-groups", display.tables())
+    return Picture(figure, alt, "Every held-out group, the worst at the top.", files)
 
 
 def draw_allan(results):
-    """None where :func:`why_no_allan` has a reason."""
-    if why_no_allan(results):
+    """None where there is a reason against it."""
+    if results.why_no_allan:
         return None
-    rows = results.in_whole_runs
     figure, axes = _panels(1)
-    AllanDisplay.from_predictions(
-        *(rates[rows] for rates in _rates(results)),
-        sampling_interval=results.interval,
-        run=None if results.run is None else results.run[rows],
-        ax=axes,
-    )
+    before, after = results.allan_curves
+    display = AllanDisplay(before=before, after=after).plot(axes, unit=results.unit)
     caption = "Allan deviation of the error, over the runs that are in range from end to end."
-    return Picture(figure, "Allan deviation before and after", caption)
-
-
-def why_no_allan(results):
-    """Why there is no Allan curve; empty where there is one."""
-    try:
-        import allantools  # noqa: F401
-    except ImportError:
-        return "allantools is not installed (pip install 'skanfis[allan]')"
-    if results.time is None:
-        return "the log has no time"
-    steps = results.steps
-    if not steps.size or np.ptp(steps) > _UNEVEN * np.median(steps):
-        return "the rows are not evenly spaced in time"
-    rows = results.in_whole_runs
-    if not rows.any():
-        return "no run is in range from end to end"
-    runs = np.zeros(rows.size) if results.run is None else results.run
-    _, lengths = np.unique(runs[rows].astype(str), return_counts=True)
-    is_enough = lengths.max() >= ROWS_PER_TIME
-    return "" if is_enough else f"no run in range has {ROWS_PER_TIME} rows"
+    alt = "Allan deviation before and after"
+    return Picture(figure, alt, caption, _files("allan-deviation", display.tables()))
 
 
 PICTURES = (
@@ -175,15 +160,20 @@ def draw_coverage(calibration):
     if not {"temperature", "output"} <= set(calibration.X):
         return None
     figure, axes = _panels(1, height=4.0)
-    CoverageDisplay.from_estimator(
+    display = CoverageDisplay.from_estimator(
         calibration.compensator.estimator,
-        _some_rows(calibration.X),
+        calibration.X,
+        min_coverage=calibration.compensator.min_coverage,
         units={"output": calibration.recipe.output_unit, "temperature_rate": "degC/s"},
         ax=axes,
     )
     alt = "Coverage over temperature and output, with the range of the calibration"
-    caption = "Coverage by the calibration data; other inputs at their medians."
-    return Picture(figure, alt, caption)
+    caption = (
+        "Coverage by the calibration data; other inputs at their medians. Hatched cells hold no "
+        "row: what is said there is a guess from their neighbours. Rows outside the dashed line "
+        "are flagged, and within it those beyond the dotted line, where there is one."
+    )
+    return Picture(figure, alt, caption, _files("coverage", display.tables()))
 
 
 def draw_memberships(calibration):
@@ -193,18 +183,54 @@ def draw_memberships(calibration):
         return None
     figure, axes = _panels(n_inputs, height=0.6 + 1.9 * n_inputs, sharex=False)
     estimator = calibration.compensator.estimator
-    MembershipDisplay.from_estimator(
+    display = MembershipDisplay.from_estimator(
         getattr(estimator, "residual_", estimator),
         _some_rows(calibration.X),
         ax=list(np.atleast_1d(axes)),
     )
     alt = "Membership functions before and after training, over histograms of the data"
     caption = "Fuzzy terms before training (dashed) and after, over the data."
-    return Picture(figure, alt, caption)
+    return Picture(figure, alt, caption, _files("fuzzy-terms", _tables_of_terms(display)))
 
 
 def _rates(results):
     return results.rate, results.before, results.after
+
+
+def _tables_of_terms(display):
+    """What a MembershipDisplay has drawn."""
+    terms = [
+        pd.DataFrame(
+            {
+                "input": each.input_name,
+                "term": term,
+                "value": each.grid,
+                "truth before": before,
+                "truth after": after,
+            }
+        )
+        for each in display.inputs
+        for term, before, after in zip(each.term_names, each.before, each.after, strict=True)
+    ]
+    return {"terms": pd.concat(terms, ignore_index=True)}
+
+
+def _files(subject, tables):
+    """Tables as CSV: nine digits, names that any program reads, no cell that a program runs."""
+    return {
+        f"{subject}{f'-{name}' if len(tables) > 1 else ''}.csv": _harmless(table)
+        .rename(columns=lambda column: column.replace("°C", "degC").replace("°", "deg"))
+        .to_csv(index=False, float_format="%.9g", lineterminator="\n")
+        for name, table in tables.items()
+    }
+
+
+def _harmless(table):
+    """Text that a spreadsheet would take for a formula gets an apostrophe in front."""
+    words = table.select_dtypes(exclude="number")
+    return table.assign(
+        **{name: [_FORMULA.sub(r"'\g<0>", str(value)) for value in words[name]] for name in words}
+    )
 
 
 def _panels(n_axes, height=4.2, sharex=True):

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 
-__all__ = ["grow_terms", "held_out_rms"]
+__all__ = ["errors_of_fold", "grow_terms", "held_out_rms"]
 
 # A term has to pay for the rules that it brings.
 _LEAST_GAIN = 0.02
@@ -51,3 +51,16 @@ def held_out_rms(fit_and_predict, folds):
             squares += float(np.sum(errors[inside] ** 2))
             count += int(inside.sum())
     return math.sqrt(squares / count) if count else math.inf
+
+
+def errors_of_fold(make, X, target, train, test, *, quiet=False):
+    """Errors of the test rows, and which of them are in the range of the training rows."""
+    with warnings.catch_warnings():
+        if quiet:
+            warnings.simplefilter("ignore")
+        estimator = make().fit(X.iloc[train], target[train])
+        errors = estimator.predict(X.iloc[test]) - target[test]
+    low, high = X.iloc[train].min(), X.iloc[train].max()
+    tested = X.iloc[test]
+    inside = ((tested >= low) & (tested <= high)).all(axis=1).to_numpy()
+    return errors, inside & np.isfinite(errors)

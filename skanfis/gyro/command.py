@@ -11,9 +11,11 @@ import pandas as pd
 from ..export import export_c
 from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
+from ._dossier import dossier_of
 from ._options import PROGRAM, make_parser
 from ._split import choose_split
 from ._staging import Staging
+from ._summary import errors_and_verdict
 from .c_code import export_c_physics
 from .compensator import INPUTS, STATUS, GyroCompensator
 from .html_report import report_page, rules_text
@@ -312,7 +314,7 @@ def _require_matplotlib():
 
 
 def _write(calibration, options, folder):
-    page = report_page(calibration, _title(options.logs))
+    page = report_page(calibration, _title(options.logs), dossier_of(options))
     compensator = calibration.compensator
     (folder / _FILES["report"]).write_text(page, encoding="utf-8")
     joblib.dump(compensator, folder / _FILES["model"])
@@ -331,20 +333,7 @@ def _title(logs):
 
 
 def _summary(calibration, folder):
-    before = _rms(calibration.before - calibration.rate)
-    errors = calibration.after - calibration.rate
-    inside = calibration.inside & np.isfinite(errors)
-    outside = ~calibration.inside & np.isfinite(errors)
-    lines = [
-        f"error before   {before:.4g} deg/s RMS",
-        f"error after    {_rms(errors[inside]):.4g} deg/s RMS, peak "
-        f"{np.abs(errors[inside]).max():.4g}, on {inside.sum():,} held-out rows in range",
-    ]
-    if outside.any():
-        lines.append(
-            f"out of range   {_rms(errors[outside]):.4g} deg/s RMS on {outside.sum():,} held-out "
-            "rows, all of them flagged"
-        )
+    lines = errors_and_verdict(calibration)
     lines += [
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
@@ -368,7 +357,7 @@ def _summary_of_rows(log, compensated, compensator, target):
             )
             if np.isfinite(after).any():
                 lines.append(
-                    f"RMS error      {_rms(before):.4g} deg/s before, "
+                    f"RMS error      {_rms(before[np.isfinite(after)]):.4g} deg/s before, "
                     f"{_rms(after[np.isfinite(after)]):.4g} after ({label})"
                 )
     return lines

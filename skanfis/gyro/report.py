@@ -1,52 +1,18 @@
 """One table of all figures of merit, per group, before and after, with bootstrap intervals."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
-
 import numpy as np
 import pandas as pd
 from sklearn.utils import check_random_state
 
 from . import metrics
+from ._bootstrap import VALUES, Bootstrap, units_to_resample
 from ._columns import check_column, check_labels
-from .allan import allan_coefficients, allan_deviation
+from ._figures_of_merit import figures_of_merit
+from ._rate_units import RATE_UNITS, in_rate_unit
 
 __all__ = ["gyro_report"]
 
-# With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
-_FEWEST_RUNS = 5
-_N_BLOCKS = 30
-# Row figures of a resample cost time in proportion to its rows, and their spread comes from the
-# runs or blocks: evenly thinned rows show it as well.
-_MOST_ROWS = 2_000
-# A nonlinearity is looked for in means over such parts of the range of rates.
-_RATE_BINS = 101
-_UNEVEN = 0.01  # largest deviation of the time between rows, relative
-_FEWEST_DEFINED = 0.9  # part of the resamples that must have the figure
-
 _NAN = float("nan")
-
-
-@dataclass(frozen=True)
-class _Figure:
-    """A figure of merit: a function of the rows (a dict of columns) and "before" or "after".
-
-    If ``combine`` is given, ``of`` gives one value or row of values per run, and ``combine`` makes
-    the figure of them.
-    """
-
-    name: str
-    unit: str
-    of: Callable
-    needs: tuple[str, ...] = ()
-    combine: Callable | None = None
-    only_after: bool = False
-    no_interval: str = ""
-
-    def value(self, rows, which):
-        found = self.of(rows, which)
-        return found if self.combine is None else self.combine(found)
 
 
 def gyro_report(
@@ -66,6 +32,7 @@ def gyro_report(
     allan=False,
     confidence_level=0.95,
     n_resamples=200,
+    rate_unit=None,
     random_state=None,
 ):
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
@@ -108,6 +75,9 @@ def gyro_report(
         Of the intervals, in (0, 1).
     n_resamples : int, default=200
         Number of resamples of the bootstrap, zero (no intervals) or more.
+    rate_unit : {"deg/s", "deg/h"}, default=None
+        Unit of every figure that is a rate, or a rate per something; None leaves to each the unit
+        that is usual: deg/s for residuals, deg/h for biases.
     random_state : int, RandomState instance or None, default=None
         Seed of the bootstrap; an int makes the intervals reproducible.
 
@@ -169,293 +139,39 @@ def gyro_report(
     labels = _labels(columns["rate"].size, run=run, groups=groups, inside=inside)
     full_scale = np.abs(columns["rate"]).max() if full_scale is None else full_scale
     _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples)
+    if rate_unit not in (None, *RATE_UNITS):
+        raise ValueError(
+            f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
+        )
     given = set(columns) | {name for name in ("run",) if labels[name] is not None}
     figures = [
         figure
-        for figure in _figures(full_scale, nominal_scale_factor, averaging_times, allan)
+        for figure in figures_of_merit(full_scale, nominal_scale_factor, averaging_times, allan)
         if given.issuperset(figure.needs)
     ]
     random_state = check_random_state(random_state)
     lines, resampled = [], {}
     for group, rows in _parts(labels["groups"], refused.size):
-        part = {name: column[rows] for name, column in columns.items()}
-        part |= {
-            name: label[rows]
-            for name, label in (("run", labels["run"]), ("inside", labels["inside"]))
-            if label is not None
-        }
+        part = _part(rows, columns, labels)
         counts, part = _without_refused(part, refused[rows])
-        units, resampled[group] = _units(part)
+        units, resampled[group] = units_to_resample(part)
         draws = random_state.randint(2**31 - 1)
-        bootstrap = _Bootstrap(part, units, resampled[group], n_resamples, confidence_level, draws)
+        bootstrap = Bootstrap(part, units, resampled[group], n_resamples, confidence_level, draws)
         lines += [[group, *line] for line in counts + bootstrap.lines(figures)]
-    report = pd.DataFrame(lines, columns=["group", "figure", "unit", *_VALUES, "note"])
+    report = pd.DataFrame(lines, columns=["group", "figure", "unit", *VALUES, "note"])
     if after is None:
-        report = report.drop(columns=_VALUES[3:])
+        report = report.drop(columns=VALUES[3:])
+    if rate_unit is not None:
+        report = _in_unit(report, rate_unit)
     report.attrs["resampled"] = resampled
     return report
 
 
-_VALUES = ["before", "before_low", "before_high", "after", "after_low", "after_high"]
-
-
-def _figures(full_scale, nominal, averaging_times, allan):
-    """Every figure of merit, in the order of the table."""
-
-    def left(rows, which):
-        return rows[which] - rows["rate"]
-
-    def error(rows, which):
-        return metrics.input_error(rows["rate"], rows[which])
-
-    def nonlinearity(statistic):
-        def of(rows, which):
-            levels = _means_by_rate(rows["rate"], rows[which])
-            return metrics.scale_factor_nonlinearity(
-                *levels, statistic=statistic, full_scale=full_scale
-            )
-
-        return of
-
-    def stability(averaging_time):
-        def of(rows, which):
-            run = rows.get("run")
-            return metrics.squares_by_run(error(rows, which), rows["time"], averaging_time, run)
-
-        return of
-
-    peak = "largest value: no interval"
-    figures = [
-        _Figure("residual_rms", "deg/s", lambda r, w: metrics.residual_rms(left(r, w))),
-        _Figure(
-            "residual_peak",
-            "deg/s",
-            lambda r, w: metrics.residual_peak(left(r, w)),
-            no_interval=peak,
-        ),
-        _Figure(
-            "residual_peak_to_peak",
-            "deg/s",
-            lambda r, w: metrics.residual_peak_to_peak(left(r, w)),
-            no_interval=peak,
-        ),
-        _Figure(
-            "reduction_factor",
-            "",
-            lambda r, _: metrics.reduction_factor(left(r, "before"), left(r, "after")),
-            needs=("after",),
-            only_after=True,
-        ),
-        _Figure(
-            "scale_factor_error",
-            "ppm",
-            lambda r, w: metrics.scale_factor_error(r["rate"], r[w], nominal=nominal),
-        ),
-        _Figure("scale_factor_nonlinearity", "ppm of full scale", nonlinearity("max")),
-        _Figure("scale_factor_nonlinearity_rms", "ppm of full scale", nonlinearity("rms")),
-        _Figure(
-            "scale_factor_asymmetry",
-            "ppm",
-            lambda r, w: metrics.scale_factor_asymmetry(r["rate"], r[w]),
-        ),
-        _Figure(
-            "scale_factor_repeatability",
-            "ppm",
-            lambda r, w: metrics.scale_factor_by_run(r["rate"], r[w], r["run"]),
-            needs=("run",),
-            combine=metrics.relative_spread,
-        ),
-        _Figure(
-            "scale_factor_temperature_sensitivity",
-            "ppm/degC",
-            lambda r, w: metrics.scale_factor_temperature_sensitivity(
-                r["rate"], r[w], r["temperature"]
-            ),
-            needs=("temperature",),
-        ),
-        _Figure("bias", "deg/h", lambda r, w: metrics.bias(error(r, w))),
-        _Figure(
-            "bias_repeatability",
-            "deg/h",
-            lambda r, w: metrics.error_by_run(error(r, w), r["run"]),
-            needs=("run",),
-            combine=metrics.spread_of_bias,
-        ),
-        _Figure(
-            "bias_temperature_sensitivity",
-            "deg/h/degC",
-            lambda r, w: metrics.bias_temperature_sensitivity(
-                error(r, w), r["temperature"], temperature_rate=r.get("temperature_rate")
-            ),
-            needs=("temperature",),
-        ),
-        _Figure(
-            "bias_ramp_sensitivity",
-            "deg/h/(degC/min)",
-            lambda r, w: metrics.bias_ramp_sensitivity(
-                error(r, w), r["temperature_rate"], temperature=r.get("temperature")
-            ),
-            needs=("temperature_rate",),
-        ),
-        _Figure(
-            "hysteresis",
-            "deg/h",
-            lambda r, w: metrics.hysteresis(error(r, w), r["temperature"], r["temperature_rate"]),
-            needs=("temperature", "temperature_rate"),
-        ),
-        *(
-            _Figure(
-                f"bias_stability_{seconds:g}s",
-                "deg/h",
-                stability(seconds),
-                needs=("time",),
-                combine=metrics.pooled_deviation,
-            )
-            for seconds in averaging_times
-        ),
-    ]
-    if allan:
-        units = {
-            "angle_random_walk": "deg/sqrt(h)",
-            "bias_instability": "deg/h",
-            "allan_minimum": "deg/h",
-            "rate_random_walk": "deg/h/sqrt(h)",
-        }
-        reader = _AllanReader(error)
-        figures += [reader.figure(name, unit) for name, unit in units.items()]
-    return figures
-
-
-class _AllanReader:
-    """Reads coefficients off the Allan curve of the error, which is made once per column."""
-
-    def __init__(self, error):
-        self._error = error
-        self._read = {}
-
-    def figure(self, name, unit):
-        interval = "no interval: see the standard errors of allan_deviation"
-        return _Figure(name, unit, partial(self._coefficient, name), no_interval=interval)
-
-    def _coefficient(self, name, rows, which):
-        column, read = self._read.get(which, (None, None))
-        if column is not rows[which]:
-            read = self._coefficients(rows, which)
-            self._read[which] = (rows[which], read)
-        value = getattr(read, name)
-        if value is None:
-            raise ValueError(read.notes[name])
-        return value
-
-    def _coefficients(self, rows, which):
-        runs = [rows["time"][run] for run in _runs(rows) if run.size > 1]
-        if not runs:
-            raise ValueError("no Allan deviation: every run is a single row")
-        intervals = np.concatenate([np.diff(time) for time in runs])
-        interval = np.median(intervals)
-        if np.abs(intervals - interval).max() > _UNEVEN * interval:
-            raise ValueError("no Allan deviation: the rows are not evenly spaced in time")
-        curve = allan_deviation(self._error(rows, which), interval, run=rows.get("run"))
-        return allan_coefficients(curve["averaging_time"], curve["deviation"])
-
-
-@dataclass(frozen=True)
-class _Bootstrap:
-    """The figures of one group and their intervals."""
-
-    rows: dict
-    units: list  # positions of the rows of each run or block
-    kind: str
-    n_resamples: int
-    confidence_level: float
-    seed: int
-
-    def lines(self, figures):
-        """Name, unit, six values and a note, for each figure."""
-        sides = [side for side in ("before", "after") if side in self.rows]
-        if not self.rows["rate"].size:
-            note = "no row is left in this group"
-            return [[figure.name, figure.unit, *6 * [_NAN], note] for figure in figures]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            spreads = self._resampled(figures, sides) if self.n_resamples else {}
-            return [self._line(figure, sides, spreads) for figure in figures]
-
-    def _line(self, figure, sides, spreads):
-        values, notes = dict.fromkeys(_VALUES, _NAN), []
-        for side in sides:
-            if figure.only_after and side == "before":
-                continue
-            value, note = _evaluated(figure, self.rows, side)
-            values[side] = value
-            if np.isfinite(value) and self.n_resamples:
-                spread = spreads.get((figure.name, side))
-                note = self._interval(figure, spread, side, values)
-            notes.append(note if len(sides) == 1 or not note else f"{side}: {note}")
-        both = {note.partition(": ")[2] for note in notes}
-        if len(notes) == 2 and len(both) == 1 and "" not in both:
-            notes = [both.pop()]
-        return [figure.name, figure.unit, *values.values(), "; ".join(filter(None, notes))]
-
-    def _interval(self, figure, spread, side, values):
-        """Put in the interval, or say why there is none."""
-        if figure.no_interval:
-            return figure.no_interval
-        if spread is None:
-            return f"no interval: fewer than {_FEWEST_RUNS} runs"
-        defined = spread[np.isfinite(spread)]
-        if defined.size < _FEWEST_DEFINED * spread.size:
-            return "no interval: too many resamples do not have this figure"
-        tail = 50.0 * (1.0 - self.confidence_level)
-        values[f"{side}_low"], values[f"{side}_high"] = np.percentile(defined, [tail, 100.0 - tail])
-        return ""
-
-    def _resampled(self, figures, sides):
-        """Values of every figure over the resamples, by name and side."""
-        random_state = np.random.RandomState(self.seed)
-        step = max(1, -(-self.rows["rate"].size // _MOST_ROWS))
-        thinned = [unit[::step] for unit in self.units]
-        by_run = {
-            (figure.name, side): _per_run(figure, self.rows, side)
-            for figure in figures
-            for side in sides
-            if figure.combine and self.kind == "runs"
-        }
-        of_rows = [figure for figure in figures if not (figure.combine or figure.no_interval)]
-        spreads: dict = {}
-        for _ in range(self.n_resamples):
-            drawn = random_state.randint(len(thinned), size=len(thinned))
-            chosen = np.concatenate([thinned[i] for i in drawn])
-            sample = {name: column[chosen] for name, column in self.rows.items()}
-            for side in sides:
-                for figure in of_rows:
-                    value = _evaluated(figure, sample, side)[0]
-                    spreads.setdefault((figure.name, side), []).append(value)
-                for figure in figures:
-                    found = by_run.get((figure.name, side))
-                    if found is not None:
-                        value = _or_nan(figure.combine, found[drawn])[0]
-                        spreads.setdefault((figure.name, side), []).append(value)
-        return {key: np.array(values) for key, values in spreads.items()}
-
-
-def _evaluated(figure, rows, side):
-    """The figure's value and "", or NaN and why there is none."""
-    if figure.only_after and side == "before":
-        return _NAN, ""
-    return _or_nan(figure.value, rows, side)
-
-
-def _or_nan(function, *arguments):
-    """What the function gives and "", or NaN and what its ValueError says."""
-    try:
-        return function(*arguments), ""
-    except ValueError as error:
-        return _NAN, str(error)
-
-
-def _per_run(figure, rows, side):
-    found, missing = _or_nan(figure.of, rows, side)
-    return None if missing else found
+def _in_unit(report, rate_unit):
+    """The report with every rate in one unit."""
+    values = [name for name in VALUES if name in report]
+    units, factors = zip(*(in_rate_unit(unit, rate_unit) for unit in report["unit"]), strict=True)
+    return report.assign(unit=units, **report[values].mul(np.array(factors), axis=0))
 
 
 def _columns(**columns):
@@ -506,6 +222,13 @@ def _parts(groups, n_rows):
             yield groups[rows[0]], rows
 
 
+def _part(rows, columns, labels):
+    """The columns of some rows, and the labels that figures need."""
+    part = {name: column[rows] for name, column in columns.items()}
+    needed = {name: labels[name] for name in ("run", "inside")}
+    return part | {name: label[rows] for name, label in needed.items() if label is not None}
+
+
 def _without_refused(part, refused):
     """Lines that count rows, and the part without those that were refused."""
     n_rows, n_outside = refused.size, 0
@@ -531,32 +254,3 @@ def _count(name, number, in_before):
         *2 * [_NAN],
         "",
     ]
-
-
-def _runs(part):
-    return metrics.rows_by_run(part.get("run"), part["rate"].size, at_least=1)
-
-
-def _units(part):
-    """What the bootstrap resamples: the rows of each run, or blocks of rows within the runs."""
-    n_rows = part["rate"].size
-    if n_rows == 0:
-        return [], "blocks of rows"
-    runs = _runs(part)
-    if len(runs) >= _FEWEST_RUNS:
-        return runs, "runs"
-    length = max(1, -(-n_rows // _N_BLOCKS))
-    blocks = [run[i : i + length] for run in runs for i in range(0, run.size, length)]
-    return blocks, "blocks of rows"
-
-
-def _means_by_rate(rate, output):
-    """Mean rate and output over bins of the rate's range that hold rows."""
-    low, width = rate.min(), np.ptp(rate) / _RATE_BINS
-    if width == 0:
-        return rate, output
-    place = np.minimum(((rate - low) / width).astype(int), _RATE_BINS - 1)
-    counts = np.bincount(place, minlength=_RATE_BINS)
-    held = counts > 0
-    sums = [np.bincount(place, values, minlength=_RATE_BINS)[held] for values in (rate, output)]
-    return sums[0] / counts[held], sums[1] / counts[held]

@@ -47,7 +47,9 @@ def log():
 @pytest.fixture
 def no_report(monkeypatch):
     """Leave out the report, which takes longer than all else together."""
-    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda calibration, title: title)
+    monkeypatch.setattr(
+        "skanfis.gyro.command.report_page", lambda calibration, title, dossier: title
+    )
 
 
 @pytest.fixture(scope="module")
@@ -434,7 +436,7 @@ def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, 
     assert main([*arguments, "--force"]) == 1
     assert [(p.name, p.read_text()) for p in out.iterdir()] == [("report.html", "old")]
     monkeypatch.undo()
-    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda calibration, title: "new")
+    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda *told: "new")
     assert main([*arguments, "--force"]) == 0
     assert (out / "report.html").read_text() == "new"
 

@@ -1,5 +1,7 @@
 """Pictures: what they store is right, and what they draw says so, with units."""
 
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -83,6 +85,94 @@ def test_draws_on_the_axes_given(display_class, rates):
     assert list(axes_of(display)) == list(axes)
     with pytest.raises(ValueError, match=f"ax has 3 axes; this picture needs {n_axes}"):
         display.plot(ax=Figure().subplots(3))
+
+
+def drawn_lines(display):
+    """Points of all lines, in the order of the axes."""
+    points = [line.get_xydata() for axes in axes_of(display) for line in axes.lines]
+    return np.concatenate(points).astype(float)
+
+
+DRAWN = {
+    ErrorDisplay: ("points", "time [s]", ["error before", "error after"]),
+    HysteresisDisplay: (
+        "bias",
+        "temperature [degC]",
+        [f"bias {when}, {how}" for when in ("before", "after") for how in ("warming", "cooling")],
+    ),
+    GroupResidualDisplay: ("groups", "RMS error", ["RMS error before", "RMS error after"]),
+}
+
+
+@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
+@pytest.mark.parametrize("display_class", DRAWN)
+def test_tables_hold_what_is_drawn(display_class, unit, rates):
+    options = OPTIONS[display_class](rates)
+    display = display_class.from_predictions(*three(rates), unit=unit, **options)
+    name, position, columns = DRAWN[display_class]
+    table = display.tables()[name]
+    values = [table[f"{column} [{unit}]"] for column in columns]
+    if display_class is GroupResidualDisplay:
+        lines = np.arange(len(table))
+        expected = np.concatenate([np.column_stack([value, lines]) for value in values])
+    else:
+        expected = np.concatenate([np.column_stack([table[position], v]) for v in values])
+    np.testing.assert_allclose(drawn_lines(display), expected, rtol=1e-12)
+
+
+def test_tables_of_bands_cells_and_scale_factors_hold_what_is_drawn(rates):
+    display = ErrorDisplay.from_predictions(*three(rates), position=np.arange(N_ROWS), unit="deg/h")
+    bands = display.tables()["bands"]
+    heights = display.axes_[1].collections[0].get_paths()[0].vertices[:, 1]
+    assert bands["largest error after [deg/h]"].max() == pytest.approx(heights.max())
+    assert bands["smallest error after [deg/h]"].min() == pytest.approx(heights.min())
+    display = ScaleFactorErrorDisplay.from_predictions(
+        *three(rates), temperature=rates["temperature"]
+    )
+    table = display.tables()["scale-factor"]
+    found = np.concatenate([table.iloc[:, [2, 3]], table.iloc[:, [2, 4]]])
+    np.testing.assert_allclose(drawn_lines(display), found, rtol=1e-12)
+    display = ResidualSurfaceDisplay.from_predictions(
+        *three(rates), temperature=rates["temperature"], unit="deg/h"
+    )
+    cells = display.tables()["cells"]
+    mesh = display.axes_[0].collections[0].get_array()
+    found = np.ma.filled(mesh.astype(float), np.nan).ravel()
+    np.testing.assert_allclose(cells["mean error after [deg/h]"], found, rtol=1e-12)
+    # A cell's rows by its ends, by hand.
+    x, y = "temperature [degC]", "true rate [deg/s]"
+    cell = cells.loc[cells["rows"].idxmax()]
+    within = (rates["temperature"] >= cell[f"{x}, from"]) & (
+        rates["temperature"] < cell[f"{x}, to"]
+    )
+    within &= (rates["rate"] >= cell[f"{y}, from"]) & (rates["rate"] <= cell[f"{y}, to"])
+    assert within.sum() == cell["rows"]
+
+
+@pytest.mark.parametrize("low", [2e-6, 0.004, 0.9, 3.0, 2000.0])
+@pytest.mark.parametrize("factor", [1.0, 3.0, 40.0, 1e5])
+def test_numbers_on_a_logarithmic_axis_can_be_read(low, factor):
+    rate = np.zeros(40)
+    after = np.repeat([low, 0.5 * low * (1 + factor), low * factor, low], 10)
+    display = GroupResidualDisplay.from_predictions(
+        rate, after * factor, after, groups=np.repeat([0, 1, 2, 3], 10)
+    )
+    renderer = display.figure_.canvas.get_renderer()
+    display.figure_.canvas.draw()
+    left, right = display.ax_.get_xlim()
+    labels = [
+        label
+        for label, place in zip(
+            display.ax_.get_xticklabels(), display.ax_.get_xticks(), strict=True
+        )
+        if left <= place <= right
+    ]
+    assert len(labels) >= 2
+    assert not any("$" in label.get_text() for label in labels)
+    boxes = [label.get_window_extent(renderer) for label in labels]
+    assert all(one.x1 < two.x0 for one, two in pairwise(boxes))
+    values = [float(label.get_text().replace(",", "")) for label in labels]
+    assert all(0.9 * left <= value <= 1.1 * right for value in values)
 
 
 @pytest.mark.parametrize("display_class", DISPLAYS)
@@ -260,6 +350,28 @@ def test_coverage_mask_is_that_of_the_estimator(compensator):
     assert display.ax_.get_xlabel() == "temperature [°C]"
 
 
+def test_cells_without_rows_are_empty_on_the_map(rng):
+    """An L of data: the corner has no row, however well neighbours cover it."""
+    x, y = rng.uniform(0.0, 10.0, (2, 4000))
+    x[:3], y[:3] = [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]
+    X = pd.DataFrame({"temperature": x, "output": y})[(x < 5.0) | (y < 5.0)]
+    model = ANFISRegressor(1, warn_out_of_bounds=False).fit(X, X["output"])
+    display = CoverageDisplay.from_estimator(model, X, n_cells=10, n_points=41, margin=0.2)
+    corner = (display.x[None, :] > 5.0) & (display.y[:, None] > 5.0)
+    beyond = (display.x[None, :] > 10.0) | (display.y[:, None] > 10.0)
+    beyond = beyond | (display.x[None, :] < 0.0) | (display.y[:, None] < 0.0)
+    mesh = display.ax_.collections[0].get_array()
+    shown = ~np.ma.getmaskarray(mesh).reshape(41, 41)
+    on_edge = np.isclose(display.x, 5.0)[None, :] | np.isclose(display.y, 5.0)[:, None]
+    np.testing.assert_array_equal(shown[~on_edge], ~(corner | beyond)[~on_edge])
+    assert display.counts.sum() == len(X)
+    assert "25% of the cells in range are empty" in display.ax_.get_title(loc="left")
+    cells = display.tables()["cells"]
+    assert (cells["rows"] == 0).sum() == 25
+    points = display.tables()["points"]
+    np.testing.assert_array_equal(points["in a cell with data"], shown.ravel())
+
+
 def test_coverage_holds_other_inputs(rng):
     X = pd.DataFrame(rng.uniform(size=(200, 3)), columns=["time", "temperature", "output"])
     model = ANFISRegressor(1).fit(X, X["time"])
@@ -291,6 +403,20 @@ def test_allan_curve_of_white_noise_and_drift(rng):
     np.testing.assert_allclose(marks, walk, rtol=0.05)
     assert "Smoothing is not compensation" in display.ax_.get_title(loc="left")
     assert display.before["deviation"].iloc[-1] > 2 * display.after["deviation"].iloc[-1]
+
+
+def test_allan_in_degrees_per_second(rng):
+    pytest.importorskip("allantools")
+    noise = 0.01 * rng.standard_normal((2, 4000)).cumsum(axis=1)
+    display = AllanDisplay.from_predictions(np.zeros(4000), *noise, sampling_interval=1.0)
+    hourly = drawn_lines(display)[:, 1]
+    display.plot(unit="deg/s")
+    curves = [line for line in display.ax_.lines if line.get_marker() == "o"]
+    drawn = np.concatenate([line.get_xydata() for line in curves])
+    table = display.tables()["allan"]
+    np.testing.assert_allclose(drawn, table.iloc[:, [1, 2]].to_numpy(), rtol=1e-12)
+    np.testing.assert_allclose(drawn[0, 1], hourly[0] / 3600.0, rtol=1e-12)
+    assert display.ax_.get_ylabel() == "Allan deviation [°/s]"
 
 
 def test_allan_marks_no_random_walk_where_short_times_show_none(rng):

@@ -1,18 +1,27 @@
 """The report: one file that needs nothing else, with all that was promised."""
 
+import base64
+import io
 import re
 import subprocess
 import sys
 from html.parser import HTMLParser
 
 import numpy as np
+import pandas as pd
 import pytest
 
 pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro._calibration import MAX_EXTRAPOLATION, Recipe, calibrate
+from skanfis.gyro._dossier import Dossier, LogFile
 from skanfis.gyro._html import Page
+from skanfis.gyro._limits import parse_limit
+from skanfis.gyro._models import make_estimator
+from skanfis.gyro._pictures import PICTURES, Picture
+from skanfis.gyro._results import Results
+from skanfis.gyro._sections.instead import formula_of
 from skanfis.gyro._split import choose_split
 from skanfis.gyro.displays._style import figures
 from skanfis.gyro.html_report import report_page, rules_text
@@ -51,12 +60,37 @@ def calibration_of(log, inputs=("time", "temperature", "temperature_rate", "outp
 @pytest.fixture(scope="module")
 def calibration():
     log = make_ofog(n_devices=1, n_runs=5, duration=900.0, profile="ramps", random_state=0)
-    return calibration_of(log, max_rules=3)
+    return calibration_of(log, terms=(1, 1, 1, 3))
+
+
+SCRIPT = "<script>alert('1')</script>"
+TITLE = "<gyro> & co.csv"
 
 
 @pytest.fixture(scope="module")
-def page(calibration):
-    return report_page(calibration, "<gyro> & co.csv")
+def dossier(calibration):
+    """All in it is text from outside; the limits lie on both sides of what was found."""
+    merit = Results(calibration).merit.query("group == 'all'").set_index("figure")
+    value = merit.loc["residual_rms", "after"]
+    typed = [f"residual_rms={factor * value:.9f}deg/s" for factor in (1.001, 0.999)]
+    return Dossier(
+        serial=SCRIPT,
+        operator=SCRIPT,
+        files=(LogFile(SCRIPT, 12, "0" * 64),),
+        options=(("logs", SCRIPT),),
+        limits=tuple(map(parse_limit, [*typed, "bias_instability=1deg/h"])),
+    )
+
+
+@pytest.fixture(scope="module")
+def page(calibration, dossier):
+    return report_page(calibration, TITLE, dossier)
+
+
+@pytest.fixture
+def no_drawing(monkeypatch):
+    """Pictures are made but not painted, which takes longer than all else."""
+    monkeypatch.setattr("skanfis.gyro._html._png", lambda figure: b"")
 
 
 def test_is_well_formed_and_escaped(page):
@@ -69,7 +103,8 @@ def test_needs_nothing_from_elsewhere(page):
     assert not {"script", "link", "iframe", "object"} & set(outline.tags)
     sources = [value for _, name, value in outline.attributes if name in ("src", "href")]
     assert sources
-    assert all(value.startswith("data:image/png;base64,") for value in sources)
+    kinds = ("data:image/png;base64,", "data:text/csv;charset=utf-8;base64,")
+    assert all(value.startswith(kinds) for value in sources)
     # Style, too; and nothing of the machine that made it.
     assert not re.search(r"url\(|@import|https?://", page)
 
@@ -89,7 +124,7 @@ def test_every_picture_says_what_it_shows(page):
 def test_fits_a_phone(page):
     assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in page
     # No table may push the page wider than the screen.
-    assert page.count('<div class="scroll"') == page.count("<table>")
+    assert page.count('<div class="scroll') == page.count("<table>")
 
 
 def test_figures_are_those_of_held_out_rows_in_range(page, calibration):
@@ -104,18 +139,16 @@ def test_figures_are_those_of_held_out_rows_in_range(page, calibration):
 
 def test_every_fold_was_new_to_its_model(calibration):
     # The last fold by hand.
-    from skanfis.gyro._calibration import make_estimator
-
     train, test = calibration.split.folds[-1]
     error = calibration.before - calibration.rate
-    model = make_estimator(calibration.recipe, (1, calibration.terms))
+    model = make_estimator(calibration.recipe, (1, (1, 1, 1, 3)))
     model.fit(calibration.X.iloc[train], error[train])
     expected = calibration.before[test] - model.predict(calibration.X.iloc[test])
     np.testing.assert_allclose(calibration.after[test], expected, rtol=1e-9)
 
 
-def test_the_same_log_gives_the_same_report(page, calibration):
-    assert report_page(calibration, "<gyro> & co.csv") == page
+def test_the_same_log_gives_the_same_report(page, calibration, dossier):
+    assert report_page(calibration, TITLE, dossier) == page
 
 
 def test_rules_and_what_to_compute_on_board(page, calibration):
@@ -127,7 +160,7 @@ def test_rules_and_what_to_compute_on_board(page, calibration):
 
 
 @pytest.mark.parametrize("physics", [False, True])
-def test_says_whether_the_rules_can_be_read(physics):
+def test_says_whether_the_rules_can_be_read(physics, no_drawing):
     log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
     calibration = calibration_of(log, ("temperature", "output"), terms=(2, 2), physics=physics)
     estimator = calibration.compensator.estimator
@@ -143,7 +176,7 @@ def test_says_whether_the_rules_can_be_read(physics):
     assert f"[sd]{figures(found.summary['strongest_alone'])}0.5" in section.replace("\n", "")
 
 
-def test_a_gyro_at_rest_has_no_scale_factor_pictures():
+def test_a_gyro_at_rest_has_no_scale_factor_pictures(no_drawing):
     log = make_ofog(n_devices=1, n_runs=4, duration=600.0, rates=[0.0], random_state=0)
     calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
     text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
@@ -153,7 +186,7 @@ def test_a_gyro_at_rest_has_no_scale_factor_pictures():
 
 
 @pytest.mark.parametrize("has_time", [True, False])
-def test_physics_shows_its_law(has_time):
+def test_physics_shows_its_law(has_time, no_drawing):
     log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
     inputs = ("temperature", "temperature_rate", "output")
     if not has_time:
@@ -175,16 +208,125 @@ def test_physics_shows_its_law(has_time):
 
 def test_page_refuses_no_text():
     page = Page("a < b", "c & d")
+    page.banner(SCRIPT, [SCRIPT], "bad")
     page.cards([("what", "1", "<i>")])
     page.section("s")
     page.heading("h")
-    page.table(("x", "unit"), [(("1", "[0, 2]"), "°/s"), ("2", "")], "caption")
+    page.table(("x", "unit"), [(("1", "[0, 2]"), "°/s"), ("2", SCRIPT)], "caption")
     page.preformatted("a\n<b>", "more")
-    page.footer("end")
+    page.download('"><b>.csv', SCRIPT)
+    page.footer("end\x00\u202e")
     outline = Outline(page.render())
     text = "".join(outline.text)
-    for part in ("a < b", "c & d", "<i>", "[0, 2]", "a\n<b>", "caption"):
+    for part in ("a < b", "c & d", "<i>", "[0, 2]", "a\n<b>", "caption", SCRIPT):
         assert part in text
+    assert not {"script", "b", "i"} & set(outline.tags)
+    assert not {"\x00", "\u202e"} & set(text)
+
+
+def test_names_from_outside_are_data(page):
+    outline = Outline(page)
+    assert "script" not in outline.tags
+    assert "".join(outline.text).count(SCRIPT) == 4
+
+
+def test_the_verdict_comes_first(page, calibration):
+    text = "".join(Outline(page).text)
+    verdict = calibration.verdict
+    assert not verdict.model_is_worth_it  # three rules, where the law of the sensor knows more
+    title = "Use the arcsine law instead of the fuzzy rules"
+    assert title in text[: text.index("RMS error before")]
+    assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
+    model = next(each for each in calibration.simpler if each.name == "arcsine law").model
+    assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What to use instead") :]
+
+
+@pytest.mark.parametrize("name", ["constant", "straight line", "cubic polynomial"])
+def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
+    """Each line of it is run."""
+    names = calibration.X.to_dict("series")
+    lines = formula_of(calibration, name).replace("^", "**").split("\n")
+    steps = "\n".join(lines[1:]).replace("\n    ", " ").split("\n")
+    for line in [*steps, lines[0]]:
+        variable, _, value = line.partition(" = ")
+        names[variable] = eval(value, {}, names)
+    simple = next(each for each in calibration.simpler if each.name == name)
+    expected = calibration.before - simple.model.predict(calibration.X)
+    np.testing.assert_allclose(names["rate"], expected, atol=1e-6)
+
+
+def test_one_unit_throughout(page, calibration, no_drawing):
+    """Of errors; rates, and the formula of what to use instead, are in deg/s."""
+    hourly = report_page(calibration, TITLE, Dossier(unit="deg/h"))
+    rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
+    for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
+        text = " ".join(Outline(text).text)
+        checked, rest = text.split("What to use instead")[-2:]
+        results = (
+            checked[checked.index("How it was checked") :]
+            + rest[
+                rest.index("Figures of merit") : rest.index("Limits of the spec")
+                if unit == "°/s"
+                else rest.index("Where it may be used")
+            ]
+        )
+        assert unit in results
+        assert other not in results
+        assert f"{figures(factor * rms)} {unit}" in text
+
+
+def test_limits_on_both_sides_of_the_figure(page):
+    text = " ".join(Outline(page).text)
+    section = text[text.index("Limits of the specification") : text.index("By held-out run")]
+    assert re.findall(r"pass|fail|not measured", section) == ["pass", "fail", "not measured"]
+    assert "1 of 3 limits are kept; not kept: residual rms; could not be measured" in text
+
+
+def files_in(page):
+    """Tables of the files that a page holds, by name."""
+    links = re.findall(r'download="([^"]*)" href="data:text/csv;charset=utf-8;base64,(.*?)"', page)
+    return {name: pd.read_csv(io.BytesIO(base64.b64decode(content))) for name, content in links}
+
+
+def test_the_data_behind_every_picture(page, calibration):
+    pictures = re.findall("<figure.*?</figure>", page, re.DOTALL)
+    assert len(pictures) >= 8
+    assert all("download=" in picture for picture in pictures)
+    files = files_in(page)
+    rows = calibration.in_range
+    points = files["error-by-temperature-points.csv"]
+    error = np.where(rows, calibration.after - calibration.rate, np.nan)
+    np.testing.assert_allclose(points["error after [deg/s]"], error, rtol=1e-8)
+    np.testing.assert_allclose(
+        points["temperature [degC]"], calibration.log["temperature"], rtol=1e-8
+    )
+    cells = files["coverage-cells.csv"]
+    assert cells["rows"].sum() == len(calibration.log)
+    groups = files["held-out-groups.csv"].set_index("group")["RMS error after [deg/s]"]
+    for run in calibration.log["run"].unique():
+        these = rows & (calibration.log["run"] == run).to_numpy()
+        expected = np.sqrt(np.mean((calibration.after - calibration.rate)[these] ** 2))
+        assert groups[run] == pytest.approx(expected, rel=1e-8)
+
+
+def test_a_file_runs_nothing_in_a_spreadsheet(calibration):
+    results = Results(calibration)
+    labels = np.where(calibration.log["run"] == 0, "=HYPERLINK(1)", "-5")
+    split = calibration.split
+    object.__setattr__(calibration, "split", type(split)(split.kind, split.folds, labels, ""))
+    try:
+        (picture,) = [draw(results) for draw in PICTURES if draw.__name__ == "draw_groups"]
+    finally:
+        object.__setattr__(calibration, "split", split)
+    assert isinstance(picture, Picture)
+    (text,) = picture.files.values()
+    assert sorted(line.split(",")[0] for line in text.splitlines()[1:]) == ["'=HYPERLINK(1)", "-5"]
+
+
+def test_paper_shows_what_a_click_opens(page):
+    style = page[page.index("@media print") : page.index("</style>")]
+    assert "details::details-content" in style
+    assert re.search(r"figure[^{}]*\{ break-inside: avoid", style)
 
 
 def test_no_screen_is_asked_for():
@@ -196,12 +338,12 @@ def test_no_screen_is_asked_for():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_a_run_without_a_row_in_range_has_no_error():
+def test_a_run_without_a_row_in_range_has_no_error(no_drawing):
     # Every run at a temperature of its own: the outermost lie beyond what the others have seen.
     log = make_ofog(
         n_devices=1, n_runs=6, duration=600.0, max_residual_heat=0.0, rates=[0.0], random_state=3
     )
-    calibration = calibration_of(log, ("time", "temperature"), max_rules=2)
+    calibration = calibration_of(log, ("time", "temperature"), terms=(1, 2))
     in_range = [calibration.inside[log["run"] == run].any() for run in log["run"].unique()]
     assert not all(in_range)
     shown = "".join(Outline(report_page(calibration, "log.csv")).text)

@@ -1,5 +1,7 @@
 """The table of figures: planted truth, before and after, groups, intervals and what is missing."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -100,6 +102,25 @@ def test_figures_without_their_input_are_left_out(log):
         "scale_factor_asymmetry",
         "bias",
     ]
+
+
+@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
+def test_one_unit_for_every_rate(log, unit):
+    options = {"n_resamples": 5, "allan": bool(find_spec("allantools"))}
+    usual = figures(report_of(log, *ALL, **options))
+    one = figures(report_of(log, *ALL, **options, rate_unit=unit))
+    per_second = {"deg/s": 1.0, "deg/h": HOUR}
+    for name, line in usual.iterrows():
+        own = line["unit"][:5]
+        # An angle per root of time is no rate.
+        if own not in per_second or line["unit"] == "deg/sqrt(h)":
+            assert one.loc[name, "unit"] == line["unit"]
+            np.testing.assert_array_equal(*(r[VALUES].astype(float) for r in (one.loc[name], line)))
+            continue
+        assert one.loc[name, "unit"] == unit + line["unit"][5:]
+        factor = per_second[unit] / per_second[own]
+        expected = factor * line[VALUES].astype(float)
+        np.testing.assert_allclose(one.loc[name, VALUES].astype(float), expected, rtol=1e-12)
 
 
 def test_before_alone(log):
@@ -240,6 +261,7 @@ def test_allan_deviation_is_read(rng):
         ({"averaging_times": (10.0, -1.0)}, "averaging_times=.* must be positive"),
         ({"confidence_level": 95}, "confidence_level=95 must lie between 0 and 1"),
         ({"n_resamples": -1}, "n_resamples=-1"),
+        ({"rate_unit": "deg"}, "rate_unit='deg' must be one of deg/s, deg/h"),
         ({"allan": True}, "allan=True needs the column time"),
     ],
 )

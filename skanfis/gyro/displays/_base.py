@@ -4,10 +4,18 @@ from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
+import pandas as pd
 
 from ._style import PER_UNIT
 
-__all__ = ["CompensationDisplay", "binned", "check_rows", "check_unit", "compensated_rate"]
+__all__ = [
+    "CompensationDisplay",
+    "binned",
+    "cells_table",
+    "check_rows",
+    "check_unit",
+    "compensated_rate",
+]
 
 PREDICTS = ("error", "rate")
 
@@ -98,3 +106,16 @@ def binned(positions, n_bins):
     edges = np.linspace(low, high if high > low else low + 1.0, n_bins + 1)
     bins = np.searchsorted(edges, positions, side="right") - 1
     return edges, np.clip(bins, 0, n_bins - 1)
+
+
+def cells_table(edges, values):
+    """One line per cell of a map: the ends of its sides, and its values of shape (n_y, n_x)."""
+    (x_name, x), (y_name, y) = edges.items()
+    n_x, n_y = x.size - 1, y.size - 1
+    columns = {
+        f"{x_name}, from": np.tile(x[:-1], n_y),
+        f"{x_name}, to": np.tile(x[1:], n_y),
+        f"{y_name}, from": np.repeat(y[:-1], n_x),
+        f"{y_name}, to": np.repeat(y[1:], n_x),
+    }
+    return pd.DataFrame(columns | {name: value.ravel() for name, value in values.items()})

@@ -12,6 +12,7 @@ __all__ = [
     "dress",
     "figures",
     "make_axes",
+    "mark_decades",
     "symmetric_limit",
 ]
 
@@ -21,6 +22,9 @@ NO_DATA = "#e9e9e6"
 
 SYMBOL = {"deg/s": "°/s", "deg/h": "°/h"}
 PER_UNIT = {"deg/s": 1.0, "deg/h": 3600.0}
+
+_LEAST_ROOM = 0.14  # between two marks, as a part of the axis
+_WHOLE, _LONGEST = 100.0, 1e6
 
 
 def make_axes(ax, n_axes, size, **options):
@@ -55,6 +59,31 @@ def figures(value):
         return f"{value:g}"
     decimals = max(2 - int(np.floor(np.log10(abs(value)))), 0)
     return f"{value:,.{decimals}f}" if decimals < 8 else f"{value:.2e}"
+
+
+def mark_decades(axis, low, high):
+    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten.
+
+    Whole decades first, then 2 and 5 of each, then the others, as far as there is room between.
+    """
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
+
+    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+    room = _LEAST_ROOM * np.log(high / low)
+    shown: list[float] = []
+    for digit in (1, 2, 5, 3, 4, 6, 7, 8, 9):
+        for place in (digit * 10.0**decade for decade in decades):
+            is_free = all(abs(np.log(place / other)) >= room for other in shown)
+            if low <= place <= high and is_free:
+                shown.append(place)
+    axis.set_major_locator(FixedLocator(sorted(shown) if len(shown) > 1 else [low, high]))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def plain(value):
+    """A mark of an axis, three digits, without an exponent where zeros do not hide its size."""
+    return f"{value:,.0f}" if _WHOLE <= value < _LONGEST else f"{value:.3g}"
 
 
 def symmetric_limit(values, share=0.995):

@@ -3,16 +3,18 @@
 import textwrap
 
 import numpy as np
+import pandas as pd
 
 from ..allan import allan_coefficients, allan_deviation
-from ._base import CompensationDisplay
-from ._style import AFTER, BEFORE, dress, figures, make_axes
+from ._base import CompensationDisplay, check_unit
+from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, mark_decades
 
 __all__ = ["AllanDisplay"]
 
 _FEWEST_TIMES = 3  # for reading a slope off the curve
 _NEARLY = 0.3
 _PER_ROOT_HOUR = 60.0  # deg/h at 1 s per deg/sqrt(h)
+_PER_HOUR = 3600.0
 
 CAUTION = (
     "Smoothing is not compensation: a filter lowers the left of a curve and hides as much of the "
@@ -68,7 +70,9 @@ class AllanDisplay(CompensationDisplay):
         self.after = after
 
     @classmethod
-    def from_predictions(cls, rate, before, after, *, sampling_interval, run=None, ax=None):
+    def from_predictions(
+        cls, rate, before, after, *, sampling_interval, run=None, unit="deg/h", ax=None
+    ):
         """Compute from rates, and draw.
 
         Parameters
@@ -81,6 +85,8 @@ class AllanDisplay(CompensationDisplay):
             Time between rows [s].
         run : array-like of shape (n_rows,), default=None
             Labels of the runs, over whose breaks no mean is taken; None is one run.
+        unit : {"deg/s", "deg/h"}, default="deg/h"
+            Unit to draw the deviation in.
         ax : matplotlib axes, default=None
             Where to draw; None makes a figure.
 
@@ -93,26 +99,31 @@ class AllanDisplay(CompensationDisplay):
             allan_deviation(np.asarray(indicated) - rate, sampling_interval, run=run)
             for indicated in (before, after)
         ]
-        return cls(before=curves[0], after=curves[1]).plot(ax=ax)
+        return cls(before=curves[0], after=curves[1]).plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None):
+    def plot(self, ax=None, *, unit="deg/h"):
         """Draw.
 
         Parameters
         ----------
         ax : matplotlib axes, default=None
             Where to draw; None makes a figure.
+        unit : {"deg/s", "deg/h"}, default="deg/h"
+            Unit to draw the deviation in.
 
         Returns
         -------
         display : AllanDisplay
             Itself.
         """
+        self.unit_ = check_unit(unit)
         self.figure_, axes = make_axes(ax, 1, (6.2, 4.4))
         self.ax_ = axes[0]
         for name, curve, color in (("before", self.before, BEFORE), ("after", self.after, AFTER)):
-            time, deviation, error = (
-                curve[column].to_numpy() for column in ("averaging_time", "deviation", "error")
+            time = curve["averaging_time"].to_numpy()
+            deviation, error = (
+                PER_UNIT[unit] / _PER_HOUR * curve[column].to_numpy()
+                for column in ("deviation", "error")
             )
             self.ax_.fill_between(
                 time,
@@ -124,19 +135,45 @@ class AllanDisplay(CompensationDisplay):
             )
             self.ax_.loglog(time, deviation, "o-", color=color, label=name, ms=3, linewidth=1.4)
             self._mark(time, deviation, color)
-        dress(self.ax_, "averaging time [s]", "Allan deviation [°/h]")
+        dress(self.ax_, "averaging time [s]", f"Allan deviation [{SYMBOL[unit]}]")
+        for axis, ends in (
+            (self.ax_.xaxis, self.ax_.get_xlim()),
+            (self.ax_.yaxis, self.ax_.get_ylim()),
+        ):
+            mark_decades(axis, *ends)
         self.ax_.legend(frameon=False)
         self.ax_.set_title("\n".join(textwrap.wrap(CAUTION, 76)), loc="left", fontsize="small")
         return self
+
+    def tables(self):
+        """What is drawn, in the unit that it was drawn in.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            "allan", before and after; the error is the deviation's standard error.
+        """
+        curves = []
+        for name, curve in (("before", self.before), ("after", self.after)):
+            factor = PER_UNIT[self.unit_] / _PER_HOUR
+            columns = {
+                "curve": name,
+                "averaging time [s]": curve["averaging_time"],
+                f"Allan deviation [{self.unit_}]": factor * curve["deviation"],
+                f"error [{self.unit_}]": factor * curve["error"],
+            }
+            curves.append(pd.DataFrame(columns))
+        return {"allan": pd.concat(curves, ignore_index=True)}
 
     def _mark(self, time, deviation, color):
         """N at 1 s on its line of slope -1/2, and the minimum, where the curve has them."""
         if time.size < _FEWEST_TIMES or not (deviation > 0).all():
             return
-        read = allan_coefficients(time, deviation)
-        if _is_read_at_short_times(read.angle_random_walk, time, deviation):
+        factor = PER_UNIT[self.unit_] / _PER_HOUR
+        read = allan_coefficients(time, deviation / factor)
+        if _is_read_at_short_times(read.angle_random_walk, time, deviation / factor):
             line = np.array([1.0, time[np.argmin(deviation)]])
-            level = _PER_ROOT_HOUR * read.angle_random_walk / np.sqrt(line)
+            level = factor * _PER_ROOT_HOUR * read.angle_random_walk / np.sqrt(line)
             self.ax_.plot(line, level, ":", color=color, linewidth=1.2)
             self.ax_.annotate(
                 f"N = {figures(read.angle_random_walk)} °/√h",
@@ -149,7 +186,7 @@ class AllanDisplay(CompensationDisplay):
         if read.allan_minimum is not None:
             place = np.argmin(deviation)
             self.ax_.annotate(
-                f"B = {figures(read.bias_instability)} °/h",
+                f"B = {figures(factor * read.bias_instability)} {SYMBOL[self.unit_]}",
                 (time[place], deviation[place]),
                 xytext=(0, -14),
                 textcoords="offset points",

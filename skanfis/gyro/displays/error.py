@@ -1,6 +1,7 @@
 """ErrorDisplay: the error against time, temperature or anything else, before and after."""
 
 import numpy as np
+import pandas as pd
 
 from ._base import CompensationDisplay, binned, check_rows, check_unit
 from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
@@ -148,7 +149,8 @@ class ErrorDisplay(CompensationDisplay):
         display : ErrorDisplay
             Itself.
         """
-        factor = PER_UNIT[check_unit(unit)]
+        self.unit_ = check_unit(unit)
+        factor = PER_UNIT[unit]
         self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.4), nrows=2, sharex=True)
         panels = (
             ("before", self.before, self.range_before, BEFORE),
@@ -175,6 +177,29 @@ class ErrorDisplay(CompensationDisplay):
             dress(axes, ylabel=f"error [{SYMBOL[unit]}]", title=title)
         self.axes_[1].set_xlabel(self.position_label)
         return self
+
+    def tables(self):
+        """What is drawn, in the unit that it was drawn in.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            "points", and "bands", from the smallest to the largest error in each bin.
+        """
+        factor = PER_UNIT[self.unit_]
+        points = pd.DataFrame(
+            {
+                self.position_label: self.position,
+                f"error before [{self.unit_}]": factor * self.before,
+                f"error after [{self.unit_}]": factor * self.after,
+            }
+        )
+        bands = {"from": self.edges[:-1], "to": self.edges[1:]}
+        bands = {f"{self.position_label}, {end}": edge for end, edge in bands.items()}
+        for name, ranges in (("before", self.range_before), ("after", self.range_after)):
+            for which, column in zip(("smallest", "largest"), ranges.T, strict=True):
+                bands[f"{which} error {name} [{self.unit_}]"] = factor * column
+        return {"points": points, "bands": pd.DataFrame(bands)}
 
 
 def _ranges(errors, bins):

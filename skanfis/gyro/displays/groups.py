@@ -1,10 +1,11 @@
 """GroupResidualDisplay: the residual of every group that was held out."""
 
 import numpy as np
+import pandas as pd
 
 from ...inspection.labels import as_label
 from ._base import CompensationDisplay, check_rows, check_unit
-from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
+from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, mark_decades
 
 __all__ = ["GroupResidualDisplay"]
 
@@ -99,7 +100,8 @@ class GroupResidualDisplay(CompensationDisplay):
         display : GroupResidualDisplay
             Itself.
         """
-        factor = PER_UNIT[check_unit(unit)]
+        self.unit_ = check_unit(unit)
+        factor = PER_UNIT[unit]
         shown = slice(-_MOST_LINES, None)
         groups = self.groups[shown]
         before, after = factor * self.before[shown], factor * self.after[shown]
@@ -111,6 +113,10 @@ class GroupResidualDisplay(CompensationDisplay):
         self.ax_.plot(before, lines, "o", color=BEFORE, label="before", markersize=5)
         self.ax_.plot(after, lines, "o", color=AFTER, label="after", markersize=5)
         self.ax_.set_xscale("log")
+        drawn = np.concatenate([before, after])
+        drawn = drawn[drawn > 0]
+        if drawn.size:
+            mark_decades(self.ax_.xaxis, *_with_room(self.ax_, drawn))
         self.ax_.set_yticks(lines, [as_label(group) for group in groups])
         self.ax_.set_ylim(-0.7, len(groups) - 0.3)
         left_out = len(self.groups) - len(groups)
@@ -125,6 +131,30 @@ class GroupResidualDisplay(CompensationDisplay):
         )
         self.ax_.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         return self
+
+    def tables(self):
+        """What is drawn, in the unit that it was drawn in; groups that are not drawn, too.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            "groups", the smallest error after compensation first.
+        """
+        factor = PER_UNIT[self.unit_]
+        columns = {
+            "group": self.groups,
+            f"RMS error before [{self.unit_}]": factor * self.before,
+            f"RMS error after [{self.unit_}]": factor * self.after,
+        }
+        return {"groups": pd.DataFrame(columns)}
+
+
+def _with_room(axes, values):
+    """Ends of an axis that leaves room beside the values, and covers a factor of four at least."""
+    low, high = values.min(), values.max()
+    room = max(1.15, 2.0 / np.sqrt(high / low))
+    axes.set_xlim(low / room, high * room)
+    return low / room, high * room
 
 
 def _rms_by_group(errors, codes):

@@ -1,9 +1,10 @@
 """HysteresisDisplay: bias against temperature, warming and cooling apart."""
 
 import numpy as np
+import pandas as pd
 
-from ._base import CompensationDisplay, binned, check_rows
-from ._style import COOLING, WARMING, dress, figures, make_axes
+from ._base import CompensationDisplay, binned, check_rows, check_unit
+from ._style import COOLING, PER_UNIT, SYMBOL, WARMING, dress, figures, make_axes
 
 __all__ = ["HysteresisDisplay"]
 
@@ -74,6 +75,7 @@ class HysteresisDisplay(CompensationDisplay):
         temperature,
         temperature_rate,
         least_rate_of_change=0.05,
+        unit="deg/h",
         ax=None,
     ):
         """Compute from rates, and draw.
@@ -90,6 +92,8 @@ class HysteresisDisplay(CompensationDisplay):
             How fast it changes [degC/min]; its sign tells warming from cooling.
         least_rate_of_change : float, default=0.05
             Rows that change more slowly [degC/min] belong to neither branch.
+        unit : {"deg/s", "deg/h"}, default="deg/h"
+            Unit to draw the bias in.
         ax : array of two matplotlib axes, default=None
             For before and after; None makes a figure.
 
@@ -114,7 +118,7 @@ class HysteresisDisplay(CompensationDisplay):
         display = cls(
             temperature=0.5 * (edges[:-1] + edges[1:]), before=branches[0], after=branches[1]
         )
-        return display.plot(ax=ax)
+        return display.plot(ax=ax, unit=unit)
 
     @property
     def gap_before_(self):
@@ -126,25 +130,29 @@ class HysteresisDisplay(CompensationDisplay):
         """Largest distance between the branches after compensation [deg/h]."""
         return _gap(self.after)
 
-    def plot(self, ax=None):
+    def plot(self, ax=None, *, unit="deg/h"):
         """Draw.
 
         Parameters
         ----------
         ax : array of two matplotlib axes, default=None
             For before and after; None makes a figure.
+        unit : {"deg/s", "deg/h"}, default="deg/h"
+            Unit to draw the bias in.
 
         Returns
         -------
         display : HysteresisDisplay
             Itself.
         """
+        self.unit_ = check_unit(unit)
+        factor = PER_UNIT[unit] / _PER_HOUR
         self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.6), nrows=2, sharex=True)
         panels = zip(
             self.axes_,
             ("before", "after"),
-            (self.before, self.after),
-            (self.gap_before_, self.gap_after_),
+            (factor * self.before, factor * self.after),
+            (factor * self.gap_before_, factor * self.gap_after_),
             strict=True,
         )
         for axes, name, (warming, cooling), gap in panels:
@@ -154,11 +162,28 @@ class HysteresisDisplay(CompensationDisplay):
             )
             axes.plot(self.temperature, warming, "^-", color=WARMING, label="warming", ms=4)
             axes.plot(self.temperature, cooling, "v-", color=COOLING, label="cooling", ms=4)
-            what = f"largest gap {figures(gap)} °/h" if both.any() else "branches never meet"
-            dress(axes, ylabel="bias [°/h]", title=f"{name}: {what}")
+            what = "branches never meet"
+            if both.any():
+                what = f"largest gap {figures(gap)} {SYMBOL[unit]}"
+            dress(axes, ylabel=f"bias [{SYMBOL[unit]}]", title=f"{name}: {what}")
         self.axes_[1].set_xlabel("temperature [°C]")
         self.axes_[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         return self
+
+    def tables(self):
+        """What is drawn, in the unit that it was drawn in.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            "bias", by temperature.
+        """
+        factor = PER_UNIT[self.unit_] / _PER_HOUR
+        columns = {"temperature [degC]": self.temperature}
+        for name, branches in (("before", self.before), ("after", self.after)):
+            for branch, values in zip(("warming", "cooling"), branches, strict=True):
+                columns[f"bias {name}, {branch} [{self.unit_}]"] = factor * values
+        return {"bias": pd.DataFrame(columns)}
 
 
 def _gap(branches):

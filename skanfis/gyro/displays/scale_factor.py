@@ -1,6 +1,7 @@
 """ScaleFactorErrorDisplay: what is left of the scale factor's error, by rate and temperature."""
 
 import numpy as np
+import pandas as pd
 
 from ._base import CompensationDisplay, binned, check_rows
 from ._style import dress, figures, make_axes
@@ -134,9 +135,9 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
             values = getattr(self, name)
             for rate, ppm, middle, color in zip(self.rate, values, middles, colors, strict=True):
                 known = np.isfinite(ppm)
+                label = f"{middle:.0f} °C"
                 # The line is broken at rest.
                 for side in (rate < 0, rate > 0):
-                    label = f"{middle:.0f} °C" if side[-1] or not (rate[known] > 0).any() else None
                     axes.plot(
                         rate[known & side],
                         ppm[known & side],
@@ -155,6 +156,30 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
         self.axes_[1].set_xlabel("true rate [°/s]")
         _legend(self.axes_[0])
         return self
+
+    def tables(self):
+        """What is drawn.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            "scale-factor", one row per band of temperature and bin of rate that has rows.
+        """
+        shape = self.rate.shape
+        low, high = (
+            np.repeat(ends[:, None], shape[1], axis=1).ravel()
+            for ends in (self.temperature_edges[:-1], self.temperature_edges[1:])
+        )
+        table = pd.DataFrame(
+            {
+                "temperature, from [degC]": low,
+                "temperature, to [degC]": high,
+                "true rate [deg/s]": self.rate.ravel(),
+                "scale-factor error before [ppm]": self.before.ravel(),
+                "scale-factor error after [ppm]": self.after.ravel(),
+            }
+        )
+        return {"scale-factor": table[np.isfinite(self.rate.ravel())].reset_index(drop=True)}
 
 
 def _legend(axes):

@@ -2,8 +2,17 @@
 
 import numpy as np
 
-from ._base import CompensationDisplay, binned, check_rows, check_unit
-from ._style import NO_DATA, PER_UNIT, SYMBOL, dress, figures, make_axes, symmetric_limit
+from ._base import CompensationDisplay, binned, cells_table, check_rows, check_unit
+from ._style import (
+    NO_DATA,
+    PER_UNIT,
+    SYMBOL,
+    dress,
+    figures,
+    make_axes,
+    mark_decades,
+    symmetric_limit,
+)
 
 __all__ = ["ResidualSurfaceDisplay"]
 
@@ -119,7 +128,8 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         """
         from matplotlib.colors import LogNorm
 
-        residual = PER_UNIT[check_unit(unit)] * self.residual
+        self.unit_ = check_unit(unit)
+        residual = PER_UNIT[unit] * self.residual
         self.figure_, self.axes_ = make_axes(ax, 2, (7.0, 3.3), ncols=2, sharey=True)
         limit = symmetric_limit(residual)
         mesh = self._draw_cells(0, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
@@ -129,7 +139,9 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         # A scale needs two ends, even where all cells have as many rows.
         norm = LogNorm(vmin=1, vmax=max(self.counts.max(), 2))
         mesh = self._draw_cells(1, counts, cmap="viridis", norm=norm)
-        self.figure_.colorbar(mesh, ax=self.axes_[1]).set_label("rows in the cell")
+        bar = self.figure_.colorbar(mesh, ax=self.axes_[1])
+        bar.set_label("rows in the cell")
+        mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
         largest = np.nanmax(np.abs(residual))
         dress(
             self.axes_[0],
@@ -140,6 +152,21 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         empty = np.mean(self.counts == 0)
         dress(self.axes_[1], "temperature [°C]", title=f"data: {empty:.0%} of the cells empty")
         return self
+
+    def tables(self):
+        """What is drawn, in the unit that it was drawn in.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            "cells", the empty ones too.
+        """
+        edges = {"temperature [degC]": self.temperature_edges, "true rate [deg/s]": self.rate_edges}
+        values = {
+            "rows": self.counts,
+            f"mean error after [{self.unit_}]": PER_UNIT[self.unit_] * self.residual,
+        }
+        return {"cells": cells_table(edges, values)}
 
     def _draw_cells(self, place, values, **options):
         axes = self.axes_[place]

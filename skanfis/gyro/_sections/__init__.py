@@ -1,0 +1,1 @@
+"""The sections of a calibration's report, each a function of the page and the results."""

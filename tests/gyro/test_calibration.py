@@ -1,0 +1,117 @@
+"""From a log to a verdict: planted truths, held out by hand, and structures chosen within folds."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.model_selection import GroupKFold
+
+from skanfis.gyro._calibration import Recipe, calibrate
+from skanfis.gyro._choice import choose_in_folds
+from skanfis.gyro._headline import headline
+from skanfis.gyro._split import Split
+from skanfis.gyro._summary import errors_and_verdict
+
+N_RUNS, N_ROWS = 8, 60
+NOISE = 2e-4
+
+
+def log_of(error, seed=0):
+    """Runs at temperatures and rates that overlap, with a planted error of both [deg/s]."""
+    rng = np.random.default_rng(seed)
+    run = np.repeat(np.arange(N_RUNS), N_ROWS)
+    temperature = rng.uniform(0.0, 50.0, run.size)
+    rate = rng.uniform(-100.0, 100.0, run.size)
+    output = rate + error(temperature, rate) + NOISE * rng.normal(size=run.size)
+    columns = {"run": run, "temperature": temperature, "rate": rate, "output": output}
+    return pd.DataFrame(columns)
+
+
+def folds_of(log, n_folds=4):
+    return list(GroupKFold(n_folds).split(log, groups=log["run"]))
+
+
+def calibrated(log, **options):
+    labels = log["run"].astype(str).to_numpy(dtype=object)
+    split = Split("run", folds_of(log), labels, "runs held out")
+    recipe = Recipe(("temperature", "output"), **options)
+    return calibrate(log, split, recipe, lambda text: None)
+
+
+def law(temperature, rate):
+    """Of an open loop: its error against the tangent is that of a sine."""
+    phase = 0.008 * (1 - 4e-4 * (temperature - 25.0)) * (rate + 0.01)
+    return np.sin(phase) / 0.008 - rate
+
+
+PLANTED = {
+    "constant": (lambda t, r: 0.005 + 0.0 * t, (2, 2)),
+    "straight line": (lambda t, r: 0.005 + 2e-4 * t + 1e-5 * r, (2, 2)),
+    "arcsine law": (law, (2, 3)),
+    "cubic polynomial": (lambda t, r: 2e-9 * (t - 25.0) * r**2 * 1e2, (1, 1)),
+    "this model": (lambda t, r: 0.01 / (1.0 + np.exp(-(t - 25.0))), (3, 1)),
+}
+
+
+@pytest.mark.parametrize("truth", PLANTED)
+def test_the_planted_truth_is_recommended(truth, tmp_path):
+    error, terms = PLANTED[truth]
+    calibration = calibrated(log_of(error), terms=terms)
+    verdict = calibration.verdict
+    assert verdict.recommended == truth, verdict
+    title, sentence = headline(calibration, "deg/s")
+    said = " ".join(errors_and_verdict(calibration))
+    assert title in said
+    if truth == "this model":
+        assert title == "The fuzzy rules are worth it"
+        return
+    assert title.startswith("Use ")
+    assert title.endswith(f"{truth} instead of the fuzzy rules")
+    assert "more than the scatter over the 8 held-out runs" in sentence
+
+
+def test_before_after_and_what_is_simpler_are_of_the_same_rows():
+    log = log_of(PLANTED["constant"][0])
+    # A run at a temperature of its own is out of range, and 30 times worse.
+    hot = log["run"] == 3
+    log.loc[hot, "temperature"] += 200.0
+    log.loc[hot, "output"] += 0.15
+    calibration = calibrated(log, terms=(1, 1))
+    rows = calibration.inside
+    assert not rows[hot].any()
+    before = (log["output"] - log["rate"]).to_numpy()
+    verdict = calibration.verdict
+    assert verdict.rms["no compensation"] == pytest.approx(np.sqrt(np.mean(before[rows] ** 2)))
+    # The constant of every fold by hand.
+    left = before.copy()
+    for train, test in folds_of(log):
+        left[test] -= before[train].mean()
+    assert verdict.rms["constant"] == pytest.approx(np.sqrt(np.mean(left[rows] ** 2)))
+    shown = errors_and_verdict(calibration)[0]
+    assert f"{verdict.rms['no compensation']:.4g} deg/s RMS, on {rows.sum():,} held" in shown
+
+
+def test_a_gyro_at_rest_has_no_law():
+    log = log_of(PLANTED["constant"][0]).assign(rate=0.0)
+    log["output"] = 0.01 + 1e-4 * log["temperature"]
+    calibration = calibrated(log, terms=(1, 1))
+    found = {simple.name: simple for simple in calibration.simpler}
+    assert "never changes" in found["arcsine law"].missing
+    assert "arcsine law" not in calibration.verdict.rms
+
+
+def test_what_a_fold_holds_out_has_no_say_in_its_structure():
+    """Whatever is done to the rows that a fold holds out, its structure stays the same."""
+    log = log_of(PLANTED["this model"][0])
+    X, y = log[["temperature"]], (log["output"] - log["rate"]).to_numpy()
+    recipe = Recipe(("temperature",), max_rules=2)
+    folds = folds_of(log, 3)
+    found = choose_in_folds(X, y, folds, recipe, lambda text: None)
+    assert max(choice.terms for choice in found) > (1,)
+    _, test = folds[1]
+    spoilt = y.copy()
+    spoilt[test] += 0.5 * np.sign(np.sin(log["temperature"].to_numpy()[test]))
+    again = choose_in_folds(X, spoilt, folds, recipe, lambda text: None)
+    assert again[1].terms == found[1].terms
+    assert dict(again[1].tried) == pytest.approx(dict(found[1].tried), rel=1e-9)
+    assert dict(again[0].tried) != pytest.approx(dict(found[0].tried), rel=1e-3)
+    assert choose_in_folds(X, y, folds, Recipe(("temperature",), terms=(2,)), print) is None

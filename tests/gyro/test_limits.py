@@ -1,0 +1,118 @@
+"""Limits of a specification: what may be typed, and which side of a limit a figure is on."""
+
+import hashlib
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.gyro._dossier import dossier_of
+from skanfis.gyro._limits import parse_limit
+from skanfis.gyro._options import make_parser
+from skanfis.gyro._specification import check_limits
+
+
+@pytest.mark.parametrize(
+    ("text", "low", "high", "unit"),
+    [
+        ("bias=5deg/h", -5.0, 5.0, "deg/h"),
+        ("bias=-2:5deg/h", -2.0, 5.0, "deg/h"),
+        ("residual_rms=:1e-2 °/s", -math.inf, 0.01, "deg/s"),
+        ("bias=.5:deg/s", 0.5, math.inf, "deg/s"),
+        ("reduction_factor=10", 10.0, math.inf, ""),
+        ("scale_factor_nonlinearity=500ppm", -500.0, 500.0, "ppm of full scale"),
+        ("scale_factor_error=500", -500.0, 500.0, "ppm"),
+        ("bias_ramp_sensitivity=2deg/s/(°C/min)", -2.0, 2.0, "deg/s/(degC/min)"),
+        ("angle_random_walk=0.1°/√h", -0.1, 0.1, "deg/sqrt(h)"),
+    ],
+)
+def test_what_may_be_typed(text, low, high, unit):
+    limit = parse_limit(text)
+    assert (limit.low, limit.high, limit.unit) == (low, high, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("bias", "must be FIGURE=LIMIT, with a figure of merit of: residual_rms"),
+        ("drift=5deg/h", "must be FIGURE=LIMIT"),
+        ("bias=5", "bias is in deg/s or deg/h; found ''"),
+        ("angle_random_walk=1deg/h", r"is in deg/sqrt\(h\); found 'deg/h'"),
+        ("bias=5ppm", "bias is in deg/s or deg/h; found 'ppm'"),
+        ("bias=five", "must be a number, or LOW:HIGH"),
+        ("bias=:deg/h", "must be a number, or LOW:HIGH"),
+        ("bias=5:-2deg/h", "lower limit 5 is above the upper one, -2"),
+        ("bias=-5deg/h", "one number limits the size"),
+        ("reduction_factor=10ppm", "reduction_factor has no unit; found 'ppm'"),
+    ],
+)
+def test_what_may_not(text, message):
+    with pytest.raises(ValueError, match=message):
+        parse_limit(text)
+
+
+def table_of(value, low=np.nan, high=np.nan):
+    line = {"group": "all", "figure": "bias", "unit": "deg/h", "after": value}
+    return pd.DataFrame([line | {"after_low": low, "after_high": high, "note": "no rate changes"}])
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "result"),
+    [
+        ("bias=5deg/h", 5.0 - 1e-9, "pass"),
+        ("bias=5deg/h", 5.0 + 1e-9, "fail"),
+        ("bias=5deg/h", -5.0 + 1e-9, "pass"),
+        ("bias=5deg/h", -5.0 - 1e-9, "fail"),
+        ("bias=-2:5deg/h", -2.0, "pass"),
+        ("bias=-2:5deg/h", -2.1, "fail"),
+        ("bias=:5deg/h", -1e9, "pass"),
+        # 0.001 deg/s is 3.6 deg/h.
+        ("bias=0.001deg/s", 3.599, "pass"),
+        ("bias=0.001deg/s", 3.601, "fail"),
+        ("bias=5deg/h", np.nan, "not measured"),
+        ("hysteresis=5deg/h", 1.0, "not measured"),
+    ],
+)
+def test_both_sides_of_a_limit(text, value, result):
+    (check,) = check_limits([parse_limit(text)], table_of(value))
+    assert check.result == result
+    assert bool(check.remark) == (result == "not measured")
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "is_sure"), [(1.0, 4.9, True), (1.0, 5.1, False), (-6.0, 1.0, False)]
+)
+def test_an_interval_over_the_limit_is_said(low, high, is_sure):
+    (check,) = check_limits([parse_limit("bias=5deg/h")], table_of(1.0, low, high))
+    assert check.result == "pass"
+    assert (check.remark == "") == is_sure
+
+
+def test_the_dossier_has_the_files_as_they_are(tmp_path):
+    content = bytes(range(256)) * 5000
+    (tmp_path / "a b.csv").write_bytes(content)
+    typed = [
+        "--min-coverage",
+        "0",
+        "--serial",
+        "7",
+        "--operator",
+        "Ö",
+        "--limits",
+        "bias=5deg/h",
+        "--report-unit=deg/h",
+    ]
+    dossier = dossier_of(make_parser().parse_args([str(tmp_path / "a b.csv"), *typed]))
+    (file,) = dossier.files
+    assert (file.name, file.n_bytes) == ("a b.csv", len(content))
+    assert file.sha256 == hashlib.sha256(content).hexdigest()
+    assert (dossier.serial, dossier.operator, dossier.unit) == ("7", "Ö", "deg/h")
+    assert dossier.limits == (parse_limit("bias=5deg/h"),)
+    assert {("limits", "bias=5deg/h"), ("min-coverage", "0.0")} <= set(dossier.options)
+
+
+def test_a_bad_limit_is_told_in_one_line(capsys):
+    with pytest.raises(SystemExit):
+        make_parser().parse_args(["log.csv", "--limits", "bias=5"])
+    assert "bias is in deg/s or deg/h; found ''" in capsys.readouterr().err
