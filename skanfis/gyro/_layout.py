@@ -70,6 +70,10 @@ def settle(source, request, first=None):
         if first is not None:
             known |= _same_names(source, first, request, said)
         guess = guess_columns(source.header, source.units, source.sample(_SAMPLE_ROWS), known)
+        if "rate" in places and "rate" not in guess.places:
+            own = places["rate"]
+            # Its name holds, whatever its first values are, unless it plays the output's part.
+            guess.places |= {} if own in guess.places.values() else {"rate": own}
         places, date, axes = guess.places, guess.date, guess.axes
         units = {part: unit for part, (unit, _) in guess.units.items()}
         said += _sentences(source.header, guess, request)

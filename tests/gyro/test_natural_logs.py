@@ -200,7 +200,7 @@ def test_many_files_folders_patterns_and_headers_that_nearly_agree(tmp_path, tru
 
 def test_means_while_reading_are_those_of_the_rows(tmp_path, monkeypatch, truth):
     monkeypatch.setattr("skanfis.gyro._table._ROWS", 37)  # no multiple of a cell
-    truth[PARTS + ["run"]].to_csv(tmp_path / "log.csv", index=False)
+    truth[[*PARTS, "run"]].to_csv(tmp_path / "log.csv", index=False)
     reading = found(tmp_path / "log.csv", average=50.0)
     cells = truth.groupby(["run", (truth["time"] // 50.0)])[PARTS].mean()
     np.testing.assert_allclose(reading.log[PARTS], cells.to_numpy(), rtol=1e-12)
@@ -239,8 +239,8 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
         (b"PK\x03\x04\x00\x00", "an archive or a workbook"),
         (b"\x1f\x8b\x08\x00", "is compressed"),
         (bytes(range(256)), "is not text"),
-        (b"time,temp,gyro\n10:00:00,20,2\nlunch,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'lun"),
-        (b"temp,gyro\n20,1\n21,1e999\n22,3\n", "line 3, column 'gyro' .output.: the value is infinite"),
+        (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
+        (b"temp,gyro\n20,1\n21,1e999\n22,3\n", "line 3, column 'gyro' .output.: .* infinite"),
     ],
 )  # fmt: skip
 def test_what_is_no_log_is_refused_in_words(tmp_path, content, message):
