@@ -225,7 +225,14 @@ def _by_behaviour(names, columns, guess):
             free.remove(climbing[0])
     lacking = [part for part in ("output", "rate") if part not in guess.places]
     if lacking:
-        _followers(columns, guess, free, lacking)
+        # What is smooth follows a bias that follows the temperature: it is no table's rate. Nor
+        # is another axis.
+        stepping = [
+            place
+            for place in free
+            if not _is_smooth(columns.numbers(place)) and _score("output", names[place]) == 0.0
+        ]
+        _followers(columns, guess, stepping, lacking)
         free = [place for place in free if place not in guess.places.values()]
     if "temperature" not in guess.places:
         smooth = [place for place in free if _is_smooth(columns.numbers(place))]
@@ -248,7 +255,7 @@ def _is_smooth(values):
         plausible
         and spread > 3.0
         and np.unique(values).size > 10
-        and np.median(np.abs(np.diff(values))) < 0.05 * spread
+        and np.quantile(np.abs(np.diff(values)), 0.99) < 0.1 * spread
     )
 
 
