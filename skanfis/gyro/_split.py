@@ -135,7 +135,12 @@ def _nothing_to_hold_out(numbers, levels):
 
 
 def _numbers(log, name):
-    return None if name not in log else np.unique(log[name].astype(str), return_inverse=True)[1]
+    if name not in log:
+        return None
+    labels = log[name].astype("category").cat
+    # By their names, as text: numbers of the categories alone depend on the order of the files.
+    places = np.unique(labels.categories.astype(str), return_inverse=True)[1]
+    return np.unique(places[labels.codes.to_numpy()], return_inverse=True)[1]
 
 
 def _levels(log):
@@ -192,7 +197,9 @@ def _hold_out(number):
 
 def _labels(log, part):
     if part != "level":
-        return log[part].astype(str).to_numpy(dtype=object)
+        labels = log[part].astype("category").cat
+        # One text for all rows of a label, not one for each.
+        return labels.categories.astype(str).to_numpy(dtype=object)[labels.codes.to_numpy()]
     sizes = np.abs(log["rate"].to_numpy())
     levels = find_rate_levels(sizes)
     names = np.array([f"|{level:.4g}| °/s" for level in levels], dtype=object)
