@@ -6,7 +6,7 @@ import joblib
 import numpy as np
 
 from ._checks import check_log
-from ._console import UsageError, pairs, refuse_existing, say
+from ._console import UsageError, refuse_existing, say
 from ._files import check_different, find_logs
 from ._logs import read_for
 from ._staging import Staging
@@ -59,7 +59,7 @@ def _read(path, options, needed, compensator, tell):
             f"(--units output={due})."
         )
     try:
-        check_log(reading.log, units=pairs(options.units, "--units"), inputs=())
+        check_log(reading.log, units=reading.units, inputs=())
     except LogError as error:
         raise reading.located(error) from error
     return reading.log

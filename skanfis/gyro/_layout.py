@@ -61,7 +61,11 @@ def settle(source, request, first=None):
             places[part] = place
         elif part in request.columns:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
-    said: list[str] = []
+    said = [
+        f"{source.header[places[part]]!r} is taken for {name!r}"
+        for part, name in request.columns.items()
+        if source.header[places[part]] != name
+    ]
     units, date, axes = {}, None, {}
     if request.guess:
         known = dict(places)

@@ -17,10 +17,14 @@ from ._files import check_different
 from ._layout import COLUMNS, Request
 from ._runs import lost_rows, name_runs, split_runs
 from ._table import LogFile
-from ._units import declared_units
+from ._units import SIGNALS, declared_units
 from .errors import LogError
 
 __all__ = ["LogError", "Reading", "check_log", "checked_request", "read", "read_log"]
+
+
+# After so many pieces of a long file, a line of progress.
+_PIECES_TOLD = 10
 
 
 def read_log(
@@ -162,12 +166,12 @@ def read(paths, request, *, max_gap=None, tell=None):
     columns = _Columns()
     for path in paths:
         file = LogFile.open(path, request, files[0] if files else None)
-        if files and set(file.layout.places) != set(files[0].layout.places):
-            differ = sorted(set(file.layout.places) ^ set(files[0].layout.places))
-            raise LogError(f"{path}: the files differ in having {', '.join(differ)}.")
         files.append(file)
-        for piece in file.pieces():
+        _check_alike(file, files[0])
+        for n_pieces, piece in enumerate(file.pieces(), start=1):
             columns.add(piece, len(files) - 1)
+            if tell is not None and n_pieces % _PIECES_TOLD == 0:
+                tell(f"{path}: {file.n_rows:,} rows so far")
         if tell is not None and len(paths) > 1:
             tell(f"read {len(files):,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
     log = columns.table(list(files[0].layout.places), _short_names(paths))
@@ -181,6 +185,19 @@ def read(paths, request, *, max_gap=None, tell=None):
     if lost := lost_rows(log, sum(len(file.dropped) for file in files)):
         notes.append(lost)
     return Reading(log, files, notes, is_exact=request.average is None)
+
+
+def _check_alike(file, first):
+    """LogError where a file has other parts than the first, or another kind of output."""
+    differ = sorted(set(file.layout.places) ^ set(first.layout.places))
+    if differ:
+        raise LogError(f"{file.path}: the files differ in having {', '.join(differ)}.")
+    units = [one.layout.units["output"] for one in (first, file)]
+    if units[0] != units[1] and set(units) & set(SIGNALS):
+        raise LogError(
+            f"{file.path}: the output is in {units[1]}, in {first.path} in {units[0]}; say which "
+            "it is (units: output=UNIT)."
+        )
 
 
 class _Columns:

@@ -152,8 +152,9 @@ def test_columns_without_names_are_told_by_what_they_do(tmp_path, truth):
     names = {part: reading.files[0].layout.name(part) for part in PARTS}
     assert names == {"time": "a", "temperature": "c", "output": "b", "rate": "d"}
     assert "because one follows the other" in "; ".join(reading.notes)
-    told = found(tmp_path / "log.csv", columns={"output": "d", "rate": "b"})
+    told = found(tmp_path / "log.csv", columns={"output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
+    assert "'d' is taken for 'D '" in told.notes
 
 
 def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
@@ -196,6 +197,16 @@ def test_many_files_folders_patterns_and_headers_that_nearly_agree(tmp_path, tru
     (folder / "r3.csv").write_bytes((folder / "r2.csv").read_bytes())
     with pytest.raises(LogError, match=r"r3.csv: holds the same bytes as .*r2.csv"):
         found([*paths, str(folder / "r3.csv")])
+
+
+def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
+    table = truth[["time", "temperature", "rate"]]
+    for name in ("gyro_counts", "gyro_dps"):
+        table.assign(**{name: truth["output"]}).to_csv(tmp_path / f"{name}.csv", index=False)
+    paths = [str(tmp_path / f"{name}.csv") for name in ("gyro_counts", "gyro_dps")]
+    with pytest.raises(LogError, match=r"gyro_dps.csv: the output is in deg/s, in .* in counts"):
+        found(paths)
+    same(found(paths, units={"output": "deg/s"}), pd.concat([truth, truth]))
 
 
 def test_means_while_reading_are_those_of_the_rows(tmp_path, monkeypatch, truth):
