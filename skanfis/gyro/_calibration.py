@@ -43,7 +43,7 @@ class Recipe:
 
     inputs: tuple[str, ...]
     output_unit: str = "deg/s"
-    scale_factor: float | None = None  # of a raw signal at rest, which does not tell it
+    scale_factor: float = 1.0  # of a raw signal at rest, which does not tell it
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"

@@ -22,11 +22,12 @@ _WORDS = {
     },
     "output": {
         5: "gyro gyroscope fog output out signal raw counts count adc measured meas indicated "
-        "sensor imu dut uut",
+        "sensor imu dut uut kreisel",
         2: "rate omega angular velocity speed",
     },
     "rate": {
-        6: "true truth table turntable ref reference stage commanded command cmd setpoint encoder",
+        6: "true truth table turntable drehtisch ref reference stage commanded command cmd setpoint "
+        "encoder",
         2: "rate omega angular velocity speed",
     },
 }
@@ -234,6 +235,13 @@ def _by_behaviour(names, columns, guess):
         ]
         _followers(columns, guess, stepping, lacking)
         free = [place for place in free if place not in guess.places.values()]
+    angular = [k for k in free if names[k].quantity in _QUANTITIES["output"]]
+    if (
+        "output" not in guess.places
+        and len(angular) == 1
+        and not _AGAINST & set(names[angular[0]].words)
+    ):
+        _take(guess, "output", angular[0], "by its unit")
     if "temperature" not in guess.places:
         smooth = [place for place in free if _is_smooth(columns.numbers(place))]
         if len(smooth) == 1:

@@ -125,7 +125,7 @@ def _calibration(options, paths, task, tell, may_skip):
     recipe = Recipe(
         inputs=inputs,
         output_unit=unit if unit in SIGNALS else "deg/s",
-        scale_factor=options.scale_factor,
+        scale_factor=options.scale_factor or 1.0,
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,

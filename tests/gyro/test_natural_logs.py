@@ -69,8 +69,7 @@ def test_a_log_of_one_kind_is_read_as_it_was_meant(tmp_path, truth, kind):
         temp_trend=1, seq=range(300)
     )
     table.to_csv(tmp_path / "log.csv", index=False, **how)
-    columns = {"output": "Kreisel", "rate": names[3]} if "Kreisel" in names else {}
-    reading = found(tmp_path / "log.csv", columns=columns)
+    reading = found(tmp_path / "log.csv")
     same(reading, truth)
     steps = np.diff(reading.log["time"]) - np.diff(truth["clock"])
     np.testing.assert_allclose(steps, 0.0, atol=1e-5)
@@ -155,6 +154,15 @@ def test_columns_without_names_are_told_by_what_they_do(tmp_path, truth):
     told = found(tmp_path / "log.csv", columns={"output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
     assert "'d' is taken for 'D '" in told.notes
+
+
+def test_an_output_alone_is_told_by_its_unit(tmp_path, truth):
+    table = truth[["time", "temperature"]].assign(**{"G7 [mV]": truth["output"], "note": "a"})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    np.testing.assert_allclose(reading.log["output"], truth["output"])
+    assert reading.units["output"] == "mV"
+    assert "output = 'G7 [mV]' in mV (by its unit)" in "; ".join(reading.notes)
 
 
 def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
