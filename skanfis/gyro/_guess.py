@@ -26,8 +26,8 @@ _WORDS = {
         2: "rate omega angular velocity speed",
     },
     "rate": {
-        6: "true truth table turntable drehtisch ref reference stage commanded command cmd setpoint "
-        "encoder",
+        6: "true truth table turntable drehtisch ref reference stage commanded command cmd "
+        "setpoint encoder",
         2: "rate omega angular velocity speed",
     },
 }
