@@ -88,11 +88,11 @@ TABLE = {
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
         [PUBLIC, "exceptions", "options", "inspection", "export", "datasets"],
-        [*PLOTTING, "pandas", "allantools", "joblib"],
+        [*PLOTTING, "pandas", "allantools", "joblib", "pyarrow"],
     ),
     PUBLIC: (["exceptions", "regressor"], []),
 }
-ONLY_INSIDE_FUNCTIONS = {"matplotlib", "allantools", "onnx", "skl2onnx"}
+ONLY_INSIDE_FUNCTIONS = {"matplotlib", "allantools", "onnx", "pyarrow", "skl2onnx"}
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 
 

@@ -1,5 +1,6 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
+from ._checks import check_log
 from .allan import AllanCoefficients, allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
@@ -13,6 +14,7 @@ from .displays import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
+from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
 from .groups import (
     check_split,
@@ -21,7 +23,7 @@ from .groups import (
     group_by_rate_level,
     group_by_run,
 )
-from .log import LogError, check_log, read_log
+from .log import read_log
 from .metrics import (
     bias,
     bias_ramp_sensitivity,

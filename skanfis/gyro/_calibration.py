@@ -37,6 +37,7 @@ class Recipe:
 
     inputs: tuple[str, ...]
     output_unit: str = "deg/s"
+    scale_factor: float = 1.0  # of a raw signal at rest, which does not tell it
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
@@ -104,7 +105,8 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     """
     factor = 1.0
     if recipe.output_unit in SIGNALS:
-        factor = scale_factor(log["rate"], log["output"]) if np.ptp(log["rate"]) > 0 else 1.0
+        at_rest = np.ptp(log["rate"]) == 0.0
+        factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, recipe.time_constant)
     before = log["output"].to_numpy() / factor
     error = before - log["rate"].to_numpy()

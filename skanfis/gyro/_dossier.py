@@ -59,8 +59,8 @@ def add_report_options(parser):
     )
 
 
-def dossier_of(options):
-    """The dossier of the command's options, with the files as they are now."""
+def dossier_of(options, paths):
+    """The dossier of the command's options and logs, with the files as they are now."""
     told = [
         (name.replace("_", "-"), _shown(value))
         for name, value in sorted(vars(options).items())
@@ -70,7 +70,7 @@ def dossier_of(options):
         made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),
         serial=options.serial,
         operator=options.operator,
-        files=tuple(_log_file(Path(path)) for path in options.logs),
+        files=tuple(_log_file(Path(path)) for path in paths),
         options=tuple(told),
         limits=tuple(options.limits),
         unit=options.report_unit,

@@ -18,6 +18,8 @@ _MOST = 3
 _ALONE = 5.0
 _N_NEIGHBOURS = 8
 _MOST_CANDIDATES = 2_000
+# Rows among which the neighbours of candidates are looked for; more tell nothing new.
+_MOST_NEIGHBOURS = 200_000
 # A temperature moves slowly: a part of its range is a lot from one row to the next.
 _SMOOTH = 0.2
 
@@ -37,7 +39,9 @@ def find_glitches(log, error):
     order, and the temperature, beside that of the rows before and after.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
-    runs = log["run"].astype(str).to_numpy() if "run" in log else np.zeros(len(log))
+    runs = np.zeros(len(log), dtype=int)
+    if "run" in log:
+        runs = log["run"].astype("category").cat.codes.to_numpy()
     beside_time = temperature - _median_around(temperature, runs)
     found = {
         row: f"the temperature of {temperature[row]:.4g} degC"
@@ -85,6 +89,12 @@ def _median_nearby(places, values, rows):
     scale = _spread(places)
     points = places / np.where(scale > 0.0, scale, 1.0)
     # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
-    tree = cKDTree(points, balanced_tree=False)
-    _, nearest = tree.query(points[rows], min(_N_NEIGHBOURS + 1, len(values)))
-    return np.median(values[nearest[:, 1:]], axis=1)
+    step = -(-len(values) // _MOST_NEIGHBOURS)
+    tree = cKDTree(points[::step], balanced_tree=False)
+    _, nearest = tree.query(points[rows], min(_N_NEIGHBOURS + 1, tree.n))
+    nearest = step * nearest
+    # Itself, or else the farthest.
+    own = nearest == rows[:, None]
+    own[~own.any(axis=1), -1] = True
+    others = nearest[~own].reshape(len(rows), -1)
+    return np.median(values[others], axis=1)

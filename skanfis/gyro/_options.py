@@ -1,22 +1,39 @@
 """The options of the command, and its help."""
 
 import argparse
-import math
 from pathlib import Path
 
+from .. import __version__
 from ._calibration import MAX_EXTRAPOLATION
+from ._checks import QUANTITIES
 from ._dossier import add_report_options
+from ._layout import COLUMNS
+from ._option_types import (
+    MOST_RULES,
+    axis,
+    count,
+    encoding,
+    extent,
+    factor,
+    gap,
+    jobs,
+    positive,
+    rules,
+    seconds,
+    share,
+    sign,
+    terms,
+)
 from ._split import KINDS
 from ._units import units_of
 from .compensator import INPUTS
-from .log import COLUMNS, QUANTITIES
 
 __all__ = ["PROGRAM", "make_parser"]
 
 PROGRAM = "python -m skanfis.gyro"
 
 _DESCRIPTION = """\
-Calibrate a gyro from logs in CSV: learn the error of its indicated rate (indicated minus true) from
+Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
@@ -24,13 +41,11 @@ Written to a folder: the model (compensator.json, and compensator.joblib as a Py
 report with tables and pictures for any browser (report.html), and the rules as text (rules.txt).
 """
 
-# A grid that could neither be told nor learnt: the search takes 36.
-_MOST_RULES = 500
-
 _EPILOG = """\
 examples:
   python -m skanfis.gyro log.csv
   python -m skanfis.gyro cold.csv warm.csv hot.csv --output gyro7
+  python -m skanfis.gyro logs/ --average 1 --output gyro7
   python -m skanfis.gyro log.csv --columns time=t_ms temperature=temp output=counts rate=table \\
       --units time=ms output=counts
   python -m skanfis.gyro --apply gyro7/compensator.json flight.csv --output flight-rates.csv
@@ -56,59 +71,121 @@ def make_parser():
     """The parser of the command's arguments."""
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
-        usage=f"{PROGRAM} LOG.csv [LOG.csv ...] [options]\n"
-        f"       {PROGRAM} --apply MODEL LOG.csv [LOG.csv ...] [options]",
+        usage=f"{PROGRAM} LOG [LOG ...] [options]\n"
+        f"       {PROGRAM} --apply MODEL LOG [LOG ...] [options]",
         description=_DESCRIPTION,
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("logs", nargs="+", metavar="LOG.csv", help="one log, or one file per run")
-    reading = parser.add_argument_group("reading the log")
-    reading.add_argument(
+    parser.add_argument("--version", action="version", version=f"skanfis {__version__}")
+    parser.add_argument(
+        "logs",
+        nargs="+",
+        metavar="LOG",
+        help="text with a header, such as CSV, or Parquet: one log, or one file per run; a folder "
+        "or a pattern such as 'logs/*.csv' stands for its files",
+    )
+    _add_reading(parser.add_argument_group("reading the log"))
+    _add_rows(parser.add_argument_group("rows"))
+    _add_model(parser.add_argument_group("the model"))
+    _add_range(parser.add_argument_group("where it holds, and how it is checked"))
+    add_report_options(parser)
+    _add_output(parser.add_argument_group("output"))
+    return parser
+
+
+def _add_reading(group):
+    group.add_argument(
         "--columns",
         nargs="+",
         action="extend",
         default=[],
         metavar="PART=NAME",
-        help=f"names of the columns; parts: {', '.join(COLUMNS)}. A part that is not named has its "
-        "own name. Needed are temperature, output and rate (the truth); time for inputs that need "
-        "it",
+        help=f"names of the columns; parts: {', '.join(COLUMNS)}. A part that is not named is "
+        "guessed by names, units and values, and the guess is told. Needed are temperature and "
+        "output; the rate (the truth) unless the gyro was at rest; time for inputs that need it",
     )
-    reading.add_argument(
+    group.add_argument(
         "--units",
         nargs="+",
         action="extend",
         default=[],
         metavar="PART=UNIT",
-        help="units of the columns, by default s, degC and deg/s. "
+        help="units of the columns, by default those in their names, or s, degC and deg/s. "
         + "; ".join(f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES),
     )
-    reading.add_argument(
+    group.add_argument(
+        "--axes",
+        nargs="+",
+        type=axis,
+        metavar="AXIS[=NAME]",
+        help="calibrate several axes, each by itself, into a folder of its own: letters, and the "
+        "columns of their outputs where these are not guessed; by default all that are found",
+    )
+    group.add_argument(
         "--separator",
-        type=_sign,
-        default=",",
+        type=sign,
         metavar="SIGN",
-        help=r"between columns (,); \t for a tab",
+        help=r"between columns, \t for a tab; by default found out",
     )
-    reading.add_argument(
-        "--decimal", type=_sign, default=".", metavar="SIGN", help="of decimal fractions (.)"
+    group.add_argument(
+        "--decimal", type=sign, metavar="SIGN", help="of decimal fractions; by default found out"
     )
-    reading.add_argument("--device", metavar="NAME", help="use the rows of this device only")
-    reading.add_argument(
+    group.add_argument(
+        "--encoding",
+        type=encoding,
+        metavar="NAME",
+        help="of the text, such as gbk; by default UTF-8, UTF-16 or Windows-1252, as found out",
+    )
+
+
+def _add_rows(group):
+    group.add_argument("--device", metavar="NAME", help="use the rows of this device only")
+    group.add_argument(
+        "--missing",
+        choices=("drop", "refuse"),
+        default="drop",
+        help="rows that lack a value: leave them out, counted and told (drop, default), or refuse "
+        "the log",
+    )
+    group.add_argument(
+        "--max-gap",
+        type=gap,
+        default="auto",
+        metavar="S",
+        help="a longer step of the time begins a new run, where no column tells runs apart; inf "
+        "for none (auto: a minute, and 50 usual steps)",
+    )
+    group.add_argument(
+        "--average",
+        type=seconds,
+        metavar="S",
+        help="average the rows over so many seconds while they are read: memory then grows with "
+        "the means only",
+    )
+    group.add_argument(
         "--at-rest",
         action="store_true",
         help="the gyro did not turn: the log needs no column for the rate, and the bias is learnt, "
-        "the earth's rate included",
+        "the earth's rate included. Found out where there is no rate, or one of zero",
     )
-    reading.add_argument(
+    group.add_argument(
+        "--scale-factor",
+        type=factor,
+        metavar="K",
+        help="of a raw signal at rest, which does not tell it: counts (V, mV) per deg/s",
+    )
+    group.add_argument(
         "--min-temperature-span",
-        type=_positive,
+        type=positive,
         default=10.0,
         metavar="DEGC",
         help="smallest range of the temperature that is accepted (10)",
     )
-    model = parser.add_argument_group("the model")
-    model.add_argument(
+
+
+def _add_model(group):
+    group.add_argument(
         "--inputs",
         nargs="+",
         choices=INPUTS,
@@ -117,21 +194,48 @@ def make_parser():
         "only with three runs or more. temperature_rate is made from time and temperature. Without "
         "output, the bias alone is learnt",
     )
-    model.add_argument(
+    group.add_argument(
         "--terms",
-        type=_terms,
+        type=terms,
         default="search",
         metavar="N,N,...",
         help="fuzzy terms per input; 'search' (default) grows them on held-out groups, 'auto' "
         "leaves them to ANFISRegressor",
     )
-    model.add_argument(
+    group.add_argument(
         "--physics",
         action="store_true",
         help="for open-loop fiber-optic gyros: fit the arcsine law first, and let the fuzzy rules "
         "learn what it leaves",
     )
-    model.add_argument(
+    group.add_argument(
+        "--time-constant",
+        type=seconds,
+        default=30.0,
+        metavar="S",
+        help="of the low-pass of the temperature's rate (30)",
+    )
+    group.add_argument(
+        "--max-rules",
+        type=rules,
+        default=36,
+        metavar="N",
+        help=f"most rules of a search (36); {MOST_RULES} at most",
+    )
+    group.add_argument(
+        "--fit-rows",
+        type=count,
+        default=100_000,
+        metavar="N",
+        help="fit to so many rows, chosen at random, of a longer log (100000); all are checked",
+    )
+    group.add_argument(
+        "--jobs", type=jobs, metavar="N", help="threads for a fit (1); -1 is one per core"
+    )
+
+
+def _add_range(group):
+    group.add_argument(
         "--outside",
         choices=("clip", "linear", "nan"),
         default="linear",
@@ -139,144 +243,50 @@ def make_parser():
         "hold the edge value (clip), go on along the tangent for a limited way (linear, default), "
         "or give no rate (nan)",
     )
-    model.add_argument(
+    group.add_argument(
         "--max-extrapolation",
-        type=_extent,
+        type=extent,
         default=MAX_EXTRAPOLATION,
         metavar="SD",
         help="how far the rules follow the tangent beyond the range of an input, in its standard "
         f"deviations; inf for without end ({MAX_EXTRAPOLATION:g})",
     )
-    model.add_argument(
+    group.add_argument(
         "--min-coverage",
-        type=_share,
+        type=share,
         default=0.1,
         metavar="SHARE",
         help="rows that the data cover less are flagged (0.1)",
     )
-    model.add_argument(
-        "--time-constant",
-        type=_seconds,
-        default=30.0,
-        metavar="S",
-        help="of the low-pass of the temperature's rate (30)",
-    )
-    model.add_argument(
-        "--max-rules",
-        type=_rules,
-        default=36,
-        metavar="N",
-        help=f"most rules of a search (36); {_MOST_RULES} at most",
-    )
-    model.add_argument(
-        "--fit-rows",
-        type=_count,
-        default=100_000,
-        metavar="N",
-        help="fit to so many rows, chosen at random, of a longer log (100000); all are checked",
-    )
-    model.add_argument(
-        "--jobs", type=_jobs, metavar="N", help="threads for a fit (1); -1 is one per core"
-    )
-    parser.add_argument(
+    group.add_argument(
         "--groups",
         choices=KINDS,
         default="auto",
         help="what to hold out in the check; by default (auto) devices where there are three or "
-        "more, else runs, and rate levels where these could be learnt by heart",
+        "more, else runs, and rate levels where these could be learnt by heart; of a single run "
+        "legs of the temperature's cycles, or pieces of them",
     )
-    add_report_options(parser)
-    output = parser.add_argument_group("output")
-    output.add_argument(
+
+
+def _add_output(group):
+    group.add_argument(
         "--apply",
         metavar="MODEL",
         help="compensate the logs by this model (compensator.json) instead of calibrating; a "
         "column for the rate is not needed, and is compared with where it is there. A .joblib file "
         "is taken too, and can run any code: see below",
     )
-    output.add_argument(
+    group.add_argument(
         "--output",
         type=Path,
         metavar="PATH",
         help="folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)",
     )
-    output.add_argument(
+    group.add_argument(
         "--c",
         choices=("c99", "c89"),
         metavar="STD",
         help="also write the model as C (compensator.h, compensator.c) by the standard c99 or c89",
     )
-    output.add_argument("--force", action="store_true", help="replace files that exist")
-    output.add_argument("--quiet", action="store_true", help="no progress on stderr")
-    return parser
-
-
-def _terms(text):
-    if text in ("search", "auto"):
-        return text
-    try:
-        terms = tuple(int(part) for part in text.split(","))
-    except ValueError:
-        terms = ()
-    if not terms or min(terms) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} must be search, auto, or numbers such as 2,3,3")
-    n_rules = math.prod(terms)
-    if n_rules > _MOST_RULES:
-        raise argparse.ArgumentTypeError(
-            f"{text} makes {n_rules:,} rules; at most {_MOST_RULES} are learnt. Use fewer terms"
-        )
-    return terms
-
-
-def _sign(text):
-    sign = "\t" if text == r"\t" else text
-    if (
-        len(sign) != 1
-        or sign.isalnum()
-        or not (sign.isprintable() or sign == "\t")
-        or sign in "\"'+-"
-    ):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} must be one sign, such as a comma, and neither letter, digit, quote, + nor -"
-        )
-    return sign
-
-
-def _positive(text):
-    return _number(text, float, lambda value: 0 < value < math.inf, "a positive number")
-
-
-def _extent(text):
-    return _number(text, float, lambda value: value >= 0, "a number, zero or positive, or inf")
-
-
-def _seconds(text):
-    return _number(text, float, lambda value: 1e-9 <= value <= 1e9, "a number from 1e-9 to 1e9")
-
-
-def _rules(text):
-    what = f"a whole number from 1 to {_MOST_RULES}"
-    return _number(text, int, lambda value: 1 <= value <= _MOST_RULES, what)
-
-
-def _jobs(text):
-    what = "a whole number, 1 or more, or -1 for one per core"
-    return _number(text, int, lambda value: value >= 1 or value == -1, what)
-
-
-def _count(text):
-    return _number(text, int, lambda value: value >= 1, "a whole number, 1 or more")
-
-
-def _share(text):
-    return _number(text, float, lambda value: 0 <= value <= 1, "a number from 0 to 1")
-
-
-def _number(text, kind, is_valid, what):
-    try:
-        value = kind(text)
-    except ValueError:
-        value = None
-    if value is None or not is_valid(value):
-        raise argparse.ArgumentTypeError(f"{text!r} must be {what}")
-    return value
+    group.add_argument("--force", action="store_true", help="replace files that exist")
+    group.add_argument("--quiet", action="store_true", help="no progress on stderr")

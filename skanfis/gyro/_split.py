@@ -1,18 +1,20 @@
-"""Which rows to hold out: whole devices or runs, and rate levels where these could be learnt."""
+"""Which rows to hold out: whole devices or runs, rate levels that could be learnt, or legs."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from sklearn.model_selection import GroupKFold
 
+from ._legs import cut_legs, find_legs, name_legs
+from .errors import LogError
 from .groups import find_rate_levels, group_by_rate_level
-from .log import LogError
 
 __all__ = ["KINDS", "Split", "choose_split"]
 
-KINDS = ("auto", "device", "run", "level", "device+level", "run+level")
+KINDS = ("auto", "device", "run", "level", "device+level", "run+level", "leg", "piece")
 
-_FEWEST = {"device": 3, "run": 3, "level": 5}
+# With two legs each way, one can be held out while another tells its direction.
+_FEWEST = {"device": 3, "run": 3, "level": 5, "leg": 4, "piece": 2}
 _N_FOLDS = 5
 # Of the levels, where runs are held out too: every fold then trains on two thirds of them.
 _N_LEVEL_FOLDS_BESIDE = 3
@@ -42,14 +44,17 @@ def choose_split(log, kind="auto", *, uses_output=True):
     """
     numbers = {name: _numbers(log, name) for name in ("device", "run")}
     levels = _levels(log) if uses_output else None
+    legs = _legs(log)
     if kind == "auto":
-        kind, reason = _choose(numbers, levels)
+        kind, reason = _choose(numbers, levels, legs)
     else:
         reason = "as asked for"
     parts = kind.split("+")
-    available = numbers | {"level": levels}
+    available = numbers | {"level": levels, "leg": legs, "piece": legs}
     for part in parts:
         _check(part, available[part])
+    if parts[-1] in ("leg", "piece"):
+        return _by_leg(log, parts[-1], legs, reason)
     folds = _folds(log, parts, available)
     labels = _labels(log, parts[0])
     held_out = " and ".join(
@@ -63,14 +68,35 @@ def choose_split(log, kind="auto", *, uses_output=True):
     return Split(kind, folds, labels, sentence)
 
 
-def _choose(numbers, levels):
+def _by_leg(log, kind, legs, reason):
+    """Legs in turn, or pieces of them where each direction was gone but once."""
+    n_legs = np.unique(legs).size
+    if kind == "leg":
+        n_folds = min(_N_FOLDS, n_legs)
+        folds = _hold_out(legs % n_folds)
+        what = f"whole legs between turning points of the temperature held out ({n_legs} legs"
+    else:
+        folds = _hold_out(cut_legs(legs))
+        what = (
+            "pieces of the legs between turning points of the temperature held out "
+            f"({n_legs} legs, {len(folds)} pieces of each"
+        )
+        reason += "; whether a cycle repeats, so few cannot show"
+    sentence = f"{what}, {len(folds)} folds; {reason})"
+    return Split(kind, folds, name_legs(legs, log["temperature"].to_numpy()), sentence)
+
+
+def _choose(numbers, levels, legs):
     """The kind of split that a log calls for, and why."""
     whole = next((name for name, groups in numbers.items() if _is_enough(name, groups)), None)
     few = _is_enough("level", levels) and np.unique(levels).size <= _MOST_LEVELS
     if whole is None:
-        if not _is_enough("level", levels):
-            raise LogError(_nothing_to_hold_out(numbers, levels))
-        return "level", "too few runs to hold out"
+        if _is_enough("level", levels):
+            return "level", "too few runs to hold out"
+        for kind in ("leg", "piece"):
+            if _is_enough(kind, legs):
+                return kind, "too few runs to hold out"
+        raise LogError(_nothing_to_hold_out(numbers, levels))
     if few and _share_levels(numbers[whole], levels):
         return f"{whole}+level", f"the {whole}s share rate levels, which could be learnt by heart"
     return whole, f"rows of one {whole} are alike"
@@ -82,11 +108,14 @@ def _is_enough(name, groups):
 
 def _check(part, groups):
     if groups is None:
-        what = "rate levels" if part == "level" else f"column for the {part}"
+        what = {"level": "rate levels", "leg": "temperature", "piece": "temperature"}.get(
+            part, f"column for the {part}"
+        )
         raise LogError(f"cannot hold out by {part}: the log has no {what}.")
     if not _is_enough(part, groups):
         raise LogError(
-            f"cannot hold out by {part}: the log has {np.unique(groups).size} {part}(s), and at "
+            f"cannot hold out by {part}: the log has {np.unique(groups).size} "
+            f"{'leg' if part == 'piece' else part}(s), and at "
             f"least {_FEWEST[part]} are needed."
         )
 
@@ -100,12 +129,18 @@ def _nothing_to_hold_out(numbers, levels):
     found.append(f"{0 if levels is None else np.unique(levels).size} rate levels")
     return (
         f"the compensator could not be checked: the log has {', '.join(found)}. At least 3 runs "
-        "(a column run, or one file each) or 5 rate levels are needed, to be held out in turn."
+        "(a column run, or one file each), 5 rate levels, or a temperature that rises and falls "
+        "are needed, to be held out in turn."
     )
 
 
 def _numbers(log, name):
-    return None if name not in log else np.unique(log[name].astype(str), return_inverse=True)[1]
+    if name not in log:
+        return None
+    labels = log[name].astype("category").cat
+    # By their names, as text: numbers of the categories alone depend on the order of the files.
+    places = np.unique(labels.categories.astype(str), return_inverse=True)[1]
+    return np.unique(places[labels.codes.to_numpy()], return_inverse=True)[1]
 
 
 def _levels(log):
@@ -116,6 +151,13 @@ def _levels(log):
         return None
     # A level for nearly every row is none: holding it out would hold out single rows.
     return levels if np.unique(levels).size * _ROWS_PER_LEVEL <= levels.size else None
+
+
+def _legs(log):
+    """Number of each row's leg of the temperature; None where there is no temperature."""
+    if "temperature" not in log:
+        return None
+    return find_legs(log["temperature"].to_numpy(), log.get("run"))
 
 
 def _share_levels(groups, levels):
@@ -155,7 +197,9 @@ def _hold_out(number):
 
 def _labels(log, part):
     if part != "level":
-        return log[part].astype(str).to_numpy(dtype=object)
+        labels = log[part].astype("category").cat
+        # One text for all rows of a label, not one for each.
+        return labels.categories.astype(str).to_numpy(dtype=object)[labels.codes.to_numpy()]
     sizes = np.abs(log["rate"].to_numpy())
     levels = find_rate_levels(sizes)
     names = np.array([f"|{level:.4g}| °/s" for level in levels], dtype=object)

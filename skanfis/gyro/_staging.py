@@ -11,6 +11,8 @@ __all__ = ["Staging"]
 class Staging:
     """A context in which files for ``folder`` are written to ``path``, and published at its end.
 
+    What is written to a folder within ``path`` comes into that folder within ``folder``.
+
     It starts by making both, so that a folder that cannot be written to is found out before there
     is anything to write. Without :meth:`publish` it leaves nothing behind, folders included.
     """
@@ -30,8 +32,10 @@ class Staging:
 
     def publish(self):
         """Give all files that were written their names, those of older ones included."""
-        for path in sorted(self.path.iterdir()):
-            os.replace(path, self._folder / path.name)
+        for path in sorted(path for path in self.path.rglob("*") if path.is_file()):
+            target = self._folder / path.relative_to(self.path)
+            self._make(target.parent)
+            os.replace(path, target)
         self._made = []
 
     def __exit__(self, *_):

@@ -7,7 +7,15 @@ import math
 
 import numpy as np
 
-__all__ = ["CANONICAL", "SIGNALS", "convert", "plausible_units", "unit_named", "units_of"]
+__all__ = [
+    "CANONICAL",
+    "SIGNALS",
+    "convert",
+    "declared_units",
+    "plausible_units",
+    "unit_named",
+    "units_of",
+]
 
 _TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 _RATE = {
@@ -75,3 +83,12 @@ def plausible_units(values, quantity, unit, low, high):
         if other not in (unit, *SIGNALS) and low <= smallest and largest <= high:
             found.append(other)
     return found
+
+
+def declared_units(units):
+    """``units`` with the usual name of each; ValueError where there is no such unit."""
+    for quantity in units or {}:
+        if quantity not in CANONICAL:
+            known = ", ".join(CANONICAL)
+            raise ValueError(f"units: there is no {quantity!r}; it may be one of {known}.")
+    return {quantity: unit_named(quantity, unit) for quantity, unit in (units or {}).items()}

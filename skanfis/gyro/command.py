@@ -1,33 +1,36 @@
 """The command ``python -m skanfis.gyro``: from a calibration log to a checked compensator."""
 
-import sys
-import time
+import contextlib
+import os
 from pathlib import Path
 
 import joblib
 import numpy as np
-import pandas as pd
 
 from ..export import export_c
 from ..inspection.labels import printable
+from ._apply import apply
 from ._calibration import Recipe, calibrate
+from ._console import (
+    ExistsError,
+    Progress,
+    UsageError,
+    refuse_existing,
+    say,
+    say_error,
+)
 from ._dossier import dossier_of
+from ._files import check_different, find_logs
+from ._logs import find_tasks, read_task
 from ._options import PROGRAM, make_parser
 from ._split import choose_split
 from ._staging import Staging
 from ._summary import errors_and_verdict
+from ._units import SIGNALS
 from .c_code import export_c_physics
-from .compensator import INPUTS, STATUS, GyroCompensator
+from .errors import LogError
 from .html_report import report_page, rules_text
-from .log import (
-    LogError,
-    check_at_rest,
-    check_log,
-    declared_units,
-    line_of,
-    located,
-    read_log,
-)
+from .metrics import hysteresis
 
 __all__ = ["main"]
 
@@ -41,96 +44,90 @@ _FILES = {
     "rules": "rules.txt",
 }
 _C_FILES = ("compensator.h", "compensator.c")
+_MOST_NAMED = 3
+_PER_MINUTE = 60.0
 
 
 def main(arguments=None):
     """Run the command; returns its exit code."""
     parser = make_parser()
     options = parser.parse_args(arguments)
-    tell = _Progress(quiet=options.quiet)
+    tell = Progress(quiet=options.quiet)
     try:
-        run = _apply if options.apply else _calibrate
-        return run(options, tell)
-    except _UsageError as error:
+        run = apply if options.apply else _calibrate
+        run(options, tell)
+        return DONE
+    except UsageError as error:
         parser.error(printable(error))  # exits
     except LogError as error:
-        return _say_error(error, REFUSED)
-    except _ExistsError as error:
-        return _say_error(error, EXISTS)
-    except OSError as error:
-        return _say_error(_told(error), FAILED)
-    except (ImportError, ValueError, ArithmeticError, MemoryError) as error:
+        return say_error(PROGRAM, error, REFUSED)
+    except ExistsError as error:
+        return say_error(PROGRAM, error, EXISTS)
+    except BrokenPipeError:
+        # Whoever read the summary has seen enough; nothing more is to be flushed there at the end.
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return FAILED
+    except (OSError, ImportError, ValueError, ArithmeticError, MemoryError) as error:
         # Of what the log made of the arithmetic: one sentence too.
-        return _say_error(str(error) or type(error).__name__, FAILED)
+        return say_error(PROGRAM, error, FAILED)
     except KeyboardInterrupt:
-        return _say_error("interrupted; nothing was written.", INTERRUPTED)
-
-
-class _UsageError(ValueError):
-    """Options that make no sense."""
-
-
-class _ExistsError(Exception):
-    """A file that would be replaced."""
-
-
-class _Progress:
-    """Lines on stderr, with the time since the start."""
-
-    def __init__(self, quiet):
-        self._quiet = quiet
-        self._start = time.monotonic()
-
-    @property
-    def seconds(self):
-        """Time since the start [s]."""
-        return time.monotonic() - self._start
-
-    def __call__(self, text):
-        if not self._quiet:
-            _write_to(sys.stderr, f"{self.seconds:7.1f} s  {printable(text)}\n")
-            sys.stderr.flush()
+        return say_error(PROGRAM, "interrupted; nothing was written.", INTERRUPTED)
 
 
 def _calibrate(options, tell):
-    units = _pairs(options.units, "--units")
-    folder = options.output or Path(f"{Path(options.logs[0]).stem}-compensator")
-    if folder.exists() and not folder.is_dir():
-        raise _ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    files = [*_FILES.values(), *(_C_FILES if options.c else ())]
-    _refuse_existing([folder / name for name in files], options.force)
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
+    folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
+    paths = options.logs = find_logs(options.logs)
+    if folder.exists() and not folder.is_dir():
+        raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
+    _refuse_overwriting(folder, options)
     _require_matplotlib()
+    check_different(paths)
     with Staging(folder) as staging:
-        calibration = _calibration(options, units, tell)
-        tell("drawing the report")
-        _write(calibration, options, staging.path)
+        tell(f"reading {_named(paths)}")
+        tasks = find_tasks(options, paths)
+        for task in tasks[: len(tasks) if len(tasks) > 1 or tasks[0].axis else 0]:
+            _refuse_overwriting(folder / task.axis, options)
+        done = []
+        for task in tasks:
+            if task.axis:
+                tell(f"axis {task.axis}: {', '.join(task.columns.values())}")
+            calibration, notes = _calibration(options, paths, task, tell, len(tasks) > 1)
+            if calibration is None:
+                continue
+            tell("drawing the report")
+            target = staging.path / task.axis
+            target.mkdir(exist_ok=True)
+            _write(calibration, options, paths, target, task.axis)
+            done.append((task, calibration, notes))
+        if not done:
+            raise LogError("the output of no axis follows the rate; see the notes above.")
         staging.publish()
-    for message in calibration.warnings:
-        tell(f"warning: {message}")
-    _say(_summary(calibration, folder))
-    tell("done, but see the warnings" if calibration.cautions else "done")
-    return DONE
+    for task, calibration, notes in done:
+        for message in calibration.warnings:
+            tell(f"warning: {message}")
+        if task.axis:
+            say([f"axis {task.axis}"])
+        say(_summary(calibration, folder / task.axis, notes))
+    cautions = any(calibration.cautions for _, calibration, _ in done)
+    tell("done, but see the warnings" if cautions else "done")
 
 
-def _calibration(options, units, tell):
-    needed = ("temperature", "output") if options.at_rest else ("temperature", "output", "rate")
-    log = _read(options, needed, tell)
-    if options.at_rest:
-        _located(lambda: check_at_rest(log, declared_units(units).get("output", "deg/s")), options)
-        log = log.assign(rate=0.0)
-    inputs = tuple(options.inputs or _default_inputs(log, options.at_rest))
-    if options.physics and "output" not in inputs:
-        raise _UsageError("--physics: the arcsine law needs the output among the inputs.")
-    _check(log, options, inputs=inputs, min_temperature_span=options.min_temperature_span)
-    if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
-        raise _UsageError(
-            f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs "
-            f"{', '.join(inputs)}."
-        )
+def _calibration(options, paths, task, tell, may_skip):
+    """The calibration of one axis, None for one that the table did not turn about; and notes."""
+    try:
+        reading, inputs = read_task(options, paths, task, tell)
+    except LogError as error:
+        if may_skip and task.is_guessed and "does not follow the rate" in error.reason:
+            tell(f"note: axis {task.axis} is left out: {error}")
+            return None, []
+        raise
+    unit = reading.units["output"]
     recipe = Recipe(
         inputs=inputs,
-        output_unit=declared_units(units).get("output", "deg/s"),
+        output_unit=unit if unit in SIGNALS else "deg/s",
+        scale_factor=options.scale_factor or 1.0,
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
@@ -141,163 +138,28 @@ def _calibration(options, units, tell):
         fit_rows=options.fit_rows,
         n_jobs=options.jobs,
     )
-    split = choose_split(log, options.groups, uses_output="output" in inputs)
+    split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
     tell(f"inputs: {', '.join(inputs)}")
     tell(f"check: {split.sentence}")
-    return calibrate(log, split, recipe, tell, _name_row(log, options))
+    return calibrate(reading.log, split, recipe, tell, reading.name_row), reading.notes
 
 
-def _apply(options, tell):
-    if len(options.logs) > 1 and options.output is None:
-        raise _UsageError("--apply to several logs needs --output.")
-    target = options.output or Path(f"{Path(options.logs[0]).stem}-compensated.csv")
-    _refuse_existing([target], options.force)
-    compensator = _load(options.apply)
-    given = declared_units(_pairs(options.units, "--units")).get("output", "deg/s")
-    if given != compensator.output_unit:
-        raise _UsageError(
-            f"the model was calibrated for an output in {compensator.output_unit}; this is in "
-            f"{given} (--units output={compensator.output_unit})."
-        )
-    needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
-    if "temperature_rate" in compensator.inputs:
-        needed |= {"time", "temperature"}
-    with Staging(target.parent) as staging:
-        log = _read(options, sorted(needed), tell)
-        _check(log, options, inputs=())
-        tell("compensating")
-        compensated = compensator.apply(log)
-        labels = [name for name in ("device", "run", "time") if name in log]
-        tell(f"writing {target}")
-        table = pd.concat([log[labels], compensated], axis=1)
-        # Twelve digits are beyond any gyro, and short beside the seventeen of a double.
-        table.to_csv(staging.path / target.name, index=False, float_format="%.12g")
-        staging.publish()
-    _say(_summary_of_rows(log, compensated, compensator, target))
-    tell("done")
-    return DONE
+def _named(paths):
+    """Some files, in few words."""
+    if len(paths) <= _MOST_NAMED:
+        return ", ".join(map(str, paths))
+    return f"{paths[0]} to {paths[-1]}, {len(paths):,} files"
 
 
-def _read(options, require, tell):
-    tell(f"reading {', '.join(options.logs)}")
-    columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
-    inputs = options.inputs or ()
-    if {"time", "temperature_rate"} & set(inputs):
-        require = (*require, "time")
-    try:
-        log = read_log(
-            options.logs,
-            columns=columns,
-            units=units,
-            require=require,
-            separator=options.separator,
-            decimal=options.decimal,
-        )
-    except LogError:
-        raise
-    except ValueError as error:
-        # An unknown part or unit.
-        raise _UsageError(str(error)) from error
-    if options.device is not None:
-        log = _of_device(log, options.device)
-    tell(f"{len(log):,} rows{_counts(log)}")
-    return log
-
-
-def _check(log, options, **requirements):
-    """As :func:`check_log`, with errors in the words of the file."""
-    units = _pairs(options.units, "--units")
-    _located(lambda: check_log(log, units=units, **requirements), options)
-
-
-def _located(check, options):
-    """Do a check, with errors in the words of the file."""
-    try:
-        check()
-    except LogError as error:
-        columns = _pairs(options.columns, "--columns")
-        raise located(error, columns, _only_file(options), options.separator) from error
-
-
-def _only_file(options):
-    """The file whose rows are those of the log; None where there is no such file."""
-    return options.logs[0] if len(options.logs) == 1 and options.device is None else None
-
-
-def _name_row(log, options):
-    """A function that says where a row of the log is found."""
-    path = _only_file(options)
-    if path is not None:
-        return lambda row: f"{path}, line {line_of(path, row, options.separator)}"
-    if "run" in log:
-        return lambda row: f"row {row}, in run {log['run'].iloc[row]}"
-    return "row {}".format
-
-
-def _of_device(log, device):
-    if "device" not in log:
-        raise _UsageError("--device: the log has no column for the device.")
-    names = list(log["device"].cat.categories)
-    if device not in names:
-        raise _UsageError(f"--device {device}: the log has {', '.join(names)}.")
-    log = log[(log["device"] == device).to_numpy()].reset_index(drop=True)
-    for name in ("run", "device"):
-        if name in log:
-            log[name] = log[name].cat.remove_unused_categories()
-    return log
-
-
-def _counts(log):
-    parts = [
-        f", {log[name].nunique():,} {name}{'s' if log[name].nunique() > 1 else ''}"
-        for name in ("run", "device")
-        if name in log
-    ]
-    return "".join(parts)
-
-
-def _default_inputs(log, at_rest):
-    """All that the log has; the time only where several runs can tell it from all else."""
-    inputs: tuple[str, ...] = INPUTS
-    if "time" not in log:
-        inputs = ("temperature", "output")
-    elif "run" not in log or log["run"].nunique() < 3:
-        inputs = ("temperature", "temperature_rate", "output")
-    return tuple(name for name in inputs if not (at_rest and name == "output"))
-
-
-def _load(path):
-    """The compensator of a file: of JSON, or else by its name a pickle, which may run any code."""
-    try:
-        return GyroCompensator.read_json(path)
-    except ValueError as error:
-        if Path(path).suffix.lower() != ".joblib":
-            raise _UsageError(str(error)) from error
-    try:
-        loaded = joblib.load(path)
-    except Exception as error:
-        # A damaged pickle may raise anything.
-        raise _UsageError(
-            f"{path} cannot be loaded ({type(error).__name__}: {error}): it is damaged, or no "
-            "compensator. Use compensator.json."
-        ) from error
-    if not isinstance(loaded, GyroCompensator):
-        raise _UsageError(f"{path} holds a {type(loaded).__name__}, not a GyroCompensator.")
-    return loaded
-
-
-def _refuse_existing(paths, force):
-    for path in paths:
-        if path.is_dir():
-            raise _ExistsError(f"{path} is a folder: choose another --output.")
-        if path.exists() and not force:
-            raise _ExistsError(f"{path} exists already: choose another --output, or --force.")
+def _refuse_overwriting(folder, options):
+    names = [*_FILES.values(), *(_C_FILES if options.c else ())]
+    refuse_existing([folder / name for name in names], options.force)
 
 
 def _refuse_twice(names, sentence):
     for place, name in enumerate(names):
         if name in names[:place]:
-            raise _UsageError(sentence.format(name))
+            raise UsageError(sentence.format(name))
 
 
 def _require_matplotlib():
@@ -313,8 +175,9 @@ def _require_matplotlib():
         raise ImportError(f"matplotlib cannot be imported: {reason}.") from error
 
 
-def _write(calibration, options, folder):
-    page = report_page(calibration, _title(options.logs), dossier_of(options))
+def _write(calibration, options, paths, folder, axis=""):
+    title = _title(options.logs) + (f", axis {axis}" if axis else "")
+    page = report_page(calibration, title, dossier_of(options, paths))
     compensator = calibration.compensator
     (folder / _FILES["report"]).write_text(page, encoding="utf-8")
     joblib.dump(compensator, folder / _FILES["model"])
@@ -332,71 +195,35 @@ def _title(logs):
     return printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
 
 
-def _summary(calibration, folder):
+def _summary(calibration, folder, notes):
     lines = errors_and_verdict(calibration)
+    if not np.ptp(calibration.rate):
+        inside = calibration.inside & np.isfinite(calibration.after)
+        lines += _hysteresis_line(calibration, inside)
     lines += [
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
+        *(f"note           {note}" for note in notes),
         *(f"WARNING        {sentence}" for sentence in calibration.cautions),
     ]
     return lines
 
 
-def _summary_of_rows(log, compensated, compensator, target):
-    flagged = compensated["status"].to_numpy() != 0
-    lines = [f"written        {target}: {len(log):,} rows, {flagged.sum():,} flagged"]
-    for name, bit in STATUS.items():
-        count = int(np.count_nonzero(compensated["status"].to_numpy() & bit))
-        if count:
-            lines.append(f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}")
-    if "rate" in log:
-        for label, rows in (("all is well", ~flagged), ("flagged", flagged)):
-            before, after = (
-                (compensated[name] - log["rate"]).to_numpy()[rows]
-                for name in ("rate_indicated", "rate_compensated")
-            )
-            if np.isfinite(after).any():
-                lines.append(
-                    f"RMS error      {_rms(before[np.isfinite(after)]):.4g} deg/s before, "
-                    f"{_rms(after[np.isfinite(after)]):.4g} after ({label})"
-                )
-    return lines
+def _hysteresis_line(calibration, rows):
+    """The gap between warming and cooling of a gyro at rest; none where there is no such gap."""
+    if "temperature_rate" not in calibration.X:
+        return []
+    temperature = calibration.log["temperature"].to_numpy()[rows]
+    warming = _PER_MINUTE * calibration.X["temperature_rate"].to_numpy()[rows]
+    errors = [(rates - calibration.rate)[rows] for rates in (calibration.before, calibration.after)]
+    try:
+        before, after = (hysteresis(error, temperature, warming) for error in errors)
+    except ValueError:
+        return []  # never warmed and cooled at one temperature
+    return [
+        f"hysteresis     {before:.4g} deg/h between warming and cooling before, {after:.4g} after"
+    ]
 
 
 def _rms(errors):
     return float(np.sqrt(np.mean(errors**2))) if errors.size else float("nan")
-
-
-def _pairs(texts, option):
-    pairs = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if not (key and equals and value):
-            raise _UsageError(f"{option}: {text!r} must be of the form PART=...")
-        if key in pairs:
-            raise _UsageError(f"{option}: {key} is given twice.")
-        pairs[key] = value
-    return pairs
-
-
-def _told(error):
-    """An error of the system in one sentence."""
-    if error.filename is None or error.strerror is None:
-        return error
-    return f"{error.filename}: {error.strerror}."
-
-
-def _say(lines):
-    for line in lines:
-        _write_to(sys.stdout, f"{printable(line)}\n")
-
-
-def _say_error(error, code):
-    _write_to(sys.stderr, f"{PROGRAM}: {printable(error)}\n")
-    return code
-
-
-def _write_to(stream, text):
-    """Text to a stream, with escapes for what its encoding lacks."""
-    encoding = getattr(stream, "encoding", None) or "utf-8"
-    stream.write(text.encode(encoding, "backslashreplace").decode(encoding))

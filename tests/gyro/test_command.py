@@ -205,8 +205,8 @@ def test_at_rest(tmp_path, capsys):
     assert main([*arguments, "--quiet"]) == 0
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     assert compensator.inputs == ("time", "temperature", "temperature_rate")
-    assert main([path, "--output", str(tmp_path / "two")]) == 3
-    assert "no column 'rate'" in capsys.readouterr().err
+    assert main([path, "--output", str(tmp_path / "two"), "--max-rules", "2", "--quiet"]) == 0
+    assert "note           there is no column for the rate" in capsys.readouterr().out
 
 
 @pytest.mark.usefixtures("no_report")
@@ -227,14 +227,14 @@ def without_value(log):
 
 def one_run_without_levels(log):
     rate = log["output"] + np.random.default_rng(0).normal(size=len(log))
-    return log.assign(run=1, time=np.arange(len(log)), rate=rate)
+    warming = np.linspace(0.0, 40.0, len(log))
+    return log.assign(run=1, time=10.0 * np.arange(len(log)), rate=rate, temperature=warming)
 
 
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda log: log.drop(columns="temperature"), "no column 'temperature'"),
-        (without_value, "line 9, column 'rate'"),
+        (lambda log: log[["time", "output", "rate", "run"]], "no column 'temperature'"),
         (
             lambda log: log.assign(time=-log["time"]),
             "log.csv, line 3, column 'time': time does not increase",
@@ -259,15 +259,27 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, cap
 
 def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
     renamed = log.rename(columns={"temperature": "T"}).assign(T=300.0)
+    parts = ["time", "T", "output", "rate", "run"]
     paths = [
-        write_log(tmp_path / f"{name}.csv", renamed, ["time", "T", "output", "rate", "run"])
-        for name in "ab"
+        write_log(tmp_path / f"{name}.csv", renamed[start:], parts)
+        for start, name in enumerate("ab")
     ]
-    arguments = ["--columns", "temperature=T", "--output", str(tmp_path / "out"), "--quiet"]
+    arguments = [
+        "--columns",
+        "temperature=T",
+        "--units",
+        "temperature=degC",
+        "--output",
+        str(tmp_path / "out"),
+        "--quiet",
+    ]
     assert main([paths[0], *arguments]) == 3
     assert "a.csv, line 2, column 'T' (temperature): 300.0 degC" in capsys.readouterr().err
     assert main([*paths, *arguments]) == 3
-    assert "column 'T', row 0: 300.0 degC is not plausible" in capsys.readouterr().err
+    assert (
+        "a.csv, line 2, column 'T' (temperature): 300.0 degC is not plausible"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize(
@@ -280,12 +292,20 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--terms", "2,x"], "must be search, auto, or numbers"),
         (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
         (["--min-coverage", "2"], "must be a number from 0 to 1"),
-        (["--fit-rows", "0"], "must be a whole number, 1 or more"),
+        (["--fit-rows", "0"], "must be a whole number from 1 to"),
         (["--time-constant", "-1"], "must be a number from 1e-9 to 1e9"),
         (["--physics", "--inputs", "temperature"], "needs the output"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
         (["--device", "a"], "no column for the device"),
         (["--jobs", "0"], "must be a whole number, 1 or more, or -1"),
+        (["--terms", "99999999,1,1,1"], "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
+        (["--terms", "9" * 9000], "must be search, auto, or numbers"),
+        (["--inputs", "time", "time"], "--inputs: time is given twice"),
+        (["--max-gap", "0"], "must be auto, a positive number, or inf"),
+        (["--encoding", "klingon"], "'klingon' is no encoding of text that is known"),
+        (["--axes", "../x"], "must be such as x or x=NAME"),
+        (["--axes", "q"], "--axes q: no column for the output of this axis is found"),
+        (["--scale-factor", "131"], "is for a raw signal at rest"),
         (["--terms", "9,9,9,9"], "9,9,9,9 makes 6,561 rules; at most 500"),
         (["--max-rules", "1000"], "must be a whole number from 1 to 500"),
         (["--inputs", "output", "output"], "--inputs: output is given twice"),
@@ -378,7 +398,8 @@ def test_a_damaged_joblib_is_refused(calibrated, tmp_path, content, capsys):
         main(["--apply", str(model), str(calibrated / "raw.csv")])
     err = capsys.readouterr().err
     assert "model.joblib cannot be loaded" in err
-    assert err.count("\n") == 3  # usage in two lines, and one sentence
+    assert err.count("\n") == 4  # why it is unpickled, usage in two lines, and one sentence
+    assert "loading it runs whatever code it holds" in err
 
 
 def test_labels_of_all_kinds_are_drawn_and_told(tmp_path, log, capsys):

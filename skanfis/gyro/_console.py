@@ -1,0 +1,84 @@
+"""What the command says: lines of progress, a summary, and errors in one sentence each."""
+
+import sys
+import time
+
+from ..inspection.labels import printable
+from .errors import LogError
+
+__all__ = ["ExistsError", "Progress", "UsageError", "pairs", "refuse_existing", "say", "say_error"]
+
+
+class UsageError(ValueError):
+    """Options that make no sense."""
+
+
+class ExistsError(Exception):
+    """A file that would be replaced."""
+
+
+class Progress:
+    """Lines on stderr, with the time since the start."""
+
+    def __init__(self, quiet):
+        self._quiet = quiet
+        self._start = time.monotonic()
+
+    @property
+    def seconds(self):
+        """Time since the start [s]."""
+        return time.monotonic() - self._start
+
+    def __call__(self, text):
+        if not self._quiet:
+            _write_to(sys.stderr, f"{self.seconds:7.1f} s  {printable(text)}\n")
+            sys.stderr.flush()
+
+
+def say(lines):
+    """Lines of the summary, to stdout."""
+    for line in lines:
+        _write_to(sys.stdout, f"{printable(line)}\n")
+
+
+def say_error(program, error, code):
+    """An error, to stderr; returns the exit code."""
+    _write_to(sys.stderr, f"{program}: {printable(told(error))}\n")
+    return code
+
+
+def told(error):
+    """An error in one sentence."""
+    if isinstance(error, LogError) or not isinstance(error, OSError):
+        return str(error) or type(error).__name__
+    if error.filename is None or error.strerror is None:
+        return str(error)
+    return f"{error.filename}: {error.strerror}."
+
+
+def _write_to(stream, text):
+    """Text to a stream, with escapes for what its encoding lacks."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+
+
+def pairs(texts, option):
+    """Options of the form PART=NAME as a dict."""
+    found = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not (key and equals and value):
+            raise UsageError(f"{option}: {text!r} must be of the form PART=...")
+        if key in found:
+            raise UsageError(f"{option}: {key} is given twice.")
+        found[key] = value
+    return found
+
+
+def refuse_existing(paths, force):
+    """ExistsError where a file is there already, or a folder in its place."""
+    for path in paths:
+        if path.is_dir():
+            raise ExistsError(f"{path} is a folder: choose another --output.")
+        if path.exists() and not force:
+            raise ExistsError(f"{path} exists already: choose another --output, or --force.")

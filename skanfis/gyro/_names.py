@@ -1,0 +1,87 @@
+"""What the name of a column tells: its words, the unit that it ends in, the axis."""
+
+import re
+from dataclasses import dataclass
+
+__all__ = ["ColumnName", "unit_in"]
+
+_TIME, _TEMPERATURE, _RATE, _SIGNAL = "time", "temperature", "rate", "signal"
+
+# Spellings in lower case, without blanks, of units as ``_units`` names them.
+_UNITS = {
+    _TIME: {
+        "s": "s sec secs second seconds",
+        "ms": "ms msec millis millisecond milliseconds",
+        "us": "us µs μs usec micros microsecond microseconds",
+        "ns": "ns nsec nanos nanosecond nanoseconds",
+        "min": "min minute minutes",
+        "h": "h hr hrs hour hours",
+    },
+    _TEMPERATURE: {
+        "degC": "degc °c ℃ c celsius deg_c cel",
+        "K": "k kelvin degk °k",
+        "degF": "degf °f ℉ f fahrenheit deg_f",
+    },
+    _RATE: {
+        "deg/s": "deg/s °/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec",
+        "deg/h": "deg/h °/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg/hour",
+        "rad/s": "rad/s rad_s rads radps rad/sec rad_sec rad_per_s",
+        "mrad/s": "mrad/s mrad_s mradps",
+        "rpm": "rpm",
+    },
+    _SIGNAL: {
+        "counts": "counts count cnts cnt lsb lsbs digits raw adc codes",
+        "V": "v volt volts",
+        "mV": "mv millivolt millivolts",
+    },
+}
+_MEANT = {
+    spelling: (quantity, unit)
+    for quantity, units in _UNITS.items()
+    for unit, spellings in units.items()
+    for spelling in spellings.split()
+}
+_BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]\s*$|[,/]\s*([^,/\s][^,]*)$")
+_WORD = re.compile(r"[A-Z]?[a-zµäöüß°]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_a-zA-Z]+")
+# Names that hold two words without a sign between them.
+_FUSED = re.compile(r"(gyro|gyr|omega|rate|imu|g|w|acc|accel|a|mag|m)([xyz])$")
+_FULL = {"g": "gyro", "w": "omega", "gyr": "gyro", "a": "acc", "m": "mag"}
+
+
+def unit_in(text):
+    """Quantity and unit that a text names, or None."""
+    return _MEANT.get("".join(text.split()).casefold())
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """A column's name, read: words in lower case, what its unit belongs to, the unit, the axis."""
+
+    words: tuple[str, ...]
+    quantity: str | None = None
+    unit: str | None = None
+    axis: str = ""
+
+    @classmethod
+    def read(cls, name, unit_line=""):
+        """From the header's text, and what a line of units says of it."""
+        meant, rest = unit_in(unit_line.strip("[](){} ")), name.strip()
+        bracketed = _BRACKETED.search(rest)
+        if bracketed and (found := unit_in(bracketed[1] or bracketed[2] or "")):
+            meant, rest = meant or found, rest[: bracketed.start()]
+        words = [part.casefold() for part in _WORD.findall(rest)]
+        axis = ""
+        split: list[str] = []
+        for word in words:
+            fused = _FUSED.match(word)
+            split += [_FULL.get(fused[1], fused[1]), fused[2]] if fused else [word]
+        for length in (3, 2, 1):
+            # A name that is a unit and nothing else keeps it as its word too.
+            found = unit_in("_".join(split[-length:])) if len(split) >= length else None
+            if meant is None and found:
+                meant, split = found, split[:-length] or split
+        for letter in "xyz":
+            if letter in split and len(split) > 1:
+                axis = letter
+        quantity, unit = meant or (None, None)
+        return cls(tuple(word for word in split if word != axis), quantity, unit, axis)

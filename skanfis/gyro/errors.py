@@ -1,0 +1,34 @@
+"""LogError: a log from which no compensator should be learnt."""
+
+__all__ = ["LogError"]
+
+
+class LogError(ValueError):
+    """A log, or a column or row of it, from which no compensator should be learnt.
+
+    Parameters
+    ----------
+    reason : str
+        What was found and what would do.
+    column : str, default=None
+        The column's part in the log: "time", "temperature", "output", "rate", "run" or "device".
+    row : int, default=None
+        Position of the first bad row, counted from 0.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import LogError
+    >>> print(LogError("is missing.", column="rate", row=7))
+    column 'rate', row 7: is missing.
+    """
+
+    def __init__(self, reason, column=None, row=None):
+        super().__init__(reason, column, row)
+        self.reason = reason
+        self.column = column
+        self.row = row
+
+    def __str__(self):
+        place = [] if self.column is None else [f"column {self.column!r}"]
+        place += [] if self.row is None else [f"row {self.row}"]
+        return f"{', '.join(place)}: {self.reason}" if place else self.reason

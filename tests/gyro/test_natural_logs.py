@@ -1,0 +1,275 @@
+"""Logs as they come: what a logger, a spreadsheet or a bench writes is read as it was meant."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.datasets import make_ofog
+from skanfis.gyro import LogError
+from skanfis.gyro._files import find_logs
+from skanfis.gyro._layout import Request
+from skanfis.gyro.log import read
+
+ASKED = {"require": ("temperature", "output"), "guess": True, "drop_missing": True}
+PARTS = ["time", "temperature", "output", "rate"]
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """Five runs, an hour from one to the next, on one clock."""
+    log = make_ofog(n_devices=1, n_runs=5, duration=600.0, random_state=0)
+    log = log.round({"temperature": 3, "output": 6})
+    return log.assign(clock=log["time"] + 3600.0 * log["run"].astype(float) + 79_200.0)
+
+
+def found(path, max_gap="auto", **options):
+    paths = path if isinstance(path, list) else [path]
+    return read(paths, Request(**(ASKED | options)), max_gap=max_gap)
+
+
+def same(reading, truth, parts=PARTS[1:]):
+    for part in parts:
+        np.testing.assert_allclose(reading.log[part], truth[part], rtol=1e-9, atol=1e-9)
+
+
+def moments(truth, form):
+    start = pd.Timestamp("2026-02-27")
+    return (start + pd.to_timedelta(truth["clock"], unit="s")).dt.strftime(form)
+
+
+WRITTEN = {
+    "ISO 8601, UTF-16, semicolons, decimal commas": (
+        "%Y-%m-%dT%H:%M:%S.%f+01:00",
+        ("Zeit", "Temperatur [°C]", "Kreisel", "Drehtisch soll [deg/s]"),
+        {"sep": ";", "decimal": ",", "encoding": "utf-16"},
+    ),
+    "clock over midnight, Windows": (
+        "%H:%M:%S.%f",
+        ("Time", "Temp (°C)", "gyro_dps", "rate_true_deg_s"),
+        {"encoding": "cp1252"},
+    ),
+    "day first, tabs": (
+        "%d.%m.%Y %H:%M:%S",
+        ("timestamp", "T[degC]", "Output", "table"),
+        {"sep": "\t"},
+    ),
+    "month first, halves of the day": (
+        "%m/%d/%Y %I:%M:%S %p",
+        ("date_time", "thermistor_C", "GYRO", "Ref_Rate"),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_a_log_of_one_kind_is_read_as_it_was_meant(tmp_path, truth, kind):
+    form, names, how = WRITTEN[kind]
+    columns = [moments(truth, form), truth["temperature"], truth["output"], truth["rate"]]
+    table = pd.DataFrame(dict(zip(names, columns, strict=True))).assign(
+        temp_trend=1, seq=range(300)
+    )
+    table.to_csv(tmp_path / "log.csv", index=False, **how)
+    reading = found(tmp_path / "log.csv")
+    same(reading, truth)
+    steps = np.diff(reading.log["time"]) - np.diff(truth["clock"])
+    np.testing.assert_allclose(steps, 0.0, atol=1e-5)
+    # The hour without power between runs of ten minutes.
+    assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
+    told = "; ".join(reading.notes)
+    for said in (f"temperature = {names[1]!r}", "split into 5 runs, at 4 gaps", "--columns"):
+        assert said in told
+
+
+def test_a_preamble_a_line_of_units_and_a_date_of_its_own(tmp_path, truth):
+    lines = ["Bench 7;operator X", "", "Datum;Uhrzeit;Temp;Gyro;Table", ";;°C;mrad/s;°/s"]
+    days, clocks = moments(truth, "%Y-%m-%d"), moments(truth, "%H:%M:%S")
+    output = truth["output"] * np.pi / 0.18
+    rows = zip(days, clocks, truth["temperature"], output, truth["rate"], strict=True)
+    lines += [";".join(map(str, row)) for row in rows]
+    (tmp_path / "log.txt").write_text("\n".join(lines), encoding="utf-8")
+    reading = found(tmp_path / "log.txt")
+    same(reading, truth)
+    np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]))
+    assert reading.units["output"] == "mrad/s"
+    assert reading.name_row(10) == f"{tmp_path / 'log.txt'}, line 15"
+
+
+def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth):
+    table = truth[PARTS].astype(object)
+    table.loc[5, "output"], table.loc[9, "temperature"], table.loc[200, "rate"] = "---", "", "NaN"
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    kept = truth.drop(index=[5, 9, 200])
+    same(reading, kept, PARTS)
+    said = "3 of 300 rows lack a value ('temperature' in 1, 'output' in 1, 'rate' in 1)"
+    assert any(note.startswith(said) and "line 7" in note for note in reading.notes)
+    for row in (4, 5, 7, 8, 250):
+        line = int(kept.index[row]) + 2
+        assert reading.name_row(row).endswith(f"line {line}")
+    with pytest.raises(LogError, match="line 11, column 'temperature': the value is missing"):
+        found(tmp_path / "log.csv", drop_missing=False)
+    table.loc[100:, "rate"] = ""
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(LogError, match=r"rows lack a value .* too many to go on"):
+        found(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth, suffix):
+    table = pd.DataFrame(
+        {
+            "seq": range(len(truth)),
+            "sweep_start_temp_c": 20.5,
+            "gyro_counts": -27_000.0 * truth["output"],
+            "temp_c": truth["temperature"],
+            "rate_true_rad_s": np.radians(truth["rate"]),
+            "rate_true_deg_s": truth["rate"],
+            "author_fit_residual_rad_s": 1e-4,
+            "temp_trend": np.where(truth.index % 2, 1, -1),
+        }
+    )
+    path = tmp_path / f"log.{suffix}"
+    if suffix == "csv":
+        table.to_csv(path, index=False)
+    else:
+        pytest.importorskip("pyarrow")
+        table.to_parquet(path)
+    reading = found(path)
+    assert list(reading.log) == ["temperature", "output", "rate"]
+    same(reading, truth, ["temperature", "rate"])
+    assert reading.units["output"] == "counts"
+    np.testing.assert_allclose(reading.log["output"], -27_000.0 * truth["output"])
+
+
+def test_columns_without_names_are_told_by_what_they_do(tmp_path, truth):
+    warming = 20.0 + 0.1 * np.arange(len(truth)) + 3.0 * np.sin(truth.index / 40.0)
+    table = pd.DataFrame(
+        {"a": 0.5 * truth.index, "b": truth["output"], "c": warming, "d": truth["rate"]}
+    )
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv", require=("temperature", "output", "rate", "time"))
+    names = {part: reading.files[0].layout.name(part) for part in PARTS}
+    assert names == {"time": "a", "temperature": "c", "output": "b", "rate": "d"}
+    assert "because one follows the other" in "; ".join(reading.notes)
+    told = found(tmp_path / "log.csv", columns={"output": "D ", "rate": "b"})
+    np.testing.assert_allclose(told.log["output"], truth["rate"])
+    assert "'d' is taken for 'D '" in told.notes
+
+
+def test_an_output_alone_is_told_by_its_unit(tmp_path, truth):
+    table = truth[["time", "temperature"]].assign(**{"G7 [mV]": truth["output"], "note": "a"})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    np.testing.assert_allclose(reading.log["output"], truth["output"])
+    assert reading.units["output"] == "mV"
+    assert "output = 'G7 [mV]' in mV (by its unit)" in "; ".join(reading.notes)
+
+
+def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
+    table = pd.DataFrame(
+        {
+            "time": 1_770_000_000_000 + 1000 * truth["clock"],
+            "temperature": truth["temperature"] + 273.15,
+            "gyro": (27_000 * truth["output"]).round(),
+            "rate": truth["rate"],
+        }
+    )
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    same(reading, truth, ["temperature", "rate"])
+    assert {reading.units[part] for part in ("time", "temperature", "output")} == {
+        "ms", "K", "counts",
+    }  # fmt: skip
+    np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-6)
+
+
+def test_many_files_folders_patterns_and_headers_that_nearly_agree(tmp_path, truth):
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    spelt = {2: {"Temp": " temp"}, 10: {"Temp": "TEMP"}}
+    for number, (_, part) in zip((1, 2, 10), truth.groupby("run"), strict=False):
+        table = part.rename(columns={"temperature": "Temp"})[["time", "Temp", "output", "rate"]]
+        table.rename(columns=spelt.get(number, {})).to_csv(folder / f"r{number}.csv", index=False)
+    (folder / "notes.txt").write_text("not a log")
+    paths = find_logs([str(folder)])
+    assert [path[-7:].strip("/") for path in paths] == ["r1.csv", "r2.csv", "r10.csv"]
+    assert find_logs([f"{folder}/r*.csv"]) == paths
+    reading = found(paths)
+    same(reading, truth[truth["run"].astype(int) < 3])
+    assert list(reading.log["run"].cat.categories) == ["r1", "r2", "r10"]
+    assert sum("is taken for 'Temp' of the first file" in note for note in reading.notes) == 2
+    assert reading.name_row(60).endswith("r2.csv, line 2")
+    for empty in ([f"{folder}/x*.csv"], [str(tmp_path)]):
+        with pytest.raises(LogError, match=r"no file matches|folder without logs"):
+            find_logs(empty)
+    (folder / "r3.csv").write_bytes((folder / "r2.csv").read_bytes())
+    with pytest.raises(LogError, match=r"r3.csv: holds the same bytes as .*r2.csv"):
+        found([*paths, str(folder / "r3.csv")])
+
+
+def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
+    table = truth[["time", "temperature", "rate"]]
+    for name in ("gyro_counts", "gyro_dps"):
+        table.assign(**{name: truth["output"]}).to_csv(tmp_path / f"{name}.csv", index=False)
+    paths = [str(tmp_path / f"{name}.csv") for name in ("gyro_counts", "gyro_dps")]
+    with pytest.raises(LogError, match=r"gyro_dps.csv: the output is in deg/s, in .* in counts"):
+        found(paths)
+    same(found(paths, units={"output": "deg/s"}), pd.concat([truth, truth]))
+
+
+def test_means_while_reading_are_those_of_the_rows(tmp_path, monkeypatch, truth):
+    monkeypatch.setattr("skanfis.gyro._table._ROWS", 37)  # no multiple of a cell
+    truth[[*PARTS, "run"]].to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv", average=50.0)
+    cells = truth.groupby(["run", (truth["time"] // 50.0)])[PARTS].mean()
+    np.testing.assert_allclose(reading.log[PARTS], cells.to_numpy(), rtol=1e-12)
+    assert len(reading.log) == 60
+    # The same pieces without means are the log itself.
+    same(found(tmp_path / "log.csv"), truth, PARTS)
+
+
+@pytest.mark.parametrize(
+    ("times", "runs"),
+    [
+        (np.r_[0:100, 0:100, 0:50], [1] * 100 + [2] * 100 + [3] * 50),  # set anew
+        (np.r_[0:100, 100 + 500 : 700], [1] * 100 + [2] * 100),  # a rest
+        (np.r_[0:100, 130:230], None),  # half a minute lost
+        (np.r_[0:50, 49, 50:149], None),  # a row out of order, which is refused later
+    ],
+)
+def test_runs_are_told_by_the_time(tmp_path, times, runs):
+    table = pd.DataFrame({"time": times, "temperature": 20.0, "output": 1.0})
+    table.to_csv(tmp_path / "log.csv", index=False)
+    log = found(tmp_path / "log.csv").log
+    assert ("run" in log) == (runs is not None)
+    if runs is not None:
+        assert log["run"].astype(int).tolist() == runs
+    assert (
+        "run" not in found(tmp_path / "log.csv", max_gap=np.inf).log or (np.diff(times) < 0).any()
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "is empty"),
+        (b"\n\n  \n", "is empty"),
+        (b"1,2,3\n4,5,6\n", "line 1: has numbers where the names of the columns are due"),
+        (b"PK\x03\x04\x00\x00", "an archive or a workbook"),
+        (b"\x1f\x8b\x08\x00", "is compressed"),
+        (bytes(range(256)), "is not text"),
+        (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
+        (b"temp,gyro\n20,1\n21,1e999\n22,3\n", "line 3, column 'gyro' .output.: .* infinite"),
+    ],
+)  # fmt: skip
+def test_what_is_no_log_is_refused_in_words(tmp_path, content, message):
+    (tmp_path / "log.csv").write_bytes(content)
+    with pytest.raises(LogError, match=message):
+        found(tmp_path / "log.csv")
+
+
+def test_a_damaged_parquet_is_refused(tmp_path):
+    pytest.importorskip("pyarrow")
+    (tmp_path / "log.parquet").write_bytes(b"PAR1 and nothing else")
+    with pytest.raises(LogError, match="is no Parquet that can be read"):
+        found(tmp_path / "log.parquet")
