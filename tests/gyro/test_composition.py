@@ -23,6 +23,7 @@ from skanfis.gyro.compose import ResidualRegressor
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
 
 QUIET = {"warn_out_of_bounds": False}
+pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def data():
 
 
 def compensator(**anfis):
-    return ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), ANFISRegressor(**QUIET, **anfis))
+    return ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), ANFISRegressor(**anfis))
 
 
 def test_the_second_learns_what_the_first_leaves(rng):
@@ -134,7 +135,7 @@ def test_weights_go_where_they_are_requested(rng):
 @pytest.mark.parametrize("scaled", [False, True])
 def test_flags_of_both_parts_come_through(data, scaled):
     X, rate = data
-    anfis = ANFISRegressor(n_mfs=2, **QUIET)
+    anfis = ANFISRegressor(n_mfs=2)
     residual = make_pipeline(StandardScaler(), anfis) if scaled else anfis
     model = ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), residual)
     model.fit(X.to_numpy(), rate)
@@ -183,7 +184,7 @@ def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
     X, rate = data
     selected = make_pipeline(
         make_column_transformer(("passthrough", ["time", "temperature"])),
-        ANFISRegressor(n_mfs=2, **QUIET),
+        ANFISRegressor(n_mfs=2),
     )
     base = OpenLoopArcsineRegressor("output", "temperature", **QUIET)
     model = ResidualRegressor(base, selected).fit(X, rate)
