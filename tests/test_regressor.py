@@ -815,7 +815,7 @@ def test_weights_are_routed_through_pipeline_and_search():
         ).fit(X, noisy, sample_weight=weight)
         found = search.predict(X)
     scaled = StandardScaler().fit_transform(X)
-    best = ANFISRegressor(**search.best_estimator_[-1].get_params())
+    best = ANFISRegressor(**search.best_estimator_[-1].get_params(deep=False))
     assert_array_equal(found, best.fit(scaled, noisy, weight).predict(scaled))
     assert np.abs(found - best.fit(scaled, noisy).predict(scaled)).max() > 1e-3 * np.ptp(Y)
     half = len(X) // 2

@@ -32,6 +32,7 @@ def assert_same(found, expected, rtol=1e-9):
     assert_allclose(found.terms["greatest_truth"], expected.terms["greatest_truth"], rtol=rtol)
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_estimators_around_the_model_speak_of_their_own_units(fitted):
     pipe, X = fitted
     y = target_of(X)

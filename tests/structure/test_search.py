@@ -24,6 +24,7 @@ def terms_per_input(model, n_inputs=3):
     return [max(names.count(f"x{j}"), 1) for j in range(n_inputs)]
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_linear_truth_gets_next_to_a_linear_model(rng):
     # A criterion by error lets a rule more pass where it does no harm; the plane stays a plane.
     X = inputs(rng)
@@ -73,6 +74,7 @@ def test_expected_error_of_the_linear_model_is_the_final_prediction_error(rng):
     assert_allclose(linear["expected_error"], error, rtol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_expected_error_is_that_on_new_rows(rng):
     def surface(n):
         X = inputs(rng, n)
