@@ -103,7 +103,9 @@ def test_the_dossier_has_the_files_as_they_are(tmp_path):
         "bias=5deg/h",
         "--report-unit=deg/h",
     ]
-    dossier = dossier_of(make_parser().parse_args([str(tmp_path / "a b.csv"), *typed]))
+    dossier = dossier_of(
+        make_parser().parse_args([str(tmp_path / "a b.csv"), *typed]), [tmp_path / "a b.csv"]
+    )
     (file,) = dossier.files
     assert (file.name, file.n_bytes) == ("a b.csv", len(content))
     assert file.sha256 == hashlib.sha256(content).hexdigest()
