@@ -5,7 +5,7 @@ is mended here and nowhere else.
 """
 
 from sklearn.base import _fit_context as fit_context
-from sklearn.utils._param_validation import HasMethods, Interval, StrOptions
+from sklearn.utils._param_validation import HasMethods, Hidden, Interval, StrOptions
 from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
 try:
@@ -19,6 +19,7 @@ except ImportError:  # before 1.9
 __all__ = [
     "CallbackSupportMixin",
     "HasMethods",
+    "Hidden",
     "Interval",
     "StrOptions",
     "check_sample_weight",

@@ -1,6 +1,5 @@
 """ANFISRegressor: the estimator."""
 
-import warnings
 from numbers import Integral, Real
 from typing import ClassVar
 
@@ -10,10 +9,12 @@ from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from ._anfis import TrainingData, train
+from ._callers import is_silent, pipelines_above
 from ._notebook import RulesReprMixin
 from ._sklearn import (
     CallbackSupportMixin,
     HasMethods,
+    Hidden,
     Interval,
     StrOptions,
     check_sample_weight,
@@ -27,9 +28,11 @@ from ._validation import (
     named_refusals,
     positive_weights,
     refuse_lazy,
+    warn_user,
 )
 from .exceptions import OutOfBoundsWarning
-from .membership import MEMBERSHIPS, membership_families
+from .export._fold import fold_with_rows, last_step
+from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, membership_families
 from .model import MAX_EXTRAPOLATION, OUT_OF_BOUNDS, TSKModel
 from .readable import readability_of_rows
 from .solvers import SOLVERS
@@ -155,7 +158,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         that input in the training data: zero or positive; 0 is "clip", ``math.inf`` the tangent
         without end. It may be changed by ``set_params`` after training.
     warn_out_of_bounds : bool, default=True
-        Whether ``predict`` warns of such rows.
+        Whether ``predict`` warns of such rows: in the names and units of the Pipeline around it,
+        and not within scikit-learn's cross-validation, where rows are left out on purpose, unless a
+        filter asks for it: ``warnings.simplefilter("always", OutOfBoundsWarning)``.
     on_interrupt : {"raise", "stop"}, default="raise"
         What Ctrl-C does during ``fit``: "raise" leaves the estimator as it was before; "stop" keeps
         the best model so far, if there has been an iteration.
@@ -273,7 +278,15 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             HasMethods(["fit", "fit_predict"]),
             HasMethods(["predict", "strengths"]),
         ],
-        "mf": [StrOptions(set(MEMBERSHIPS)), type, list, tuple, np.ndarray],
+        "mf": [
+            StrOptions(set(MEMBERSHIPS)),
+            # Refused with the name that they have here.
+            Hidden(StrOptions(set(NAMES_IN_MATLAB))),
+            type,
+            list,
+            tuple,
+            np.ndarray,
+        ],
         "term_names": [list, tuple, np.ndarray, dict, None],
         "premise_features": ["array-like", str, Integral, None],
         "consequent_features": ["array-like", str, Integral, None],
@@ -461,13 +474,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         model = self.model_.with_out_of_bounds(self.out_of_bounds, self.max_extrapolation)
         inside = model.in_bounds(X)
         outputs = model.predict(X, inside)
-        if self.warn_out_of_bounds and not inside.all():
-            message = model.describe_out_of_bounds(X)
-            warnings.warn(
-                f"{message} Policy: {model.policy}.",
-                OutOfBoundsWarning,
-                stacklevel=2,
-            )
+        if self.warn_out_of_bounds and not inside.all() and not is_silent(OutOfBoundsWarning):
+            message = self._describe_out_of_bounds(model, X)
+            warn_user(f"{message} Policy: {model.policy}.", OutOfBoundsWarning)
         return outputs[:, 0] if self._single_output else outputs
 
     def in_bounds(self, X):
@@ -698,6 +707,18 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 )
         check_finite(X, "X", self.model_.input_names)
         return X
+
+    def _describe_out_of_bounds(self, model, X):
+        """Which columns leave the box: those of the outermost pipeline that can be folded."""
+        for pipeline, given in reversed(pipelines_above()):
+            try:
+                if last_step(pipeline) is self:
+                    model, X = fold_with_rows(pipeline, given)
+                    break
+            except (TypeError, ValueError):
+                # A step that mixes columns: the columns that it makes are all that can be named.
+                continue
+        return model.describe_out_of_bounds(X)
 
     def _is_plain_input(self, X):
         """Whether X is an array in which scikit-learn's checks, half of a call, find nothing."""

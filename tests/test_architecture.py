@@ -38,17 +38,20 @@ PUBLIC = "__init__"
 TABLE = {
     **{layer: (KERNEL[:place], NUMERIC) for place, layer in enumerate(KERNEL)},
     "_sklearn": ([], LEARNING),
-    "_validation": (["_sklearn"], LEARNING),
+    "_callers": ([], LEARNING),
+    "_validation": (["_sklearn", "_callers"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
-    "structure": ([*KERNEL, "_validation", "cluster"], [*NUMERIC, "sklearn"]),
+    "structure": ([*KERNEL, "_callers", "_validation", "cluster"], [*NUMERIC, "sklearn"]),
     "training": ([*KERNEL, "_validation", "structure"], LEARNING),
     "_anfis": ([*KERNEL, "_sklearn", "_validation", "structure", "training"], LEARNING),
     "regressor": (
         [
             *KERNEL,
             "_sklearn",
+            "_callers",
             "_validation",
             "_notebook",
+            "export",
             "readable",
             "structure",
             "training",

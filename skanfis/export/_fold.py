@@ -20,6 +20,7 @@ from sklearn.preprocessing import (
     FunctionTransformer,
     MaxAbsScaler,
     MinMaxScaler,
+    OneHotEncoder,
     RobustScaler,
     StandardScaler,
 )
@@ -29,6 +30,7 @@ from sklearn.utils.validation import check_is_fitted
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
+from ._one_hot import Indicator, indicators, part_of
 
 __all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
 
@@ -48,16 +50,17 @@ def fold(estimator):
     estimator : fitted estimator or TSKModel
         An ANFIS estimator; a Pipeline that ends in one, with steps in front that treat every
         column alone (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler, "passthrough",
-        column selections, a ColumnTransformer of these); a TransformedTargetRegressor of these
-        whose transformer is such a scaler; a search such as GridSearchCV over these. A TSKModel is
-        returned as it is.
+        column selections, a OneHotEncoder, a ColumnTransformer of these); a
+        TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
+        GridSearchCV over these. A TSKModel is returned as it is.
 
     Returns
     -------
     model : TSKModel
         Its inputs are the raw columns that reach the model, in the order of X, by their names in X
-        ("x0", "x1", ... where it has none); a column that a step drops is no input. Terms and rules
-        keep their order. ``model.predict(X)``, with X of these columns, is what
+        ("x0", "x1", ... where it has none); a column that a step drops is no input. In the place of
+        a column that is one-hot encoded are its indicators, by the encoder's names ("fibre_PM").
+        Terms and rules keep their order. ``model.predict(X)``, with X of these columns, is what
         ``estimator.predict(X)`` is, to rounding errors, under every policy out of bounds.
 
     Raises
@@ -101,10 +104,19 @@ def last_step(estimator):
 
 @dataclass(frozen=True)
 class _Column:
-    """How a column comes from a raw one: arithmetic with numbers, in the scaler's own order."""
+    """How a column comes from a raw one: arithmetic with numbers, in the scaler's own order.
+
+    With an indicator, from that of one category of the raw column.
+    """
 
     source: int
     operations: tuple = ()
+    indicator: Indicator | None = None
+
+    @property
+    def key(self):
+        """What orders the inputs, and no two of them share."""
+        return self.source, -1 if self.indicator is None else self.indicator.place
 
     def then(self, operations):
         return replace(self, operations=(*self.operations, *operations))
@@ -160,8 +172,8 @@ class _Folding:
     def __init__(self, estimator):
         if isinstance(estimator, TSKModel):
             self.model = estimator
-            self.names, self.sources = estimator.input_names, np.arange(estimator.n_inputs)
-            self.is_named = True
+            self.names, self.is_named = estimator.input_names, True
+            self.inputs = [_Column(j) for j in range(estimator.n_inputs)]
             return
         *steps, (label, last) = _flat("", estimator)
         model = _model_of(label, last)
@@ -172,11 +184,11 @@ class _Folding:
         self.names = tuple(f"x{j}" for j in range(n_raw)) if names is None else tuple(names)
         columns = [_Column(j) for j in range(n_raw)]
         for label, step in steps:
-            columns = _through(label, step, columns)
+            columns = _through(label, step, columns, self.names)
         self._check_once(columns)
-        order = np.argsort([column.source for column in columns], kind="stable")
-        self.sources = np.array([columns[j].source for j in order])
-        model = _with_raw_inputs(model, columns, order, [self.names[j] for j in self.sources])
+        order = np.array(sorted(range(len(columns)), key=lambda j: columns[j].key))
+        self.inputs = [columns[j] for j in order]
+        model = _with_raw_inputs(model, columns, order, [self._name(one) for one in self.inputs])
         for label, transformer in reversed(_targets("", estimator)):
             model = _with_raw_target(model, label, transformer)
         self.model = model
@@ -189,25 +201,44 @@ class _Folding:
                 f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
                 f"has {', '.join(map(repr, given))}."
             )
-        table = check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
-        if table.shape[1] != len(self.names):
+        encoded = [one for one in self.inputs if one.indicator is not None]
+        table = X if encoded else _as_numbers(X)
+        n_columns = np.shape(table)[1]
+        if n_columns != len(self.names):
             raise ValueError(
-                f"X has {table.shape[1]} columns, the estimator takes {len(self.names)}: "
+                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
                 f"{', '.join(map(repr, self.names))}."
             )
-        rows = table[:, self.sources]
+        if encoded:
+            rows = np.column_stack([_values(one, X) for one in self.inputs])
+        else:
+            rows = table[:, [one.source for one in self.inputs]]
         check_finite(rows, "X", self.model.input_names)
         return rows
 
+    def _name(self, column):
+        return self.names[column.source] if column.indicator is None else column.indicator.name
+
     def _check_once(self, columns):
-        sources = [column.source for column in columns]
-        for source in sources:
-            if sources.count(source) > 1:
+        keys = [column.key for column in columns]
+        for column in columns:
+            if keys.count(column.key) > 1:
                 raise ValueError(
-                    f"Column {self.names[source]!r} reaches the model {sources.count(source)} "
+                    f"Column {self._name(column)!r} reaches the model {keys.count(column.key)} "
                     "times: its rules cannot be written with one membership per column. Let every "
                     "column reach it once."
                 )
+
+
+def _as_numbers(X):
+    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
+
+
+def _values(column, X):
+    """What an input is on the rows of the user's table."""
+    if column.indicator is not None:
+        return column.indicator.values(X)
+    return _as_numbers(part_of(X, [column.source]))[:, 0]
 
 
 def _flat(label, estimator):
@@ -258,8 +289,9 @@ def _describe(label, step):
 def _refuse(label, step, reason):
     raise ValueError(
         f"{_describe(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
-        "MinMaxScaler, MaxAbsScaler, RobustScaler, column selections and ColumnTransformers of "
-        "these can. For rules in the units of that step's output, give the ANFIS estimator alone."
+        "MinMaxScaler, MaxAbsScaler, RobustScaler, OneHotEncoder, column selections and "
+        "ColumnTransformers of these can. For rules in the units of that step's output, give the "
+        "ANFIS estimator alone."
     )
 
 
@@ -267,14 +299,16 @@ def _is_passthrough(step):
     return step is None or (isinstance(step, str) and step == "passthrough")
 
 
-def _through(label, step, columns):
-    """The columns after a step."""
+def _through(label, step, columns, names=()):
+    """The columns after a step; ``names`` are those of the user's table."""
     if not columns or _is_passthrough(step):
         return columns
     if isinstance(step, Pipeline):
         for name, part in step.steps:
-            columns = _through(name, part, columns)
+            columns = _through(name, part, columns, names)
         return columns
+    if type(step) is OneHotEncoder:
+        return _one_hot(label, step, columns, names)
     if isinstance(step, SelectorMixin):
         return [columns[j] for j in step.get_support(indices=True)]
     if type(step) is ColumnTransformer:
@@ -282,13 +316,24 @@ def _through(label, step, columns):
             column
             for name, part, chosen in step.transformers_
             if not (isinstance(part, str) and part == "drop")
-            for column in _through(name, part, [columns[j] for j in _positions(chosen, step)])
+            for column in _through(
+                name, part, [columns[j] for j in _positions(chosen, step)], names
+            )
         ]
     operations = _scaler_operations(label, step)
     return [
         column.then([(operation, float(numbers[k])) for operation, numbers in operations])
         for k, column in enumerate(columns)
     ]
+
+
+def _one_hot(label, encoder, columns, names):
+    """Indicators in the place of the columns that an encoder is given."""
+    if any(column.operations or column.indicator for column in columns):
+        _refuse(label, encoder, "it must be given columns of the table as they are")
+    sources = [column.source for column in columns]
+    found = indicators(encoder, sources, [names[j] for j in sources])
+    return [_Column(source, indicator=one) for source, one in found]
 
 
 def _positions(chosen, transformer):

@@ -8,6 +8,7 @@ from .sigmoid import SigmoidDifference, SigmoidProduct
 
 __all__ = [
     "MEMBERSHIPS",
+    "NAMES_IN_MATLAB",
     "Bell",
     "Gaussian",
     "Membership",
@@ -40,6 +41,20 @@ MEMBERSHIPS: dict[str, type[Membership]] = {
     )
 }
 
+# What MATLAB's Fuzzy Logic Toolbox calls them: named in errors, and in the pages on files.
+NAMES_IN_MATLAB = {
+    "gaussmf": "gaussian",
+    "gbellmf": "bell",
+    "trimf": "triangular",
+    "trapmf": "trapezoidal",
+    "gauss2mf": "two_sided_gaussian",
+    "pimf": "pi_shaped",
+    "smf": "s_shaped",
+    "zmf": "z_shaped",
+    "dsigmf": "sigmoid_difference",
+    "psigmf": "sigmoid_product",
+}
+
 
 def membership_families(mf, input_names) -> list[type[Membership]]:
     """One family per input, from a name, a class, or a sequence of these."""
@@ -55,6 +70,10 @@ def membership_families(mf, input_names) -> list[type[Membership]]:
             families.append(entry)
         elif isinstance(entry, str) and entry in MEMBERSHIPS:
             families.append(MEMBERSHIPS[entry])
+        elif isinstance(entry, str) and entry in NAMES_IN_MATLAB:
+            raise ValueError(
+                f"mf={entry!r} is MATLAB's name for it: give mf={NAMES_IN_MATLAB[entry]!r}."
+            )
         else:
             raise ValueError(
                 f"mf holds {entry!r}: it must be one of {', '.join(map(repr, MEMBERSHIPS))}, or a "
