@@ -76,7 +76,7 @@ $(DOCS)/.installed: pyproject.toml
 	@touch $@
 
 demo: $(DEMO)/.installed
-	$(DEMO)/bin/python examples/plot_gyro_compensation.py --output figures
+	$(DEMO)/bin/python examples/plot_gyro_compensation.py figures
 
 test: $(DEV)/.installed
 	$(call pytest,$(DEV))

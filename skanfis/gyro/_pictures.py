@@ -144,7 +144,7 @@ def why_no_allan(results):
     try:
         import allantools  # noqa: F401
     except ImportError:
-        return "allantools is not installed (pip install 'skanfis[allan]')"
+        return "allantools is not installed (pip install allantools)"
     if results.time is None:
         return "the log has no time"
     steps = results.steps
