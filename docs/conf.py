@@ -1,6 +1,13 @@
 """Configuration of Sphinx; every option that is not set has its default."""
 
+import os
+import sys
+from pathlib import Path
+
 import skanfis
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
 
 project = "skanfis"
 author = "The skanfis developers"
@@ -10,7 +17,7 @@ version = release = skanfis.__version__
 extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
+    "mathml",
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]

@@ -38,9 +38,7 @@ from skanfis.inspection import MembershipDisplay
 # indicates. The true rate is never an input: on a vehicle nobody knows it. What is learnt is the
 # error, indicated minus true rate.
 
-log = make_ofog(
-    n_devices=1, n_runs=12, sampling_interval=20.0, n_rate_levels=401, random_state=0
-)
+log = make_ofog(n_devices=1, n_runs=12, sampling_interval=20.0, n_rate_levels=401, random_state=0)
 X = log[["time", "temperature", "output"]]
 error = log["output"] - log["rate"]
 run = log["run"]

@@ -264,7 +264,7 @@ def warn_user(message, category):
     if is_silent(category):
         return
     frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_globals["__name__"].partition(".")[0] in (
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (
         "skanfis",
         "sklearn",
     ):
