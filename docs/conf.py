@@ -24,6 +24,14 @@ extensions = [
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
 default_role = "literal"
+# Every reference to a name has to lead somewhere, but for those to other packages' pages.
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:.*", r"(sklearn|numpy|scipy|pandas)\..*"),
+    # Properties, which stand in the tables of attributes; and what signatures name but no page has.
+    ("py:obj", r"\w+"),
+    ("py:class", r"skanfis\.(model\.TSKModel|readable\.measures\.Measures)"),
+]
 
 autosummary_generate = True
 # A class and a function whose names differ by a capital only would be one file on some systems.
@@ -44,4 +52,12 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"skanfis {version}"
-html_theme_options = {"show_prev_next": False}
+html_theme_options = {"show_prev_next": False, "show_toc_level": 2}
+# Released versions stay side by side, one folder each, with a menu to go from one to another: `make
+# release` says where (DOCS_URL), and writes the list of versions there.
+if docs_url := os.environ.get("DOCS_URL"):
+    html_baseurl = f"{docs_url}/{version}/"
+    html_theme_options |= {
+        "switcher": {"json_url": f"{docs_url}/versions.json", "version_match": version},
+        "navbar_end": ["version-switcher", "theme-switcher"],
+    }

@@ -1,0 +1,138 @@
+"""A data scientist's first hour, from nothing: install, paste, look. Run it with any Python 3.11+.
+
+    python .ci/first_hour.py           # or, in an environment that has it: ... PYTHON
+
+In a folder away from the source, with an environment of its own, it installs the package as a user
+does, pastes README's code and the pages of docs/ that are there to be pasted, and makes the mistakes
+that newcomers make: what it shows is what they see. It fails where one of these ends otherwise than
+in an answer or in a sentence.
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+import textwrap
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+README_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PAGE_BLOCK = re.compile(r"^\.\. code-block:: python\n\n((?:   .*\n|\n)+)", re.MULTILINE)
+
+# What newcomers type, and a part of the sentence that they are to get.
+MISTAKES = {
+    "a column of text": (
+        """
+        import pandas as pd
+        from skanfis import ANFISRegressor
+        table = pd.DataFrame({"age": [1.0, 2.0, 3.0], "site": ["a", "b", "c"]})
+        ANFISRegressor().fit(table, [1.0, 2.0, 3.0])
+        """,
+        "text in column 'site', first at row 0",
+    ),
+    "MATLAB's name of a family": (
+        """
+        from skanfis import ANFISRegressor
+        from skanfis.datasets import make_jang_sinc
+        ANFISRegressor(n_mfs=2, mf="gbellmf").fit(*make_jang_sinc())
+        """,
+        "give mf='bell'",
+    ),
+    "a missing value": (
+        """
+        import numpy as np
+        from skanfis import ANFISRegressor
+        ANFISRegressor().fit([[1.0], [np.nan], [3.0]], [1.0, 2.0, 3.0])
+        """,
+        "NaN in column 'x0', first at row 1",
+    ),
+    "a picture without matplotlib": (
+        """
+        import sys
+        sys.modules["matplotlib"] = sys.modules["matplotlib.pyplot"] = None
+        from skanfis import ANFISRegressor
+        from skanfis.datasets import make_jang_sinc
+        from skanfis.inspection import MembershipDisplay
+        MembershipDisplay.from_estimator(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()))
+        """,
+        "pip install matplotlib",
+    ),
+}
+
+# A search over four values with five folds says nothing of rows that its folds leave out of range.
+SEARCH = """
+    import warnings
+    from sklearn.datasets import load_diabetes
+    from sklearn.model_selection import GridSearchCV
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+    from skanfis import ANFISRegressor
+    X, y = load_diabetes(return_X_y=True, as_frame=True)
+    pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=1))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        search = GridSearchCV(pipe, {"anfisregressor__alpha": [0.01, 0.1, 1.0, 10.0]}).fit(X, y)
+        assert not caught, [str(w.message) for w in caught]
+        search.predict(X.assign(bmi=9.0))
+    assert len(caught) == 1
+    print(caught[0].category.__name__, caught[0].message)
+    assert "'bmi' in 442 of 442 rows (trained on [-0.09" in str(caught[0].message)
+"""
+
+
+def blocks(path, pattern):
+    found = pattern.findall(path.read_text(encoding="utf-8"))
+    return [textwrap.dedent(block) for block in found]
+
+
+def run(python, code, folder):
+    """Paste code into a fresh interpreter; what it prints, and whether it failed."""
+    (folder / "pasted.py").write_text(textwrap.dedent(code), encoding="utf-8")
+    options = {"capture_output": True, "text": True, "encoding": "utf-8", "cwd": folder}
+    done = subprocess.run([python, "-X", "utf8", "pasted.py"], **options)
+    return done.returncode, done.stdout + done.stderr
+
+
+def install(folder):
+    """An environment with the package in it; its Python."""
+    venv.create(folder / "environment", with_pip=True)
+    place = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
+    python = str(folder / "environment" / place)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", f"{ROOT}[plot]"], check=True)
+    return python
+
+
+def hour(python, folder):
+    """Everything in order; titles of what did not go as it should."""
+    pastes = {
+        f"README.md, block {i}": code
+        for i, code in enumerate(blocks(ROOT / "README.md", README_BLOCK), start=1)
+    }
+    for page in ("quickstart", "from_matlab"):
+        pastes[f"docs/{page}.rst"] = "".join(blocks(ROOT / "docs" / f"{page}.rst", PAGE_BLOCK))
+    pastes["a search"] = SEARCH
+    for title, code in pastes.items():
+        failed, told = run(python, code, folder)
+        print(f"=== {title}\n{told}")
+        if failed:
+            yield title
+    for title, (code, sentence) in MISTAKES.items():
+        failed, told = run(python, code, folder)
+        print(f"=== {title}\n{told.strip().splitlines()[-1]}\n")
+        if not (failed and sentence in told.strip().splitlines()[-1]):
+            yield title
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        python = sys.argv[1] if len(sys.argv) == 2 else install(folder)
+        failed = list(hour(python, folder))
+    print(f"FAILED: {', '.join(failed)}" if failed else "The first hour went as it should.")
+    return bool(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
