@@ -40,7 +40,9 @@ class Page(HTMLParser):
 
 def problems(root):
     """Sentences, one for each link that fails."""
-    pages = {path.resolve(): Page(path) for path in sorted(root.rglob("*.html"))}
+    # The theme's own files, templates among them, are not pages.
+    paths = [path for path in sorted(root.rglob("*.html")) if "_static" not in path.parts]
+    pages = {path.resolve(): Page(path) for path in paths}
     if not pages:
         yield f"{root} has no pages"
     for path, page in pages.items():

@@ -1,11 +1,12 @@
-"""A data scientist's first hour, from nothing: install, paste, look. Run it with any Python 3.11+.
+"""Two users' first hours, from nothing: install, paste, look. Run it with any Python 3.11 or newer.
 
     python .ci/first_hour.py           # or, in an environment that has it: ... PYTHON
 
 In a folder away from the source, with an environment of its own, it installs the package as a user
-does, pastes README's code and the pages of docs/ that are there to be pasted, and makes the mistakes
-that newcomers make: what it shows is what they see. It fails where one of these ends otherwise than
-in an answer or in a sentence.
+does. A data scientist pastes README's code and the pages of docs/ that are there to be pasted, and
+makes the mistakes that newcomers make; an inertial test engineer has raw logs of four kinds, and a
+command. What it shows is what they see. It fails where one of these ends otherwise than in an
+answer or in a sentence.
 """
 
 import re
@@ -82,6 +83,43 @@ SEARCH = """
 """
 
 
+# Raw logs of four kinds, as loggers write them.
+LOGS = """
+    from skanfis.datasets import make_ofog
+    table = make_ofog(n_devices=1, n_runs=6, sampling_interval=60.0, random_state=0)
+    plain = table[["time", "temperature", "output", "rate", "run"]]
+    plain.to_csv("plain.csv", index=False)
+    local = plain.assign(time=1000.0 * plain["time"], temperature=plain["temperature"] + 273.15)
+    local.columns = ["Zeit", "Temperatur", "Ausgang", "Drehrate", "Lauf"]
+    local.to_csv("semicolons.csv", sep=";", decimal=",", index=False)
+    for run, rows in table.groupby("run"):
+        counts = rows[["time", "temperature", "counts", "rate"]]
+        counts.to_csv(f"counts{run}.csv", index=False)
+    at_rest = make_ofog(
+        n_devices=1, n_runs=4, profile="ramps", rates=[0.0], sampling_interval=60.0, random_state=0
+    )
+    at_rest[["time", "temperature", "output", "run"]].to_csv("at_rest.csv", index=False)
+"""
+COMMANDS = {
+    "plain": ["plain.csv"],
+    "semicolons, decimal commas, milliseconds, kelvin": [
+        *("semicolons.csv", "--separator", ";", "--decimal", ","),
+        *("--columns", "time=Zeit", "temperature=Temperatur", "output=Ausgang"),
+        *("rate=Drehrate", "run=Lauf", "--units", "time=ms", "temperature=K"),
+    ],
+    "raw counts, a file for each run": [
+        *(f"counts{run}.csv" for run in range(6)),
+        *("--columns", "output=counts", "--units", "output=counts"),
+    ],
+    "at rest": ["at_rest.csv", "--at-rest"],
+}
+# And what is to end in one sentence.
+REFUSED = {
+    "no such file": (["nowhere.csv"], "nowhere.csv"),
+    "a column that is not there": (["plain.csv", "--columns", "rate=truth"], "truth"),
+}
+
+
 def blocks(path, pattern):
     found = pattern.findall(path.read_text(encoding="utf-8"))
     return [textwrap.dedent(block) for block in found]
@@ -104,7 +142,34 @@ def install(folder):
     return python
 
 
-def hour(python, folder):
+def command(python, arguments, folder):
+    """Run the gyro command; what it says, and whether it failed."""
+    options = {"capture_output": True, "text": True, "encoding": "utf-8", "cwd": folder}
+    given = [python, "-X", "utf8", "-m", "skanfis.gyro", *arguments]
+    done = subprocess.run(given, **options)
+    return done.returncode, done.stdout, done.stderr
+
+
+def engineer(python, folder):
+    """Logs, a report for each, and mistakes; titles of what did not go as it should."""
+    failed, told = run(python, LOGS, folder)
+    if failed:
+        yield f"writing logs: {told}"
+        return
+    for title, arguments in COMMANDS.items():
+        output = folder / f"made {title}"
+        failed, told, complaint = command(python, [*arguments, "--output", output.name], folder)
+        print(f"=== a log: {title}\n{complaint if failed else told}")
+        if failed or not (output / "report.html").is_file():
+            yield title
+    for title, (arguments, part) in REFUSED.items():
+        failed, _, complaint = command(python, arguments, folder)
+        print(f"=== {title}\n{complaint}")
+        if not failed or part not in complaint or "Traceback" in complaint:
+            yield title
+
+
+def data_scientist(python, folder):
     """Everything in order; titles of what did not go as it should."""
     pastes = {
         f"README.md, block {i}": code
@@ -129,8 +194,8 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         python = sys.argv[1] if len(sys.argv) == 2 else install(folder)
-        failed = list(hour(python, folder))
-    print(f"FAILED: {', '.join(failed)}" if failed else "The first hour went as it should.")
+        failed = [*data_scientist(python, folder), *engineer(python, folder)]
+    print(f"FAILED: {', '.join(failed)}" if failed else "Both hours went as they should.")
     return bool(failed)
 
 

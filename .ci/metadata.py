@@ -1,8 +1,8 @@
 """What a package index shows: README with links that work there, and the project's addresses.
 
-hatchling runs this when it builds (pyproject.toml, tool.hatch.metadata.hooks.custom). The address of
-the public repository is one setting there, `url`; `make release URL=...` fills it in. While it is
-empty, README goes in as it is and no address is shown.
+hatchling runs this when it builds (pyproject.toml, tool.hatch.metadata.hooks.custom). The address
+of the public repository is one setting there, `url`; `make release URL=...` fills it in. While it
+is empty, README goes in as it is and no address is shown.
 """
 
 import re

@@ -1,6 +1,6 @@
 """Put a built documentation beside those of other versions, and list them for the menu.
 
-    python .ci/publish_docs.py docs/_build/html PAGES https://OWNER.github.io/skanfis
+python .ci/publish_docs.py docs/_build/html PAGES https://OWNER.github.io/skanfis
 """
 
 import json

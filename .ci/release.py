@@ -1,7 +1,7 @@
 """What a release writes and asks before it is published; see `make release`.
 
-    python .ci/release.py prepare --url https://HOST/OWNER/skanfis [--dry-run]
-    python .ci/release.py tag
+python .ci/release.py prepare --url https://HOST/OWNER/skanfis [--dry-run]
+python .ci/release.py tag
 """
 
 import argparse
@@ -20,7 +20,7 @@ def version():
 
 
 def edits(url, today):
-    """File, pattern and what is to stand there, of everything that names version, date or address."""
+    """File, pattern and what is to stand there, of all that names version, date or address."""
     number = re.escape(version())
     return [
         ("pyproject.toml", r'^url = ".*"$', f'url = "{url}"'),

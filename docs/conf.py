@@ -48,8 +48,12 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "min_reported_time": 1,
     "show_memory": False,
+    # A page that would need a network.
+    "write_computation_times": False,
 }
 
+html_static_path = ["_static"]
+html_css_files = ["skanfis.css"]
 html_theme = "pydata_sphinx_theme"
 html_title = f"skanfis {version}"
 html_theme_options = {"show_prev_next": False, "show_toc_level": 2}

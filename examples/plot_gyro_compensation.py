@@ -102,8 +102,8 @@ for name, value in rms.items():
 # In pictures
 # -----------
 #
-# What training has made of the terms, dashed before and solid after, over the histogram of the data;
-# and what every model leaves of the error. Mind the scale.
+# What training has made of the terms, dashed before and solid after, over the histogram of the
+# data; and what every model leaves of the error. Mind the scale.
 
 figure = plt.figure(figsize=(10, 8), layout="constrained")
 upper, lower = figure.subfigures(2, 1, height_ratios=(4, 5))

@@ -39,8 +39,8 @@ X.head()
 # A pipeline
 # ----------
 #
-# Text is encoded in front. Numbers need no scaler; one would do no harm. Of two makers one column is
-# enough.
+# Text is encoded in front. Numbers need no scaler; one would do no harm. Of two makers one column
+# is enough.
 
 encode = make_column_transformer(
     (OneHotEncoder(drop="if_binary"), ["maker"]), remainder="passthrough"
@@ -80,8 +80,8 @@ MembershipDisplay.from_estimator(model, X_train)
 # May they be read?
 # -----------------
 #
-# Where the strongest rule alone says what all say together, points lie on the diagonal. Here they do
-# not: two lines, blended along the inductance, make a product of frequency and inductance, and
+# Where the strongest rule alone says what all say together, points lie on the diagonal. Here they
+# do not: two lines, blended along the inductance, make a product of frequency and inductance, and
 # neither line stands for anything alone. The model says so itself. Its predictions are as good as
 # they were; but read the picture of the response below, not the rules. :doc:`/reading_rules` says
 # what may be believed of a rule, and when.
@@ -110,10 +110,10 @@ ResponseSurfaceDisplay.from_estimator(model, X_train, features=["frequency", "in
 # Is there a better setting?
 # --------------------------
 #
-# Mostly not: structure and penalties come from the data. A search is for what you would rather have,
-# terms on the frequency for instance, if that costs little. ``n_mfs`` is in the order of the columns
-# behind the encoder, whose own come first. A search says nothing of rows that its folds leave out of
-# range; the model that it keeps does.
+# Mostly not: structure and penalties come from the data. A search is for what you would rather
+# have, terms on the frequency for instance, if that costs little. ``n_mfs`` is in the order of the
+# columns behind the encoder, whose own come first. A search says nothing of rows that its folds
+# leave out of range; the model that it keeps does.
 
 search = GridSearchCV(
     model,

@@ -4,13 +4,12 @@ A scaler such as StandardScaler maps every column alone, z = (x - offset) / scal
 scale. Rules about z are rules about x = offset + scale z: memberships, box and consequents change
 their units, nothing else does. The same holds for the target, y = offset + scale t.
 
-The box needs care. Its edges are rows of the training data, and the edge computed back from z may
-differ from the row's x in the last bit: the row would then be out of bounds. The edge taken is
-therefore the outermost x that the scaler's own arithmetic maps into the box of z.
+A OneHotEncoder makes numbers of what is none: its indicators are inputs of the folded model, in the
+place of the column that it encodes.
 """
 
 import operator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
@@ -30,16 +29,10 @@ from sklearn.utils.validation import check_is_fitted
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
-from ._one_hot import Indicator, indicators, part_of
+from ._column import Column
+from ._one_hot import indicators, part_of
 
 __all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
-
-_INVERSE = {
-    operator.sub: operator.add,
-    operator.add: operator.sub,
-    operator.truediv: operator.mul,
-    operator.mul: operator.truediv,
-}
 
 
 def fold(estimator):
@@ -102,70 +95,6 @@ def last_step(estimator):
     return last
 
 
-@dataclass(frozen=True)
-class _Column:
-    """How a column comes from a raw one: arithmetic with numbers, in the scaler's own order.
-
-    With an indicator, from that of one category of the raw column.
-    """
-
-    source: int
-    operations: tuple = ()
-    indicator: Indicator | None = None
-
-    @property
-    def key(self):
-        """What orders the inputs, and no two of them share."""
-        return self.source, -1 if self.indicator is None else self.indicator.place
-
-    def then(self, operations):
-        return replace(self, operations=(*self.operations, *operations))
-
-    def forward(self, x):
-        for operation, number in self.operations:
-            x = operation(x, number)
-        return x
-
-    def backward(self, z):
-        for operation, number in reversed(self.operations):
-            z = _INVERSE[operation](z, number)
-        return z
-
-    def offset_and_scale(self):
-        """Of x = offset + scale z."""
-        offset, scale = 0.0, 1.0
-        for operation, number in self.operations:
-            if operation is operator.sub:
-                offset += number * scale
-            elif operation is operator.add:
-                offset -= number * scale
-            elif operation is operator.truediv:
-                scale *= number
-            else:
-                scale /= number
-        return offset, scale
-
-    def outermost(self, edge, side):
-        """The outermost x, to the ``side`` (-1 or 1), that is mapped to no more than ``edge``."""
-        guess = self.backward(edge)
-        if not self.operations or not np.isfinite(guess):
-            return guess
-
-        def is_inside(x):
-            return side * self.forward(x) <= side * edge
-
-        offset, _ = self.offset_and_scale()
-        step = side * np.spacing(max(abs(guess), abs(offset)))
-        inner, outer = guess, guess
-        while not is_inside(inner):
-            inner, step = inner - step, 2.0 * step
-        while is_inside(outer):
-            outer, step = outer + step, 2.0 * step
-        while (middle := inner + 0.5 * (outer - inner)) not in (inner, outer):
-            inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
-        return inner
-
-
 class _Folding:
     """What becomes of an estimator: its model in raw units, and how to find the inputs in X."""
 
@@ -173,7 +102,7 @@ class _Folding:
         if isinstance(estimator, TSKModel):
             self.model = estimator
             self.names, self.is_named = estimator.input_names, True
-            self.inputs = [_Column(j) for j in range(estimator.n_inputs)]
+            self.inputs = [Column(j) for j in range(estimator.n_inputs)]
             return
         *steps, (label, last) = _flat("", estimator)
         model = _model_of(label, last)
@@ -182,7 +111,7 @@ class _Folding:
         names = getattr(first, "feature_names_in_", None)
         self.is_named = names is not None
         self.names = tuple(f"x{j}" for j in range(n_raw)) if names is None else tuple(names)
-        columns = [_Column(j) for j in range(n_raw)]
+        columns = [Column(j) for j in range(n_raw)]
         for label, step in steps:
             columns = _through(label, step, columns, self.names)
         self._check_once(columns)
@@ -333,7 +262,7 @@ def _one_hot(label, encoder, columns, names):
         _refuse(label, encoder, "it must be given columns of the table as they are")
     sources = [column.source for column in columns]
     found = indicators(encoder, sources, [names[j] for j in sources])
-    return [_Column(source, indicator=one) for source, one in found]
+    return [Column(source, indicator=one) for source, one in found]
 
 
 def _positions(chosen, transformer):
@@ -417,7 +346,7 @@ def _with_raw_support(support, offset, scale, order):
 
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
-    columns = _through(label, transformer, [_Column(k) for k in range(model.n_outputs)])
+    columns = _through(label, transformer, [Column(k) for k in range(model.n_outputs)])
     if [column.source for column in columns] != list(range(model.n_outputs)):
         _refuse(label, transformer, "it drops or moves columns of the target")
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T
