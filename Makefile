@@ -39,7 +39,7 @@ endef
 # than four where their number is left open: each pays for its imports.
 pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks release clean
+.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour release clean
 
 help:
 	@echo "make demo         run the gyro example and save its pictures in figures/"
@@ -52,6 +52,7 @@ help:
 	@echo "make wheel        sdist and wheel, in dist/"
 	@echo "make check-dist   what a package index and an installer would object to in these"
 	@echo "make docs         the documentation, in docs/_build/html"
+	@echo "make first-hour   two users' first hours from nothing, and what they see"
 	@echo "make release URL=https://HOST/OWNER/skanfis [DRY=1]   all checks, then tag and publish"
 	@echo "make benchmarks   all benchmarks"
 	@echo "make clean        remove environments and everything that was built"
@@ -132,6 +133,9 @@ release: $(DEV)/.installed
 	$(MAKE) check-dist
 	$(if $(DRY),@echo "A rehearsal: nothing was tagged or uploaded.",$(DEV)/bin/python .ci/release.py tag)
 	$(if $(DRY),@true,$(DEV)/bin/python -m twine upload dist/*)
+
+first-hour:
+	$(PYTHON) .ci/first_hour.py
 
 benchmarks: $(DEV)/.installed
 	$(DEV)/bin/python -m benchmarks

@@ -86,7 +86,7 @@ SEARCH = """
 # Raw logs of four kinds, as loggers write them.
 LOGS = """
     from skanfis.datasets import make_ofog
-    table = make_ofog(n_devices=1, n_runs=6, sampling_interval=60.0, random_state=0)
+    table = make_ofog(n_devices=1, n_runs=4, sampling_interval=60.0, random_state=0)
     plain = table[["time", "temperature", "output", "rate", "run"]]
     plain.to_csv("plain.csv", index=False)
     local = plain.assign(time=1000.0 * plain["time"], temperature=plain["temperature"] + 273.15)
@@ -108,7 +108,7 @@ COMMANDS = {
         *("rate=Drehrate", "run=Lauf", "--units", "time=ms", "temperature=K"),
     ],
     "raw counts, a file for each run": [
-        *(f"counts{run}.csv" for run in range(6)),
+        *(f"counts{run}.csv" for run in range(4)),
         *("--columns", "output=counts", "--units", "output=counts"),
     ],
     "at rest": ["at_rest.csv", "--at-rest"],
@@ -200,4 +200,5 @@ def main():
 
 
 if __name__ == "__main__":
+    sys.stdout.reconfigure(encoding="utf-8", line_buffering=True)
     sys.exit(main())

@@ -9,6 +9,7 @@ place of the column that it encodes.
 """
 
 import operator
+from collections import UserList
 from dataclasses import replace
 
 import numpy as np
@@ -275,6 +276,9 @@ def _positions(chosen, transformer):
             first = names.index(first) if first is not None else None
             last = names.index(last) + 1 if last is not None else None
         return np.arange(transformer.n_features_in_)[first : last : chosen.step]
+    if isinstance(chosen, UserList):
+        # The columns of a remainder, before scikit-learn 1.7: to look at one issues a warning.
+        chosen = chosen.data
     chosen = np.atleast_1d(np.asarray(chosen, dtype=object if len(names) else None))
     if all(isinstance(one, str) for one in chosen):
         return [names.index(one) for one in chosen]
