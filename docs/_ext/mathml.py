@@ -53,8 +53,9 @@ def beside(mathml):
     named = re.sub(r"&(?!lt;|gt;|amp;)\w+;", lambda name: html.unescape(name[0]), mathml)
     tree = ElementTree.fromstring(named)
     for bar in tree.iter(TAG + "mo"):
-        if bar.text in BARS and "stretchy" not in bar.attrib:
-            bar.attrib |= {"stretchy": "false", "lspace": "0", "rspace": "0"}
+        if bar.text in BARS:
+            bar.attrib.setdefault("stretchy", "false")
+            bar.attrib |= {"lspace": "0", "rspace": "0"}
     for node in tree.iter(TAG + "munderover"):
         base, index, accent = node
         if base.tag == TAG + "mi" and (accent.text or "") in ACCENTS:
