@@ -39,7 +39,7 @@ endef
 # than four where their number is left open: each pays for its imports.
 pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: help demo test fuzz lint format test-floors wheel test-wheel docs benchmarks clean
+.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour release clean
 
 help:
 	@echo "make demo         run the gyro example and save its pictures in figures/"
@@ -50,7 +50,10 @@ help:
 	@echo "make test-floors  all tests at the oldest dependencies that pyproject.toml allows"
 	@echo "make test-wheel   all but the slow tests against the built wheel, away from the source"
 	@echo "make wheel        sdist and wheel, in dist/"
+	@echo "make check-dist   what a package index and an installer would object to in these"
 	@echo "make docs         the documentation, in docs/_build/html"
+	@echo "make first-hour   two users' first hours from nothing, and what they see"
+	@echo "make release URL=https://HOST/OWNER/skanfis [DRY=1]   all checks, then tag and publish"
 	@echo "make benchmarks   all benchmarks"
 	@echo "make clean        remove environments and everything that was built"
 
@@ -76,7 +79,7 @@ $(DOCS)/.installed: pyproject.toml
 	@touch $@
 
 demo: $(DEMO)/.installed
-	$(DEMO)/bin/python examples/plot_gyro_compensation.py --output figures
+	$(DEMO)/bin/python examples/plot_gyro_compensation.py figures
 
 test: $(DEV)/.installed
 	$(call pytest,$(DEV))
@@ -101,6 +104,10 @@ wheel: $(DEV)/.installed
 	rm -rf dist
 	$(DEV)/bin/python -m build --outdir dist
 
+check-dist: wheel
+	$(DEV)/bin/python -m twine check --strict dist/*
+	$(DEV)/bin/check-wheel-contents dist/*.whl
+
 # The tests read pyproject.toml for pytest's settings and docs/api.rst for the names it lists. What a
 # wheel may lack is files: the slow tests, long lists of models through the same code, add nothing.
 test-wheel: wheel
@@ -115,7 +122,20 @@ test-wheel: wheel
 
 docs: $(DOCS)/.installed
 	$(DOCS)/bin/python -m sphinx --fail-on-warning --keep-going docs docs/_build/html
+	$(DOCS)/bin/python .ci/check_links.py docs/_build/html
 	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"
+
+# The address, date and version are written first, so that everything below is checked as it will be
+# published. twine asks for the credentials, or takes them from its own settings.
+release: $(DEV)/.installed
+	$(DEV)/bin/python .ci/release.py prepare --url "$(URL)" $(if $(DRY),--dry-run)
+	.ci/run
+	$(MAKE) check-dist
+	$(if $(DRY),@echo "A rehearsal: nothing was tagged or uploaded.",$(DEV)/bin/python .ci/release.py tag)
+	$(if $(DRY),@true,$(DEV)/bin/python -m twine upload dist/*)
+
+first-hour:
+	$(PYTHON) .ci/first_hour.py
 
 benchmarks: $(DEV)/.installed
 	$(DEV)/bin/python -m benchmarks

@@ -1,6 +1,13 @@
 """Configuration of Sphinx; every option that is not set has its default."""
 
+import os
+import sys
+from pathlib import Path
+
 import skanfis
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
 
 project = "skanfis"
 author = "The skanfis developers"
@@ -10,13 +17,21 @@ version = release = skanfis.__version__
 extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
+    "mathml",
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["_build"]
 templates_path = ["_templates"]
 default_role = "literal"
+# Every reference to a name has to lead somewhere, but for those to other packages' pages.
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:.*", r"(sklearn|numpy|scipy|pandas)\..*"),
+    # Properties, which stand in the tables of attributes; and what signatures name but no page has.
+    ("py:obj", r"\w+"),
+    ("py:class", r"skanfis\.(model\.TSKModel|readable\.measures\.Measures)"),
+]
 
 autosummary_generate = True
 # A class and a function whose names differ by a capital only would be one file on some systems.
@@ -33,8 +48,20 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "min_reported_time": 1,
     "show_memory": False,
+    # A page that would need a network.
+    "write_computation_times": False,
 }
 
+html_static_path = ["_static"]
+html_css_files = ["skanfis.css"]
 html_theme = "pydata_sphinx_theme"
 html_title = f"skanfis {version}"
-html_theme_options = {"show_prev_next": False}
+html_theme_options = {"show_prev_next": False, "show_toc_level": 2}
+# Released versions stay side by side, one folder each, with a menu to go from one to another: `make
+# release` says where (DOCS_URL), and writes the list of versions there.
+if docs_url := os.environ.get("DOCS_URL"):
+    html_baseurl = f"{docs_url}/{version}/"
+    html_theme_options |= {
+        "switcher": {"json_url": f"{docs_url}/versions.json", "version_match": version},
+        "navbar_end": ["version-switcher", "theme-switcher"],
+    }

@@ -3,7 +3,7 @@ A pipeline in ONNX
 ==================
 
 This page converts a scaler and an ANFIS together to ONNX, runs the graph with onnxruntime, and
-compares it with ``predict`` in either precision. ``pip install "skanfis[onnx]"`` has what it takes;
+compares it with ``predict`` in either precision. ``pip install ".[onnx]"`` has what it takes;
 :doc:`/onnx` says more.
 """
 

@@ -11,6 +11,8 @@ from numbers import Integral
 import numpy as np
 from sklearn import get_config
 
+from ._callers import is_silent
+
 __all__ = [
     "bearable_weights",
     "check_finite",
@@ -99,19 +101,33 @@ def _name_what_is_no_number(table, what, error):
             "Drop the column, or encode categories as numbers in a Pipeline before "
             "(sklearn.preprocessing.OneHotEncoder or OrdinalEncoder)."
         )
-    for name, column in _columns(table):
-        if getattr(getattr(column, "dtype", None), "kind", "O") in "biufc":
-            continue
-        for row, value in enumerate(column):
-            try:
-                # Complex numbers are scikit-learn's to refuse.
-                float(np.nan if value is None or isinstance(value, complex) else value)
-            except (TypeError, ValueError) as refusal:
-                kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
-                where = "" if name is None else f" in column {name!r}"
-                raise type(refusal)(
-                    f"Input {what} holds {kind}{where}, first at row {row}: {refusal}. {advice}"
-                ) from error
+    refused = [
+        (name, *place)
+        for name, column in _columns(table)
+        if (place := _first_refused(column)) is not None
+    ]
+    if refused:
+        name, row, value, refusal = refused[0]
+        kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
+        where = "" if name is None else f" in column {name!r}"
+        more = ", ".join(repr(other) for other, *_ in refused[1:])
+        also = f" So do the columns {more}." if more else ""
+        raise type(refusal)(
+            f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"
+        ) from error
+
+
+def _first_refused(column):
+    """Row and value of the first entry that is no number, and why; None where all are."""
+    if getattr(getattr(column, "dtype", None), "kind", "O") in "biufc":
+        return None
+    for row, value in enumerate(column):
+        try:
+            # Complex numbers are scikit-learn's to refuse.
+            float(np.nan if value is None or isinstance(value, complex) else value)
+        except (TypeError, ValueError) as refusal:
+            return row, value, refusal
+    return None
 
 
 def _columns(table):
@@ -269,9 +285,14 @@ def _add_content(digest, value):
 
 
 def warn_user(message, category):
-    """Warn at the line that called this package, or scikit-learn, whatever lies between."""
+    """Warn at the line that called this package, or scikit-learn, whatever lies between.
+
+    Not from within scikit-learn's cross-validation, where the category is this package's own.
+    """
+    if is_silent(category):
+        return
     frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_globals["__name__"].partition(".")[0] in (
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (
         "skanfis",
         "sklearn",
     ):

@@ -1,6 +1,5 @@
 """ANFISRegressor: the estimator."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral, Real
@@ -12,10 +11,12 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
+from ._callers import is_silent, pipelines_above
 from ._notebook import RulesReprMixin
 from ._sklearn import (
     CallbackSupportMixin,
     HasMethods,
+    Hidden,
     Interval,
     StrOptions,
     check_parameters,
@@ -32,11 +33,19 @@ from ._validation import (
     named_refusals,
     positive_weights,
     refuse_lazy,
+    warn_user,
 )
 from .constraints import FixedPoint, OutputLimits
 from .constraints.wishes import Wishes
 from .exceptions import OutOfBoundsWarning
-from .membership import MEMBERSHIPS, TRIED_FAMILIES, Membership, membership_families
+from .export._fold import fold_with_rows, last_step
+from .membership import (
+    MEMBERSHIPS,
+    NAMES_IN_MATLAB,
+    TRIED_FAMILIES,
+    Membership,
+    membership_families,
+)
 from .model import OUT_OF_BOUNDS, TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
@@ -273,7 +282,15 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             HasMethods(["fit", "fit_predict"]),
             HasMethods(["predict", "strengths"]),
         ],
-        "mf": [StrOptions({"auto", *MEMBERSHIPS}), type, list, tuple, np.ndarray],
+        "mf": [
+            StrOptions({"auto", *MEMBERSHIPS}),
+            # Refused with the name that they have here.
+            Hidden(StrOptions(set(NAMES_IN_MATLAB))),
+            type,
+            list,
+            tuple,
+            np.ndarray,
+        ],
         "premise_features": ["array-like", str, Integral, None],
         "consequent_features": ["array-like", str, Integral, None],
         "order": [Interval(Integral, 0, 1, closed="both")],
@@ -445,13 +462,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
         inside = model.in_bounds(X)
         outputs = model.predict(X, inside)
-        if model.out_of_bounds == "linear" and not inside.all():
-            message = model.describe_out_of_bounds(X)
-            warnings.warn(
-                f"{message} Policy: {model.policy}.",
-                OutOfBoundsWarning,
-                stacklevel=2,
-            )
+        extrapolates = model.out_of_bounds == "linear" and not inside.all()
+        if extrapolates and not is_silent(OutOfBoundsWarning):
+            message = self._describe_out_of_bounds(model, X)
+            warn_user(f"{message} Policy: {model.policy}.", OutOfBoundsWarning)
         return outputs[:, 0] if self._single_output else outputs
 
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
@@ -737,6 +751,18 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 )
         check_finite(X, "X", self.model_.input_names)
         return X
+
+    def _describe_out_of_bounds(self, model, X):
+        """Which columns leave the box: those of the outermost pipeline that can be folded."""
+        for pipeline, given in reversed(pipelines_above()):
+            try:
+                if last_step(pipeline) is self:
+                    model, X = fold_with_rows(pipeline, given)
+                    break
+            except (TypeError, ValueError):
+                # A step that mixes columns: the columns that it makes are all that can be named.
+                continue
+        return model.describe_out_of_bounds(X)
 
     def _is_plain_input(self, X):
         """Whether X is an array in which scikit-learn's checks, half of a call, find nothing."""

@@ -568,6 +568,20 @@ def test_parameter_of_the_wrong_type_or_range(parameter, value, allowed):
     assert f"Got {value!r} instead" in str(refusal.value)
 
 
+@pytest.mark.parametrize("mf", ["gbellmf", ["gbellmf", "bell"]])
+def test_matlab_name_of_a_family(mf):
+    with refused(ValueError, "'gbellmf' is MATLAB's name", "mf='bell'"):
+        ANFISRegressor(mf=mf).fit(X[:, :2], Y)
+
+
+def test_all_columns_of_text_are_named():
+    table = pd.DataFrame({"a": np.arange(9.0), "kind": ["p"] * 9, "site": ["q"] * 9})
+    with refused(
+        ValueError, "text in column 'kind', first at row 0", "the columns 'site'", "OneHot"
+    ):
+        ANFISRegressor().fit(table, Y[:9])
+
+
 def test_no_worker_at_all():
     with refused(ValueError, "n_jobs == 0"):
         ANFISRegressor(n_jobs=0).fit(X, Y)

@@ -4,13 +4,13 @@ A scaler such as StandardScaler maps every column alone, z = (x - offset) / scal
 scale. Rules about z are rules about x = offset + scale z: memberships, box and consequents change
 their units, nothing else does. The same holds for the target, y = offset + scale t.
 
-The box needs care. Its edges are rows of the training data, and the edge computed back from z may
-differ from the row's x in the last bit: the row would then be out of bounds. The edge taken is
-therefore the outermost x that the scaler's own arithmetic maps into the box of z.
+A OneHotEncoder makes numbers of what is none: its indicators are inputs of the folded model, in the
+place of the column that it encodes.
 """
 
 import operator
-from dataclasses import dataclass, replace
+from collections import UserList
+from dataclasses import replace
 
 import numpy as np
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
@@ -20,6 +20,7 @@ from sklearn.preprocessing import (
     FunctionTransformer,
     MaxAbsScaler,
     MinMaxScaler,
+    OneHotEncoder,
     RobustScaler,
     StandardScaler,
 )
@@ -30,15 +31,10 @@ from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
 from ..options import policy_of
+from ._column import Column
+from ._one_hot import indicators, part_of
 
 __all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
-
-_INVERSE = {
-    operator.sub: operator.add,
-    operator.add: operator.sub,
-    operator.truediv: operator.mul,
-    operator.mul: operator.truediv,
-}
 
 
 def fold(estimator):
@@ -49,16 +45,17 @@ def fold(estimator):
     estimator : fitted estimator or TSKModel
         An ANFIS estimator; a Pipeline that ends in one, with steps in front that treat every
         column alone (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler, "passthrough",
-        column selections, a ColumnTransformer of these); a TransformedTargetRegressor of these
-        whose transformer is such a scaler; a search such as GridSearchCV over these. A TSKModel is
-        returned as it is.
+        column selections, a OneHotEncoder, a ColumnTransformer of these); a
+        TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
+        GridSearchCV over these. A TSKModel is returned as it is.
 
     Returns
     -------
     model : TSKModel
         Its inputs are the raw columns that reach the model, in the order of X, by their names in X
-        ("x0", "x1", ... where it has none); a column that a step drops is no input. Terms and rules
-        keep their order. ``model.predict(X)``, with X of these columns, is what
+        ("x0", "x1", ... where it has none); a column that a step drops is no input. In the place of
+        a column that is one-hot encoded are its indicators, by the encoder's names ("fibre_PM").
+        Terms and rules keep their order. ``model.predict(X)``, with X of these columns, is what
         ``estimator.predict(X)`` is, to rounding errors, under every policy out of bounds.
 
     Raises
@@ -100,69 +97,14 @@ def last_step(estimator):
     return last
 
 
-@dataclass(frozen=True)
-class _Column:
-    """How a column comes from a raw one: arithmetic with numbers, in the scaler's own order."""
-
-    source: int
-    operations: tuple = ()
-
-    def then(self, operations):
-        return replace(self, operations=(*self.operations, *operations))
-
-    def forward(self, x):
-        for operation, number in self.operations:
-            x = operation(x, number)
-        return x
-
-    def backward(self, z):
-        for operation, number in reversed(self.operations):
-            z = _INVERSE[operation](z, number)
-        return z
-
-    def offset_and_scale(self):
-        """Of x = offset + scale z."""
-        offset, scale = 0.0, 1.0
-        for operation, number in self.operations:
-            if operation is operator.sub:
-                offset += number * scale
-            elif operation is operator.add:
-                offset -= number * scale
-            elif operation is operator.truediv:
-                scale *= number
-            else:
-                scale /= number
-        return offset, scale
-
-    def outermost(self, edge, side):
-        """The outermost x, to the ``side`` (-1 or 1), that is mapped to no more than ``edge``."""
-        guess = self.backward(edge)
-        if not self.operations or not np.isfinite(guess):
-            return guess
-
-        def is_inside(x):
-            return side * self.forward(x) <= side * edge
-
-        offset, _ = self.offset_and_scale()
-        step = side * np.spacing(max(abs(guess), abs(offset)))
-        inner, outer = guess, guess
-        while not is_inside(inner):
-            inner, step = inner - step, 2.0 * step
-        while is_inside(outer):
-            outer, step = outer + step, 2.0 * step
-        while (middle := inner + 0.5 * (outer - inner)) not in (inner, outer):
-            inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
-        return inner
-
-
 class _Folding:
     """What becomes of an estimator: its model in raw units, and how to find the inputs in X."""
 
     def __init__(self, estimator):
         if isinstance(estimator, TSKModel):
             self.model = estimator
-            self.names, self.sources = estimator.input_names, np.arange(estimator.n_inputs)
-            self.is_named = True
+            self.names, self.is_named = estimator.input_names, True
+            self.inputs = [Column(j) for j in range(estimator.n_inputs)]
             return
         *steps, (label, last) = _flat("", estimator)
         model = _model_of(label, last)
@@ -171,13 +113,13 @@ class _Folding:
         names = getattr(first, "feature_names_in_", None)
         self.is_named = names is not None
         self.names = tuple(f"x{j}" for j in range(n_raw)) if names is None else tuple(names)
-        columns = [_Column(j) for j in range(n_raw)]
+        columns = [Column(j) for j in range(n_raw)]
         for label, step in steps:
-            columns = _through(label, step, columns)
+            columns = _through(label, step, columns, self.names)
         self._check_once(columns)
-        order = np.argsort([column.source for column in columns], kind="stable")
-        self.sources = np.array([columns[j].source for j in order])
-        model = _with_raw_inputs(model, columns, order, [self.names[j] for j in self.sources])
+        order = np.array(sorted(range(len(columns)), key=lambda j: columns[j].key))
+        self.inputs = [columns[j] for j in order]
+        model = _with_raw_inputs(model, columns, order, [self._name(one) for one in self.inputs])
         for label, transformer in reversed(_targets("", estimator)):
             model = _with_raw_target(model, label, transformer)
         self.model = model
@@ -190,25 +132,44 @@ class _Folding:
                 f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
                 f"has {', '.join(map(repr, given))}."
             )
-        table = check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
-        if table.shape[1] != len(self.names):
+        encoded = [one for one in self.inputs if one.indicator is not None]
+        table = X if encoded else _as_numbers(X)
+        n_columns = np.shape(table)[1]
+        if n_columns != len(self.names):
             raise ValueError(
-                f"X has {table.shape[1]} columns, the estimator takes {len(self.names)}: "
+                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
                 f"{', '.join(map(repr, self.names))}."
             )
-        rows = table[:, self.sources]
+        if encoded:
+            rows = np.column_stack([_values(one, X) for one in self.inputs])
+        else:
+            rows = table[:, [one.source for one in self.inputs]]
         check_finite(rows, "X", self.model.input_names)
         return rows
 
+    def _name(self, column):
+        return self.names[column.source] if column.indicator is None else column.indicator.name
+
     def _check_once(self, columns):
-        sources = [column.source for column in columns]
-        for source in sources:
-            if sources.count(source) > 1:
+        keys = [column.key for column in columns]
+        for column in columns:
+            if keys.count(column.key) > 1:
                 raise ValueError(
-                    f"Column {self.names[source]!r} reaches the model {sources.count(source)} "
+                    f"Column {self._name(column)!r} reaches the model {keys.count(column.key)} "
                     "times: its rules cannot be written with one membership per column. Let every "
                     "column reach it once."
                 )
+
+
+def _as_numbers(X):
+    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
+
+
+def _values(column, X):
+    """What an input is on the rows of the user's table."""
+    if column.indicator is not None:
+        return column.indicator.values(X)
+    return _as_numbers(part_of(X, [column.source]))[:, 0]
 
 
 def _flat(label, estimator):
@@ -260,8 +221,9 @@ def _describe(label, step):
 def _refuse(label, step, reason):
     raise ValueError(
         f"{_describe(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
-        "MinMaxScaler, MaxAbsScaler, RobustScaler, column selections and ColumnTransformers of "
-        "these can. For rules in the units of that step's output, give the ANFIS estimator alone."
+        "MinMaxScaler, MaxAbsScaler, RobustScaler, OneHotEncoder, column selections and "
+        "ColumnTransformers of these can. For rules in the units of that step's output, give the "
+        "ANFIS estimator alone."
     )
 
 
@@ -269,14 +231,16 @@ def _is_passthrough(step):
     return step is None or (isinstance(step, str) and step == "passthrough")
 
 
-def _through(label, step, columns):
-    """The columns after a step."""
+def _through(label, step, columns, names=()):
+    """The columns after a step; ``names`` are those of the user's table."""
     if not columns or _is_passthrough(step):
         return columns
     if isinstance(step, Pipeline):
         for name, part in step.steps:
-            columns = _through(name, part, columns)
+            columns = _through(name, part, columns, names)
         return columns
+    if type(step) is OneHotEncoder:
+        return _one_hot(label, step, columns, names)
     if isinstance(step, SelectorMixin):
         return [columns[j] for j in step.get_support(indices=True)]
     if type(step) is ColumnTransformer:
@@ -284,13 +248,24 @@ def _through(label, step, columns):
             column
             for name, part, chosen in step.transformers_
             if not (isinstance(part, str) and part == "drop")
-            for column in _through(name, part, [columns[j] for j in _positions(chosen, step)])
+            for column in _through(
+                name, part, [columns[j] for j in _positions(chosen, step)], names
+            )
         ]
     operations = _scaler_operations(label, step)
     return [
         column.then([(operation, float(numbers[k])) for operation, numbers in operations])
         for k, column in enumerate(columns)
     ]
+
+
+def _one_hot(label, encoder, columns, names):
+    """Indicators in the place of the columns that an encoder is given."""
+    if any(column.operations or column.indicator for column in columns):
+        _refuse(label, encoder, "it must be given columns of the table as they are")
+    sources = [column.source for column in columns]
+    found = indicators(encoder, sources, [names[j] for j in sources])
+    return [Column(source, indicator=one) for source, one in found]
 
 
 def _positions(chosen, transformer):
@@ -303,6 +278,9 @@ def _positions(chosen, transformer):
             first = names.index(first) if first is not None else None
             last = names.index(last) + 1 if last is not None else None
         return np.arange(transformer.n_features_in_)[first : last : chosen.step]
+    if isinstance(chosen, UserList):
+        # The columns of a remainder, before scikit-learn 1.7: to look at one issues a warning.
+        chosen = chosen.data
     chosen = np.atleast_1d(np.asarray(chosen, dtype=object if len(names) else None))
     if all(isinstance(one, str) for one in chosen):
         return [names.index(one) for one in chosen]
@@ -374,7 +352,7 @@ def _with_raw_support(support, offset, scale, order):
 
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
-    columns = _through(label, transformer, [_Column(k) for k in range(model.n_outputs)])
+    columns = _through(label, transformer, [Column(k) for k in range(model.n_outputs)])
     if [column.source for column in columns] != list(range(model.n_outputs)):
         _refuse(label, transformer, "it drops or moves columns of the target")
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T

@@ -56,7 +56,8 @@ def register_onnx_converter() -> None:
         from skl2onnx import update_registered_converter
     except ImportError as error:
         raise ImportError(
-            "register_onnx_converter needs skl2onnx: pip install 'skanfis[onnx]'."
+            "register_onnx_converter needs skl2onnx: pip install skl2onnx onnxruntime (the extra "
+            "'onnx'; in a clone pip install '.[onnx]')."
         ) from error
     from .. import ANFISRegressor
 

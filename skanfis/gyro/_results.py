@@ -150,7 +150,7 @@ class Results:
         try:
             import allantools  # noqa: F401
         except ImportError:
-            return "allantools is not installed (pip install 'skanfis[allan]')"
+            return "allantools is not installed (pip install allantools)"
         if self.time is None:
             return "the log has no time"
         steps = self.steps

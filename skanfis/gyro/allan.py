@@ -215,6 +215,6 @@ def _import_oadev():
     except ImportError as error:
         raise ImportError(
             "The Allan deviation needs allantools, which is not installed: "
-            "pip install 'skanfis[allan]' (or pip install allantools)."
+            "pip install allantools (the extra 'allan'; in a clone pip install '.[allan]')."
         ) from error
     return oadev

@@ -167,7 +167,7 @@ def _require_matplotlib():
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
-        message = "the report needs matplotlib: pip install 'skanfis[plot]'"
+        message = "the report needs matplotlib: pip install matplotlib"
         raise ImportError(message) from error
     except ValueError as error:
         # Of its settings; MPLBACKEND is one.

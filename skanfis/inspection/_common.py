@@ -60,8 +60,8 @@ def _pyplot():
         import matplotlib.pyplot as plt
     except ImportError as error:
         raise ImportError(
-            "Displays are drawn with matplotlib: pip install 'skanfis[plot]', or pip install "
-            "matplotlib."
+            "Displays are drawn with matplotlib: pip install matplotlib (the extra 'plot'; in a "
+            "clone pip install '.[plot]')."
         ) from error
     return plt
 

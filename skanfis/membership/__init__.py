@@ -8,6 +8,7 @@ from .sigmoid import SigmoidDifference, SigmoidProduct
 
 __all__ = [
     "MEMBERSHIPS",
+    "NAMES_IN_MATLAB",
     "TRIED_FAMILIES",
     "Bell",
     "Gaussian",
@@ -41,6 +42,20 @@ MEMBERSHIPS: dict[str, type[Membership]] = {
     )
 }
 
+# What MATLAB's Fuzzy Logic Toolbox calls them: named in errors, and in the pages on files.
+NAMES_IN_MATLAB = {
+    "gaussmf": "gaussian",
+    "gbellmf": "bell",
+    "trimf": "triangular",
+    "trapmf": "trapezoidal",
+    "gauss2mf": "two_sided_gaussian",
+    "pimf": "pi_shaped",
+    "smf": "s_shaped",
+    "zmf": "z_shaped",
+    "dsigmf": "sigmoid_difference",
+    "psigmf": "sigmoid_product",
+}
+
 
 # Tried by mf="auto", the default first: those that may peak anywhere, without and with kinks.
 TRIED_FAMILIES: tuple[type[Membership], ...] = (
@@ -72,6 +87,10 @@ def membership_families(mf, input_names) -> list[type[Membership]]:
             families.append(entry)
         elif isinstance(entry, str) and entry in MEMBERSHIPS:
             families.append(MEMBERSHIPS[entry])
+        elif isinstance(entry, str) and entry in NAMES_IN_MATLAB:
+            raise ValueError(
+                f"mf={entry!r} is MATLAB's name for it: give mf={NAMES_IN_MATLAB[entry]!r}."
+            )
         else:
             raise ValueError(
                 f"mf holds {entry!r}: it must be one of {', '.join(map(repr, MEMBERSHIPS))}, or a "

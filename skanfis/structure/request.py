@@ -9,6 +9,7 @@ from sklearn import get_config
 from sklearn.base import clone
 from sklearn.utils.validation import has_fit_parameter
 
+from .._callers import names_in_pipeline
 from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
@@ -225,14 +226,17 @@ def _labeller(clusterer, weighted):
 def report_constant(rows, names):
     """Warn of inputs that never change."""
     scale = rows.inputs
+    if not scale.is_constant.any():
+        return
+    given = names_in_pipeline(names)
+    names, where = (names, "") if given is None else (given, " after the steps in front")
     flat = [
-        f"{name!r} (always {value:.6g})"
+        f"{name!r} (always {value:.6g}{where})"
         for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
         if is_flat
     ]
-    if flat:
-        warn_user(
-            f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
-            "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",
-            ConstantInputWarning,
-        )
+    warn_user(
+        f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
+        "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",
+        ConstantInputWarning,
+    )

@@ -21,6 +21,7 @@ from sklearn.preprocessing import (
     MaxAbsScaler,
     MinMaxScaler,
     Normalizer,
+    OneHotEncoder,
     PolynomialFeatures,
     PowerTransformer,
     RobustScaler,
@@ -30,6 +31,7 @@ from sklearn.preprocessing import (
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning
 from skanfis.export._fold import fold, fold_with_rows
+from skanfis.options import LinearExtrapolation
 
 NAMES = ["hours", "kelvin", "rate"]
 POLICIES = ("clip", "linear", "nan")
@@ -252,9 +254,11 @@ def test_scattered_terms_are_named_by_where_they_stand_in_raw_units():
 def test_policy_is_the_one_set_last():
     X, y = data()
     pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(X, y)
-    pipe.set_params(anfisregressor__out_of_bounds="nan", anfisregressor__max_extrapolation=2)
-    assert fold(pipe).out_of_bounds == "nan"
+    pipe.set_params(anfisregressor__out_of_bounds=LinearExtrapolation(2))
+    assert fold(pipe).out_of_bounds == "linear"
     assert fold(pipe).max_extrapolation == 2.0
+    pipe.set_params(anfisregressor__out_of_bounds="nan")
+    assert fold(pipe).out_of_bounds == "nan"
 
 
 def test_a_model_is_its_own_folding():
@@ -272,6 +276,62 @@ def test_a_search_stands_for_its_best():
     pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2))
     search = GridSearchCV(pipe, {"anfisregressor__n_mfs": [2, [2, 3, 1]]}, cv=2).fit(X, y)
     assert_same_predictions(search, around(X), 10.0)
+
+
+def mixed(n_rows=200):
+    """A table with text in it, and a target that depends on it."""
+    g = np.random.default_rng(3)
+    frame = pd.DataFrame(
+        {
+            "fibre": g.choice(["PM", "SM", "rare"], n_rows, p=[0.5, 0.45, 0.05]),
+            "kelvin": g.uniform(230.0, 340.0, n_rows),
+            "axis": g.choice(["x", "y"], n_rows),
+        }
+    )
+    slope = frame["fibre"].map({"PM": 0.1, "SM": -0.2, "rare": 0.3})
+    return frame, slope * (frame["kelvin"] - 290.0) + (frame["axis"] == "y")
+
+
+@pytest.mark.parametrize(
+    ("options", "fibres"),
+    [
+        ({}, ["fibre_PM", "fibre_SM", "fibre_rare"]),
+        ({"drop": "first"}, ["fibre_SM", "fibre_rare"]),
+        ({"drop": "if_binary"}, ["fibre_PM", "fibre_SM", "fibre_rare"]),
+        ({"min_frequency": 0.2}, ["fibre_PM", "fibre_SM", "fibre_infrequent_sklearn"]),
+        ({"handle_unknown": "ignore", "sparse_output": False}, None),
+    ],
+)
+def test_one_hot_encoded_columns_are_inputs(options, fibres):
+    X, y = mixed()
+    encode = make_pipeline(OneHotEncoder(**options), StandardScaler(with_mean=False))
+    front = ColumnTransformer(
+        [("kind", encode, ["axis", "fibre"])], remainder=RobustScaler(), sparse_threshold=0
+    )
+    pipe = make_pipeline(front, regressor(**KINDS["scattered"])).fit(X, y)
+    model, rows = fold_with_rows(pipe, X)
+    if fibres is not None:
+        assert list(model.input_names[: len(fibres) + 1]) == [*fibres, "kelvin"]
+        indicator = (X["fibre"] == "SM").to_numpy()
+        assert_array_equal(rows[:, model.input_names.index("fibre_SM")], indicator)
+    else:
+        X = X.assign(fibre="unheard of")
+    assert_same_predictions(pipe, X, 50.0)
+    # Rows out of range as well.
+    assert_same_predictions(pipe, X.assign(kelvin=X["kelvin"] * 1.2), 50.0)
+
+
+def test_encoder_is_given_columns_as_they_are():
+    X, y = data()
+    bins = np.floor(X / X.std(axis=0))
+    pipe = make_pipeline(
+        MaxAbsScaler(), OneHotEncoder(sparse_output=False), regressor(n_mfs=1)
+    ).fit(bins, y)
+    with pytest.raises(ValueError, match=r"'onehotencoder'.* columns of the table as they are"):
+        fold(pipe)
+    unscaled = make_pipeline(OneHotEncoder(sparse_output=False), regressor(n_mfs=1)).fit(bins, y)
+    assert fold(unscaled).input_names[0] == f"x0_{bins[:, 0].min()}"
+    assert_same_predictions(unscaled, bins, 10.0)
 
 
 @pytest.mark.parametrize(

@@ -355,7 +355,7 @@ def test_cells_without_rows_are_empty_on_the_map(rng):
     x, y = rng.uniform(0.0, 10.0, (2, 4000))
     x[:3], y[:3] = [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]
     X = pd.DataFrame({"temperature": x, "output": y})[(x < 5.0) | (y < 5.0)]
-    model = ANFISRegressor(1, warn_out_of_bounds=False).fit(X, X["output"])
+    model = ANFISRegressor(1).fit(X, X["output"])
     display = CoverageDisplay.from_estimator(model, X, n_cells=10, n_points=41, margin=0.2)
     corner = (display.x[None, :] > 5.0) & (display.y[:, None] > 5.0)
     beyond = (display.x[None, :] > 10.0) | (display.y[:, None] > 10.0)

@@ -33,7 +33,7 @@ def test_single_panels_are_drawn_where_asked(display):
 
 def test_displays_say_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.pyplot", None)
-    with pytest.raises(ImportError, match="pip install 'skanfis\\[plot\\]'"):
+    with pytest.raises(ImportError, match=r"pip install matplotlib .*'\.\[plot\]'"):
         LossCurveDisplay(loss=np.ones(2)).plot()
 
 

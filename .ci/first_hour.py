@@ -1,0 +1,204 @@
+"""Two users' first hours, from nothing: install, paste, look. Run it with any Python 3.11 or newer.
+
+    python .ci/first_hour.py           # or, in an environment that has it: ... PYTHON
+
+In a folder away from the source, with an environment of its own, it installs the package as a user
+does. A data scientist pastes README's code and the pages of docs/ that are there to be pasted, and
+makes the mistakes that newcomers make; an inertial test engineer has raw logs of four kinds, and a
+command. What it shows is what they see. It fails where one of these ends otherwise than in an
+answer or in a sentence.
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+import textwrap
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+README_BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PAGE_BLOCK = re.compile(r"^\.\. code-block:: python\n\n((?:   .*\n|\n)+)", re.MULTILINE)
+
+# What newcomers type, and a part of the sentence that they are to get.
+MISTAKES = {
+    "a column of text": (
+        """
+        import pandas as pd
+        from skanfis import ANFISRegressor
+        table = pd.DataFrame({"age": [1.0, 2.0, 3.0], "site": ["a", "b", "c"]})
+        ANFISRegressor().fit(table, [1.0, 2.0, 3.0])
+        """,
+        "text in column 'site', first at row 0",
+    ),
+    "MATLAB's name of a family": (
+        """
+        from skanfis import ANFISRegressor
+        from skanfis.datasets import make_jang_sinc
+        ANFISRegressor(n_mfs=2, mf="gbellmf").fit(*make_jang_sinc())
+        """,
+        "give mf='bell'",
+    ),
+    "a missing value": (
+        """
+        import numpy as np
+        from skanfis import ANFISRegressor
+        ANFISRegressor().fit([[1.0], [np.nan], [3.0]], [1.0, 2.0, 3.0])
+        """,
+        "NaN in column 'x0', first at row 1",
+    ),
+    "a picture without matplotlib": (
+        """
+        import sys
+        sys.modules["matplotlib"] = sys.modules["matplotlib.pyplot"] = None
+        from skanfis import ANFISRegressor
+        from skanfis.datasets import make_jang_sinc
+        from skanfis.inspection import MembershipDisplay
+        MembershipDisplay.from_estimator(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()))
+        """,
+        "pip install matplotlib",
+    ),
+}
+
+# A search over four values with five folds says nothing of rows that its folds leave out of range.
+SEARCH = """
+    import warnings
+    from sklearn.datasets import load_diabetes
+    from sklearn.model_selection import GridSearchCV
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+    from skanfis import ANFISRegressor
+    X, y = load_diabetes(return_X_y=True, as_frame=True)
+    pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=1))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        search = GridSearchCV(pipe, {"anfisregressor__alpha": [0.01, 0.1, 1.0, 10.0]}).fit(X, y)
+        assert not caught, [str(w.message) for w in caught]
+        search.predict(X.assign(bmi=9.0))
+    assert len(caught) == 1
+    print(caught[0].category.__name__, caught[0].message)
+    assert "'bmi' in 442 of 442 rows (trained on [-0.09" in str(caught[0].message)
+"""
+
+
+# Raw logs of four kinds, as loggers write them.
+LOGS = """
+    from skanfis.datasets import make_ofog
+    table = make_ofog(n_devices=1, n_runs=4, sampling_interval=60.0, random_state=0)
+    plain = table[["time", "temperature", "output", "rate", "run"]]
+    plain.to_csv("plain.csv", index=False)
+    local = plain.assign(time=1000.0 * plain["time"], temperature=plain["temperature"] + 273.15)
+    local.columns = ["Zeit", "Temperatur", "Ausgang", "Drehrate", "Lauf"]
+    local.to_csv("semicolons.csv", sep=";", decimal=",", index=False)
+    for run, rows in table.groupby("run"):
+        counts = rows[["time", "temperature", "counts", "rate"]]
+        counts.to_csv(f"counts{run}.csv", index=False)
+    at_rest = make_ofog(
+        n_devices=1, n_runs=4, profile="ramps", rates=[0.0], sampling_interval=60.0, random_state=0
+    )
+    at_rest[["time", "temperature", "output", "run"]].to_csv("at_rest.csv", index=False)
+"""
+COMMANDS = {
+    "plain": ["plain.csv"],
+    "semicolons, decimal commas, milliseconds, kelvin": [
+        *("semicolons.csv", "--separator", ";", "--decimal", ","),
+        *("--columns", "time=Zeit", "temperature=Temperatur", "output=Ausgang"),
+        *("rate=Drehrate", "run=Lauf", "--units", "time=ms", "temperature=K"),
+    ],
+    "raw counts, a file for each run": [
+        *(f"counts{run}.csv" for run in range(4)),
+        *("--columns", "output=counts", "--units", "output=counts"),
+    ],
+    "at rest": ["at_rest.csv", "--at-rest"],
+}
+# And what is to end in one sentence.
+REFUSED = {
+    "no such file": (["nowhere.csv"], "nowhere.csv"),
+    "a column that is not there": (["plain.csv", "--columns", "rate=truth"], "truth"),
+}
+
+
+def blocks(path, pattern):
+    found = pattern.findall(path.read_text(encoding="utf-8"))
+    return [textwrap.dedent(block) for block in found]
+
+
+def run(python, code, folder):
+    """Paste code into a fresh interpreter; what it prints, and whether it failed."""
+    (folder / "pasted.py").write_text(textwrap.dedent(code), encoding="utf-8")
+    options = {"capture_output": True, "text": True, "encoding": "utf-8", "cwd": folder}
+    done = subprocess.run([python, "-X", "utf8", "pasted.py"], **options)
+    return done.returncode, done.stdout + done.stderr
+
+
+def install(folder):
+    """An environment with the package in it; its Python."""
+    venv.create(folder / "environment", with_pip=True)
+    place = "Scripts/python.exe" if sys.platform == "win32" else "bin/python"
+    python = str(folder / "environment" / place)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", f"{ROOT}[plot]"], check=True)
+    return python
+
+
+def command(python, arguments, folder):
+    """Run the gyro command; what it says, and whether it failed."""
+    options = {"capture_output": True, "text": True, "encoding": "utf-8", "cwd": folder}
+    given = [python, "-X", "utf8", "-m", "skanfis.gyro", *arguments]
+    done = subprocess.run(given, **options)
+    return done.returncode, done.stdout, done.stderr
+
+
+def engineer(python, folder):
+    """Logs, a report for each, and mistakes; titles of what did not go as it should."""
+    failed, told = run(python, LOGS, folder)
+    if failed:
+        yield f"writing logs: {told}"
+        return
+    for title, arguments in COMMANDS.items():
+        output = folder / f"made {title}"
+        failed, told, complaint = command(python, [*arguments, "--output", output.name], folder)
+        print(f"=== a log: {title}\n{complaint if failed else told}")
+        if failed or not (output / "report.html").is_file():
+            yield title
+    for title, (arguments, part) in REFUSED.items():
+        failed, _, complaint = command(python, arguments, folder)
+        print(f"=== {title}\n{complaint}")
+        if not failed or part not in complaint or "Traceback" in complaint:
+            yield title
+
+
+def data_scientist(python, folder):
+    """Everything in order; titles of what did not go as it should."""
+    pastes = {
+        f"README.md, block {i}": code
+        for i, code in enumerate(blocks(ROOT / "README.md", README_BLOCK), start=1)
+    }
+    for page in ("quickstart", "from_matlab"):
+        pastes[f"docs/{page}.rst"] = "".join(blocks(ROOT / "docs" / f"{page}.rst", PAGE_BLOCK))
+    pastes["a search"] = SEARCH
+    for title, code in pastes.items():
+        failed, told = run(python, code, folder)
+        print(f"=== {title}\n{told}")
+        if failed:
+            yield title
+    for title, (code, sentence) in MISTAKES.items():
+        failed, told = run(python, code, folder)
+        print(f"=== {title}\n{told.strip().splitlines()[-1]}\n")
+        if not (failed and sentence in told.strip().splitlines()[-1]):
+            yield title
+
+
+def main():
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        python = sys.argv[1] if len(sys.argv) == 2 else install(folder)
+        failed = [*data_scientist(python, folder), *engineer(python, folder)]
+    print(f"FAILED: {', '.join(failed)}" if failed else "Both hours went as they should.")
+    return bool(failed)
+
+
+if __name__ == "__main__":
+    sys.stdout.reconfigure(encoding="utf-8", line_buffering=True)
+    sys.exit(main())
