@@ -20,9 +20,17 @@ from .antecedent import GridAntecedent
 from .model import TSKModel
 from .naming import default_term_names, given_term_names
 from .penalty import Penalty
+from .posterior import Posterior
 from .rows import Rows, check_scales
 from .solvers import SOLVERS, SolverResult
-from .structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
+from .structure import (
+    SampleSize,
+    Start,
+    StructureRequest,
+    effective_weight,
+    imported_antecedent,
+    report_constant,
+)
 from .support import RuleSupport
 from .training import (
     EarlyStopping,
@@ -198,14 +206,18 @@ class _Trainer:
                 learned = self._learn(self.rows, self._start(self.rows), None)
             learned, redundant, pruning = self._prune(learned)
             start, result = learned.start, learned.result
+            problem, premise = learned.problem, learned.premise
             losses = learned.validation_losses if self.held_out is not None else None
         except KeyboardInterrupt:
             if self.keeper is None or self.keeper.best is None:
                 raise
             start, result = self.keeper.end()
             redundant, pruning, losses = self._redundant(result), None, None
+            problem = self.learner.problem(self.rows, start)
+            premise = self.learner.premise(self.rows, start)
         self._report(start, result)
         model = self.freeze(start, result.evaluation)
+        model = replace(model, posterior=self._posterior(problem, premise, result.evaluation))
         if weights is not None:
             weights = self.data.spread_over_rows(weights, self.training)
         return Training(model, result, start, redundant, pruning, weights, losses)
@@ -246,6 +258,10 @@ class _Trainer:
             term_names=start.term_names,
             output_names=self.data.output_names,
         )
+
+    def _posterior(self, problem, premise, evaluation):
+        learnt = None if self.learner.solver == "lse" else premise
+        return Posterior.of(problem, learnt, evaluation, effective_weight(problem.rows))
 
     def _start(self, rows):
         start = self.request.start(rows, self.size)

@@ -26,6 +26,7 @@ import numpy as np
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .naming import default_term_names
+from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
 __all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel"]
@@ -67,6 +68,8 @@ class TSKModel:
         input beyond its range; zero or positive, or infinite.
     support : RuleSupport or None
         Where the training data of every rule lie; None where the model knows of none.
+    posterior : Posterior or None
+        What the standard deviation of a prediction needs; None where the model knows of none.
     term_names : tuple of str
         One per term, unique on its input; where not given, see ``naming``.
     output_names : tuple of str
@@ -88,6 +91,7 @@ class TSKModel:
     support: RuleSupport | None = None
     term_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
+    posterior: Posterior | None = None
 
     def __post_init__(self):
         if not self.term_names:
@@ -173,6 +177,39 @@ class TSKModel:
             outputs[~inside] = np.nan
         return outputs
 
+    def standard_deviation(self, X, inside=None):
+        """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``.
+
+        NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
+        """
+        posterior = self.posterior
+        if posterior is None:
+            raise ValueError(self._why_no_posterior())
+        inside = self.in_bounds(X) if inside is None else inside
+        if not inside.all() and self.out_of_bounds == "raise":
+            raise ValueError(self.describe_out_of_bounds(X))
+
+        def within(Z):
+            return np.sqrt(posterior.variance(self, Z))
+
+        def beyond(Z):
+            nearest = self._clip(Z)
+            way, slopes = Z - nearest, self._values_and_gradient(nearest)[1]
+            followed = self._held(way) if self.out_of_bounds == "linear" else 0.0
+            unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
+            return np.sqrt(posterior.variance(self, nearest, way, unfollowed))
+
+        n_values = posterior.values_per_row(self)
+        if inside.all():
+            return self._by_block(X, within, self.n_outputs, n_values)
+        found = np.full((X.shape[0], self.n_outputs), np.nan)
+        if inside.any():
+            found[inside] = self._by_block(X[inside], within, self.n_outputs, n_values)
+        if self.out_of_bounds != "nan":
+            n_values += self._n_slopes
+            found[~inside] = self._by_block(X[~inside], beyond, self.n_outputs, n_values)
+        return found
+
     def gradient(self, X):
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
 
@@ -214,6 +251,19 @@ class TSKModel:
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
         return self._by_block(X, of_block, 1, n_distances)[:, 0]
+
+    def _why_no_posterior(self):
+        n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
+        if n_parameters > MOST_PARAMETERS:
+            return (
+                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} no posterior "
+                "is kept, and there is no standard deviation. Use fewer rules, or intervals from "
+                "residuals: ConformalRegressor(..., scaled=False)."
+            )
+        return (
+            "The model knows of no posterior: it was taken as it was given, not fitted. Fit it to "
+            "data (solver='lse' fits the consequents and leaves the premises alone)."
+        )
 
     def way_out(self, X):
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs).

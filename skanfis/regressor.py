@@ -197,6 +197,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         "structure", "expected_error" on new rows like these in standard deviations of the target,
         "log_evidence", "agreement", "alpha", "stiffness"; with groups "held_out_error" decides.
         Empty where the structure was given.
+    noise_std_ : float or ndarray of shape (n_outputs,) or None
+        Standard deviation of the noise of a row of mean weight, in the units of y: what remains of
+        the residual after the effective number of parameters. None where
+        ``predict(return_std=True)`` has nothing to go by.
     readability_ : skanfis.inspection.Readability
         How far the rules can be read one by one, measured on the training rows.
     redundant_rules_ : list of dict
@@ -421,6 +425,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.n_iter_ = max(training.result.n_iter, 1)
         self.loss_curve_ = training.result.loss_curve
         self.status_ = training.result.message
+        posterior = self.model_.posterior
+        noise = None if posterior is None else posterior.noise
+        self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
         penalty = training.start.penalty
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
@@ -436,21 +443,31 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             bridge.end(self.model_)
         return self
 
-    def predict(self, X):
+    def predict(self, X, return_std=False):
         """Predict the target.
 
         Parameters
         ----------
         X : array-like of shape (n_samples, n_features)
+        return_std : bool, default=False
+            Whether to return the standard deviation of a new row of mean weight as well: of the
+            noise, the consequents and, by Laplace's method, the premises, in the target's units. It
+            is that of the rows' common noise; it takes the structure and the weights of the penalty
+            for known. Outside the training range it grows with the distance, whatever the policy;
+            where the prediction is NaN, so is it.
 
         Returns
         -------
         y : ndarray of shape (n_samples,) or (n_samples, n_outputs)
+        std : ndarray of the shape of y
+            Only with ``return_std=True``.
 
         Raises
         ------
         ValueError
-            If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data.
+            If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
+            or, with ``return_std=True``, if the model was taken as given and not fitted, or is too
+            large to keep the factor of a posterior (2,000 parameters).
 
         Warns
         -----
@@ -468,7 +485,11 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 OutOfBoundsWarning,
                 stacklevel=2,
             )
-        return outputs[:, 0] if self._single_output else outputs
+        single = self._single_output
+        if return_std:
+            deviations = model.standard_deviation(X, inside)
+            return (outputs[:, 0], deviations[:, 0]) if single else (outputs, deviations)
+        return outputs[:, 0] if single else outputs
 
     def in_bounds(self, X):
         """Tell which rows lie in the range of the training data, input by input.

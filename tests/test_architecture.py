@@ -24,6 +24,7 @@ KERNEL = [
     "premise",
     "naming",
     "support",
+    "posterior",
     "model",
     "solvers",
 ]
@@ -56,6 +57,7 @@ TABLE = {
         ],
         LEARNING,
     ),
+    "intervals": (["_sklearn", "_validation", "exceptions", "regressor"], LEARNING),
     "readable": (["exceptions", "model", "_validation", "export"], [*NUMERIC, "pandas"]),
     "inspection": (
         ["model", "naming", "_validation", "export", "readable"],

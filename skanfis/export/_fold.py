@@ -346,6 +346,7 @@ def _with_raw_inputs(model, columns, order, names):
         maximum=_edges(columns, model.maximum, 1.0)[order],
         support=_with_raw_support(model.support, offset, scale, order),
         input_names=tuple(map(str, names)),
+        posterior=None,
     )
     if model.term_names == default_term_names(model.antecedent):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
@@ -378,4 +379,4 @@ def _with_raw_target(model, label, transformer):
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T
     coefficients = model.coefficients * scale
     coefficients[:, 0] += offset
-    return replace(model, coefficients=coefficients)
+    return replace(model, coefficients=coefficients, posterior=None)
