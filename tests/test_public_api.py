@@ -16,6 +16,7 @@ PUBLIC_MODULES = [
     "skanfis.export",
     "skanfis.gyro",
     "skanfis.inspection",
+    "skanfis.intervals",
 ]
 API_PAGE = Path(__file__).parents[1] / "docs" / "api.rst"
 
