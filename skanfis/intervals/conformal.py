@@ -2,6 +2,7 @@
 
 import inspect
 import warnings
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import ClassVar
 
@@ -10,15 +11,11 @@ from joblib import Parallel, delayed
 from sklearn import get_config
 from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
 from sklearn.frozen import FrozenEstimator
-from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, ShuffleSplit
+from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, ShuffleSplit, check_cv
 from sklearn.pipeline import Pipeline
-from sklearn.utils import check_array
+from sklearn.utils import check_array, indexable
 from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping, process_routing
-from sklearn.utils.validation import (
-    check_consistent_length,
-    check_is_fitted,
-    has_fit_parameter,
-)
+from sklearn.utils.validation import check_is_fitted, has_fit_parameter
 
 from .._sklearn import (
     HasMethods,
@@ -68,9 +65,9 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     scaled : bool, default=True
         Whether intervals are as wide as the model's own standard deviation says, row by row, by
         ``predict(X, return_std=True)``; else all have one width ("cross": nearly).
-    cv : int or splitter, default=10
+    cv : int, splitter or iterable of splits, default=10
         Of "cross": the number of folds, at most; no more than rows, or groups. A splitter of
-        scikit-learn must hold out every row once.
+        scikit-learn, or splits, must hold out every row once.
     calibration_fraction : float, default=0.25
         Of "split": part of the rows, or of the groups, held out. 1 takes all rows given, for a
         model that is fitted already, as ``FrozenEstimator(model)``.
@@ -132,7 +129,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         "estimator": [HasMethods(["fit", "predict"]), None],
         "method": [StrOptions({"cross", "split", "loo"})],
         "scaled": ["boolean"],
-        "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"])],
+        "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"]), Iterable],
         "calibration_fraction": [Interval(Real, 0, 1, closed="right")],
         "random_state": ["random_state"],
         "n_jobs": [Integral, None],
@@ -199,7 +196,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             two groups; if ``cv`` does not hold out every row once; if ``method="loo"`` is given
             groups; if the regressor has no standard deviation.
         """
-        targets, weight, numbers = self._checked(X, y, sample_weight, groups)
+        X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
+        targets, weight, numbers = self._checked(y, sample_weight, groups)
         params = self._fit_params(sample_weight, groups)
         data = _Data(X, y, targets, params)
         self._single_output, self._is_by_group = targets.ndim == 1, numbers is not None
@@ -277,13 +275,15 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def _regressor(self):
         return ANFISRegressor() if self.estimator is None else self.estimator
 
-    def _checked(self, X, y, sample_weight, groups):
+    def _checked(self, y, sample_weight, groups):
         """Targets as an array, positive weights or None, numbers of groups or None."""
+        if y is None:
+            name = type(self).__name__
+            raise ValueError(f"{name} requires y to be passed, but the target y is None.")
         with named_refusals(y=y):
             targets = check_array(
                 y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"
             )
-        check_consistent_length(X, targets, groups)
         names = [f"y{k}" for k in range(targets.reshape(len(targets), -1).shape[1])]
         check_finite(targets.reshape(len(targets), -1), "y", names)
         if sample_weight is not None:
@@ -345,7 +345,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """Scores of every row by the models of the folds without it."""
         n_rows = len(data.targets)
         if not isinstance(self.cv, Integral):
-            splitter = self.cv
+            splitter = check_cv(self.cv)
         elif groups is None:
             splitter = KFold(min(int(self.cv), n_rows), shuffle=True, random_state=self._seed())
         else:
@@ -355,7 +355,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if not (counts == 1).all():
             row = int(np.argmax(counts != 1))
             raise ValueError(
-                f"cv={self.cv!r} holds out row {row} {counts[row]} times; every row must be held "
+                f"cv={splitter!r} holds out row {row} {counts[row]} times; every row must be held "
                 "out once, as KFold, GroupKFold and LeaveOneGroupOut do."
             )
         regressor = self._regressor()
