@@ -82,6 +82,17 @@ class Posterior:
     premises: np.ndarray
     cross: np.ndarray
 
+    def __getstate__(self):
+        """What a file holds: of a triangle no zeros."""
+        lower = self.consequents[np.tril_indices(self.consequents.shape[0])]
+        return self.__dict__ | {"consequents": lower}
+
+    def __setstate__(self, state):
+        n_columns = int(np.sqrt(2 * state["consequents"].size))
+        full = np.zeros((n_columns, n_columns))
+        full[np.tril_indices(n_columns)] = state["consequents"]
+        self.__dict__.update(state | {"consequents": full})
+
     @classmethod
     def of(cls, problem: SeparableProblem, premise: Premise | None, evaluation: Evaluation, n_rows):
         """The posterior where a fit has ended, in the user's units.

@@ -119,7 +119,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     >>> rng = np.random.default_rng(0)
     >>> X = rng.uniform(-1, 1, size=(400, 1))
     >>> y = np.sin(3 * X[:, 0]) + 0.1 * rng.standard_t(3, size=400)
-    >>> model = ConformalRegressor(ANFISRegressor(n_mfs=3), cv=5).fit(X[:200], y[:200])
+    >>> rules = ANFISRegressor(n_mfs=3, warn_out_of_bounds=False)
+    >>> model = ConformalRegressor(rules, cv=5).fit(X[:200], y[:200])
     >>> lower, upper = model.predict_interval(X[200:], coverage=0.9)
     >>> bool(0.85 < np.mean((lower <= y[200:]) & (y[200:] <= upper)) < 0.95)
     True
