@@ -139,6 +139,26 @@ class Posterior:
             cross * (shared * scale)[:, None, None],
         )
 
+    def change_units(self, antecedent: Antecedent, scale, order):
+        """Return the same posterior for inputs given as offset + scale * x, in another order.
+
+        ``antecedent`` is the model's own, before the change.
+        """
+        place = np.argsort(order)
+        widths = np.concatenate([[1.0], scale[self.inputs]])
+        return replace(
+            self,
+            inputs=place[self.inputs],
+            consequents=self.consequents / np.tile(widths, antecedent.n_rules),
+            premises=self.premises * _units(antecedent, scale),
+        )
+
+    def change_target_units(self, scale):
+        """Return the same posterior for outputs given as offset + scale * y."""
+        return replace(
+            self, noise=self.noise * np.abs(scale), cross=self.cross * scale[:, None, None]
+        )
+
     def variance(self, model, Z, way=None, unfollowed=None):
         """Variance of every output, (n_outputs, n_rows), at rows Z (n_inputs, n_rows) of the box.
 

@@ -71,6 +71,7 @@ TABLE = {
             "antecedent",
             "naming",
             "support",
+            "posterior",
             "model",
             "_validation",
         ],

@@ -1,5 +1,6 @@
 """The posterior against dense Bayesian regression and Laplace's method written down plainly."""
 
+import json
 import pickle
 from dataclasses import replace
 
@@ -7,9 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from sklearn.cluster import KMeans
+from sklearn.compose import TransformedTargetRegressor, make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import RobustScaler, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
+from skanfis.export import export_json
+from skanfis.export.model_json import parse_json
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
@@ -258,3 +264,46 @@ def test_what_has_no_posterior_says_why(monkeypatch):
     monkeypatch.setattr("skanfis.model.MOST_PARAMETERS", 10)
     with pytest.raises(ValueError, match=r"20 parameters; beyond 10 .* scaled=False"):
         ANFISRegressor(**settings).fit(X, y).predict(X, return_std=True)
+
+
+def test_scalers_folded_in_and_json_keep_the_deviation():
+    rng = np.random.default_rng(8)
+    X, y = wave(rng, 120)
+    X = np.column_stack([X[:, 1], rng.normal(size=120), X[:, 0]])
+    rules = ANFISRegressor(n_mfs=[3, 1, 2], consequent_features=[0, 2], **GIVEN, **OUT)
+    columns = make_column_transformer((StandardScaler(), [2, 0]), (RobustScaler(), [1]))
+    columns.fit(X)
+    scaled = make_pipeline(columns, rules)
+    estimator = TransformedTargetRegressor(scaled, transformer=StandardScaler()).fit(X, y)
+    inner, scaler = estimator.regressor_, estimator.transformer_
+    new = X[:40] * [1.0, 1.3, 1.05]
+    mean, std = inner[-1].predict(inner[0].transform(new), return_std=True)
+    model = parse_json(export_json(estimator, posterior=True))
+    assert_allclose(model.predict(new)[:, 0], scaler.inverse_transform(mean[:, None])[:, 0])
+    assert_allclose(model.standard_deviation(new)[:, 0], std * scaler.scale_, rtol=1e-9)
+    with pytest.raises(ValueError, match="knows of no posterior"):
+        parse_json(export_json(estimator)).standard_deviation(new)
+    with pytest.raises(ValueError, match=r"posterior=True, but the model knows of none"):
+        export_json(parse_json(export_json(estimator)), posterior=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p: p.pop("noise"), '"posterior" is'),
+        (lambda p: p.update(noise=[0.1, 0.2]), "posterior.noise: .* not a list of 1"),
+        (lambda p: p.update(inputs=[0, 0]), "is not an input, or not for the first time"),
+        (lambda p: p["consequents"].pop(), "not a triangle of 12 rows"),
+        (lambda p: p["consequents"][3].pop(), r"posterior.consequents\[3\]: .* list of 4"),
+        (lambda p: p["premises"].pop(), "posterior.premises has 7 rows, not 0 or 8"),
+        (lambda p: p["cross"][0][0].insert(0, 1.0), "posterior.cross: .* list of 12"),
+        (lambda p: p["cross"][0][0].__setitem__(0, "1"), "is not a number of size up to"),
+    ],
+)
+def test_json_of_a_posterior_that_is_none_is_refused(change, message):
+    X, y = wave(np.random.default_rng(9), 60)
+    fitted = ANFISRegressor(n_mfs=2, max_iter=2, tol=0.5, **GIVEN).fit(X, y)
+    document = json.loads(export_json(fitted, posterior=True))
+    change(document["posterior"])
+    with pytest.raises(ValueError, match=message):
+        parse_json(json.dumps(document))

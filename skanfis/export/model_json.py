@@ -28,7 +28,8 @@ Numbers are written so that the same double comes back; widths stay the logarith
 holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
 terms are positions in "terms", -1 for an input that it does not look at. "max_extrapolation" is
 null where the tangent has no end. "support" has an entry per rule, its factor row by row up to the
-diagonal; it is null where the model knows of no data.
+diagonal; it is null where the model knows of no data. On request there is a further object,
+"posterior"; see ``_posterior_json``.
 """
 
 import json
@@ -57,6 +58,7 @@ from ._limits import (
     read_bytes,
     shown,
 )
+from ._posterior_json import posterior_item, read_posterior
 
 __all__ = ["export_json", "read_json", "write_json"]
 
@@ -86,7 +88,7 @@ _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 _ROUNDING = 1e-6
 
 
-def export_json(estimator):
+def export_json(estimator, *, posterior=False):
     """Give a trained model as JSON text, exact to the last bit.
 
     Parameters
@@ -94,6 +96,9 @@ def export_json(estimator):
     estimator : fitted estimator or TSKModel
         An :class:`~skanfis.ANFISRegressor`, or a Pipeline of scalers and one, which is folded into
         one model of the raw inputs.
+    posterior : bool, default=False
+        Whether to write what ``predict(X, return_std=True)`` needs: some p^2 / 2 numbers for p
+        consequent parameters, which nobody reads.
 
     Returns
     -------
@@ -103,8 +108,9 @@ def export_json(estimator):
     Raises
     ------
     ValueError
-        If a step in front cannot be folded, if a membership is not one of skanfis' own, or if
-        :func:`read_json` would refuse a number, such as a spread beyond 1e50.
+        If a step in front cannot be folded, if a membership is not one of skanfis' own, if
+        :func:`read_json` would refuse a number, such as a spread beyond 1e50, or if the posterior
+        is asked for and the model knows of none.
     TypeError
         If ``estimator`` is no such estimator.
 
@@ -156,6 +162,13 @@ def export_json(estimator):
         "rules": rules,
         "support": None if model.support is None else _support_items(model.support),
     }
+    if posterior:
+        if model.posterior is None:
+            raise ValueError(
+                "posterior=True, but the model knows of none: it was taken as it was given, not "
+                "fitted, or is too large to keep one."
+            )
+        document["posterior"] = posterior_item(model.posterior)
     try:
         _model(document)
     except ValueError as error:
@@ -163,7 +176,7 @@ def export_json(estimator):
     return _laid_out(document)
 
 
-def write_json(estimator, path):
+def write_json(estimator, path, *, posterior=False):
     """Write a trained model to a JSON file, as :func:`export_json` gives it.
 
     Parameters
@@ -171,6 +184,8 @@ def write_json(estimator, path):
     estimator : fitted estimator or TSKModel
     path : str or path-like
         Of the file, which is replaced where it exists.
+    posterior : bool, default=False
+        Whether to write what ``predict(X, return_std=True)`` needs.
 
     Returns
     -------
@@ -194,7 +209,8 @@ def write_json(estimator, path):
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_json(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.json")
     """
-    Path(path).write_text(export_json(estimator), encoding="utf-8", newline="\n")
+    text = export_json(estimator, posterior=posterior)
+    Path(path).write_text(text, encoding="utf-8", newline="\n")
 
 
 def read_json(path):
@@ -208,7 +224,7 @@ def read_json(path):
     -------
     model : skanfis.model.TSKModel
         It predicts what the model written does, to the last bit. Give it to ``ANFISRegressor`` as
-        ``partition`` to train on.
+        ``partition`` to train on, or with ``max_iter=0`` to predict with as it is.
 
     Raises
     ------
@@ -250,6 +266,8 @@ def parse_json(text):
 def _model(document):
     """The model that a file's content describes."""
     _check_version(document)
+    posterior = document.get("posterior")
+    document = {key: value for key, value in document.items() if key != "posterior"}
     _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
         document, _FILE, "the file"
     )
@@ -281,6 +299,11 @@ def _model(document):
         support=None if support is None else _support(support, n_rules, len(inputs)),
         term_names=term_names,
         output_names=tuple(outputs),
+        posterior=None
+        if posterior is None
+        else read_posterior(
+            posterior, antecedent, len(inputs), len(outputs), int(coefficients.shape[1] > 1)
+        ),
     )
 
 
