@@ -177,38 +177,46 @@ class TSKModel:
             outputs[~inside] = np.nan
         return outputs
 
-    def standard_deviation(self, X, inside=None):
+    def standard_deviation(self, X):
         """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``.
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
+        return self.predict_with_deviation(X)[1]
+
+    def predict_with_deviation(self, X, inside=None):
+        """Outputs and their standard deviations, each of shape (n_rows, n_outputs)."""
         posterior = self.posterior
         if posterior is None:
             raise ValueError(self._why_no_posterior())
         inside = self.in_bounds(X) if inside is None else inside
-        if not inside.all() and self.out_of_bounds == "raise":
-            raise ValueError(self.describe_out_of_bounds(X))
+        n_outputs, n_values = self.n_outputs, posterior.values_per_row(self)
 
         def within(Z):
-            return np.sqrt(posterior.variance(self, Z))
+            outputs, variance = posterior.inside(self, Z)
+            if posterior.inputs.size < self.coefficients.shape[1] - 1:
+                outputs = self._outputs(Z)
+            return np.vstack([outputs, np.sqrt(variance)])
 
         def beyond(Z):
             nearest = self._clip(Z)
             way, slopes = Z - nearest, self._values_and_gradient(nearest)[1]
             followed = self._held(way) if self.out_of_bounds == "linear" else 0.0
             unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
-            return np.sqrt(posterior.variance(self, nearest, way, unfollowed))
+            return np.sqrt(posterior.beyond(self, nearest, way, unfollowed))
 
-        n_values = posterior.values_per_row(self)
         if inside.all():
-            return self._by_block(X, within, self.n_outputs, n_values)
-        found = np.full((X.shape[0], self.n_outputs), np.nan)
+            found = self._by_block(X, within, 2 * n_outputs, n_values)
+            return found[:, :n_outputs], found[:, n_outputs:]
+        outputs = self.predict(X, inside)
+        deviations = np.full(outputs.shape, np.nan)
         if inside.any():
-            found[inside] = self._by_block(X[inside], within, self.n_outputs, n_values)
+            found = self._by_block(X[inside], within, 2 * n_outputs, n_values)
+            deviations[inside] = found[:, n_outputs:]
         if self.out_of_bounds != "nan":
             n_values += self._n_slopes
-            found[~inside] = self._by_block(X[~inside], beyond, self.n_outputs, n_values)
-        return found
+            deviations[~inside] = self._by_block(X[~inside], beyond, n_outputs, n_values)
+        return outputs, deviations
 
     def gradient(self, X):
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).

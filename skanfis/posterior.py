@@ -31,13 +31,14 @@ Of the tangent's variance, which is |h0 + h1|^2 with h0 from phi(c) and h1 from 
 product 2 h0 h1 counts where it is positive only: a deviation never falls on the way out.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.linalg import blas
 
 from .antecedent import Antecedent
 from .consequent import NormalFactor, basis, rule_outputs
+from .gram import DesignMoments
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
@@ -85,7 +86,7 @@ class Posterior:
     def __getstate__(self):
         """What a file holds: of a triangle no zeros."""
         lower = self.consequents[np.tril_indices(self.consequents.shape[0])]
-        return self.__dict__ | {"consequents": lower}
+        return {one.name: getattr(self, one.name) for one in fields(self)} | {"consequents": lower}
 
     def __setstate__(self, state):
         n_columns = int(np.sqrt(2 * state["consequents"].size))
@@ -159,16 +160,31 @@ class Posterior:
             self, noise=self.noise * np.abs(scale), cross=self.cross * scale[:, None, None]
         )
 
-    def variance(self, model, Z, way=None, unfollowed=None):
-        """Variance of every output, (n_outputs, n_rows), at rows Z (n_inputs, n_rows) of the box.
+    def inside(self, model, Z):
+        """Outputs and their variance, each (n_outputs, n_rows), at rows Z (n_inputs, n_rows).
 
-        Or of rows out of it, of which Z is the nearest point, ``way`` the way from there, and
+        u is not formed: u' u is the sum of moments of ``gram``, of which there are fewer. Outputs
+        are those of the consequents' own inputs.
+        """
+        strengths, shares, basis_rows, outputs, changes = self._derivatives(model, Z)
+        moments, table, slopes = self._tables(model)
+        basis_rows[1:] /= model.spread[self.inputs, None]
+        square = moments.quadratic(table, shares, basis_rows)
+        found = self.noise[:, None] ** 2 * (1.0 + np.maximum(square, 0.0))
+        for k, change in enumerate(changes):
+            by_basis = (slopes[k] @ strengths).reshape(basis_rows.shape[0], -1, Z.shape[1])
+            half = self.premises @ change
+            half -= np.einsum("iqn,in->qn", by_basis, basis_rows)
+            found[k] += np.einsum("qn,qn->n", half, half)
+        return outputs, found
+
+    def beyond(self, model, Z, way, unfollowed):
+        """Variance of every output, (n_outputs, n_rows), of rows out of the box.
+
+        Z is the nearest point in it, ``way`` the way from there, (n_inputs, n_rows), and
         ``unfollowed`` (n_outputs, n_rows) what the prediction leaves out of the tangent.
         """
-        noise = self.noise[:, None] ** 2
         halves = self._halves(model, Z)
-        if way is None:
-            return noise + self._products(halves, halves)
         length = np.sqrt(np.sum((way / model.spread[:, None]) ** 2, axis=0))
         step = way * (_STEP / np.maximum(length, np.finfo(float).tiny))
         inside = [self._halves(model, Z - (k + 1) * step) for k in range(len(_WEIGHTS))]
@@ -178,12 +194,27 @@ class Posterior:
             slopes.append(slope * (length / _STEP))
         growth = 2.0 * np.maximum(self._products(halves, slopes), 0.0)
         growth += self._products(slopes, slopes)
+        noise = self.noise[:, None] ** 2
         return noise + self._products(halves, halves) + growth + unfollowed**2
 
     def values_per_row(self, model):
         """Numbers that a row takes while its variance is found."""
         n_columns, n_parameters = self.consequents.shape[0], self.premises.shape[1]
-        return 2 * n_columns + 3 * n_parameters + self.cross.shape[0] * self.premises.shape[0]
+        return n_columns + 3 * n_parameters
+
+    def _tables(self, model):
+        """What ``inside`` needs of F and B_k, found once: moments, table of F' F, B_k F."""
+        if not hasattr(self, "_cached"):
+            n_rules, n_basis = model.n_rules, 1 + self.inputs.size
+            # Of inputs in standard deviations: squares of others might be beyond all floats.
+            widths = np.concatenate([[1.0], model.spread[self.inputs]])
+            factor = self.consequents * np.tile(widths, n_rules)
+            moments = DesignMoments(model.antecedent.share_counts, n_basis)
+            slopes = (self.cross @ factor).reshape(*self.cross.shape[:2], n_rules, n_basis)
+            slopes = slopes.transpose(0, 3, 1, 2).reshape(self.noise.size, -1, n_rules)
+            found = moments, moments.of_matrix(factor.T @ factor), np.ascontiguousarray(slopes)
+            object.__setattr__(self, "_cached", found)
+        return self.__dict__["_cached"]
 
     def _products(self, one, other):
         """Inner products of every output and row, (n_outputs, n_rows)."""
@@ -192,29 +223,38 @@ class Posterior:
 
     def _halves(self, model, Z):
         """U (n_columns, n_rows), and v of every output (n_outputs, n_displacements, n_rows)."""
-        antecedent, n_rows = model.antecedent, Z.shape[1]
+        strengths, _, basis_rows, _, changes = self._derivatives(model, Z)
+        design = (strengths[:, None, :] * basis_rows).reshape(-1, Z.shape[1])
+        # Half the work of a full product, and in Fortran order no copies.
+        half = blas.dtrmm(1.0, self.consequents.T, design.T, side=1, lower=0, overwrite_b=1).T
+        found = np.empty((self.noise.size, self.premises.shape[0], Z.shape[1]))
+        for k, change in enumerate(changes):
+            found[k] = self.premises @ change - self.cross[k] @ half
+        return half, found
+
+    def _derivatives(self, model, Z):
+        """Strengths, shares, basis, outputs, and every output's derivatives by the premises."""
+        antecedent = model.antecedent
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
         basis_rows = basis(Z[self.inputs] - model.reference[self.inputs, None])
-        design = (strengths[:, None, :] * basis_rows).reshape(-1, n_rows)
-        # Half the work of a full product, and in Fortran order no copies.
-        half = blas.dtrmm(1.0, self.consequents.T, design.T, side=1, lower=0, overwrite_b=1).T
-        found = np.empty((self.noise.size, self.premises.shape[0], n_rows))
-        if self.premises.shape[0] == 0:
-            return half, found
         columns = np.concatenate([[0], 1 + self.inputs]) if model.order == 1 else [0]
-        changes = np.empty((self.premises.shape[1], n_rows))
-        for k, one in enumerate(model.coefficients[:, columns].transpose(2, 0, 1)):
+        outputs, every = [], []
+        for one in model.coefficients[:, columns].transpose(2, 0, 1):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
+            outputs.append(output)
+            if self.premises.shape[0] == 0:
+                continue
             by_term = antecedent.term_sensitivity(by_rule, output, shares)
+            changes = np.empty((self.premises.shape[1], Z.shape[1]))
             row = term = 0
             for gradient in gradients:
                 out = changes[row : row + gradient.shape[0] * gradient.shape[1]]
                 own = by_term[term : term + gradient.shape[1]]
                 np.multiply(gradient, own, out=out.reshape(gradient.shape))
                 row, term = row + out.shape[0], term + own.shape[0]
-            found[k] = self.premises @ changes - self.cross[k] @ half
-        return half, found
+            every.append(changes)
+        return strengths, shares, basis_rows, np.stack(outputs), every
 
 
 def _mean_squares(problem, evaluation):

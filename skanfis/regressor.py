@@ -477,7 +477,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         model = self.model_.with_out_of_bounds(self.out_of_bounds, self.max_extrapolation)
         inside = model.in_bounds(X)
-        outputs = model.predict(X, inside)
+        if return_std:
+            outputs, deviations = model.predict_with_deviation(X, inside)
+        else:
+            outputs = model.predict(X, inside)
         if self.warn_out_of_bounds and not inside.all():
             message = model.describe_out_of_bounds(X)
             warnings.warn(
@@ -487,7 +490,6 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             )
         single = self._single_output
         if return_std:
-            deviations = model.standard_deviation(X, inside)
             return (outputs[:, 0], deviations[:, 0]) if single else (outputs, deviations)
         return outputs[:, 0] if single else outputs
 
