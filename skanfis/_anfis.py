@@ -207,6 +207,7 @@ class _Trainer:
             learned, redundant, pruning = self._prune(learned)
             start, result = learned.start, learned.result
             problem, premise = learned.problem, learned.premise
+            robust = None if weights is None else (weights, self.estimator.epsilon)
             losses = learned.validation_losses if self.held_out is not None else None
         except KeyboardInterrupt:
             if self.keeper is None or self.keeper.best is None:
@@ -214,10 +215,12 @@ class _Trainer:
             start, result = self.keeper.end()
             redundant, pruning, losses = self._redundant(result), None, None
             problem = self.learner.problem(self.rows, start)
-            premise = self.learner.premise(self.rows, start)
+            premise, robust = self.learner.premise(self.rows, start), None
         self._report(start, result)
         model = self.freeze(start, result.evaluation)
-        model = replace(model, posterior=self._posterior(problem, premise, result.evaluation))
+        model = replace(
+            model, posterior=self._posterior(problem, premise, result.evaluation, robust)
+        )
         if weights is not None:
             weights = self.data.spread_over_rows(weights, self.training)
         return Training(model, result, start, redundant, pruning, weights, losses)
@@ -259,9 +262,10 @@ class _Trainer:
             output_names=self.data.output_names,
         )
 
-    def _posterior(self, problem, premise, evaluation):
+    def _posterior(self, problem, premise, evaluation, robust):
         learnt = None if self.learner.solver == "lse" else premise
-        return Posterior.of(problem, learnt, evaluation, effective_weight(problem.rows))
+        n_rows = effective_weight(problem.rows)
+        return Posterior.of(problem, learnt, evaluation, n_rows, robust)
 
     def _start(self, rows):
         start = self.request.start(rows, self.size)

@@ -193,17 +193,17 @@ class TSKModel:
         n_outputs, n_values = self.n_outputs, posterior.values_per_row(self)
 
         def within(Z):
-            outputs, variance = posterior.inside(self, Z)
+            outputs, deviations = posterior.inside(self, Z)
             if posterior.inputs.size < self.coefficients.shape[1] - 1:
                 outputs = self._outputs(Z)
-            return np.vstack([outputs, np.sqrt(variance)])
+            return np.vstack([outputs, deviations])
 
         def beyond(Z):
             nearest = self._clip(Z)
             way, slopes = Z - nearest, self._values_and_gradient(nearest)[1]
             followed = self._held(way) if self.out_of_bounds == "linear" else 0.0
             unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
-            return np.sqrt(posterior.beyond(self, nearest, way, unfollowed))
+            return posterior.beyond(self, nearest, way, unfollowed)
 
         if inside.all():
             found = self._by_block(X, within, 2 * n_outputs, n_values)

@@ -17,7 +17,8 @@ Gauss-Newton matrix. With fixed premises this is Bayesian linear regression.
 
 sigma^2 is what the residual leaves after the effective number of parameters k, as in restricted
 maximum likelihood and in MacKay (1992), n MSE / (n - k), k = tr M^-1 G + tr H (H + kappa)^-1. It is
-the noise of a row of mean weight. Every output has a sigma of its own for its noise and its
+the noise of a row of mean weight. With Huber's loss it is that of rows which are no outliers.
+Every output has a sigma of its own for its noise and its
 consequents; the premises, which all outputs share, have the mean of them.
 
 Out of the box, on the way delta from its nearest point c, what is asked is how far the model's own
@@ -35,6 +36,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.linalg import blas
+from scipy.special import ndtr
 
 from .antecedent import Antecedent
 from .consequent import NormalFactor, basis, rule_outputs
@@ -95,11 +97,19 @@ class Posterior:
         self.__dict__.update(state | {"consequents": full})
 
     @classmethod
-    def of(cls, problem: SeparableProblem, premise: Premise | None, evaluation: Evaluation, n_rows):
+    def of(
+        cls,
+        problem: SeparableProblem,
+        premise: Premise | None,
+        evaluation: Evaluation,
+        n_rows,
+        robust=None,
+    ):
         """The posterior where a fit has ended, in the user's units.
 
-        ``premise`` is None where the premises were not learnt; ``n_rows`` are rows by weight. None
-        of a model of more than ``MOST_PARAMETERS``.
+        ``premise`` is None where the premises were not learnt; ``n_rows`` are rows by weight;
+        ``robust`` are the weights that Huber's loss has left the rows, and its epsilon. None of a
+        model of more than ``MOST_PARAMETERS``.
         """
         antecedent, rows = evaluation.antecedent, problem.rows
         n_columns, n_parameters = problem.n_columns, antecedent.parameters.size
@@ -113,7 +123,7 @@ class Posterior:
         assert normal is not None
         half = np.ascontiguousarray(normal.factor.half_solve(np.eye(n_columns)))
         n_effective = n_columns - float(np.sum(half * (half @ normal.penalty)))
-        noise = np.sqrt(_mean_squares(problem, evaluation))
+        noise = np.sqrt(_mean_squares(problem, evaluation, robust))
         premises = np.zeros((0, n_parameters))
         cross = np.zeros((problem.n_outputs, 0, n_columns))
         n_varying = max(int(np.count_nonzero(~rows.targets.is_constant)), 1)
@@ -161,7 +171,7 @@ class Posterior:
         )
 
     def inside(self, model, Z):
-        """Outputs and their variance, each (n_outputs, n_rows), at rows Z (n_inputs, n_rows).
+        """Outputs and their deviations, each (n_outputs, n_rows), at rows Z (n_inputs, n_rows).
 
         u is not formed: u' u is the sum of moments of ``gram``, of which there are fewer. Outputs
         are those of the consequents' own inputs.
@@ -170,16 +180,18 @@ class Posterior:
         moments, table, slopes = self._tables(model)
         basis_rows[1:] /= model.spread[self.inputs, None]
         square = moments.quadratic(table, shares, basis_rows)
-        found = self.noise[:, None] ** 2 * (1.0 + np.maximum(square, 0.0))
+        unit = self._unit
+        found = (self.noise[:, None] / unit) ** 2 * (1.0 + np.maximum(square, 0.0))
         for k, change in enumerate(changes):
             by_basis = (slopes[k] @ strengths).reshape(basis_rows.shape[0], -1, Z.shape[1])
             half = self.premises @ change
             half -= np.einsum("iqn,in->qn", by_basis, basis_rows)
+            half /= unit[k]
             found[k] += np.einsum("qn,qn->n", half, half)
-        return outputs, found
+        return outputs, np.sqrt(found) * unit
 
     def beyond(self, model, Z, way, unfollowed):
-        """Variance of every output, (n_outputs, n_rows), of rows out of the box.
+        """Deviation of every output, (n_outputs, n_rows), of rows out of the box.
 
         Z is the nearest point in it, ``way`` the way from there, (n_inputs, n_rows), and
         ``unfollowed`` (n_outputs, n_rows) what the prediction leaves out of the tangent.
@@ -194,8 +206,9 @@ class Posterior:
             slopes.append(slope * (length / _STEP))
         growth = 2.0 * np.maximum(self._products(halves, slopes), 0.0)
         growth += self._products(slopes, slopes)
-        noise = self.noise[:, None] ** 2
-        return noise + self._products(halves, halves) + growth + unfollowed**2
+        unit = self._unit
+        found = (self.noise[:, None] / unit) ** 2 + self._products(halves, halves) + growth
+        return np.sqrt(found + (unfollowed / unit) ** 2) * unit
 
     def values_per_row(self, model):
         """Numbers that a row takes while its variance is found."""
@@ -216,20 +229,28 @@ class Posterior:
             object.__setattr__(self, "_cached", found)
         return self.__dict__["_cached"]
 
+    @property
+    def _unit(self):
+        """A power of two near the noise of every output, (n_outputs, 1): squares stay finite."""
+        return np.ldexp(1.0, np.frexp(self.noise)[1])[:, None]
+
     def _products(self, one, other):
-        """Inner products of every output and row, (n_outputs, n_rows)."""
-        found = self.noise[:, None] ** 2 * np.einsum("pn,pn->n", one[0], other[0])
+        """Inner products of every output and row in squares of its unit, (n_outputs, n_rows)."""
+        found = (self.noise[:, None] / self._unit) ** 2 * np.einsum("pn,pn->n", one[0], other[0])
         return found + np.einsum("kqn,kqn->kn", one[1], other[1])
 
     def _halves(self, model, Z):
-        """U (n_columns, n_rows), and v of every output (n_outputs, n_displacements, n_rows)."""
+        """U (n_columns, n_rows), and v of every output (n_outputs, n_displacements, n_rows).
+
+        The latter in units of ``_unit``.
+        """
         strengths, _, basis_rows, _, changes = self._derivatives(model, Z)
         design = (strengths[:, None, :] * basis_rows).reshape(-1, Z.shape[1])
         # Half the work of a full product, and in Fortran order no copies.
         half = blas.dtrmm(1.0, self.consequents.T, design.T, side=1, lower=0, overwrite_b=1).T
         found = np.empty((self.noise.size, self.premises.shape[0], Z.shape[1]))
         for k, change in enumerate(changes):
-            found[k] = self.premises @ change - self.cross[k] @ half
+            found[k] = (self.premises @ change - self.cross[k] @ half) / self._unit[k]
         return half, found
 
     def _derivatives(self, model, Z):
@@ -257,12 +278,25 @@ class Posterior:
         return strengths, shares, basis_rows, np.stack(outputs), every
 
 
-def _mean_squares(problem, evaluation):
-    """Weighted mean square of the residual of every standardised output."""
-    total = np.zeros(problem.n_outputs)
-    for _, residual, weight in problem.residuals(evaluation):
-        total += np.sum(residual**2, axis=1) if weight is None else residual**2 @ weight
-    return total / problem.rows.total_weight
+def _mean_squares(problem, evaluation, robust):
+    """Weighted mean square of the residual of every standardised output, or what outliers leave.
+
+    By Huber's second proposal (1964): the mean of psi(r)^2, psi = w r, over what it is of a
+    standard normal r.
+    """
+    total, total_weight = np.zeros(problem.n_outputs), 0.0
+    for part, residual, weight in problem.residuals(evaluation):
+        left = 1.0 if robust is None else robust[0][part]
+        weight = np.ones(residual.shape[1]) if weight is None else weight
+        # The rows' weights have Huber's in them already.
+        total += residual**2 @ (weight * left)
+        total_weight += np.sum(weight / left)
+    if robust is None:
+        return total / total_weight
+    c = robust[1]
+    beyond = 2.0 * ndtr(-c)
+    density = np.exp(-0.5 * c**2) / np.sqrt(2.0 * np.pi)
+    return total / total_weight / (1.0 - beyond - 2.0 * c * density + c**2 * beyond)
 
 
 def _premises(problem, premise, evaluation):

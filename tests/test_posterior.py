@@ -226,6 +226,8 @@ def test_units_repeats_weights_outputs_and_files():
     std = fit(X, y).predict(new, return_std=True)[1]
     unit = fit(X * [1e6, 1e-6], 1e-9 * y)
     assert_allclose(unit.predict(new * [1e6, 1e-6], return_std=True)[1], 1e-9 * std, rtol=1e-5)
+    huge = fit(X * [1e100, 1e50], 1e190 * y).predict(new * [1e100, 1e50], return_std=True)[1]
+    assert_allclose(huge, 1e190 * std, rtol=1e-5)
     times = rng.integers(1, 4, size=150)
     repeated = fit(np.repeat(X, times, axis=0), np.repeat(y, times)).predict(new, return_std=True)
     weighted = fit(X, y, sample_weight=times).predict(new, return_std=True)
@@ -236,6 +238,18 @@ def test_units_repeats_weights_outputs_and_files():
     assert_allclose(stds[:, 1], 3.0 * stds[:, 0], rtol=1e-9)
     again = pickle.loads(pickle.dumps(both))
     assert (again.predict(new, return_std=True)[1] == stds).all()
+
+
+def test_noise_of_hubers_loss_is_that_of_the_sound_rows():
+    rng = np.random.default_rng(10)
+    X, y = wave(rng, 400, noise=0.05)
+    settings = {"loss": "huber", "n_mfs": [4, 2], "max_iter": 20, "tol": 1e-2, **GIVEN, **OUT}
+    sound = ANFISRegressor(**settings).fit(X, y)
+    y[:8] += 1e3
+    spoilt = ANFISRegressor(**settings).fit(X, y)
+    plain = ANFISRegressor(**settings | {"loss": "squared_error"}).fit(X[8:], y[8:])
+    assert_allclose(sound.noise_std_, plain.noise_std_, rtol=0.05)
+    assert_allclose(spoilt.noise_std_, plain.noise_std_, rtol=0.1)
 
 
 def test_blocks_change_nothing(monkeypatch):
