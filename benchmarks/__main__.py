@@ -19,6 +19,7 @@ ON_REQUEST = (
     "real_sets",
     "battery",
     "blow_ups",
+    "how_sure",
     "small_problems",
     "start",
     "peers",
@@ -43,7 +44,7 @@ def parse():
         help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
     )
     parser.add_argument("--details", action="store_true", help="also what explains the figures")
-    many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems")
+    many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems, how_sure")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")

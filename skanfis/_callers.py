@@ -76,4 +76,5 @@ def _module(frame):
 
 
 def _is_own(category):
-    return category.__module__.partition(".")[0] == _PACKAGE
+    # A filter's category may be a tuple of several.
+    return isinstance(category, type) and category.__module__.partition(".")[0] == _PACKAGE

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from sklearn.base import _fit_context
+from sklearn.utils import _safe_indexing as safe_indexing
 from sklearn.utils._param_validation import HasMethods, Hidden, Interval, StrOptions
 from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
@@ -28,6 +29,7 @@ __all__ = [
     "check_parameters",
     "check_sample_weight",
     "fit_context",
+    "safe_indexing",
 ]
 
 

@@ -90,6 +90,31 @@ class DesignMoments:
         right = _products(groups[self._split :], n_rows)
         blas.dgemm(1.0, left.T, right.T, beta=1.0, c=sums, trans_a=1, overwrite_c=1)
 
+    def quadratic(self, table, shares, basis_rows):
+        """Phi' A phi of every row, (n_rows,), by a table of :meth:`of_matrix` of A."""
+        groups, start = [], 0
+        for count in self._lengths[:-1]:
+            factor = shares[start : start + count]
+            groups.append(pairs(factor, factor))
+            start += count
+        groups.append(pairs(basis_rows, basis_rows))
+        n_rows = basis_rows.shape[1]
+        left = _products(groups[: self._split], n_rows)
+        right = _products(groups[self._split :], n_rows)
+        return np.einsum("in,in->n", left, table @ right)
+
+    def of_matrix(self, matrix):
+        """The table T of a symmetric matrix A: sum(T * moments) = phi' A phi for every row."""
+        n = len(self._lengths)
+        table = matrix.reshape(*self._lengths, *self._lengths)
+        table = table.transpose([axis for k in range(n) for axis in (k, n + k)])
+        table = table.reshape([length**2 for length in self._lengths])
+        for k, length in enumerate(self._lengths):
+            summed = np.zeros((self._sizes[k], *np.delete(table.shape, k)))
+            np.add.at(summed, _pair_index(length).ravel(), np.moveaxis(table, k, 0))
+            table = np.moveaxis(summed, 0, k)
+        return np.ascontiguousarray(table).reshape(self.shape)
+
     def gram(self, sums):
         """Phi' S Phi out of the sums, (n_columns, n_columns)."""
         moments = np.ascontiguousarray(sums).reshape(self._sizes)

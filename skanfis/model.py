@@ -29,6 +29,7 @@ import numpy as np
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .naming import default_term_names
+from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
 __all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel", "TargetRange"]
@@ -102,6 +103,8 @@ class TSKModel:
         held either.
     support : RuleSupport or None
         Where the training data of every rule lie; None where the model knows of none.
+    posterior : Posterior or None
+        What the standard deviation of a prediction needs; None where the model knows of none.
     term_names : tuple of str
         One per term, unique on its input; where not given, see ``naming``.
     target : TargetRange or None
@@ -126,6 +129,7 @@ class TSKModel:
     term_names: tuple[str, ...] = ()
     output_names: tuple[str, ...] = ()
     target: TargetRange | None = None
+    posterior: Posterior | None = None
 
     def __post_init__(self):
         if not self.term_names:
@@ -218,6 +222,47 @@ class TSKModel:
             outputs[~inside] = np.nan
         return outputs
 
+    def standard_deviation(self, X):
+        """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``.
+
+        NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
+        """
+        return self.predict_with_deviation(X)[1]
+
+    def predict_with_deviation(self, X, inside=None):
+        """Outputs and their standard deviations, each of shape (n_rows, n_outputs)."""
+        posterior = self.posterior
+        if posterior is None:
+            raise ValueError(self._why_no_posterior())
+        inside = self.in_bounds(X) if inside is None else inside
+        n_outputs, n_values = self.n_outputs, posterior.values_per_row(self)
+
+        def within(Z):
+            outputs, deviations = posterior.inside(self, Z)
+            if posterior.inputs.size < self.coefficients.shape[1] - 1:
+                outputs = self._outputs(Z)
+            return np.vstack([self._hold(outputs), deviations])
+
+        def beyond(Z):
+            nearest = self._clip(Z)
+            way, slopes = Z - nearest, self._values_and_gradient(nearest)[1]
+            followed = self._held(way) if self.out_of_bounds == "linear" else 0.0
+            unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
+            return posterior.beyond(self, nearest, way, unfollowed)
+
+        if inside.all():
+            found = self._by_block(X, within, 2 * n_outputs, n_values)
+            return found[:, :n_outputs], found[:, n_outputs:]
+        outputs = self.predict(X, inside)
+        deviations = np.full(outputs.shape, np.nan)
+        if inside.any():
+            found = self._by_block(X[inside], within, 2 * n_outputs, n_values)
+            deviations[inside] = found[:, n_outputs:]
+        if self.out_of_bounds != "nan":
+            n_values += self._n_slopes
+            deviations[~inside] = self._by_block(X[~inside], beyond, n_outputs, n_values)
+        return outputs, deviations
+
     def gradient(self, X):
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
 
@@ -259,6 +304,19 @@ class TSKModel:
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
         return self._by_block(X, of_block, 1, n_distances)[:, 0]
+
+    def _why_no_posterior(self):
+        n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
+        if n_parameters > MOST_PARAMETERS:
+            return (
+                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} no posterior "
+                "is kept, and there is no standard deviation. Use fewer rules, or intervals from "
+                "residuals: ConformalRegressor(..., scaled=False)."
+            )
+        return (
+            "The model knows of no posterior: it was taken as it was given, not fitted. Fit it to "
+            "data (solver='lse' fits the consequents and leaves the premises alone)."
+        )
 
     def way_out(self, X):
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs).

@@ -94,6 +94,7 @@ class Linearisation:
 
     gradient: np.ndarray
     gauss_newton: np.ndarray
+    cross: tuple[np.ndarray, ...]  # L^-1 C' / W of every output, L the factor of the consequents
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,12 +328,14 @@ class SeparableProblem:
         shapes = [(n_raw, n_raw), (n_raw,)]
         shapes += [(n_raw * self.n_basis, n_rules)] * self.n_outputs
         gauss_newton, slope, *cross = self._sum_over_chunks(accumulate, shapes)
+        halves = []
         for one in cross:
             by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
             columns = np.ascontiguousarray(by_column).reshape(self.n_columns, n_raw)
             half = evaluation.normal.factor.half_solve(self.local.transform_rows(columns))
             gauss_newton -= half.T @ half
-        return Linearisation(-slope, gauss_newton)
+            halves.append(half)
+        return Linearisation(-slope, gauss_newton, tuple(halves))
 
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""

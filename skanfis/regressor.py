@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from numbers import Integral, Real
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -195,6 +195,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         "structure", "expected_error" on new rows like these in standard deviations of the target,
         "log_evidence", "agreement", "alpha", "stiffness"; with groups "held_out_error" decides.
         Empty where the structure was given.
+    noise_std_ : float or ndarray of shape (n_outputs,) or None
+        Standard deviation of the noise of a row of mean weight, in the units of y: what remains of
+        the residual after the effective number of parameters. None where
+        ``predict(return_std=True)`` has nothing to go by.
     readability_ : skanfis.inspection.Readability
         How far the rules can be read one by one, measured on the training rows.
     redundant_rules_ : list of dict
@@ -422,6 +426,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.n_iter_ = max(fitted.result.n_iter, 1)
         self.loss_curve_ = fitted.result.loss_curve
         self.status_ = fitted.result.message
+        posterior = self.model_.posterior
+        noise = None if posterior is None else posterior.noise
+        self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
         penalty = fitted.start.penalty
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
@@ -437,21 +444,39 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             callbacks.end(self.model_)
         return self
 
-    def predict(self, X: ArrayLike) -> np.ndarray:
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> np.ndarray: ...
+
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[True]) -> tuple[np.ndarray, np.ndarray]: ...
+
+    def predict(
+        self, X: ArrayLike, return_std: bool = False
+    ) -> np.ndarray | tuple[np.ndarray, np.ndarray]:
         """Predict the target.
 
         Parameters
         ----------
         X : array-like of shape (n_samples, n_features)
+        return_std : bool, default=False
+            Whether to return the standard deviation of a new row of mean weight as well: of the
+            noise, the consequents and, by Laplace's method, the premises, in the target's units. It
+            is that of the rows' common noise; it takes the structure and the weights of the penalty
+            for known. Outside the training range it grows with the distance, whatever the policy;
+            where the prediction is NaN, so is it.
 
         Returns
         -------
         y : ndarray of shape (n_samples,) or (n_samples, n_outputs)
+        std : ndarray of the shape of y
+            Only with ``return_std=True``.
 
         Raises
         ------
         ValueError
-            If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data.
+            If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
+            or, with ``return_std=True``, if the model was taken as given and not fitted, or is too
+            large to keep the factor of a posterior (2,000 parameters).
 
         Warns
         -----
@@ -461,12 +486,18 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         X = self._check_inputs(X)
         model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
         inside = model.in_bounds(X)
-        outputs = model.predict(X, inside)
+        if return_std:
+            outputs, deviations = model.predict_with_deviation(X, inside)
+        else:
+            outputs = model.predict(X, inside)
         extrapolates = model.out_of_bounds == "linear" and not inside.all()
         if extrapolates and not is_silent(OutOfBoundsWarning):
             message = self._describe_out_of_bounds(model, X)
             warn_user(f"{message} Policy: {model.policy}.", OutOfBoundsWarning)
-        return outputs[:, 0] if self._single_output else outputs
+        single = self._single_output
+        if return_std:
+            return (outputs[:, 0], deviations[:, 0]) if single else (outputs, deviations)
+        return outputs[:, 0] if single else outputs
 
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in the range of the training data, input by input.

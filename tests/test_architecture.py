@@ -24,6 +24,7 @@ KERNEL = [
     "premise",
     "naming",
     "support",
+    "posterior",
     "model",
 ]
 
@@ -71,6 +72,7 @@ TABLE = {
         ],
         LEARNING,
     ),
+    "intervals": (["_sklearn", "_validation", "exceptions", "regressor"], LEARNING),
     "readable": (["exceptions", "model", "_validation", "export"], [*NUMERIC, "pandas"]),
     "inspection": (
         ["model", "naming", "_validation", "export", "readable"],
@@ -84,6 +86,7 @@ TABLE = {
             "antecedent",
             "naming",
             "support",
+            "posterior",
             "model",
             "options",
             "_validation",

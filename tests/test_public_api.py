@@ -18,6 +18,7 @@ PUBLIC_MODULES = [
     "skanfis.export",
     "skanfis.gyro",
     "skanfis.inspection",
+    "skanfis.intervals",
     "skanfis.options",
     "skanfis.solvers",
 ]

@@ -326,6 +326,7 @@ def _with_raw_inputs(model, columns, order, names):
         maximum=_edges(columns, model.maximum, 1.0)[order],
         support=_with_raw_support(model.support, offset, scale, order),
         input_names=tuple(map(str, names)),
+        posterior=_with_raw_posterior(model, scale, order),
     )
     if model.term_names == default_term_names(model.antecedent):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
@@ -350,6 +351,12 @@ def _with_raw_support(support, offset, scale, order):
     return None if support is None else support.change_units(offset, scale).reordered(order)
 
 
+def _with_raw_posterior(model, scale, order):
+    if model.posterior is None:
+        return None
+    return model.posterior.change_units(model.antecedent, scale, order)
+
+
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
     columns = _through(label, transformer, [Column(k) for k in range(model.n_outputs)])
@@ -358,5 +365,10 @@ def _with_raw_target(model, label, transformer):
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T
     coefficients = model.coefficients * scale
     coefficients[:, 0] += offset
-    target = None if model.target is None else model.target.change_units(offset, scale)
-    return replace(model, coefficients=coefficients, target=target)
+    target, posterior = model.target, model.posterior
+    return replace(
+        model,
+        coefficients=coefficients,
+        target=None if target is None else target.change_units(offset, scale),
+        posterior=None if posterior is None else posterior.change_target_units(scale),
+    )

@@ -30,6 +30,7 @@ terms are positions in "terms", -1 for an input that it does not look at. "max_e
 null where the tangent has no end. An output's minimum, maximum and spread are those of the target
 in training. "support" has an entry per rule, its factor row by row up to the diagonal. Either is
 null where the model knows of no data.
+On request there is a further object, "posterior"; see ``_posterior_json``.
 """
 
 import json
@@ -58,6 +59,7 @@ from ._limits import (
     read_bytes,
     shown,
 )
+from ._posterior_json import posterior_item, read_posterior
 
 __all__ = ["export_json", "read_json", "write_json"]
 
@@ -88,7 +90,7 @@ _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 _ROUNDING = 1e-6
 
 
-def export_json(estimator) -> str:
+def export_json(estimator, *, posterior=False) -> str:
     """Give a trained model as JSON text, exact to the last bit.
 
     Parameters
@@ -96,6 +98,9 @@ def export_json(estimator) -> str:
     estimator : fitted estimator or TSKModel
         An :class:`~skanfis.ANFISRegressor`, or a Pipeline of scalers and one, which is folded into
         one model of the raw inputs.
+    posterior : bool, default=False
+        Whether to write what ``predict(X, return_std=True)`` needs: some p^2 / 2 numbers for p
+        consequent parameters, which nobody reads.
 
     Returns
     -------
@@ -105,8 +110,9 @@ def export_json(estimator) -> str:
     Raises
     ------
     ValueError
-        If a step in front cannot be folded, if a membership is not one of skanfis' own, or if
-        :func:`read_json` would refuse a number, such as a spread beyond 1e50.
+        If a step in front cannot be folded, if a membership is not one of skanfis' own, if
+        :func:`read_json` would refuse a number, such as a spread beyond 1e50, or if the posterior
+        is asked for and the model knows of none.
     TypeError
         If ``estimator`` is no such estimator.
 
@@ -158,6 +164,13 @@ def export_json(estimator) -> str:
         "rules": rules,
         "support": None if model.support is None else _support_items(model.support),
     }
+    if posterior:
+        if model.posterior is None:
+            raise ValueError(
+                "posterior=True, but the model knows of none: it was taken as it was given, not "
+                "fitted, or is too large to keep one."
+            )
+        document["posterior"] = posterior_item(model.posterior)
     try:
         _model(document)
     except ValueError as error:
@@ -165,7 +178,7 @@ def export_json(estimator) -> str:
     return _laid_out(document)
 
 
-def write_json(estimator, path) -> None:
+def write_json(estimator, path, *, posterior=False) -> None:
     """Write a trained model to a JSON file, as :func:`export_json` gives it.
 
     Parameters
@@ -173,6 +186,8 @@ def write_json(estimator, path) -> None:
     estimator : fitted estimator or TSKModel
     path : str or path-like
         Of the file, which is replaced where it exists.
+    posterior : bool, default=False
+        Whether to write what ``predict(X, return_std=True)`` needs.
 
     Returns
     -------
@@ -196,7 +211,8 @@ def write_json(estimator, path) -> None:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_json(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.json")
     """
-    Path(path).write_text(export_json(estimator), encoding="utf-8", newline="\n")
+    text = export_json(estimator, posterior=posterior)
+    Path(path).write_text(text, encoding="utf-8", newline="\n")
 
 
 def read_json(path) -> TSKModel:
@@ -210,7 +226,7 @@ def read_json(path) -> TSKModel:
     -------
     model : skanfis.model.TSKModel
         It predicts what the model written does, to the last bit. Give it to ``ANFISRegressor`` as
-        ``partition`` to train on.
+        ``partition`` to train on, or with ``max_iter=0`` to predict with as it is.
 
     Raises
     ------
@@ -252,6 +268,8 @@ def parse_json(text):
 def _model(document):
     """The model that a file's content describes."""
     _check_version(document)
+    posterior = document.get("posterior")
+    document = {key: value for key, value in document.items() if key != "posterior"}
     _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
         document, _FILE, "the file"
     )
@@ -284,6 +302,11 @@ def _model(document):
         term_names=term_names,
         output_names=output_names,
         target=target,
+        posterior=None
+        if posterior is None
+        else read_posterior(
+            posterior, antecedent, len(inputs), len(outputs), int(coefficients.shape[1] > 1)
+        ),
     )
 
 

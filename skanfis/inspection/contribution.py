@@ -51,6 +51,8 @@ class RuleContributionDisplay:
         Names of the input and the output.
     held : dict
         Value of every other input by its name.
+    band : ndarray of shape (n_points,), default=None
+        Half the width of a band around the prediction.
 
     Attributes
     ----------
@@ -87,6 +89,7 @@ class RuleContributionDisplay:
         input_name,
         output_name,
         held,
+        band=None,
     ) -> None:
         self.grid = grid
         self.contributions = contributions
@@ -97,6 +100,7 @@ class RuleContributionDisplay:
         self.input_name = input_name
         self.output_name = output_name
         self.held = held
+        self.band = band
 
     @classmethod
     def from_estimator(
@@ -107,6 +111,7 @@ class RuleContributionDisplay:
         held=None,
         output=0,
         baseline="mean",
+        n_deviations=0,
         n_points=201,
         max_rules=6,
         colormap="viridis",
@@ -129,6 +134,9 @@ class RuleContributionDisplay:
         baseline : "mean" or float, default="mean"
             What the rules' values are compared with. "mean" is the mean of the prediction along the
             line drawn; 0 gives the contributions of :func:`skanfis.export.explain`.
+        n_deviations : float, default=0
+            Half the width of a band around the prediction, in its standard deviations
+            (``predict(X, return_std=True)``), zero or positive; 0 draws none.
         n_points : int, default=201
             Points of each curve, 2 or more.
         max_rules : int, default=6
@@ -156,6 +164,11 @@ class RuleContributionDisplay:
             baseline = float(np.mean(np.sum(strengths * values, axis=1)))
         elif not isinstance(baseline, Real) or not np.isfinite(float(baseline)):
             raise ValueError(f"baseline={baseline!r} must be 'mean' or a finite number.")
+        if not isinstance(n_deviations, Real) or not 0.0 <= float(n_deviations) < np.inf:
+            raise ValueError(f"n_deviations={n_deviations!r} must be a number, zero or positive.")
+        band = None
+        if n_deviations:
+            band = float(n_deviations) * model.standard_deviation(rows)[:, k]
         rules, inputs = premises(model)
         display = cls(
             grid=grid,
@@ -167,6 +180,7 @@ class RuleContributionDisplay:
             rule_terms=[terms_text(model, rule, inputs) for rule in rules],
             premise_inputs=tuple(model.input_names[i] for i in inputs),
             held={model.input_names[i]: float(row[i]) for i in range(model.n_inputs) if i != j},
+            band=band,
         )
         return display.plot(max_rules=max_rules, colormap=colormap, ax=ax)
 
@@ -206,6 +220,9 @@ class RuleContributionDisplay:
             others = self.baseline + np.delete(self.contributions, told, axis=0).sum(axis=0)
             label = f"{len(self.contributions) - told.size} other rules"
             self.ax_.plot(self.grid, others, ":", color="0.5", linewidth=1.5, label=label)
+        if self.band is not None:
+            ends = (total - self.band, total + self.band)
+            self.ax_.fill_between(self.grid, *ends, color="black", alpha=0.15, label="deviation")
         self.ax_.plot(self.grid, total, color="black", linewidth=2.2, label="prediction")
         self.ax_.set(
             xlabel=as_label(self.input_name),
@@ -237,6 +254,8 @@ class RuleContributionDisplay:
         self.ax_.fill_between(
             self.grid, 0.0, 1.0, where=~covered, color="0.93", transform=across, zorder=0
         )
-        seen = np.vstack([self.baseline + self.contributions, total])[:, covered]
+        band = 0.0 if self.band is None else self.band
+        lines = [self.baseline + self.contributions, total - band, total + band]
+        seen = np.vstack(lines)[:, covered]
         if margin := 0.1 * np.ptp(seen):
             self.ax_.set_ylim(seen.min() - margin, seen.max() + margin)

@@ -4,7 +4,7 @@ from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .imported import check_inputs, imported_antecedent
 from .request import StructureRequest, report_constant
-from .sample import SampleSize, representative_rows
+from .sample import SampleSize, effective_weight, representative_rows
 from .size import GridSize, term_counts
 from .start import Start
 
@@ -16,6 +16,7 @@ __all__ = [
     "StructureRequest",
     "check_inputs",
     "clustered_antecedent",
+    "effective_weight",
     "grid_antecedent",
     "imported_antecedent",
     "report_constant",

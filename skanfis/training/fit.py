@@ -25,10 +25,18 @@ from ..model import TargetRange, TSKModel
 from ..objective import Evaluation, SeparableProblem
 from ..options import EarlyStopping, Huber, policy_of
 from ..penalty import Penalty
+from ..posterior import Posterior
 from ..premise import Premise
 from ..rows import Rows, check_scales
 from ..solvers import SOLVERS, LeastSquares, Solver, SolverResult
-from ..structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
+from ..structure import (
+    SampleSize,
+    Start,
+    StructureRequest,
+    effective_weight,
+    imported_antecedent,
+    report_constant,
+)
 from ..support import RuleSupport
 from .progress import Callbacks, Printer, watch_all
 from .pruning import RuleStatistics, redundant_rules, rule_statistics
@@ -160,11 +168,13 @@ def fit_rules(
     if fit.huber is None:
         run = fit.best_run(fit.rows, fit.start(fit.rows))
     else:
-        run, weights = fit.robust_run(fit.huber.epsilon)
-        weights = data.spread_over_rows(weights, fit.trained_on)
+        run, row_weights = fit.robust_run(fit.huber.epsilon)
+        weights = data.spread_over_rows(row_weights, fit.trained_on)
     fit.warn_unless_converged(run)
     statistics = rule_statistics(fit.rows, run.evaluation.antecedent)
     model, result, kept = fit.frozen(run.start, run.evaluation, statistics), run.result, None
+    robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
+    model = replace(model, posterior=fit.posterior(run, robust))
     if data.wishes is not None:
         model, result, kept = fit.constrained(model, run)
     return Fitted(
@@ -388,6 +398,12 @@ class _Fit:
             output_names=self.data.output_names,
             target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
         )
+
+    def posterior(self, run, robust):
+        """What standard deviations need; ``robust`` are the weights of rows and Huber's epsilon."""
+        learnt = run.premise if self.solver.moves_premises else None
+        n_rows = effective_weight(run.problem.rows)
+        return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
 
     def constrained(self, model, run):
         """The nearest model that keeps what is known, its result, and a report."""

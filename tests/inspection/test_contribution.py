@@ -59,3 +59,20 @@ def test_where_data_are_missing_is_grey_and_out_of_the_limits():
 def test_baseline_is_checked(baseline):
     with pytest.raises(ValueError, match=r"baseline=.* must be 'mean' or a finite number"):
         RuleContributionDisplay.from_estimator(A_GRID, baseline=baseline)
+
+
+def test_band_is_so_many_deviations_wide():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(size=(60, 2))
+    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, X[:, 0] + 0.1 * rng.normal(size=60))
+    display = drawn(RuleContributionDisplay.from_estimator(model, 1, n_deviations=2, n_points=9))
+    rows = np.column_stack([np.full(9, display.held["x0"]), display.grid])
+    mean, std = model.predict(rows, return_std=True)
+    (band,) = display.ax_.collections
+    ends = band.get_paths()[0].vertices
+    assert_allclose(ends[1:10, 1], mean - 2.0 * std)
+    assert_allclose(display.band, 2.0 * std)
+    with pytest.raises(ValueError, match="knows of no posterior"):
+        RuleContributionDisplay.from_estimator(A_GRID, n_deviations=1)
+    with pytest.raises(ValueError, match="n_deviations=-1 must be a number, zero or positive"):
+        RuleContributionDisplay.from_estimator(model, n_deviations=-1)

@@ -1,0 +1,103 @@
+r"""Order statistics with a mass for every row, and one more for the row that is to come.
+
+Of K units (rows, or groups of rows) and a new one that might have come in any other's place, each
+has the mass 1 / (K + 1); that of a group is shared by its rows. The mass of the new one lies at
+infinity. A score s covers with probability c where the rows of score s or less have the mass c:
+without groups, where s is the ceil((K + 1) c)-th smallest.
+"""
+
+import numpy as np
+
+__all__ = ["cross_bounds", "is_enough", "n_needed", "row_masses", "score_quantile"]
+
+# What rounding leaves of a sum of masses.
+_ROUNDING = 1e-9
+# Halvings that bring a bound down to the last digits of a float.
+_HALVINGS = 60
+
+
+def row_masses(n_rows, sample_weight=None, groups=None):
+    """The mass of every row, (n_rows,), and the number of units.
+
+    Weights say how often a row counts beside the others, not how many rows there are: the number of
+    units is that of an unweighted sample of the same precision, (sum s)^2 / sum s^2 (Kish 1965).
+    """
+    weight = np.ones(n_rows) if sample_weight is None else sample_weight / np.max(sample_weight)
+    if groups is None:
+        total = np.sum(weight)
+        n_units = float(total**2 / np.sum(weight**2))
+        return weight * (n_units / (total * (n_units + 1.0))), n_units
+    totals = np.bincount(groups, weights=weight)
+    n_units = float(np.count_nonzero(totals))
+    share = weight / np.where(totals > 0.0, totals, 1.0)[groups]
+    return share / (n_units + 1.0), n_units
+
+
+def is_enough(mass, coverage):
+    """Whether a mass is the coverage or more, up to rounding."""
+    return mass >= coverage - _ROUNDING
+
+
+def n_needed(coverage):
+    """The least number of units with K / (K + 1) >= coverage."""
+    return int(np.ceil(coverage / (1.0 - coverage) - _ROUNDING))
+
+
+def score_quantile(scores, masses, coverage):
+    """The smallest score (n_rows,) below or at which lies the mass ``coverage``; infinite if none.
+
+    NaN counts as infinite: what was not predicted is not covered by any width.
+    """
+    scores = np.where(np.isnan(scores), np.inf, scores)
+    order = np.argsort(scores)
+    place = np.searchsorted(np.cumsum(masses[order]), coverage - _ROUNDING)
+    return scores[order[place]] if place < scores.size else np.inf
+
+
+def cross_bounds(folds, predictions, deviations, coverage):
+    r"""Lower and upper bound of every row by models that have not seen the row they are judged by.
+
+    The upper bound is the smallest t at which
+
+        sum over rows i of  m_i [ y_k(x) + s_i sigma_k(x) <= t ]  >=  coverage ,
+
+    k the model that has not seen i (Barber, Candes, Ramdas and Tibshirani 2021; with sigma_k = 1
+    the CV+ of that paper, and with one row per fold the jackknife+). The lower bound likewise.
+
+    Parameters
+    ----------
+    folds : list of (ndarray, ndarray)
+        Scores and masses of the rows that each model has not seen.
+    predictions, deviations : ndarray of shape (n_folds, n_rows)
+    coverage : float
+
+    Returns
+    -------
+    lower, upper : ndarray of shape (n_rows,)
+    """
+    steps = []
+    for scores, masses in folds:
+        scores = np.where(np.isnan(scores), np.inf, scores)
+        order = np.argsort(scores)
+        steps.append((scores[order], np.concatenate([[0.0], np.cumsum(masses[order])])))
+    finite = [sorted_[np.isfinite(sorted_)] for sorted_, _ in steps]
+    reach = max((one[-1] for one in finite if one.size), default=0.0)
+    bounds = []
+    for sign in (-1.0, 1.0):
+        centers = sign * predictions
+        low, high = centers.min(axis=0), (centers + reach * deviations).max(axis=0)
+        covers = is_enough(_mass(steps, centers, deviations, high), coverage)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            enough = is_enough(_mass(steps, centers, deviations, middle), coverage)
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        bounds.append(sign * np.where(covers | np.isnan(high), high, np.inf))
+    return bounds[0], bounds[1]
+
+
+def _mass(steps, centers, deviations, at):
+    """The mass of the rows whose bound is ``at`` or less, (n_rows,)."""
+    total = np.zeros(at.size)
+    for (scores, upto), center, deviation in zip(steps, centers, deviations, strict=True):
+        total += upto[np.searchsorted(scores, (at - center) / deviation, side="right")]
+    return total

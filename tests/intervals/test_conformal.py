@@ -1,0 +1,280 @@
+"""Intervals against crepes, MAPIE, refits one row at a time, and the coverage that theory gives."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from sklearn.base import clone
+from sklearn.dummy import DummyRegressor
+from sklearn.frozen import FrozenEstimator
+from sklearn.linear_model import BayesianRidge, LinearRegression
+from sklearn.model_selection import GroupKFold, KFold, ShuffleSplit
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.utils.estimator_checks import estimator_checks_generator
+
+from skanfis import ANFISRegressor
+from skanfis.intervals import ConformalRegressor
+from skanfis.intervals._quantiles import cross_bounds, n_needed, row_masses, score_quantile
+from skanfis.solvers import VariableProjection
+
+QUICK = {
+    "n_mfs": 2,
+    "max_iter": 3,
+    "agreement": 0.1,
+    "alpha": 0.01,
+    "solver": VariableProjection(tol=0.1, stiffness=0.1),
+}
+
+
+def bent(rng, n_rows):
+    """Noise that grows with the input."""
+    X = rng.uniform(-1, 1, size=(n_rows, 1))
+    return X, np.sin(2 * X[:, 0]) + (0.1 + 0.2 * (X[:, 0] > 0)) * rng.normal(size=n_rows)
+
+
+def covered(bounds, y):
+    return np.mean((bounds[0] <= y) & (y <= bounds[1]))
+
+
+def test_split_is_that_of_crepes():
+    from crepes import ConformalRegressor as Crepes
+
+    rng = np.random.default_rng(0)
+    X, y = bent(rng, 200)
+    new = bent(rng, 50)[0]
+    fitted = ANFISRegressor(**QUICK).fit(*bent(rng, 100))
+    mean, std = fitted.predict(X, return_std=True)
+    theirs = Crepes().fit(residuals=y - mean, sigmas=std)
+    frozen = FrozenEstimator(fitted)
+    ours = ConformalRegressor(frozen, method="split", calibration_fraction=1.0).fit(X, y)
+    mean, std = fitted.predict(new, return_std=True)
+    for coverage in (0.5, 0.9, 0.95):
+        expected = theirs.predict_int(mean, sigmas=std, confidence=coverage)
+        assert_allclose(np.column_stack(ours.predict_interval(new, coverage)), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("n_splits", [5, 40])
+def test_cross_is_the_cv_plus_of_mapie(n_splits):
+    from mapie.regression import CrossConformalRegressor
+
+    rng = np.random.default_rng(1)
+    X, y = bent(rng, 40)
+    new = rng.uniform(-3, 3, size=(30, 1))
+    cv = KFold(n_splits, shuffle=True, random_state=3)
+    settings = {"confidence_level": 0.8, "method": "plus", "cv": cv}
+    theirs = CrossConformalRegressor(LinearRegression(), **settings).fit_conformalize(X, y)
+    expected = theirs.predict_interval(new)[1][:, :, 0]
+    ours = ConformalRegressor(LinearRegression(), scaled=False, cv=cv).fit(X, y)
+    assert_allclose(np.column_stack(ours.predict_interval(new, 0.8)), expected, rtol=1e-9)
+
+
+def test_cross_bounds_are_those_found_by_sorting():
+    rng = np.random.default_rng(2)
+    scores = [rng.exponential(size=n) for n in (7, 12, 9)]
+    scores[1][:2] = scores[1][2], np.nan
+    masses = np.split(row_masses(28, rng.uniform(0.5, 2.0, size=28))[0], [7, 19])
+    centers, deviations = rng.normal(size=(3, 40)), rng.uniform(0.1, 2.0, size=(3, 40))
+    every = np.concatenate(masses)
+    found = cross_bounds(list(zip(scores, masses, strict=True)), centers, deviations, 0.8)
+    for i in range(40):
+        for sign, bounds in zip((-1, 1), found, strict=True):
+            reached = [
+                sign * centers[k, i] + np.nan_to_num(scores[k], nan=np.inf) * deviations[k, i]
+                for k in range(3)
+            ]
+            expected = score_quantile(np.concatenate(reached), every, 0.8)
+            assert_allclose(sign * bounds[i], expected, rtol=1e-12)
+
+
+def test_units_count_and_not_the_size_of_weights():
+    rng = np.random.default_rng(3)
+    weight, groups = rng.uniform(1, 3, size=30), rng.permutation(np.arange(30) % 4)
+    masses, n_units = row_masses(30, weight)
+    assert_allclose(n_units, weight.sum() ** 2 / (weight**2).sum())
+    assert_allclose(masses, weight / weight.sum() * n_units / (n_units + 1))
+    assert_allclose(row_masses(30, 1e-200 * weight)[0], masses)
+    masses, n_units = row_masses(30, weight, groups)
+    assert n_units == 4
+    assert_allclose(np.bincount(groups, masses), 0.2)
+    assert_allclose(row_masses(30, weight * 5.0**groups, groups)[0], masses)
+    assert [n_needed(c) for c in (0.5, 0.8, 0.9, 0.95, 0.99)] == [1, 4, 9, 19, 99]
+    # The ninth of nine scores, and of eight none.
+    assert score_quantile(np.arange(9.0), row_masses(9)[0], 0.9) == 8.0
+    assert score_quantile(np.arange(8.0), row_masses(8)[0], 0.9) == np.inf
+
+
+def test_leave_one_out_is_that_of_refits():
+    """One rule and no ridge are a line: its residual and deviation without each row, by refits."""
+    rng = np.random.default_rng(4)
+    X, y = rng.normal(size=(25, 2)), rng.normal(size=25)
+    regressor = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=1, alpha=0.0))
+    model = ConformalRegressor(regressor, method="loo").fit(X, y)
+    A = np.column_stack([np.ones(25), X])
+    noise = np.sqrt(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2) / 22)
+    assert_allclose(model.estimator_[-1].noise_std_, noise, rtol=1e-8)
+    expected = []
+    for i in range(25):
+        rest = np.delete(A, i, axis=0)
+        beta = np.linalg.lstsq(rest, np.delete(y, i), rcond=None)[0]
+        leverage = A[i] @ np.linalg.solve(rest.T @ rest, A[i])
+        expected.append(abs(y[i] - A[i] @ beta) / (noise * np.sqrt(1 + leverage)))
+    assert_allclose(model.scores_, np.sort(expected), rtol=1e-7)
+    plain = clone(model).set_params(scaled=False).fit(X, y)
+    one = np.delete(np.arange(25), 3)
+    without = LinearRegression().fit(X[one], y[one]).predict(X[[3]])
+    assert np.isclose(plain.scores_, np.abs(y[3] - without), rtol=1e-7).any()
+
+
+def test_split_covers_exactly_as_often_as_theory_says():
+    """19 rows held out: the 18th score is exceeded by one new row in ten, whatever the model."""
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(250):
+        X, y = bent(rng, 219)
+        model = ConformalRegressor(
+            BayesianRidge(), method="split", calibration_fraction=0.5, random_state=1
+        ).fit(X[:38], y[:38])
+        found.append(covered(model.predict_interval(X[38:], 0.9), y[38:]))
+    assert abs(np.mean(found) - 0.9) < 0.012
+
+
+def test_by_group_covers_new_groups_where_by_row_does_not():
+    """Every run has an offset of its own: rows of a known run say nothing of a new one."""
+    rng = np.random.default_rng(6)
+    by_row, by_group = [], []
+    for _ in range(25):
+        run = np.repeat(np.arange(60), rng.integers(3, 12, size=60))
+        y = rng.normal(size=60)[run] + 0.1 * rng.normal(size=run.size)
+        X, known = np.zeros((run.size, 1)), run < 12
+        # Each run's mean is learnt from its own rows, as a flexible model does.
+        X[:, 0] = run
+        model = ConformalRegressor(NearestRun(), scaled=False, cv=20)
+        by_row.append(covered(model.fit(X[known], y[known]).predict_interval(X[~known]), y[~known]))
+        model.fit(X[known], y[known], groups=run[known])
+        by_group.append(covered(model.predict_interval(X[~known]), y[~known]))
+        assert model.n_units_ == 12
+    assert np.mean(by_row) < 0.5
+    assert 0.87 < np.mean(by_group) < 0.97
+
+
+class NearestRun(DummyRegressor):
+    """The mean of the run, and of all where it is new."""
+
+    def fit(self, X, y, sample_weight=None):
+        super().fit(X, y)
+        run = X[:, 0].astype(int)
+        counts = np.bincount(run, minlength=60)
+        means = np.bincount(run, y, minlength=60) / np.maximum(counts, 1)
+        self.means_ = np.where(counts > 0, means, y.mean())
+        return self
+
+    def predict(self, X):
+        return self.means_[X[:, 0].astype(int)]
+
+
+@pytest.mark.parametrize("method", ["cross", "split", "loo"])
+def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method):
+    rng = np.random.default_rng(7)
+    X, y = bent(rng, 300)
+    regressor = make_pipeline(StandardScaler(), ANFISRegressor(**QUICK))
+    model = ConformalRegressor(regressor, method=method, cv=4).fit(X, y)
+    new, truth = bent(rng, 3000)
+    assert abs(covered(model.predict_interval(new, 0.8), truth) - 0.8) < 0.06
+    lower, upper = model.predict_interval([[0.0], [1.5], [3.0]])
+    assert (np.diff(upper - lower) > 0.0).all()
+
+
+def test_several_outputs_are_each_covered():
+    rng = np.random.default_rng(8)
+    X, y = bent(rng, 160)
+    y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=160)])
+    for method in ("cross", "split"):
+        model = ConformalRegressor(ANFISRegressor(**QUICK), method=method, cv=3).fit(X[:80], y[:80])
+        lower, upper = model.predict_interval(X[80:], 0.8)
+        assert lower.shape == (80, 2)
+        assert (np.abs(np.mean((lower <= y[80:]) & (y[80:] <= upper), axis=0) - 0.8) < 0.13).all()
+
+
+def test_groups_and_weights_reach_a_regressor_in_a_pipeline(metadata_routing):
+    rng = np.random.default_rng(9)
+    X, y = bent(rng, 60)
+    run, weight = np.arange(60) // 6, rng.integers(0, 3, size=60).astype(float)
+    rules = ANFISRegressor(**QUICK).set_fit_request(sample_weight=True, groups=True)
+    scaler = StandardScaler().set_fit_request(sample_weight=True)
+    given = {"sample_weight": weight, "groups": run}
+    model = ConformalRegressor(make_pipeline(scaler, rules), cv=5).fit(X, y, **given)
+    folds = list(GroupKFold(5).split(X, y, run))
+    for estimator, (train, _) in zip(model.estimators_, folds, strict=True):
+        alone = StandardScaler().fit(X[train], sample_weight=weight[train])
+        fitted = ANFISRegressor(**QUICK).fit(
+            alone.transform(X[train]), y[train], weight[train], run[train]
+        )
+        assert_allclose(estimator.predict(X), fitted.predict(alone.transform(X)), rtol=1e-12)
+
+
+@pytest.fixture
+def metadata_routing():
+    from sklearn import config_context
+
+    with config_context(enable_metadata_routing=True):
+        yield
+
+
+def refused(match, *args, fit=None, **params):
+    rng = np.random.default_rng(10)
+    X, y = bent(rng, 24)
+    model, given = ConformalRegressor(*args, **params), fit(X) if fit else {}
+    with pytest.raises(ValueError, match=match):
+        model.fit(X, y, **given).predict_interval(X)
+
+
+def test_bad_input_is_refused_by_name():
+    rules = ANFISRegressor(n_mfs=1, alpha=0.1)
+    refused(
+        r"needs 9 rows held out or more; there are 6, enough for coverage=0\.857",
+        rules,
+        method="split",
+    )
+    refused(
+        r"needs 9 groups or more; there are 8", rules, fit=lambda X: {"groups": np.arange(24) // 3}
+    )
+    refused("single group", rules, fit=lambda X: {"groups": np.zeros(24)})
+    refused(
+        "leaves out rows, not groups", rules, method="loo", fit=lambda X: {"groups": np.arange(24)}
+    )
+    refused("tells nothing of its noise", BayesianRidge(), method="loo")
+    refused("LinearRegression does not have: use scaled=False", LinearRegression())
+    refused("every row must be held out once", rules, cv=ShuffleSplit(2, random_state=0))
+    refused("leaves no row to train on", rules, method="split", calibration_fraction=1.0)
+    refused(
+        "enable_metadata_routing=True",
+        make_pipeline(StandardScaler(), rules),
+        fit=lambda X: {"sample_weight": np.ones(24)},
+    )
+    refused(
+        "Negative values in sample_weight", rules, fit=lambda X: {"sample_weight": -np.ones(24)}
+    )
+    X, y = bent(np.random.default_rng(0), 24)
+    with pytest.raises(ValueError, match="Input y contains NaN in column 'y0', first at row 3"):
+        ConformalRegressor(rules).fit(X, np.where(np.arange(24) == 3, np.nan, y))
+    model = ConformalRegressor(rules).fit(X, y)
+    with pytest.raises(ValueError, match=r"coverage=90 must be a number between 0 and 1"):
+        model.predict_interval(X, 90)
+    with pytest.raises(ValueError, match="Input X contains NaN"):
+        model.predict_interval([[np.nan]])
+
+
+CHECKED = ConformalRegressor(ANFISRegressor(n_mfs=1, alpha=0.1), cv=2, method="cross")
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
+@pytest.mark.parametrize(
+    ("estimator", "check"),
+    [
+        pytest.param(estimator, check, id=getattr(check, "func", check).__name__)
+        for estimator, check in estimator_checks_generator(CHECKED)
+    ],
+)
+def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
+    check(estimator)

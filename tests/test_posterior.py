@@ -1,0 +1,337 @@
+"""The posterior against dense Bayesian regression and Laplace's method written down plainly."""
+
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from sklearn.cluster import KMeans
+from sklearn.compose import TransformedTargetRegressor, make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import RobustScaler, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent
+from skanfis.export import export_json
+from skanfis.export.model_json import parse_json
+from skanfis.membership import Bell, Gaussian
+from skanfis.objective import SeparableProblem
+from skanfis.options import LinearExtrapolation
+from skanfis.penalty import Penalty
+from skanfis.posterior import Posterior
+from skanfis.premise import Premise
+from skanfis.solvers import GradientDescent, Hybrid, LeastSquares, VariableProjection
+
+from . import oracles
+
+PENALTY = Penalty(agreement=0.3, alpha=1e-3, slope=1e-2, stiffness=0.02)
+KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
+
+
+def quick(tol=1e-3):
+    """Weights of the penalty that are given."""
+    solver = VariableProjection(tol=tol, stiffness=1e-2)
+    return {"agreement": 0.01, "alpha": 1e-3, "solver": solver}
+
+
+def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt):
+    """Noise and standard deviation of new rows of standardised inputs, of one output.
+
+    The joint precision is J' J of every residual that the cost is made of, by complex steps, and
+    inverted whole; the noise is what the residual leaves after the trace of the smoother.
+    """
+    dense = oracles.DenseProblem(
+        rows, problem.antecedent, problem.order, penalty, problem.consequent_inputs
+    )
+    theta, beta = evaluation.antecedent.parameters, evaluation.coefficients[:, 0]
+    n, p = rows.n_rows, beta.size
+    by_beta = dense.residual_matrix(theta)
+    by_theta = oracles.complex_step(lambda t: dense.residual_matrix(t) @ beta, theta)
+    x = premise.displacement(theta)
+    to_theta = oracles.central_difference(premise.parameters, x)
+    jacobian = np.hstack([by_beta, by_theta @ to_theta])
+    precision = jacobian.T @ jacobian
+    precision[p:, p:] += penalty.stiffness * np.eye(x.size)
+    new_design = oracles.dense_design(
+        problem.antecedent, theta, new, problem.order, problem.consequent_inputs
+    )
+    by_premises = oracles.complex_step(
+        lambda t: (
+            oracles.dense_design(
+                problem.antecedent, t, new, problem.order, problem.consequent_inputs
+            )
+            @ beta
+        ),
+        theta,
+    )
+    row = np.hstack([new_design, by_premises @ to_theta])
+    if not is_learnt:
+        precision, row = precision[:p, :p], row[:, :p]
+    covariance = np.linalg.inv(precision)
+    # What of the parameters the data determine, and not the prior: that of the consequents at fixed
+    # premises, that of the premises with the consequents eliminated.
+    data = by_beta[:n].T @ by_beta[:n]
+    k = np.trace(np.linalg.solve(by_beta.T @ by_beta, data))
+    if is_learnt:
+        k += x.size - penalty.stiffness * np.trace(covariance[p:, p:])
+    squares = dense.weight @ (dense.y[:, 0] - dense.design(theta) @ beta) ** 2
+    noise = np.sqrt(squares * n / (n - k))
+    model = np.einsum("ip,pq,iq->i", row, covariance, row) / n
+    return noise, noise * np.sqrt(1.0 + model)
+
+
+@pytest.mark.parametrize("is_learnt", [False, True], ids=["fixed premises", "with the premises"])
+@pytest.mark.parametrize("kind", ["grid", "scattered", "table, one slope", "order 0"])
+def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt):
+    rng = np.random.default_rng(3)
+    rows = oracles.bumpy_rows(rng, 200, 2, 1, weighted=False)
+    inputs, order = None, int(kind != "order 0")
+    if kind == "scattered":
+        antecedent = oracles.random_scattered(rng, Bell, 3, [0, 1])
+    elif kind == "table, one slope":
+        antecedent, inputs = oracles.random_table(rng, inputs=2), np.array([1])
+    else:
+        thetas = [Gaussian.start(np.linspace(-1, 1, m), np.full(m, 1.0), 0.5) for m in (3, 2)]
+        antecedent = GridAntecedent.build([Gaussian] * 2, [0, 1], thetas)
+    problem = SeparableProblem(rows, antecedent, order, PENALTY, consequent_inputs=inputs)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    moved = np.clip(0.1 * rng.normal(size=premise.size), premise.lower, premise.upper)
+    evaluation = problem.evaluate(premise.parameters(moved))
+    posterior = Posterior.of(problem, premise if is_learnt else None, evaluation, rows.n_rows)
+    new = rng.uniform(-1, 1, size=(2, 30))
+    noise, expected = dense_deviation(problem, premise, rows, PENALTY, evaluation, new, is_learnt)
+    n_rules, scale = antecedent.n_rules, rows.inputs.scale
+    solved = evaluation.coefficients.reshape(n_rules, -1, 1) * rows.targets.scale
+    coefficients = np.zeros((n_rules, 1 + 2 * order, 1))
+    coefficients[:, 0] = solved[:, 0] + rows.targets.offset
+    coefficients[:, 1 + problem.consequent_inputs] = (
+        solved[:, 1:] / scale[problem.consequent_inputs, None]
+    )
+    model = oracle_model(rows, evaluation.antecedent, coefficients, posterior)
+    X = (rows.inputs.offset[:, None] + scale[:, None] * new).T
+    found = model.standard_deviation(X)[:, 0]
+    assert_allclose(posterior.noise[0], noise * rows.targets.scale[0], rtol=1e-8)
+    assert_allclose(found, expected * rows.targets.scale[0], rtol=1e-8)
+
+
+def oracle_model(rows, antecedent, coefficients, posterior):
+    """A model in raw units, its box wide."""
+    fitted = ANFISRegressor(n_mfs=1, max_iter=0).fit(rows.X, rows.y).model_
+    raw = antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
+    return replace(
+        fitted,
+        antecedent=raw,
+        initial_antecedent=raw,
+        coefficients=coefficients,
+        term_names=("",) * raw.n_terms,
+        minimum=np.full(2, -np.inf),
+        maximum=np.full(2, np.inf),
+        posterior=posterior,
+    )
+
+
+def wave(rng, n_rows, noise=0.1):
+    X = rng.uniform(-1, 1, size=(n_rows, 2)) * [3.0, 500.0] + [20.0, 0.0]
+    u, v = (X[:, 0] - 20.0) / 3.0, X[:, 1] / 500.0
+    return X, np.sin(2 * u) + u * v + noise * rng.normal(size=n_rows)
+
+
+def test_bayesian_line_in_and_out_of_range():
+    """One rule is ridge regression: its posterior in closed form, along the tangent and held."""
+    rng = np.random.default_rng(0)
+    X, y = rng.normal(size=(60, 2)), rng.normal(size=60)
+    model = ANFISRegressor(n_mfs=1, alpha=0.3, out_of_bounds=LinearExtrapolation(np.inf)).fit(X, y)
+    Z, t = (X - X.mean(axis=0)) / X.std(axis=0), (y - y.mean()) / y.std()
+    design = np.hstack([np.ones((60, 1)), Z])
+    precision = design.T @ design + 60 * 0.3 * np.diag([0.0, 1.0, 1.0])
+    beta = np.linalg.solve(precision, design.T @ t)
+    k = np.trace(np.linalg.solve(precision, design.T @ design))
+    noise = np.sqrt(np.sum((t - design @ beta) ** 2) / (60 - k)) * y.std()
+    new = rng.normal(size=(40, 2)) * 4.0
+    row = np.hstack([np.ones((40, 1)), (new - X.mean(axis=0)) / X.std(axis=0)])
+    expected = noise * np.sqrt(1.0 + np.sum(row * np.linalg.solve(precision, row.T).T, axis=1))
+    mean, found = model.predict(new, return_std=True)
+    assert_allclose(model.noise_std_, noise, rtol=1e-10)
+    # The mean square of the inputs is where a line is known best: from there it only grows.
+    assert_allclose(found, expected, rtol=1e-8)
+    line = mean
+    held, deviation = model.set_params(out_of_bounds="clip").predict(new, return_std=True)
+    assert_allclose(deviation, np.hypot(found, line - held), rtol=1e-8)
+
+
+@pytest.mark.parametrize("settings", [{"mf": "triangular"}, {"partition": KMEANS}, {"mf": "bell"}])
+def test_deviation_grows_on_the_way_out_under_every_policy(settings):
+    rng = np.random.default_rng(1)
+    X, y = wave(rng, 300)
+    if "mf" in settings:
+        settings = settings | {"n_mfs": [3, 2]}
+    model = ANFISRegressor(max_iter=10, **(quick(0.1) | settings)).fit(X, y)
+    edge = np.clip(X[:20] + rng.normal(size=(20, 2)) * [6, 1000], X.min(axis=0), X.max(axis=0))
+    on_edge = (edge == X.min(axis=0)) | (edge == X.max(axis=0))
+    out = np.where(on_edge, edge - X.mean(axis=0), 0.0)
+    for policy in ("linear", "clip"):
+        model.set_params(out_of_bounds=policy)
+        steps = [0.0, 1e-9, 1e-3, 0.1, 0.3, 1.0, 10.0, 100.0]
+        found = [model.predict(edge + step * out, return_std=True)[1] for step in steps]
+        assert_allclose(found[0], found[1], rtol=1e-6)
+        assert (np.diff(found, axis=0)[1:] >= 0.0).all()
+        outside = ~model.in_bounds(edge + out)
+        assert (found[-1] > 30.0 * found[0])[outside].all()
+    inside = model.in_bounds(edge + out)
+    nan = model.set_params(out_of_bounds="nan").predict(edge + out, return_std=True)[1]
+    assert (np.isnan(nan) == ~inside).all()
+    with pytest.raises(ValueError, match="lies outside the training data"):
+        model.set_params(out_of_bounds="raise").predict(edge + out, return_std=True)
+
+
+def test_tangent_has_the_deviation_that_a_step_inside_foretells():
+    """Just outside, the deviation goes on with the slope that it has just inside."""
+    X, y = wave(np.random.default_rng(2), 400)
+    model = ANFISRegressor(n_mfs=[3, 2]).fit(X, y)
+    high, step = X[:, 0].max(), 1e-4
+    at = np.column_stack([np.full(9, high), np.linspace(-480, 480, 9)])
+    before, edge, after = (
+        model.predict(at + np.array([k * step, 0.0]), return_std=True)[1] ** 2 for k in (-1, 0, 1)
+    )
+    assert_allclose(after - edge, np.maximum(edge - before, 0.0), rtol=2e-3, atol=1e-12)
+
+
+SOLVERS = {
+    "varpro": VariableProjection(tol=1e-2, stiffness=1e-2),
+    "hybrid": Hybrid(tol=1e-2, stiffness=1e-2),
+    "gradient": GradientDescent(tol=1e-2, stiffness=1e-2),
+    "lse": LeastSquares(),
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_planted_truth_lies_within_the_deviations(solver):
+    """Data of a known model: errors of new rows over their deviations have variance one."""
+    rng = np.random.default_rng(4)
+    X, y = wave(rng, 400)
+    truth = ANFISRegressor(n_mfs=[3, 2], max_iter=20, **quick()).fit(X, y)
+    squares, model_squares = [], []
+    for _ in range(4):
+        X, new = wave(rng, 250)[0], wave(rng, 1000)[0]
+        X, new = truth_box(truth, X), truth_box(truth, new)
+        y = truth.predict(X) + 0.1 * rng.normal(size=len(X))
+        model = ANFISRegressor(n_mfs=[3, 2], max_iter=30, **(quick() | {"solver": SOLVERS[solver]}))
+        mean, std = model.fit(X, y).predict(new, return_std=True)
+        exact = truth.predict(new)
+        squares.append(np.mean(((exact + 0.1 * rng.normal(size=1000) - mean) / std) ** 2))
+        model_squares.append(np.mean((exact - mean) ** 2) / np.mean(std**2 - model.noise_std_**2))
+        assert_allclose(model.noise_std_, 0.1, rtol=0.15)
+    assert 0.85 < np.mean(squares) < 1.15
+    assert 0.4 < np.mean(model_squares) < 2.0
+
+
+def truth_box(truth, X):
+    return np.clip(X, truth.model_.minimum, truth.model_.maximum)
+
+
+def test_units_repeats_weights_outputs_and_files():
+    rng = np.random.default_rng(5)
+    X, y = wave(rng, 150)
+    settings = {"n_mfs": [2, 2], **quick()}
+    fit = ANFISRegressor(**settings).fit
+    new = wave(rng, 20)[0] * 1.2
+    std = fit(X, y).predict(new, return_std=True)[1]
+    unit = fit(X * [1e6, 1e-6], 1e-9 * y)
+    assert_allclose(unit.predict(new * [1e6, 1e-6], return_std=True)[1], 1e-9 * std, rtol=1e-5)
+    huge = fit(X * [1e100, 1e50], 1e190 * y).predict(new * [1e100, 1e50], return_std=True)[1]
+    assert_allclose(huge, 1e190 * std, rtol=1e-5)
+    times = rng.integers(1, 4, size=150)
+    repeated = fit(np.repeat(X, times, axis=0), np.repeat(y, times)).predict(new, return_std=True)
+    weighted = fit(X, y, sample_weight=times).predict(new, return_std=True)
+    assert_allclose(weighted[1], repeated[1], rtol=1e-6)
+    # A second output of other noise has its own; the first keeps what it has but for the premises.
+    both = ANFISRegressor(**settings | {"solver": "lse"}).fit(X, np.column_stack([y, 3.0 * y + 7]))
+    _, stds = both.predict(new, return_std=True)
+    assert_allclose(stds[:, 1], 3.0 * stds[:, 0], rtol=1e-9)
+    again = pickle.loads(pickle.dumps(both))
+    assert (again.predict(new, return_std=True)[1] == stds).all()
+
+
+def test_noise_of_hubers_loss_is_that_of_the_sound_rows():
+    rng = np.random.default_rng(10)
+    X, y = wave(rng, 400, noise=0.05)
+    settings = {"loss": "huber", "n_mfs": [4, 2], "max_iter": 20, **quick(1e-2)}
+    sound = ANFISRegressor(**settings).fit(X, y)
+    y[:8] += 1e3
+    spoilt = ANFISRegressor(**settings).fit(X, y)
+    plain = ANFISRegressor(**settings | {"loss": "squared_error"}).fit(X[8:], y[8:])
+    assert_allclose(sound.noise_std_, plain.noise_std_, rtol=0.05)
+    assert_allclose(spoilt.noise_std_, plain.noise_std_, rtol=0.1)
+
+
+def test_blocks_change_nothing(monkeypatch):
+    rng = np.random.default_rng(6)
+    X, y = wave(rng, 200)
+    model = ANFISRegressor(n_mfs=2, max_iter=5, solver=VariableProjection(tol=0.1)).fit(X, y)
+    new = wave(rng, 300)[0] * 1.1
+    whole = model.predict(new, return_std=True)[1]
+    monkeypatch.setattr("skanfis.model._BLOCK_BYTES", 1)
+    assert_allclose(model.predict(new, return_std=True)[1], whole, rtol=1e-12)
+
+
+def test_what_has_no_posterior_says_why(monkeypatch):
+    X, y = wave(np.random.default_rng(7), 100)
+    settings = {"n_mfs": 2, "max_iter": 5, **quick(0.1)}
+    model = ANFISRegressor(**settings).fit(X, y)
+    # What a fitted model knows of itself it knows as the start of another, too.
+    given = ANFISRegressor(partition=model, max_iter=0).fit(X, y)
+    assert given.noise_std_ == model.noise_std_
+    unknown = replace(model.model_, posterior=None)
+    given = ANFISRegressor(partition=unknown, max_iter=0).fit(X, y)
+    assert given.noise_std_ is None
+    with pytest.raises(ValueError, match="taken as it was given, not fitted"):
+        given.predict(X, return_std=True)
+    monkeypatch.setattr("skanfis.posterior.MOST_PARAMETERS", 10)
+    monkeypatch.setattr("skanfis.model.MOST_PARAMETERS", 10)
+    with pytest.raises(ValueError, match=r"20 parameters; beyond 10 .* scaled=False"):
+        ANFISRegressor(**settings).fit(X, y).predict(X, return_std=True)
+
+
+def test_scalers_folded_in_and_json_keep_the_deviation():
+    rng = np.random.default_rng(8)
+    X, y = wave(rng, 120)
+    X = np.column_stack([X[:, 1], rng.normal(size=120), X[:, 0]])
+    rules = ANFISRegressor(n_mfs=[3, 1, 2], consequent_features=[0, 2], **quick())
+    columns = make_column_transformer((StandardScaler(), [2, 0]), (RobustScaler(), [1]))
+    columns.fit(X)
+    scaled = make_pipeline(columns, rules)
+    estimator = TransformedTargetRegressor(scaled, transformer=StandardScaler()).fit(X, y)
+    inner, scaler = estimator.regressor_, estimator.transformer_
+    new = X[:40] * [1.0, 1.3, 1.05]
+    mean, std = inner[-1].predict(inner[0].transform(new), return_std=True)
+    model = parse_json(export_json(estimator, posterior=True))
+    assert_allclose(model.predict(new)[:, 0], scaler.inverse_transform(mean[:, None])[:, 0])
+    assert_allclose(model.standard_deviation(new)[:, 0], std * scaler.scale_, rtol=1e-9)
+    with pytest.raises(ValueError, match="knows of no posterior"):
+        parse_json(export_json(estimator)).standard_deviation(new)
+    with pytest.raises(ValueError, match=r"posterior=True, but the model knows of none"):
+        export_json(parse_json(export_json(estimator)), posterior=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p: p.pop("noise"), '"posterior" is'),
+        (lambda p: p.update(noise=[0.1, 0.2]), "posterior.noise: .* not a list of 1"),
+        (lambda p: p.update(inputs=[0, 0]), "is not an input, or not for the first time"),
+        (lambda p: p["consequents"].pop(), "not a triangle of 12 rows"),
+        (lambda p: p["consequents"][3].pop(), r"posterior.consequents\[3\]: .* list of 4"),
+        (lambda p: p["premises"].pop(), "posterior.premises has 7 rows, not 0 or 8"),
+        (lambda p: p["cross"][0][0].insert(0, 1.0), "posterior.cross: .* list of 12"),
+        (lambda p: p["cross"][0][0].__setitem__(0, "1"), "is not a number of size up to"),
+    ],
+)
+def test_json_of_a_posterior_that_is_none_is_refused(change, message):
+    X, y = wave(np.random.default_rng(9), 60)
+    fitted = ANFISRegressor(n_mfs=2, max_iter=2, **quick(0.5)).fit(X, y)
+    document = json.loads(export_json(fitted, posterior=True))
+    change(document["posterior"])
+    with pytest.raises(ValueError, match=message):
+        parse_json(json.dumps(document))
