@@ -209,6 +209,25 @@ class Rows:
         step = _BLOCKS_PER_CHUNK
         return [blocks[start : start + step] for start in range(0, len(blocks), step)]
 
+    def sum(self, one_pass, block_rows, map_ordered=map):
+        """Sums of a pass (see ``passes``) over all rows, in blocks of at most so many of them.
+
+        ``map_ordered`` is ``map``, or what spreads chunks over workers; sums are added in the
+        chunks' order, so that they do not depend on it.
+        """
+
+        def of_chunk(chunk):
+            sums = [np.zeros(shape, order="F") for shape in one_pass.shapes]
+            for part in chunk:
+                one_pass(*self.read(part), sums)
+            return sums
+
+        totals = [np.zeros(shape, order="F") for shape in one_pass.shapes]
+        for sums in map_ordered(of_chunk, self.chunks(block_rows)):
+            for total, one in zip(totals, sums, strict=True):
+                total += one
+        return totals
+
     def table(self, part):
         """Standardised [z, y] of some rows, (n_rows, n_inputs + n_outputs), weights left out."""
         inputs = (self.X[part] - self.inputs.offset) / self.inputs.scale

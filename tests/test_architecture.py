@@ -18,6 +18,7 @@ KERNEL = [
     "consequent",
     "gram",
     "rows",
+    "passes",
     "penalty",
     "objective",
     "evidence",
