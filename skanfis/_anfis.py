@@ -21,6 +21,7 @@ from .model import TSKModel
 from .naming import default_term_names, given_term_names
 from .penalty import Penalty
 from .rows import Rows, check_scales
+from .sampling import is_many, with_sample
 from .solvers import SOLVERS, SolverResult
 from .structure import SampleSize, Start, StructureRequest, imported_antecedent, report_constant
 from .support import RuleSupport
@@ -169,7 +170,9 @@ class _Trainer:
             self.rows, every = data.rows(self.training), self.rows
             held_out = every.part(validation)
             self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
-        self.size = SampleSize.of(self.rows)
+        elif is_many(self.rows) and estimator.loss == "squared_error":
+            self.rows = with_sample(self.rows)
+        self.size = SampleSize.of(self.rows.sample or self.rows)
         self.learner = Learner(
             "lse" if estimator.max_iter == 0 else estimator.solver,
             estimator.order,
@@ -248,7 +251,9 @@ class _Trainer:
         )
 
     def _start(self, rows):
-        start = self.request.start(rows, self.size)
+        start = self.request.start(rows.sample or rows, self.size)
+        if rows.sample is not None:
+            start = self.request.for_all(start, rows.sample, rows)
         if self.learner.solver != "varpro":
             # Where the evidence was sought, variable projection has moved the premises already.
             start = replace(start, displacement=None)
@@ -275,6 +280,9 @@ class _Trainer:
         run = partial(self._run, self.learner, rows, start)
         if displacement is not None or self.estimator.n_init == 1:
             return run(displacement, is_alone=True)
+        if rows.sample is not None:
+            best = self._learn(rows.sample, start, displacement)
+            return run(best.displacement, is_alone=True)
         return learn_from_starts(
             partial(run, is_alone=False),
             self.learner.premise(rows, start),

@@ -37,7 +37,7 @@ Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in 
 
 import copy
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -156,6 +156,7 @@ class SeparableProblem:
         _keep_freed_memory()
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
         gram, _, _ = self._first_pass(antecedent, no_coefficients)
+        self._on_sample: SeparableProblem | None = None
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
         self._common_line = CommonLine(self.local, self._extent(antecedent))
 
@@ -175,6 +176,17 @@ class SeparableProblem:
         """Return the same problem with another penalty; no pass over the rows."""
         other = copy.copy(self)
         other.penalty = penalty
+        return other
+
+    def on_all(self, rows):
+        """Return the problem of all rows of which this one's are a sample; no pass over them.
+
+        The local basis stays that of the sample. Cost, consequents and gradient are those of all
+        rows, the Gauss-Newton matrix is the sample's (subsampled Newton: Byrd et al. 2011): it
+        decides how long a step is and not where steps end, and of all sums it is the dearest.
+        """
+        other = copy.copy(self)
+        other.rows, other._weight, other._on_sample = rows, rows.total_weight, self
         return other
 
     @property
@@ -239,6 +251,8 @@ class SeparableProblem:
 
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
+        if self._on_sample is not None:
+            return self._linearise_by_sample(evaluation)
         antecedent = evaluation.antecedent
         n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
         gauss_newton, slope, *cross = self._sum(
@@ -250,6 +264,16 @@ class SeparableProblem:
             half = evaluation.normal.factor.half_solve(self.local.transform_rows(columns))
             gauss_newton -= half.T @ half
         return Linearisation(-slope, gauss_newton)
+
+    def _linearise_by_sample(self, evaluation):
+        antecedent, coefficients = evaluation.antecedent, evaluation.coefficients
+        slope, *_ = self._sum(
+            JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
+        )
+        # The sample's own normal equations: D' S D and what is taken off are of the same rows.
+        own = self._on_sample.evaluate(antecedent.parameters, coefficients)
+        own = replace(own, coefficients=coefficients)
+        return Linearisation(-slope, self._on_sample.linearise(own).gauss_newton)
 
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""

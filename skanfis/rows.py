@@ -165,7 +165,10 @@ def _weights_of(sample_weight, part, n_rows):
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups."""
+    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups.
+
+    Of many rows there may be a ``sample`` on which to begin, see ``sampling``.
+    """
 
     X: np.ndarray
     y: np.ndarray
@@ -173,6 +176,7 @@ class Rows:
     inputs: Scale
     targets: Scale
     groups: np.ndarray | None = None  # the run, device, ... that each row belongs to
+    sample: "Rows | None" = None
 
     @classmethod
     def standardised(cls, X, y, sample_weight=None, groups=None):
@@ -227,6 +231,11 @@ class Rows:
             for total, one in zip(totals, sums, strict=True):
                 total += one
         return totals
+
+    def reduce(self, of_rows, merge):
+        """What ``of_rows`` makes of the rows; where they are in parts, merged two by two."""
+        del merge
+        return of_rows(self)
 
     def table(self, part):
         """Standardised [z, y] of some rows, (n_rows, n_inputs + n_outputs), weights left out."""

@@ -18,6 +18,7 @@ KERNEL = [
     "consequent",
     "gram",
     "rows",
+    "sampling",
     "passes",
     "penalty",
     "objective",

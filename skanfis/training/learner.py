@@ -59,22 +59,38 @@ class Learner:
     map_ordered: Callable = map
 
     def run(self, rows: Rows, start: Start, displacement=None, watch=None) -> Learned:
-        """Train from a start, or from a displacement of it; ``watch`` may end it."""
-        problem, premise = self.problem(rows, start), self.premise(rows, start)
+        """Train from a start, or from a displacement of it; ``watch`` may end it.
+
+        Of many rows, variable projection first trains on their sample, unwatched: what is left to
+        do on all of them is a step or two.
+        """
+        premise = self.premise(rows, start)
         displacement = start.displacement if displacement is None else displacement
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
-        result = SOLVERS[self.solver](
+        if rows.sample is None:
+            problem, options = self.problem(rows, start), self.options
+        else:
+            problem, options = self.problem(rows.sample, start), self.options
+            if self.solver == "varpro":
+                result = self._solve(problem, premise, displacement, None, options)
+                displacement = premise.displacement(result.evaluation.antecedent.parameters)
+                options = {**options, "patience": 1}
+            problem = problem.on_all(rows)
+        result = self._solve(problem, premise, displacement, watch, options)
+        return Learned(start, problem, premise, result)
+
+    def _solve(self, problem, premise, displacement, watch, options):
+        return SOLVERS[self.solver](
             problem,
             premise,
             max_iter=self.max_iter,
             tol=self.tol,
-            stiffness=start.penalty.stiffness,
+            stiffness=problem.penalty.stiffness,
             start=displacement,
             on_iteration=watch,
-            **self.options,
+            **options,
         )
-        return Learned(start, problem, premise, result)
 
     def problem(self, rows: Rows, start: Start):
         """The least-squares problem at a start."""
