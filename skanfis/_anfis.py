@@ -217,7 +217,7 @@ class _Trainer:
         """The model in the user's units."""
         rows, antecedent = self.rows, start.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
-        n_rules, n_outputs = antecedent.n_rules, rows.y.shape[1]
+        n_rules, n_outputs = antecedent.n_rules, rows.targets.offset.size
         solved = evaluation.coefficients.reshape(n_rules, -1, n_outputs) * rows.targets.scale
         solved[:, 0] += rows.targets.offset
         coefficients = solved

@@ -430,7 +430,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.robust_weights_ = training.robust_weights
         losses = training.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
-        self.readability_ = readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+        self.readability_ = self._readability(data)
         self._start_parameters = self._those_of_the_start()
         if bridge is not None:
             bridge.end(self.model_)
@@ -547,6 +547,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         """p0, p1, ..., pd of every rule, in the user's units."""
         consequents = self._fitted_model().consequents
         return consequents[:, :, 0] if self._single_output else consequents
+
+    def _readability(self, data):
+        return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
 
     def _fitted_model(self):
         check_is_fitted(self)

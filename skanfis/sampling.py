@@ -75,11 +75,10 @@ def with_sample(rows, most=None):
         drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_join, most=most))
         if drawn.numbers.size == most:
             break
-    is_plain = rows.sample_weight is None and (drawn.weight == 1.0).all()
     sample = Rows(
         drawn.X,
         drawn.y,
-        None if is_plain else drawn.weight,
+        None if (drawn.weight == 1.0).all() else drawn.weight,
         rows.inputs,
         rows.targets,
         drawn.groups,

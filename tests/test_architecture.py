@@ -76,6 +76,10 @@ TABLE = {
         ],
         [*NUMERIC, "sklearn", "pandas", "onnx", "skl2onnx"],
     ),
+    "dask": (
+        [*KERNEL, "_validation", "readable", "regressor"],
+        [*NUMERIC, "sklearn", "pandas", "dask"],
+    ),
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
@@ -84,7 +88,7 @@ TABLE = {
     ),
     PUBLIC: (["exceptions", "regressor"], []),
 }
-ONLY_INSIDE_FUNCTIONS = {"matplotlib", "allantools", "onnx", "skl2onnx"}
+ONLY_INSIDE_FUNCTIONS = {"dask", "matplotlib", "allantools", "onnx", "skl2onnx"}
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 
 
