@@ -252,7 +252,7 @@ class SeparableProblem:
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
         if self._on_sample is not None:
-            return self._linearise_by_sample(evaluation)
+            return self._linearise_by(self._on_sample, evaluation)
         antecedent = evaluation.antecedent
         n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
         gauss_newton, slope, *cross = self._sum(
@@ -265,15 +265,15 @@ class SeparableProblem:
             gauss_newton -= half.T @ half
         return Linearisation(-slope, gauss_newton)
 
-    def _linearise_by_sample(self, evaluation):
+    def _linearise_by(self, sample, evaluation):
         antecedent, coefficients = evaluation.antecedent, evaluation.coefficients
         slope, *_ = self._sum(
             JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
         )
         # The sample's own normal equations: D' S D and what is taken off are of the same rows.
-        own = self._on_sample.evaluate(antecedent.parameters, coefficients)
+        own = sample.evaluate(antecedent.parameters, coefficients)
         own = replace(own, coefficients=coefficients)
-        return Linearisation(-slope, self._on_sample.linearise(own).gauss_newton)
+        return Linearisation(-slope, sample.linearise(own).gauss_newton)
 
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""

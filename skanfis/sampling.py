@@ -24,7 +24,7 @@ __all__ = ["MANY_ROWS", "SAMPLE_ROWS", "is_many", "with_sample"]
 # rows a thousandth, before all rows have their say.
 MANY_ROWS, SAMPLE_ROWS = 100_000, 20_000
 _READ_ROWS = 4096
-# So many turns of the wheel per unit of the fingerprint; a power of two, by which rounding is exact.
+# So many turns of the wheel per unit of the fingerprint; times a power of two nothing is rounded.
 _TURNS = 8192.0
 # More are drawn than are wanted, so that enough come: the standard deviation is below one percent.
 _MARGIN = 1.25
@@ -32,33 +32,40 @@ _MARGIN = 1.25
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """Distinct rows by their numbers: raw X, y, weight, group, fingerprint and number of each."""
+    """Rows by their numbers: raw X, y, weight, fingerprint, number, and group (or None) of each."""
 
-    X: np.ndarray
-    y: np.ndarray
-    weight: np.ndarray
+    columns: tuple[np.ndarray, ...]
     groups: np.ndarray | None
-    prints: np.ndarray
-    numbers: np.ndarray
 
-    def joined(self, other, most):
-        """The smallest of both."""
-        pairs = zip(self._arrays(), other._arrays(), strict=True)
-        joined = [None if a is None else np.concatenate([a, b]) for a, b in pairs]
-        return _Drawn(*joined).smallest(most)
+    @property
+    def size(self):
+        return self.columns[0].shape[0]
+
+    @staticmethod
+    def of_all(parts):
+        """The rows of several."""
+        columns = zip(*(part.columns for part in parts), strict=True)
+        groups = [part.groups for part in parts]
+        return _Drawn(
+            tuple(map(np.concatenate, columns)),
+            None if groups[0] is None else np.concatenate(groups),
+        )
+
+    def taken(self, places):
+        """Some of the rows."""
+        groups = None if self.groups is None else self.groups[places]
+        return _Drawn(tuple(column[places] for column in self.columns), groups)
 
     def smallest(self, most):
         """Each row once, with the weight of all; at most so many, by their numbers."""
-        order = np.argsort(self.prints, kind="stable")
-        first = np.flatnonzero(np.diff(self.prints[order], prepend=-np.inf))
-        weight = np.add.reduceat(self.weight[order], first) if first.size else self.weight
-        kept = order[first]
-        ranks = np.argsort(self.numbers[kept], kind="stable")[:most]
-        arrays = [None if a is None else a[kept[ranks]] for a in self._arrays()]
-        return replace(_Drawn(*arrays), weight=weight[ranks])
-
-    def _arrays(self):
-        return (self.X, self.y, self.weight, self.groups, self.prints, self.numbers)
+        rows = self.taken(np.argsort(self.columns[3], kind="stable"))
+        X, y, weight, prints, numbers = rows.columns
+        first = np.flatnonzero(np.diff(prints, prepend=-np.inf))
+        if first.size:
+            sums = np.zeros(rows.size)
+            sums[first] = np.add.reduceat(weight, first)
+            rows = replace(rows, columns=(X, y, sums, prints, numbers))
+        return rows.taken(first[np.argsort(numbers[first], kind="stable")[:most]])
 
 
 def is_many(rows):
@@ -69,41 +76,31 @@ def is_many(rows):
 def with_sample(rows, most=None):
     """Return the same rows with a ``sample`` of them, on the same scales."""
     most = SAMPLE_ROWS if most is None else most
-    drawn = None
+    # The second limit is for rows that repeat each other, of which the first brings too few.
     for limit in (_MARGIN * most / rows.n_rows, 1.0):
-        # The second turn is for rows that repeat each other, of which the first brings too few.
         drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_join, most=most))
-        if drawn.numbers.size == most:
+        if drawn.size == most:
             break
-    sample = Rows(
-        drawn.X,
-        drawn.y,
-        None if (drawn.weight == 1.0).all() else drawn.weight,
-        rows.inputs,
-        rows.targets,
-        drawn.groups,
-    )
+    X, y, weight, _, _ = drawn.columns
+    weight = None if (weight == 1.0).all() else weight
+    sample = Rows(X, y, weight, rows.inputs, rows.targets, drawn.groups)
     return replace(rows, sample=sample)
 
 
 def _join(one, other, most):
-    return one.joined(other, most)
+    return _Drawn.of_all([one, other]).smallest(most)
 
 
 def _draw(rows, most, limit):
     """Of some rows in memory, those of the smallest numbers, below ``limit``."""
-    found = _of_block(rows, slice(0, 0), limit)
-    waiting = []
+    found, n_found = [_of_block(rows, slice(0, 0), limit)], 0
     for start in range(0, rows.n_rows, _READ_ROWS):
-        waiting.append(_of_block(rows, slice(start, start + _READ_ROWS), limit))
-        if sum(block.numbers.size for block in waiting) > 2 * most:
-            found, waiting = _all_of([found, *waiting]).smallest(most), []
-    return _all_of([found, *waiting]).smallest(most)
-
-
-def _all_of(blocks):
-    columns = zip(*(block._arrays() for block in blocks), strict=True)
-    return _Drawn(*(None if c[0] is None else np.concatenate(c) for c in columns))
+        found.append(_of_block(rows, slice(start, start + _READ_ROWS), limit))
+        n_found += found[-1].size
+        if n_found > 2 * most:
+            found = [_Drawn.of_all(found).smallest(most)]
+            n_found = found[0].size
+    return _Drawn.of_all(found).smallest(most)
 
 
 def _of_block(rows, part, limit):
@@ -112,10 +109,12 @@ def _of_block(rows, part, limit):
     numbers = (_TURNS * prints) % 1.0
     kept = np.flatnonzero(numbers < limit)
     return _Drawn(
-        np.asarray(rows.X[part], dtype=float)[kept],
-        np.asarray(rows.y[part], dtype=float)[kept],
-        np.ones(kept.size) if weight is None else weight[kept],
+        (
+            np.asarray(rows.X[part], dtype=float)[kept],
+            np.asarray(rows.y[part], dtype=float)[kept],
+            np.ones(kept.size) if weight is None else weight[kept],
+            prints[kept],
+            numbers[kept],
+        ),
         None if rows.groups is None else rows.groups[part][kept],
-        prints[kept],
-        numbers[kept],
     )

@@ -230,10 +230,9 @@ class DaskANFISRegressor(ANFISRegressor):
             return super()._check_training_data(*_named(layout, *data.gathered()))
         self._refuse_what_needs_residuals()
         self.n_features_in_, self._single_output = layout.n_inputs, layout.is_single_output
-        if hasattr(self, "feature_names_in_"):
-            del self.feature_names_in_
+        self.__dict__.pop("feature_names_in_", None)
         if layout.given_input_names == layout.input_names:
-            self.feature_names_in_ = np.array(layout.input_names, dtype=object)
+            self.__dict__["feature_names_in_"] = np.array(layout.input_names, dtype=object)
         return data
 
     def _refuse_what_needs_residuals(self):

@@ -21,7 +21,7 @@ def reduce_blocks(blocks: Blocks, of_loaded: Callable, merge: Callable):
     One task per block, and a tree of merges; nothing but the result comes to the client.
     RuntimeError where the cluster is gone, or kills its workers.
     """
-    from dask import delayed
+    from dask.delayed import delayed
 
     # One key for all tasks: what they have in common is sent to a worker once.
     common = delayed((blocks.without_pieces(), of_loaded), traverse=False)
@@ -55,6 +55,11 @@ def _computed(lazy):
     try:
         return lazy.compute()
     except CancelledError as error:
+        raise RuntimeError(_gone(error)) from error
+    except ValueError as error:
+        # Futures of a client that is closed are no part of the graph any more.
+        if not str(error).startswith("Missing dependency"):
+            raise
         raise RuntimeError(_gone(error)) from error
     except Exception as error:
         if type(error).__module__.partition(".")[0] != "distributed":
@@ -140,6 +145,8 @@ class ClusterData:
     def rows(self):
         """The rows on their scales."""
         found = self.described
+        assert found.inputs is not None
+        assert found.targets is not None
         check_scales(found.inputs, found.targets, self.input_names, self.output_names)
         return ClusterRows(self.blocks, found.n_rows, found.weight, found.inputs, found.targets)
 

@@ -1,5 +1,7 @@
 """Solvers find the premises: functions of a problem, a premise and a stopping rule."""
 
+from collections.abc import Callable
+
 from .gradient import gradient
 from .hybrid import hybrid
 from .lbfgs import lbfgs
@@ -9,7 +11,7 @@ from .varpro import varpro
 
 __all__ = ["SOLVERS", "SolverResult", "gradient", "hybrid", "lbfgs", "lse", "varpro"]
 
-SOLVERS = {
+SOLVERS: dict[str, Callable] = {
     "varpro": varpro,
     "hybrid": hybrid,
     "gradient": gradient,
