@@ -145,7 +145,9 @@ def _delayed(collection, what, like):
             "array or Series."
         )
     if not hasattr(collection, "chunks"):
-        return list(collection.to_delayed())
+        # Simplified, so that files are read in the columns that are needed; but not optimised:
+        # that joins small files into one partition, X's other ones than y's.
+        return list(collection.simplify().to_delayed(optimize_graph=False))
     if collection.ndim == 2:
         collection = collection.rechunk({1: -1})
     chunks = None if like is None else getattr(like, "chunks", None)
