@@ -25,6 +25,7 @@ from ._validation import (
     feature_indices,
     group_numbers,
     named_refusals,
+    on_host,
     positive_weights,
     refuse_lazy,
 )
@@ -660,6 +661,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _check_training_data(self, X, y, sample_weight, groups):
         """The data, of all rows with weight."""
         refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
+        X, y, sample_weight, groups = map(on_host, (X, y, sample_weight, groups))
         numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
         output_names = _target_names(y)
         with named_refusals(X=X, y=y):
@@ -695,6 +697,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _check_inputs(self, X):
         check_is_fitted(self)
         if not self._is_plain_input(X):
+            X = on_host(X)
             with named_refusals(X=X):
                 X = validate_data(
                     self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False

@@ -283,3 +283,12 @@ def test_prediction_wants_the_columns_of_training():
 def test_layout_gives_names_where_there_are_none():
     layout = blocks.Blocks.of(*cut(100, *data(300))).layout
     assert (layout.input_names, layout.output_names) == (("x0", "x1"), ("y",))
+
+
+def test_plain_estimator_names_the_one_for_dask():
+    X, y = data(300)
+    lazy_X, lazy_y = cut(100, X, y)
+    with pytest.raises(TypeError, match=r"skanfis\.dask\.DaskANFISRegressor"):
+        ANFISRegressor().fit(lazy_X, lazy_y)
+    with pytest.raises(TypeError, match=r"X\.compute"):
+        ANFISRegressor(n_mfs=1).fit(X, y).predict(lazy_X)
