@@ -38,7 +38,8 @@ def resolve(dotted_name):
 
 def is_of_another(public):
     """Whether a class takes the parameters of a public class, whose docstring has them."""
-    return any(base.__init__ is public.__init__ for base in getattr(public, "__mro__", [])[1:])
+    bases = [base for base in getattr(public, "__mro__", [])[1:] if hasattr(skanfis, base.__name__)]
+    return any(base.__init__ is public.__init__ for base in bases)
 
 
 def sections(docstring):

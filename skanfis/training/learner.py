@@ -13,6 +13,10 @@ from ..structure import Start
 
 __all__ = ["Learned", "Learner"]
 
+# Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
+# what is left to do is done on all rows.
+_THOROUGH = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Learned:
@@ -73,7 +77,8 @@ class Learner:
         else:
             problem, options = self.problem(rows.sample, start), self.options
             if self.solver == "varpro":
-                result = self._solve(problem, premise, displacement, None, options)
+                thorough = {**options, "tol": _THOROUGH * self.tol}
+                result = self._solve(problem, premise, displacement, None, thorough)
                 displacement = premise.displacement(result.evaluation.antecedent.parameters)
                 options = {**options, "patience": 1}
             problem = problem.on_all(rows)
@@ -81,15 +86,14 @@ class Learner:
         return Learned(start, problem, premise, result)
 
     def _solve(self, problem, premise, displacement, watch, options):
+        settings = {"max_iter": self.max_iter, "tol": self.tol, **options}
         return SOLVERS[self.solver](
             problem,
             premise,
-            max_iter=self.max_iter,
-            tol=self.tol,
             stiffness=problem.penalty.stiffness,
             start=displacement,
             on_iteration=watch,
-            **options,
+            **settings,
         )
 
     def problem(self, rows: Rows, start: Start):
