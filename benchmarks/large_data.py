@@ -107,7 +107,7 @@ def on_cluster(folder, n_workers):
         passes.append([_name(of_loaded), perf_counter() - start, there, back])
         return result
 
-    options = {"threads_per_worker": 1, "memory_limit": _MEMORY, "dashboard_address": None}
+    options = {"threads_per_worker": 1, "memory_limit": _MEMORY, "dashboard_address": ":0"}
     with (
         LocalCluster(n_workers=n_workers, **options) as cluster,
         Client(cluster) as client,

@@ -198,6 +198,12 @@ def _numbers(table, what, names, n_columns, shown):
             f"{what} has the columns {', '.join(map(str, found))}; the collection says "
             f"{', '.join(map(str, names))}. Write all parts with the same columns in one order."
         )
+    if not hasattr(table, "dtype") and not hasattr(table, "dtypes"):
+        # Where its future is gone, dask may hand over a chunk's key in its place.
+        raise RuntimeError(
+            f"{what} is a {type(table).__name__} and no rows: the cluster that they lived on was "
+            "closed. Load or persist them again with the client that is now open."
+        )
     kinds = _kinds(table)
     for place, kind in enumerate(kinds):
         if kind not in "biuf":

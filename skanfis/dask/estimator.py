@@ -29,7 +29,7 @@ class DaskANFISRegressor(ANFISRegressor):
     Data that are NumPy arrays or pandas frames from the beginning are left to it altogether.
 
     The scheduler is that which dask uses: the ``dask.distributed`` client that was made last, or
-    else the threads of this process. Partitions are loaded anew for every pass, some seven to ten
+    else the threads of this process. Partitions are loaded anew for every pass, some nine
     times, unless they have been persisted (``X.persist()``): data may be larger than the memory of
     all workers.
 
