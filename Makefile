@@ -64,13 +64,13 @@ $(DEMO)/.installed: pyproject.toml
 
 $(DEV)/.installed: pyproject.toml
 	$(call make-venv,$(DEV),$(PYTHON),>=)
-	$(DEV)/bin/python -m pip install --editable ".[plot,allan,onnx]" --group dev
+	$(DEV)/bin/python -m pip install --editable ".[plot,allan,onnx,dask]" --group dev
 	@touch $@
 
 $(FLOORS)/.installed: pyproject.toml .ci/floors.py
 	$(call make-venv,$(FLOORS),$(FLOORS_PYTHON),==)
 	$(FLOORS)/bin/python .ci/floors.py > $(FLOORS)/floors.txt
-	$(FLOORS)/bin/python -m pip install --editable ".[plot,allan,onnx]" --group test --constraint $(FLOORS)/floors.txt
+	$(FLOORS)/bin/python -m pip install --editable ".[plot,allan,onnx,dask]" --group test --constraint $(FLOORS)/floors.txt
 	@touch $@
 
 $(DOCS)/.installed: pyproject.toml
@@ -116,7 +116,7 @@ test-wheel: wheel
 	wheel=$$(ls "$$PWD"/dist/*.whl); \
 	$(DEV)/bin/python -m venv "$$away/venv"; cd "$$away"; \
 	venv/bin/python -m pip install --upgrade "pip>=25.1"; \
-	venv/bin/python -m pip install "$$wheel[plot,allan,onnx]" --group test; \
+	venv/bin/python -m pip install "$$wheel[plot,allan,onnx,dask]" --group test; \
 	venv/bin/python -c "import skanfis; print('Testing', skanfis.__file__)"; \
 	$(call pytest,venv) -m "not slow" tests --pyargs skanfis
 

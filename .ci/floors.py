@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 
 # Those that the package itself can use.
-EXTRAS = ("plot", "allan", "onnx")
+EXTRAS = ("plot", "allan", "onnx", "dask")
 PYPROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
 
 

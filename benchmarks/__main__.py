@@ -25,6 +25,7 @@ ON_REQUEST = (
     "peers",
     "fuzz_fis",
     "compiled",
+    "large_data",
 )
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
@@ -44,6 +45,13 @@ def parse():
         help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
     )
     parser.add_argument("--details", action="store_true", help="also what explains the figures")
+    parser.add_argument(
+        "--rows",
+        type=int,
+        default=10_000_000,
+        metavar="N",
+        help="large_data: rows on the cluster, 0 for none",
+    )
     many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems, how_sure")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")

@@ -71,7 +71,7 @@ def measure(block_bytes):
     """Seconds of products and passes with blocks of this size, and the rows of a block."""
     with patch.object(objective, "_BLOCK_BYTES", block_bytes):
         problem = make_problem()
-        block_rows = problem._block_rows(problem.antecedent)
+        block_rows = problem._block_rows
     return side_by_side({**bare_products(problem), **passes(problem)}), block_rows
 
 

@@ -20,6 +20,7 @@ __all__ = [
     "feature_indices",
     "group_numbers",
     "named_refusals",
+    "on_host",
     "positive_weights",
     "refuse_lazy",
     "warn_user",
@@ -57,6 +58,20 @@ def refuse_lazy(**tables):
             raise TypeError(
                 f"{what} is a lazy frame, which has no values yet: give {what}.collect()."
             )
+        if hasattr(table, "__dask_graph__"):
+            raise TypeError(
+                f"{what} is a dask collection, which has no values yet: use "
+                f"skanfis.dask.DaskANFISRegressor, or give {what}.compute()."
+            )
+
+
+def on_host(table):
+    """Arrays of other libraries (PyTorch, CuPy, ...) as NumPy's, where they are in main memory.
+
+    Those on another device refuse this themselves, and say what would do. Frames stay as they are.
+    """
+    is_foreign = hasattr(table, "__dlpack__") and not isinstance(table, np.ndarray)
+    return np.asarray(table) if is_foreign else table
 
 
 def _check_kind(table, what):

@@ -37,13 +37,14 @@ Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in 
 
 import copy
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .antecedent import Antecedent
-from .consequent import LocalBasis, NormalFactor, basis, rule_masses, rule_outputs
+from .consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
 from .gram import DesignMoments
+from .passes import Design, FirstPass, JointPass, SecondPass
 from .penalty import CommonLine, Penalty, disagreement_matrix
 from .rows import Rows
 
@@ -141,28 +142,34 @@ class SeparableProblem:
         every_input = np.arange(rows.X.shape[1])
         given = every_input if consequent_inputs is None else consequent_inputs
         self.consequent_inputs = given if order == 1 else every_input[:0]
-        self._takes_every_input = self.consequent_inputs.size == every_input.size
+        takes_every_input = self.consequent_inputs.size == every_input.size
         self.n_basis = 1 + self.consequent_inputs.size
         self.n_columns = antecedent.n_rules * self.n_basis
         self.n_outputs = rows.y.shape[1]
-        self._moments = DesignMoments(antecedent.share_counts, self.n_basis)
-        self._chunks = rows.chunks(self._block_rows(antecedent))
+        self._design = Design(
+            None if takes_every_input else self.consequent_inputs,
+            self.n_basis,
+            self.n_outputs,
+            DesignMoments(antecedent.share_counts, self.n_basis),
+        )
+        self._block_rows = self._rows_of_block(antecedent)
         self._weight = rows.total_weight
         _keep_freed_memory()
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
-        self._sums_at_start = self._first_pass(antecedent, no_coefficients)
+        self._sums_at_start: tuple | None = self._first_pass(antecedent, no_coefficients)
         gram = self._sums_at_start[0]
+        self.on_sample: SeparableProblem | None = None
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
         self._common_line = CommonLine(self.local, self._extent(antecedent))
 
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
-        for chunk in self._chunks:
+        for chunk in self.rows.chunks(self._block_rows):
             for part in chunk:
                 Z, _, _ = self.rows.read(part)
                 root = np.sqrt(antecedent.strengths(Z))
-                for j, z in enumerate(self._basis(Z)[1:]):
+                for j, z in enumerate(self._design.basis(Z)[1:]):
                     distance = root * np.abs(z - self.local.center[:, j, None])
                     np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
         return np.maximum(farthest, 1.0)
@@ -171,6 +178,18 @@ class SeparableProblem:
         """Return the same problem with another penalty; no pass over the rows."""
         other = copy.copy(self)
         other.penalty = penalty
+        return other
+
+    def on_all(self, rows):
+        """Return the problem of all rows of which this one's are a sample; no pass over them.
+
+        The local basis stays that of the sample. Cost, consequents and gradient are those of all
+        rows, the Gauss-Newton matrix is the sample's (subsampled Newton: Byrd et al. 2011): it
+        decides how long a step is and not where steps end, and of all sums it is the dearest.
+        """
+        other = copy.copy(self)
+        other.rows, other._weight, other.on_sample = rows, rows.total_weight, self
+        other._sums_at_start = None
         return other
 
     @property
@@ -186,53 +205,24 @@ class SeparableProblem:
         matrix += penalty.rho * line.slopes
         return matrix
 
-    def _block_rows(self, antecedent):
+    def _rows_of_block(self, antecedent):
         values_per_row = (
-            sum(self._moments.shape)
+            sum(self._design.moments.shape)
             + antecedent.parameters.size * (1 + self.n_basis)
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
         return int(np.clip(fitting, _FEWEST_ROWS, _MOST_ROWS))
 
-    def _basis(self, Z):
-        """Basis functions of the consequents at a block of rows."""
-        return basis(Z if self._takes_every_input else Z[self.consequent_inputs])
-
-    def _sum_over_chunks(self, accumulate, shapes):
-        """Sum of what ``accumulate(rows, sums)`` adds to zeroed arrays, in the chunks' order."""
-
-        def of_chunk(chunk):
-            sums = [np.zeros(shape, order="F") for shape in shapes]
-            for part in chunk:
-                accumulate(part, sums)
-            return sums
-
-        totals = [np.zeros(shape, order="F") for shape in shapes]
-        for sums in self.map_ordered(of_chunk, self._chunks):
-            for total, one in zip(totals, sums, strict=True):
-                total += one
+    def _sum(self, one_pass):
+        """Means over the weight of what a pass sums."""
+        totals = self.rows.sum(one_pass, self._block_rows, self.map_ordered)
         return [total / self._weight for total in totals]
 
     def _first_pass(self, antecedent, reference):
         """Phi' S Phi, Phi' S r and r' S r (per output), over W; r is the reference's residual."""
-        by_rule = reference.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
-
-        def accumulate(part, sums):
-            moments, slope, square = sums
-            Z, target, weight = self.rows.read(part)
-            basis_rows = self._basis(Z)
-            weighted_basis = basis_rows if weight is None else basis_rows * weight
-            strengths, shares = antecedent.strengths_and_shares(Z)
-            self._moments.accumulate(moments, shares, basis_rows, weighted_basis)
-            for k in range(self.n_outputs):
-                residual = target[k] - rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
-                slope[:, k] += (strengths @ (weighted_basis * residual).T).ravel()
-                square[k] += weighted_basis[0] @ residual**2  # the basis begins with 1
-
-        shapes = [self._moments.shape, reference.shape, (self.n_outputs,)]
-        moments, slope, square = self._sum_over_chunks(accumulate, shapes)
-        return self._moments.gram(moments), np.ascontiguousarray(slope), square
+        moments, slope, square = self._sum(FirstPass(self._design, antecedent, reference))
+        return self._design.moments.gram(moments), np.ascontiguousarray(slope), square
 
     def evaluate(self, parameters, reference=None):
         """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
@@ -241,11 +231,11 @@ class SeparableProblem:
             gram, slope, square = self._first_pass(antecedent, reference)
         else:
             reference = np.zeros((self.n_columns, self.n_outputs))
-            gram, slope, square = self._sums_at_start
-            if np.array_equal(parameters, self.antecedent.parameters):
-                slope = slope.copy()  # it is changed below
-            else:
-                gram, slope, square = self._first_pass(antecedent, reference)
+            known = self._sums_at_start
+            if known is None or not np.array_equal(parameters, self.antecedent.parameters):
+                known = self._first_pass(antecedent, reference)
+            gram, slope, square = known
+            slope = slope.copy()  # it is changed below
         disagreement = self.local.transform_gram(disagreement_matrix(gram, antecedent.n_rules))
         penalty = self.penalty_matrix(disagreement)
         masses = rule_masses(gram, antecedent.n_rules)
@@ -270,64 +260,13 @@ class SeparableProblem:
 
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
-        antecedent, agreement = evaluation.antecedent, self.penalty.agreement
+        if self.on_sample is not None:
+            return self._linearise_by_sample(evaluation)
+        antecedent = evaluation.antecedent
         n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
-        by_rule = evaluation.coefficients.reshape(n_rules, self.n_basis, self.n_outputs)
-        own = _own_parameters(antecedent) if agreement else []
-
-        def accumulate(part, sums):
-            square, slope, *cross = sums
-            Z, target, weight = self.rows.read(part)
-            basis_rows = self._basis(Z)
-            weighted_basis = basis_rows if weight is None else basis_rows * weight
-            log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
-            strengths, shares = antecedent.normalise(log_mu)
-            n_rows = Z.shape[1]
-            sensitivity = np.empty((n_raw, n_rows))
-            for k in range(self.n_outputs):
-                by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
-                by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
-                self._chain(gradients, by_term, sensitivity)
-                # One product for D' S Phi and, the basis beginning with 1, the weighted D itself.
-                products = sensitivity[:, None, :] * weighted_basis
-                square += products[:, 0] @ sensitivity.T
-                slope += products[:, 0] @ (target[k] - output)
-                if agreement:
-                    products *= 1.0 - 0.5 * agreement
-                cross[k] += products.reshape(-1, n_rows) @ strengths.T
-                if agreement:
-                    excess = by_rule_k - strengths * output  # w_r e_r
-                    disagree(square, slope, cross[k], excess, strengths, gradients, weighted_basis)
-
-        def disagree(square, slope, cross, excess, strengths, gradients, weighted_basis):
-            """Add the part of V: its dV, K and L."""
-            # w_r e_r^2, where w_r may be next to nothing.
-            squares = excess**2 / np.maximum(strengths, np.finfo(float).tiny)
-            weight, n_rows = weighted_basis[0], excess.shape[1]
-            total = squares.sum(axis=0)
-            every = np.concatenate([g.reshape(-1, n_rows) for g in gradients])
-            mean, change = np.empty((2, n_raw, n_rows))
-            self._chain(gradients, antecedent.sum_over_rules(strengths), mean)  # N
-            self._chain(gradients, antecedent.sum_over_rules(squares), change)
-            change -= mean * total  # e_r^2 dw_r, summed over rules
-            slope -= 0.5 * agreement * (change @ weight)
-            # - (change N' + N change' + total N N') / 4
-            half = (0.25 * agreement * weight) * (change + 0.5 * total * mean)
-            product = half @ mean.T
-            square -= product + product.T
-            weighted_mean = (-0.5 * agreement) * mean[:, None, :] * weighted_basis
-            cross += weighted_mean.reshape(-1, n_rows) @ excess.T
-            cross = cross.reshape(n_raw, self.n_basis, n_rules)
-            for r, rows in enumerate(own):
-                gradient = every[rows]
-                square[np.ix_(rows, rows)] += (
-                    gradient * (0.25 * agreement * weight * squares[r])
-                ) @ gradient.T
-                cross[rows, :, r] += (gradient * (0.5 * agreement * excess[r])) @ weighted_basis.T
-
-        shapes = [(n_raw, n_raw), (n_raw,)]
-        shapes += [(n_raw * self.n_basis, n_rules)] * self.n_outputs
-        gauss_newton, slope, *cross = self._sum_over_chunks(accumulate, shapes)
+        gauss_newton, slope, *cross = self._sum(
+            SecondPass(self._design, antecedent, evaluation.coefficients, self.penalty.agreement)
+        )
         halves = []
         for one in cross:
             by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
@@ -337,10 +276,28 @@ class SeparableProblem:
             halves.append(half)
         return Linearisation(-slope, gauss_newton, tuple(halves))
 
+    def curvature(self, evaluation):
+        """As :meth:`linearise`, where the gradient is not asked for; of a sample if there is one."""
+        if self.on_sample is None:
+            return self.linearise(evaluation)
+        # The sample's own normal equations: D' S D and what is taken off are of the same rows.
+        sample, coefficients = self.on_sample, evaluation.coefficients
+        own = sample.evaluate(evaluation.antecedent.parameters, coefficients)
+        return sample.linearise(replace(own, coefficients=coefficients))
+
+    def _linearise_by_sample(self, evaluation):
+        antecedent, coefficients = evaluation.antecedent, evaluation.coefficients
+        slope, *_ = self._sum(
+            JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
+        )
+        return replace(self.curvature(evaluation), gradient=-slope)
+
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
         antecedent, line = self.antecedent.with_parameters(parameters), self._common_line
-        premises, slope, square, apart, masses = self._joint_pass(antecedent, coefficients)
+        premises, slope, square, apart, masses = self._sum(
+            JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
+        )
         local = self.local.to_local(coefficients)
         pull = self.penalty.alpha * (line.own @ local) + self.penalty.rho * (line.slopes @ local)
         cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
@@ -353,11 +310,11 @@ class SeparableProblem:
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
         by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
-        for chunk in self._chunks:
+        for chunk in self.rows.chunks(self._block_rows):
             for part in chunk:
                 Z, target, weight = self.rows.read(part)
                 strengths = evaluation.antecedent.strengths(Z)
-                basis_rows = self._basis(Z)
+                basis_rows = self._design.basis(Z)
                 for k in range(self.n_outputs):
                     target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
                 yield part, target, weight
@@ -366,45 +323,9 @@ class SeparableProblem:
         """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,)."""
         Z, _, _ = self.rows.read(part)
         strengths = evaluation.antecedent.strengths(Z)
-        design = (strengths[:, None, :] * self._basis(Z)).reshape(self.n_columns, -1)
+        design = (strengths[:, None, :] * self._design.basis(Z)).reshape(self.n_columns, -1)
         half = evaluation.normal.factor.half_solve(self.local.transform_rows(design))
         return np.sum(half**2, axis=0) / self._weight
-
-    def _joint_pass(self, antecedent, coefficients):
-        """Slopes by theta and beta but for A, r' S r and V (per output), rules' masses; over W."""
-        agreement = self.penalty.agreement
-        by_rule = coefficients.reshape(antecedent.n_rules, self.n_basis, self.n_outputs)
-
-        def accumulate(part, sums):
-            premises, slope, square, apart, masses = sums
-            Z, target, weight = self.rows.read(part)
-            basis_rows = self._basis(Z)
-            log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
-            strengths, shares = antecedent.normalise(log_mu)
-            masses += strengths.sum(axis=1) if weight is None else strengths @ weight
-            for k in range(self.n_outputs):
-                by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
-                residual = target[k] - output
-                weighted = residual if weight is None else residual * weight
-                slope[:, k] += (strengths @ (basis_rows * weighted).T).ravel()
-                square[k] += weighted @ residual
-                by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
-                by_term *= weighted
-                if agreement:
-                    excess = by_rule_k - strengths * output
-                    squares = excess**2 / np.maximum(strengths, np.finfo(float).tiny)
-                    total = squares.sum(axis=0)
-                    own = np.ones_like(total) if weight is None else weight
-                    apart[k] += own @ total
-                    slope[:, k] -= agreement * ((excess * own) @ basis_rows.T).ravel()
-                    change = antecedent.sum_over_rules(squares)
-                    change -= antecedent.sum_over_rules(strengths) * total
-                    by_term -= (0.5 * agreement) * own * change
-                premises += self._chain_sum(gradients, by_term)
-
-        shapes = [(antecedent.parameters.size,), coefficients.shape]
-        shapes += [(self.n_outputs,), (self.n_outputs,), (antecedent.n_rules,)]
-        return self._sum_over_chunks(accumulate, shapes)
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""
@@ -412,38 +333,3 @@ class SeparableProblem:
         blocks[:, 1:] *= self.local.spread[:, :, None]
         blocks[:, 1:] += self.local.center[:, :, None] * blocks[:, :1]
         return blocks.reshape(local.shape)
-
-    @staticmethod
-    def _chain_sum(gradients, by_term):
-        """Sum over rows of what ``_chain`` gives, without an array of every parameter's rows."""
-        parts, term = [], 0
-        for gradient in gradients:
-            n_terms = gradient.shape[1]
-            own = by_term[term : term + n_terms]
-            parts.append(np.einsum("pti,ti->pt", gradient, own).ravel())
-            term += n_terms
-        return np.concatenate(parts) if parts else np.empty(0)
-
-    @staticmethod
-    def _chain(gradients, by_term, out):
-        """Sensitivity to every parameter: that to log mu times its derivative, group by group."""
-        row = term = 0
-        for gradient in gradients:
-            n_parameters, n_terms, _ = gradient.shape
-            target = out[row : row + n_parameters * n_terms].reshape(gradient.shape)
-            np.multiply(gradient, by_term[term : term + n_terms], out=target)
-            row, term = row + n_parameters * n_terms, term + n_terms
-
-
-def _own_parameters(antecedent):
-    """Of every rule, the positions of its terms' parameters in the vector of all."""
-    of_term: list[np.ndarray] = []
-    start = 0
-    for group in antecedent.groups:
-        rows = start + np.arange(group.theta.size).reshape(group.theta.shape)
-        of_term.extend(rows.T)
-        start += group.theta.size
-    return [
-        np.concatenate([of_term[t] for t in terms if t >= 0] or [np.empty(0, dtype=int)])
-        for terms in antecedent.rule_terms
-    ]

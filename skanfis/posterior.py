@@ -284,6 +284,12 @@ def _mean_squares(problem, evaluation, robust):
     By Huber's second proposal (1964): the mean of psi(r)^2, psi = w r, over what it is of a
     standard normal r.
     """
+    if robust is None and problem.n_outputs == 1:
+        return np.array([evaluation.mean_squared_error])
+    if robust is None and problem.on_sample is not None:
+        # How the outputs share it shows on the sample; all of it is known of all rows.
+        found = _mean_squares(problem.on_sample, evaluation, None)
+        return found * (evaluation.mean_squared_error / max(found.sum(), np.finfo(float).tiny))
     total, total_weight = np.zeros(problem.n_outputs), 0.0
     for part, residual, weight in problem.residuals(evaluation):
         left = 1.0 if robust is None else robust[0][part]
@@ -305,7 +311,7 @@ def _premises(problem, premise, evaluation):
     All with sigma^2 / n equal to one.
     """
     x = premise.displacement(evaluation.antecedent.parameters)
-    raw = problem.linearise(evaluation)
+    raw = problem.curvature(evaluation)
     identity = np.eye(premise.size)
     transposed, hessian = premise.pull_back(x, identity, raw.gauss_newton)
     stiffness = problem.penalty.stiffness

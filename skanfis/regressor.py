@@ -31,6 +31,7 @@ from ._validation import (
     feature_indices,
     group_numbers,
     named_refusals,
+    on_host,
     positive_weights,
     refuse_lazy,
     warn_user,
@@ -438,7 +439,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.robust_weights_ = fitted.robust_weights
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
-        self.readability_ = readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+        self.readability_ = self._readability(data)
         self._start_parameters = self._those_of_the_start()
         if callbacks is not None:
             callbacks.end(self.model_)
@@ -627,6 +628,12 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         consequents = self._fitted_model().consequents
         return consequents[:, :, 0] if self._single_output else consequents
 
+    def _deviations(self, X):
+        return self.predict(X, return_std=True)[1]
+
+    def _readability(self, data):
+        return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+
     def _fitted_model(self) -> TSKModel:
         check_is_fitted(self)
         return self.model_
@@ -740,6 +747,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _check_training_data(self, X, y, sample_weight, groups):
         """The data, of all rows with weight."""
         refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
+        X, y, sample_weight, groups = map(on_host, (X, y, sample_weight, groups))
         numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
         output_names = _target_names(y)
         with named_refusals(X=X, y=y):
@@ -776,6 +784,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _check_inputs(self, X):
         check_is_fitted(self)
         if not self._is_plain_input(X):
+            X = on_host(X)
             with named_refusals(X=X):
                 X = validate_data(
                     self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False

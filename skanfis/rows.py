@@ -165,7 +165,10 @@ def _weights_of(sample_weight, part, n_rows):
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups."""
+    """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups.
+
+    Of many rows there may be a ``sample`` on which to begin, see ``sampling``.
+    """
 
     X: np.ndarray
     y: np.ndarray
@@ -173,6 +176,7 @@ class Rows:
     inputs: Scale
     targets: Scale
     groups: np.ndarray | None = None  # the run, device, ... that each row belongs to
+    sample: "Rows | None" = None
 
     @classmethod
     def standardised(cls, X, y, sample_weight=None, groups=None):
@@ -208,6 +212,30 @@ class Rows:
         blocks = _slices(self.n_rows, block_rows)
         step = _BLOCKS_PER_CHUNK
         return [blocks[start : start + step] for start in range(0, len(blocks), step)]
+
+    def sum(self, one_pass, block_rows, map_ordered=map):
+        """Sums of a pass (see ``passes``) over all rows, in blocks of at most so many of them.
+
+        ``map_ordered`` is ``map``, or what spreads chunks over workers; sums are added in the
+        chunks' order, so that they do not depend on it.
+        """
+
+        def of_chunk(chunk):
+            sums = [np.zeros(shape, order="F") for shape in one_pass.shapes]
+            for part in chunk:
+                one_pass(*self.read(part), sums)
+            return sums
+
+        totals = [np.zeros(shape, order="F") for shape in one_pass.shapes]
+        for sums in map_ordered(of_chunk, self.chunks(block_rows)):
+            for total, one in zip(totals, sums, strict=True):
+                total += one
+        return totals
+
+    def reduce(self, of_rows, merge):
+        """What ``of_rows`` makes of the rows; where they are in parts, merged two by two."""
+        del merge
+        return of_rows(self)
 
     def table(self, part):
         """Standardised [z, y] of some rows, (n_rows, n_inputs + n_outputs), weights left out."""

@@ -15,6 +15,7 @@ The covariance of standardised inputs has 0.1^2 added to its diagonal: rows on a
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -75,33 +76,17 @@ class RuleSupport:
         Memory does not grow with the rows: of each rule, at most ``n_coefficients`` fingerprints of
         inputs are held.
         """
-        blocks = _blocks(rows, antecedent)
-        n_rules, n_inputs = antecedent.n_rules, rows.X.shape[1]
-        mass, first = np.zeros(n_rules), np.zeros((n_rules, n_inputs))
-        second = np.zeros((n_rules, n_inputs, n_inputs))
-        distinct = _DistinctInputs(n_rules, n_coefficients)
-        for part in blocks:
-            Z, _, weight = rows.read(part)
-            strengths = antecedent.strengths(Z)
-            distinct.add(Z, strengths.argmax(axis=0))
-            if weight is not None:
-                strengths *= weight
-            mass += strengths.sum(axis=1)
-            first += strengths @ Z.T
-            for of_rule, total in zip(strengths, second, strict=True):
-                total += (of_rule * Z) @ Z.T
+        mass, first, second, distinct = rows.reduce(
+            partial(_first_pass, antecedent=antecedent, enough=n_coefficients), _merge
+        )
         known = np.flatnonzero(distinct.counts)
         center, factor = np.zeros_like(first), np.zeros_like(second)
         center[known] = first[known] / mass[known, None]
         factor[known] = _inverse_factor(second[known] / mass[known, None, None], center[known])
-        radius = np.zeros(n_rules)
-        for part in blocks:
-            Z, _, _ = rows.read(part)
-            strengths = antecedent.strengths(Z)
-            speaks = strengths >= _SPEAKS * strengths.max(axis=0)
-            for r in known[speaks[known].any(axis=1)]:
-                away = factor[r] @ (Z[:, speaks[r]] - center[r][:, None])
-                radius[r] = max(radius[r], np.sqrt(np.max(np.sum(away**2, axis=0))))
+        radius = rows.reduce(
+            partial(_radii, antecedent=antecedent, known=known, center=center, factor=factor),
+            np.maximum,
+        )
         return cls(distinct.counts / n_coefficients, center, factor, radius)
 
     def change_units(self, offset, scale):
@@ -134,6 +119,43 @@ class RuleSupport:
         return found
 
 
+def _first_pass(rows, antecedent, enough):
+    """Mass, sums of inputs and of their products by rule, and the distinct inputs."""
+    n_rules, n_inputs = antecedent.n_rules, rows.X.shape[1]
+    mass, first = np.zeros(n_rules), np.zeros((n_rules, n_inputs))
+    second = np.zeros((n_rules, n_inputs, n_inputs))
+    distinct = _DistinctInputs(n_rules, enough)
+    for part in _blocks(rows, antecedent):
+        Z, _, weight = rows.read(part)
+        strengths = antecedent.strengths(Z)
+        distinct.add(Z, strengths.argmax(axis=0))
+        if weight is not None:
+            strengths *= weight
+        mass += strengths.sum(axis=1)
+        first += strengths @ Z.T
+        for of_rule, total in zip(strengths, second, strict=True):
+            total += (of_rule * Z) @ Z.T
+    return mass, first, second, distinct
+
+
+def _merge(one, other):
+    sums = [a + b for a, b in zip(one[:3], other[:3], strict=True)]
+    return *sums, one[3].joined(other[3])
+
+
+def _radii(rows, antecedent, known, center, factor):
+    """The largest distance at which each rule speaks."""
+    radius = np.zeros(antecedent.n_rules)
+    for part in _blocks(rows, antecedent):
+        Z, _, _ = rows.read(part)
+        strengths = antecedent.strengths(Z)
+        speaks = strengths >= _SPEAKS * strengths.max(axis=0)
+        for r in known[speaks[known].any(axis=1)]:
+            away = factor[r] @ (Z[:, speaks[r]] - center[r][:, None])
+            radius[r] = max(radius[r], np.sqrt(np.max(np.sum(away**2, axis=0))))
+    return radius
+
+
 def _blocks(rows, antecedent):
     """Slices of rows whose memberships and strengths take a bounded number of bytes."""
     n_values = 3 * antecedent.n_rules + 3 * antecedent.n_terms + 4 * rows.X.shape[1]
@@ -158,17 +180,29 @@ class _DistinctInputs:
 
     def add(self, Z, strongest):
         wanted = self.counts[strongest] < self.enough
-        if not wanted.any():
-            return
-        rules = np.concatenate([self._rules, strongest[wanted]])
-        numbers = np.concatenate([self._numbers, fingerprint(Z[:, wanted])])
+        if wanted.any():
+            self._absorb(strongest[wanted], fingerprint(Z[:, wanted]))
+
+    def joined(self, other):
+        """Return the count of both, each input once."""
+        both = _DistinctInputs(self.counts.size, self.enough)
+        both.counts = np.maximum(self.counts, other.counts)
+        both._absorb(
+            np.concatenate([self._rules, other._rules]),
+            np.concatenate([self._numbers, other._numbers]),
+        )
+        return both
+
+    def _absorb(self, rules, numbers):
+        rules = np.concatenate([self._rules, rules])
+        numbers = np.concatenate([self._numbers, numbers])
         order = np.lexsort((numbers, rules))
         rules, numbers = rules[order], numbers[order]
         is_new = np.ones(rules.size, dtype=bool)
         is_new[1:] = (np.diff(rules) != 0) | (np.diff(numbers) != 0.0)
         rules, numbers = rules[is_new], numbers[is_new]
         found = np.bincount(rules, minlength=self.counts.size)
-        seen = found > 0
+        seen = (found > 0) & (self.counts < self.enough)
         self.counts[seen] = np.minimum(found[seen], self.enough)
         kept = self.counts[rules] < self.enough
         self._rules, self._numbers = rules[kept], numbers[kept]

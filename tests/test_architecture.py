@@ -18,6 +18,8 @@ KERNEL = [
     "consequent",
     "gram",
     "rows",
+    "sampling",
+    "passes",
     "penalty",
     "objective",
     "evidence",
@@ -93,6 +95,10 @@ TABLE = {
         ],
         [*NUMERIC, "sklearn", "pandas", "onnx", "skl2onnx"],
     ),
+    "dask": (
+        [*KERNEL, "_validation", "constraints", "options", "readable", "regressor"],
+        [*NUMERIC, "sklearn", "pandas", "dask"],
+    ),
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
@@ -101,7 +107,7 @@ TABLE = {
     ),
     PUBLIC: (["exceptions", "regressor"], []),
 }
-ONLY_INSIDE_FUNCTIONS = {"matplotlib", "allantools", "onnx", "pyarrow", "skl2onnx"}
+ONLY_INSIDE_FUNCTIONS = {"dask", "matplotlib", "allantools", "onnx", "pyarrow", "skl2onnx"}
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 
 

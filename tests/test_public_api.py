@@ -14,6 +14,7 @@ PUBLIC_MODULES = [
     "skanfis.bounds",
     "skanfis.cluster",
     "skanfis.constraints",
+    "skanfis.dask",
     "skanfis.datasets",
     "skanfis.export",
     "skanfis.gyro",
@@ -38,6 +39,12 @@ def public_names():
 def resolve(dotted_name):
     module, _, name = dotted_name.rpartition(".")
     return getattr(import_module(module), name)
+
+
+def is_of_another(public):
+    """Whether a class takes the parameters of a public class, whose docstring has them."""
+    bases = [base for base in getattr(public, "__mro__", [])[1:] if hasattr(skanfis, base.__name__)]
+    return any(base.__init__ is public.__init__ for base in bases)
 
 
 def sections(docstring):
@@ -68,7 +75,8 @@ def test_docstring_is_complete(name):
     public = resolve(name)
     found = sections(public.__doc__)
     assert re.match(r"\S.*\.$", found["Summary"].split("\n\n")[0], flags=re.DOTALL)
-    assert described(found.get("Parameters", "")) == list(inspect.signature(public).parameters)
+    if not is_of_another(public):
+        assert described(found.get("Parameters", "")) == list(inspect.signature(public).parameters)
     assert inspect.isclass(public) or "Returns" in found
     assert ">>> " in found["Examples"]
 

@@ -79,7 +79,8 @@ class _Exchange:
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
         self.held = Held(self.model, problem, wishes, _FIRST_MARGIN)
         self.is_known = all(is_known(group.family) for group in model.antecedent.groups)
-        low, high, rows = model.minimum, model.maximum, problem.rows
+        low, high = model.minimum, model.maximum
+        rows = problem.rows.sample or problem.rows
         unit = qmc.Halton(low.size, scramble=False).random(_SAMPLE)
         parts = [low + unit * (high - low), rows.X[:: max(rows.n_rows // _SAMPLE, 1)]]
         if low.size <= _CORNERS:

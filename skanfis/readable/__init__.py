@@ -1,6 +1,6 @@
 """Whether the rules of a model can be read one by one: measured on rows, judged by limits."""
 
-from .measures import Measures, Source, measure
+from .measures import Measures, Source, TargetScale, measure, rule_sums
 from .report import (
     GREATEST_ALONE,
     GREATEST_BEYOND,
@@ -23,6 +23,7 @@ __all__ = [
     "Measures",
     "Readability",
     "Source",
+    "TargetScale",
     "crossings",
     "distinct_terms",
     "findings_without_rows",
@@ -30,5 +31,6 @@ __all__ = [
     "measure",
     "own_terms",
     "readability_of_rows",
+    "rule_sums",
     "warn_if_unreadable",
 ]

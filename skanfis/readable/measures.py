@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Measures", "Source", "measure"]
+__all__ = ["Measures", "Source", "TargetScale", "measure", "rule_sums"]
 
 # Rows that are read at once, and bytes that the intermediate results of a block may take.
 _READ_ROWS = 65_536
@@ -136,6 +136,34 @@ def measure(model, source):
     return sums.measures()
 
 
+@dataclass(frozen=True, eq=False)
+class TargetScale:
+    """What :func:`measure` finds of the target first, where it is known; arrays (n_outputs,)."""
+
+    weight: float
+    mean: np.ndarray
+    deviation: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def rule_sums(rows, model, target):
+    """The sums of :func:`measure` over a part of the rows; ``joined`` adds those of another part.
+
+    Parameters
+    ----------
+    rows : object
+        With X (n_rows, n_inputs) in raw units, and sample_weight (n_rows,) or None.
+    model : TSKModel
+    target : TargetScale
+        Of all rows.
+    """
+    sums = _Sums(model.with_out_of_bounds("clip"), target)
+    weight = np.ones(len(rows.X)) if rows.sample_weight is None else rows.sample_weight
+    sums.add(rows.X, weight)
+    return sums
+
+
 def _is_constant(low, high):
     return high - low <= _CONSTANT * np.maximum(np.abs(low), np.abs(high))
 
@@ -228,6 +256,13 @@ class _Sums:
             self.disagreement[:, k] += np.einsum("rn,rn->r", mass, distance)
             greatest = np.abs(weighted, out=weighted).sum(axis=0).max()
             self.greatest[k] = max(self.greatest[k], greatest)
+
+    def joined(self, other):
+        for name in ("mass", "rows", "first", "alone", "disagreement"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name in ("truth", "greatest"):
+            setattr(self, name, np.maximum(getattr(self, name), getattr(other, name)))
+        return self
 
     def measures(self):
         target = self.target

@@ -110,7 +110,9 @@ def _propose(x, gradient, hessian, premise, free, radius, damping):
     return trial_x, step, -(gradient @ step + 0.5 * step @ hessian @ step)
 
 
-def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None):
+def varpro(
+    problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None, patience=2
+):
     """Minimise the reduced cost over the premises.
 
     Parameters
@@ -120,13 +122,16 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
     max_iter : int
         Most iterations (accepted steps).
     tol : float
-        Stop when expected and actual relative decrease of the cost stay below ``tol`` twice.
+        Stop when expected and actual relative decrease of the cost stay below ``tol``, so many
+        times in a row as ``patience`` says.
     stiffness : float
         Weight of the pull of the premises to their start.
     start : ndarray of shape (premise.size,), optional
         Displacements to start from, inside the box; zero if not given.
     on_iteration : callable, optional
         Called with (n_iter, evaluation) after every accepted step; what is true ends the training.
+    patience : int
+        Twice, where nothing is known of the start; once, where a sample of the rows has settled.
 
     Returns
     -------
@@ -168,7 +173,7 @@ def varpro(problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_ite
             status = "stopped"
             break
         settled = settled + 1 if max(decrease, expected) <= tol * cost else 0
-        if settled == 2:
+        if settled == patience:
             status = "cost"
             break
     return SolverResult(current, np.array(loss_curve), n_iter, status)
@@ -230,4 +235,6 @@ class VariableProjection(Solver):
             stiffness=stiffness,
             start=start,
             on_iteration=on_iteration,
+            # What a sample of the rows has settled is settled at once.
+            patience=2 if problem.on_sample is None else 1,
         )

@@ -11,6 +11,7 @@ from sklearn.utils.validation import has_fit_parameter
 
 from .._callers import names_in_pipeline
 from .._validation import warn_user
+from ..evidence import FREE
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
@@ -18,11 +19,11 @@ from ..rows import Rows
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .imported import imported_antecedent
-from .sample import ENOUGH_ROWS, SampleSize
+from .sample import ENOUGH_ROWS, SampleSize, effective_weight
 from .search import SEARCHED, StructureSearch
 from .size import GridSize, RuleBaseSize, term_counts
 from .start import Start
-from .tuning import tuned_start
+from .tuning import scaled, tuned_start
 
 __all__ = ["StructureRequest", "report_constant"]
 
@@ -125,6 +126,12 @@ class StructureRequest:
             self.premises_move,
             is_compared,
         )
+
+    def for_all(self, start: Start, sample: Rows, rows: Rows) -> Start:
+        """A start found on a sample, with the weights that were not given those of all rows."""
+        free = [key for key in FREE if key not in self.weights]
+        ratio = effective_weight(sample) / rows.total_weight
+        return replace(start, penalty=scaled(start.penalty, free, ratio))
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""

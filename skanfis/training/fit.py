@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from sklearn.base import BaseEstimator
+from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
@@ -28,7 +28,8 @@ from ..penalty import Penalty
 from ..posterior import Posterior
 from ..premise import Premise
 from ..rows import Rows, check_scales
-from ..solvers import SOLVERS, LeastSquares, Solver, SolverResult
+from ..sampling import is_many, with_sample
+from ..solvers import SOLVERS, LeastSquares, Solver, SolverResult, VariableProjection
 from ..structure import (
     SampleSize,
     Start,
@@ -53,6 +54,9 @@ from .stopping import ValidationLoss, hold_out
 
 __all__ = ["Fitted", "SolverRun", "TrainingData", "fit_rules"]
 
+# Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
+# what is left to do is done on all rows.
+_THOROUGH = 0.1
 # Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
 # them, and what has not after these goes to and fro.
 _MOST_TURNS = 20
@@ -210,11 +214,15 @@ class _Fit:
             self.trained_on, validation = hold_out(self.rows, fraction, seed)
             held_out, self.rows = self.rows.part(validation), data.rows(self.trained_on)
             self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
-        self.size = SampleSize.of(self.rows)
+        elif is_many(self.rows) and self.huber is None:
+            self.rows = with_sample(self.rows)
+        self.size = SampleSize.of(self.rows.sample or self.rows)
 
     def start(self, rows: Rows) -> Start:
         """Where a run begins: rules, weights of the penalty, and the premises so far."""
-        start = self.request.start(rows, self.size)
+        start = self.request.start(rows.sample or rows, self.size)
+        if rows.sample is not None:
+            start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:
             start = replace(start, displacement=None)
         if self.printer is not None:
@@ -230,6 +238,8 @@ class _Fit:
         premise = _premise(rows, start)
         if n_init == 1 or premise.size == 0:
             return self.run(rows, start, start.displacement)
+        if rows.sample is not None:
+            return self.run(rows, start, self.best_run(rows.sample, start).displacement)
         displacements = displaced_starts(premise, start.displacement, n_init, self.rng)
         parallel = Parallel(self.estimator.n_jobs, backend="threading", return_as="generator")
         best, smallest = None, np.inf
@@ -251,7 +261,7 @@ class _Fit:
     def run(self, rows: Rows, start: Start, displacement, is_alone=True) -> SolverRun:
         """One run of the solver, watched; the iterations of one among several are not told."""
         estimator = self.estimator
-        problem, premise = self.problem(rows, start), _premise(rows, start)
+        problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)
         validation = None
         if self.held_out is not None:
             validation = ValidationLoss(
@@ -265,13 +275,20 @@ class _Fit:
             watchers += [self.printer, self.iteration_watcher(start)]
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
+        settings = {"max_iter": estimator.max_iter, "stiffness": start.penalty.stiffness}
+        if rows.sample is not None:
+            if isinstance(self.solver, VariableProjection):
+                # Unwatched: what is left to do on all rows is a step or two.
+                thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
+                found = thorough.solve(problem, premise, start=displacement, **settings)
+                displacement = premise.displacement(found.evaluation.antecedent.parameters)
+            problem = problem.on_all(rows)
         result = self.solver.solve(
             problem,
             premise,
-            max_iter=estimator.max_iter,
-            stiffness=start.penalty.stiffness,
             start=displacement,
             on_iteration=watch_all(*watchers),
+            **settings,
         )
         if validation is None:
             return SolverRun(start, problem, premise, result)
@@ -402,7 +419,8 @@ class _Fit:
     def posterior(self, run, robust):
         """What standard deviations need; ``robust`` are the weights of rows and Huber's epsilon."""
         learnt = run.premise if self.solver.moves_premises else None
-        n_rows = effective_weight(run.problem.rows)
+        rows = run.problem.rows
+        n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
         return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
 
     def constrained(self, model, run):

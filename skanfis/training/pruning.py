@@ -11,6 +11,7 @@ the stronger one stays.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
@@ -48,6 +49,15 @@ class RuleStatistics:
 
 def rule_statistics(rows: Rows, antecedent: Antecedent) -> RuleStatistics:
     """Statistics of every rule, in one pass over the rows."""
+    overlap, strongest, peak = rows.reduce(partial(_count, antecedent=antecedent), _merge)
+    return RuleStatistics(overlap / rows.total_weight, strongest / rows.total_weight, peak)
+
+
+def _merge(one, other):
+    return one[0] + other[0], one[1] + other[1], np.maximum(one[2], other[2])
+
+
+def _count(rows, antecedent):
     n_rules = antecedent.n_rules
     overlap, strongest, peak = np.zeros((n_rules, n_rules)), np.zeros(n_rules), np.zeros(n_rules)
     for chunk in rows.chunks(_READ_ROWS):
@@ -57,7 +67,7 @@ def rule_statistics(rows: Rows, antecedent: Antecedent) -> RuleStatistics:
             overlap += (strengths if weight is None else strengths * weight) @ strengths.T
             strongest += np.bincount(strengths.argmax(axis=0), weights=weight, minlength=n_rules)
             np.maximum(peak, strengths.max(axis=1), out=peak)
-    return RuleStatistics(overlap / rows.total_weight, strongest / rows.total_weight, peak)
+    return overlap, strongest, peak
 
 
 def redundant_rules(statistics: RuleStatistics):

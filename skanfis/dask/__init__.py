@@ -1,0 +1,5 @@
+"""Training and prediction on a dask cluster: every pass over the rows is a reduction there."""
+
+from .estimator import DaskANFISRegressor
+
+__all__ = ["DaskANFISRegressor"]

@@ -1,0 +1,59 @@
+"""A cluster of real processes: one of them dies in the middle of a pass, and one is closed."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+pytest.importorskip("distributed")
+
+import dask.array as da
+from distributed import Client, LocalCluster
+
+from skanfis import ANFISRegressor, sampling
+from skanfis.dask import DaskANFISRegressor
+
+N_ROWS = 4000
+
+
+def ends_once(flag, calls):
+    """A function that returns its block; at the so-manieth call, the process ends instead."""
+
+    def end_once(block):  # inside, so that it is sent as it is: workers know no module of tests
+        with open(flag, "a") as file:
+            file.write(".")
+        if os.path.getsize(flag) == calls:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return block
+
+    return end_once
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore::DeprecationWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+def test_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS - 1)
+    monkeypatch.setattr(sampling, "SAMPLE_ROWS", 1000)
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (N_ROWS, 2))
+    y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(N_ROWS)
+    expected = ANFISRegressor(n_mfs=2).fit(X, y).model_.coefficients
+    flag = tmp_path / "calls"
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
+    with LocalCluster(**options) as cluster, Client(cluster):
+        blocks = da.from_array(X, chunks=(1000, 2)).blocks
+        fragile = blocks[1].map_blocks(ends_once(str(flag), 3), dtype=float, meta=X[:0])
+        lazy_X = da.concatenate([blocks[0], fragile, blocks[2:]])
+        lazy_y = da.from_array(y, chunks=1000)
+        model = DaskANFISRegressor(n_mfs=2).fit(lazy_X, lazy_y)
+        assert flag.stat().st_size > 3  # one ended in the third pass, and there were more
+        assert_allclose(model.model_.coefficients, expected, rtol=0.0, atol=1e-10)
+        predicted = model.predict(lazy_X)
+        assert_allclose(predicted.compute(), model.predict(X), rtol=1e-12)
+        lazy_X, lazy_y = da.from_array(X, chunks=(1000, 2)).persist(), lazy_y.persist()
+    with pytest.raises(RuntimeError, match="was closed"):
+        model.fit(lazy_X, lazy_y)

@@ -1,0 +1,294 @@
+"""Fits on dask collections are those of one process, and rows stay where they are."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.metrics import r2_score
+
+pytest.importorskip("dask")
+
+import dask
+import dask.array as da
+import dask.dataframe as dd
+
+from skanfis import ANFISRegressor, sampling
+from skanfis.dask import DaskANFISRegressor, blocks, rows
+from skanfis.dask.blocks import joined_scales
+from skanfis.export import export_json
+from skanfis.rows import column_statistics
+
+N_ROWS = 6000
+NAMES = ["temperature", "rate"]
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    with dask.config.set(scheduler="synchronous"):
+        yield
+
+
+@pytest.fixture
+def few_are_many(monkeypatch):
+    monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS - 1)
+    monkeypatch.setattr(sampling, "SAMPLE_ROWS", 1500)
+
+
+def data(n_rows=N_ROWS):
+    g = np.random.default_rng(0)
+    X = g.normal(size=(n_rows, 2)) * [20.0, 100.0] + [25.0, 0.0]
+    y = np.tanh(X[:, 0] / 30.0) * X[:, 1] + g.normal(size=n_rows)
+    return X, y
+
+
+def frame(n_rows=N_ROWS):
+    X, y = data(n_rows)
+    return pd.DataFrame(X, columns=NAMES).assign(error=y)
+
+
+def cut(chunks, *arrays):
+    """Dask arrays, cut at the same rows."""
+    return [da.from_array(a, chunks=(chunks, *a.shape[1:])) for a in arrays]
+
+
+def assert_same_model(one, other, rtol):
+    one, other = one.model_, other.model_
+    for name in ("coefficients", "minimum", "reference", "spread", "rule_weights", "rule_rows"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert_allclose(a, b, rtol=0.0, atol=rtol * np.abs(b).max())
+    for name in ("share", "center", "factor", "radius"):
+        a, b = getattr(one.support, name), getattr(other.support, name)
+        assert_allclose(a, b, rtol=0.0, atol=10.0 * rtol * np.abs(b).max())
+
+
+@pytest.mark.parametrize(
+    "chunks", [N_ROWS, 700, (1, 0, N_ROWS - 2, 1, 0)], ids=["one", "even", "odd and empty"]
+)
+def test_coefficients_are_those_of_one_process(few_are_many, chunks):
+    X, y = data()
+    single = ANFISRegressor(n_mfs=3).fit(X, y)
+    spread = DaskANFISRegressor(n_mfs=3).fit(*cut(chunks, X, y))
+    assert_same_model(spread, single, 1e-10)
+    assert spread.n_iter_ == single.n_iter_
+    assert spread.readability_.line == single.readability_.line
+
+
+def test_search_by_groups_with_weights_is_that_of_one_process(few_are_many, monkeypatch):
+    monkeypatch.setattr(sampling, "SAMPLE_ROWS", 150)
+    X, y = data(2 * N_ROWS)
+    g = np.random.default_rng(1)
+    weight, groups = g.integers(0, 3, len(y)).astype(float), g.integers(0, 3, len(y))
+    whole = (X[:, :1], np.column_stack([y, X[:, 0] ** 2]), weight, groups)
+    single = ANFISRegressor(partition="grid").fit(*whole)
+    found = DaskANFISRegressor(partition="grid").fit(*cut(2345, *whole))
+    assert "held_out_error" in found.structures_[0]
+    assert_same_model(found, single, 1e-10)
+
+
+def test_few_rows_are_fetched_and_trained_on_as_ever():
+    table = frame(500)
+    lazy = dd.from_pandas(table, npartitions=3)
+    here = ANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    there = DaskANFISRegressor(n_mfs=2).fit(lazy[NAMES], lazy["error"])
+    assert_array_equal(there.consequents_, here.consequents_)
+    assert list(there.feature_names_in_) == NAMES
+    assert there.model_.output_names == ("error",)
+    eager = DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    assert_array_equal(eager.consequents_, here.consequents_)
+
+
+def test_nothing_but_sums_and_one_sample_comes_to_the_client(few_are_many, monkeypatch):
+    X, y = data()
+    sizes = []
+    real = rows._computed
+
+    def computed(lazy):
+        result = real(lazy)
+        sizes.append(len(pickle.dumps(result)))
+        return result
+
+    monkeypatch.setattr(rows, "_computed", computed)
+    DaskANFISRegressor(n_mfs=2).fit(*cut(500, X, y))
+    sample = sizes.pop(1)
+    assert sample < 1.3 * 1500 * 6 * 8
+    assert max(sizes) < 10_000  # the data are 144,000
+    assert len(sizes) <= 10
+
+
+def test_parquet_of_small_files_is_read_partition_by_partition(few_are_many, tmp_path):
+    table = frame()
+    for i in range(8):
+        part = table.iloc[i * 750 : (i + 1) * 750].assign(other="text")
+        part.to_parquet(tmp_path / f"{i}.parquet")
+    lazy = dd.read_parquet(tmp_path)
+    model = DaskANFISRegressor(n_mfs=2).fit(lazy[NAMES], lazy["error"])
+    single = ANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    assert_same_model(model, single, 1e-10)
+    predicted = model.predict(lazy[NAMES])
+    assert isinstance(predicted, dd.Series)
+    assert predicted.name == "error"
+    assert_array_equal(predicted.compute().to_numpy(), model.predict(table[NAMES]))
+
+
+@pytest.mark.parametrize("method", ["predict", "coverage", "in_bounds", "strengths"])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_what_is_lazy_is_what_is_eager(method, n_outputs):
+    X, y = data(600)
+    y = y if n_outputs == 1 else np.column_stack([y, X])
+    model = DaskANFISRegressor(n_mfs=2).fit(X, y)
+    eager = getattr(model, method)(X)
+    lazy = getattr(model, method)(da.from_array(X, chunks=((250, 0, 350), (1, 1))))
+    assert isinstance(lazy, da.Array)
+    assert lazy.shape == eager.shape
+    assert lazy.dtype == eager.dtype
+    assert_array_equal(lazy.compute(), eager)
+    table = dd.from_pandas(pd.DataFrame(X), npartitions=3)
+    in_frame = getattr(model, method)(table)
+    assert_array_equal(in_frame.compute().to_numpy(), eager)
+    assert in_frame.compute().dtypes.tolist() if lazy.ndim == 2 else in_frame.dtype == eager.dtype
+
+
+def test_score_is_a_reduction_of_the_same_value():
+    X, y = data(600)
+    Y, weight = np.column_stack([y, X[:, 0] ** 2]), np.random.default_rng(2).uniform(size=600)
+    model = DaskANFISRegressor(n_mfs=2).fit(X, Y)
+    expected = r2_score(Y, model.predict(X), sample_weight=weight)
+    assert_allclose(model.score(*cut(170, X, Y, weight)), expected, rtol=1e-12)
+
+
+def test_fitted_model_is_small_and_travels():
+    X, y = data(600)
+    model = DaskANFISRegressor(n_mfs=2).fit(*cut(200, X, y))
+    assert len(pickle.dumps(model)) < 20_000
+    assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), model.predict(X))
+    plain = ANFISRegressor(n_mfs=2).fit(X, y)
+    assert export_json(model) == export_json(plain)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e9])
+def test_scales_of_parts_join_to_those_of_the_whole(offset):
+    g = np.random.default_rng(3)
+    values = g.normal(size=(900, 3)) * [1.0, 1e-5, 0.0] + offset * np.array([1.0, 0.0, 1.0])
+    weight = g.uniform(0.1, 3.0, 900)
+    found, total = column_statistics(values[:1], weight[:1]), weight[0]
+    for part in (slice(1, 500), slice(500, 503), slice(503, 900)):
+        other = column_statistics(values[part], weight[part])
+        found = joined_scales(found, other, total, weight[part].sum())
+        total += weight[part].sum()
+    whole = column_statistics(values, weight)
+    for name in ("offset", "scale", "minimum", "maximum"):
+        # Means of parts are floats: what they round is a part of the offset.
+        rounding = 4.0 * np.finfo(float).eps * np.abs(whole.offset)
+        error = np.abs(getattr(found, name) - getattr(whole, name))
+        assert (error <= 1e-13 * whole.scale + rounding).all()
+
+
+def parts_of(*tables):
+    """A frame of these partitions, which say nothing of themselves before they are there."""
+    meta = tables[0].iloc[:0]
+    return dd.from_delayed([dask.delayed(t) for t in tables], meta=meta, verify_meta=False)
+
+
+def with_nan():
+    table = frame(300)
+    table.loc[212, "rate"] = np.nan
+    lazy = dd.from_pandas(table, npartitions=3, sort=False)
+    return lazy[NAMES], lazy["error"]
+
+
+def with_other_columns():
+    table = frame(300)
+    lazy = parts_of(table[:100], table[100:].rename(columns={"rate": "Rate"}))
+    return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
+
+
+def with_text():
+    table = frame(300)
+    lazy = parts_of(table[NAMES][:100], table[NAMES][100:].astype({"rate": str}))
+    return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
+
+
+def with_unknown_chunks(keep):
+    X, y = cut(100, *data(300))
+    return X[X[:, 0] > -1e9], y[(y > keep)]
+
+
+def of_other_lengths():
+    X, y = data(300)
+    return cut(100, X, y[:-1])
+
+
+def of_other_partitions():
+    lazy = dd.from_pandas(frame(300), npartitions=3)
+    return lazy[NAMES], lazy["error"].repartition(npartitions=2)
+
+
+def half_lazy():
+    X, y = data(300)
+    return da.from_array(X), y
+
+
+def with_negative_weights():
+    X, y = data(300)
+    return cut(100, X, y, np.where(np.arange(300) == 107, -2.0, 1.0))
+
+
+def without_weight():
+    X, y = data(300)
+    return cut(100, X, y, np.zeros(300))
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (with_nan, ValueError, r"Partition 2: .*NaN in column 'rate', first at row 12"),
+        (with_other_columns, ValueError, r"Partition 1: .*has the columns temperature, Rate"),
+        (with_text, ValueError, r"Partition 1: .*no real numbers in column 'rate'"),
+        (lambda: with_unknown_chunks(0.0), ValueError, r"Partition \d: X has 100 rows and y \d+"),
+        (of_other_lengths, ValueError, "X has 300 rows and y 299"),
+        (of_other_partitions, ValueError, "y has 2 partitions, X has 3"),
+        (half_lazy, TypeError, "y is a ndarray, but the other one is a dask collection"),
+        (with_negative_weights, ValueError, "Partition 1: Negative values in sample_weight"),
+        (without_weight, ValueError, "Found 300 rows, of which 0 have weight"),
+    ],
+)
+def test_bad_data_are_refused_by_name(make, error, message):
+    with pytest.raises(error, match=message):
+        DaskANFISRegressor(n_mfs=2).fit(*make())
+
+
+def test_unknown_chunks_that_fit_together_are_fine():
+    X, y = data(300)
+    model = DaskANFISRegressor(n_mfs=2).fit(*with_unknown_chunks(-np.inf))
+    assert_array_equal(model.consequents_, ANFISRegressor(n_mfs=2).fit(X, y).consequents_)
+
+
+@pytest.mark.parametrize("settings", [{"loss": "huber"}, {"early_stopping": True}], ids=str)
+def test_what_needs_every_residual_is_refused(few_are_many, settings):
+    with pytest.raises(ValueError, match="needs every row's own residual"):
+        DaskANFISRegressor(n_mfs=2, **settings).fit(*cut(1000, *data()))
+
+
+def test_prediction_wants_the_columns_of_training():
+    table = frame(300)
+    model = DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    with pytest.raises(ValueError, match="trained on temperature, rate"):
+        model.predict(dd.from_pandas(table[NAMES[::-1]], npartitions=2))
+    with pytest.raises(ValueError, match="expecting 2 features"):
+        model.predict(da.zeros((10, 3)))
+
+
+def test_layout_gives_names_where_there_are_none():
+    layout = blocks.Blocks.of(*cut(100, *data(300))).layout
+    assert (layout.input_names, layout.output_names) == (("x0", "x1"), ("y",))
+
+
+def test_plain_estimator_names_the_one_for_dask():
+    X, y = data(300)
+    lazy_X, lazy_y = cut(100, X, y)
+    with pytest.raises(TypeError, match=r"skanfis\.dask\.DaskANFISRegressor"):
+        ANFISRegressor().fit(lazy_X, lazy_y)
+    with pytest.raises(TypeError, match=r"X\.compute"):
+        ANFISRegressor(n_mfs=1).fit(X, y).predict(lazy_X)

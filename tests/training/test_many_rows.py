@@ -1,0 +1,91 @@
+"""Many rows: premises from a sample, a step on all rows, and the error of training on all."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis import ANFISRegressor, sampling
+from skanfis.membership import Gaussian
+from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
+from skanfis.rows import Rows
+from skanfis.sampling import with_sample
+from skanfis.solvers import VariableProjection
+
+from .. import oracles
+
+N_ROWS, N_SAMPLE = 12_000, 3000
+
+
+def noisy_surface(n_rows=N_ROWS):
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (n_rows, 2))
+    return X, np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(n_rows)
+
+
+@pytest.fixture
+def few_are_many(monkeypatch):
+    monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS - 1)
+    monkeypatch.setattr(sampling, "SAMPLE_ROWS", N_SAMPLE)
+
+
+@pytest.fixture
+def full_passes(monkeypatch):
+    """Passes over all rows, by name."""
+    seen = []
+    whole = Rows.sum
+
+    def counted(self, one_pass, *args):
+        if self.n_rows == N_ROWS:
+            seen.append(type(one_pass).__name__)
+        return whole(self, one_pass, *args)
+
+    monkeypatch.setattr(Rows, "sum", counted)
+    return seen
+
+
+def test_threshold_is_where_the_docs_say():
+    assert (sampling.MANY_ROWS, sampling.SAMPLE_ROWS) == (100_000, 20_000)
+
+
+def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeypatch):
+    X, y = noisy_surface()
+    quick = ANFISRegressor(n_mfs=3).fit(X, y)
+    assert full_passes[:3] == ["FirstPass", "JointPass", "FirstPass"]
+    assert len(full_passes) <= 5
+    monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS)
+    full = ANFISRegressor(n_mfs=3).fit(X, y)
+    assert quick.loss_curve_[-1] < 1.001 * full.loss_curve_[-1]
+    new = np.random.default_rng(1).uniform(-0.99, 0.99, (2000, 2))
+    difference = quick.predict(new) - full.predict(new)
+    # The noise's own effect on 9 rules of 3 coefficients is 0.1 sqrt(27 / 12000) = 0.005.
+    assert np.sqrt(np.mean(difference**2)) < 2e-3
+
+
+@pytest.mark.parametrize("agreement", [0.0, 0.3])
+def test_gradient_is_that_of_all_rows(agreement):
+    g = np.random.default_rng(0)
+    rows = with_sample(oracles.bumpy_rows(g, 600, 2, 2, weighted=True), 150)
+    antecedent = oracles.random_grid(g, [Gaussian, Gaussian], [2, 3])
+    penalty = Penalty(agreement=agreement, alpha=1e-3)
+    problem = SeparableProblem(rows.sample, antecedent, 1, penalty).on_all(rows)
+    found = problem.linearise(problem.evaluate(antecedent.parameters))
+    expected = oracles.central_difference(
+        lambda theta: problem.evaluate(theta).cost, antecedent.parameters
+    )
+    assert_allclose(found.gradient, expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"n_init": 2}, {"solver": "hybrid", "max_iter": 3}, {"solver": "lse"}],
+    ids=str,
+)
+def test_every_way_of_training_ends_on_all_rows(few_are_many, full_passes, settings):
+    X, y = noisy_surface()
+    settings = {"solver": VariableProjection(tol=1e-2)} | settings
+    model = ANFISRegressor(n_mfs=2, **settings).fit(X, y)
+    assert full_passes[-1] in ("FirstPass", "JointPass")
+    residual = (y - model.predict(X)) / y.std()
+    assert_allclose(np.mean(residual**2), model.loss_curve_[-1], rtol=1e-9)
+    assert model.model_.rule_rows.sum() == pytest.approx(N_ROWS)
