@@ -42,6 +42,7 @@ TABLE = {
     "cluster": (["_sklearn", "_validation"], LEARNING),
     "structure": ([*KERNEL, "_validation", "cluster"], [*NUMERIC, "sklearn"]),
     "training": ([*KERNEL, "_validation", "structure"], LEARNING),
+    "streaming": ([*KERNEL, "_validation", "structure", "training"], NUMERIC),
     "_anfis": ([*KERNEL, "_sklearn", "_validation", "structure", "training"], LEARNING),
     "regressor": (
         [
@@ -50,6 +51,7 @@ TABLE = {
             "_validation",
             "_notebook",
             "readable",
+            "streaming",
             "structure",
             "training",
             "_anfis",

@@ -4,10 +4,10 @@ from .gradient import gradient
 from .hybrid import hybrid
 from .lbfgs import lbfgs
 from .lse import lse
-from .result import SolverResult
+from .result import MESSAGES, SolverResult
 from .varpro import varpro
 
-__all__ = ["SOLVERS", "SolverResult", "gradient", "hybrid", "lbfgs", "lse", "varpro"]
+__all__ = ["MESSAGES", "SOLVERS", "SolverResult", "gradient", "hybrid", "lbfgs", "lse", "varpro"]
 
 SOLVERS = {
     "varpro": varpro,

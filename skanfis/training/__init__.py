@@ -2,7 +2,7 @@
 
 from .learner import Learned, Learner
 from .progress import CallbackBridge, Keeper, Printer, watch_all
-from .pruning import redundant_rules, rule_statistics, without_rules
+from .pruning import RuleStatistics, redundant_rules, rule_statistics, without_rules
 from .restarts import learn_from_starts
 from .robust import learn_robustly, resistant
 from .stopping import EarlyStopping, hold_out
@@ -14,6 +14,7 @@ __all__ = [
     "Learned",
     "Learner",
     "Printer",
+    "RuleStatistics",
     "hold_out",
     "learn_from_starts",
     "learn_robustly",

@@ -15,7 +15,7 @@ import numpy as np
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TermGroup
 from ..rows import Rows
 
-__all__ = ["redundant_rules", "rule_statistics", "without_rules"]
+__all__ = ["RuleStatistics", "redundant_rules", "rule_statistics", "without_rules"]
 
 _READ_ROWS = 4096
 # A strength that is nowhere above this.
