@@ -729,6 +729,15 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         return self.model_.strengths(X)
 
     @property
+    def information_(self):
+        """How well ``partial_fit`` has determined the consequents.
+
+        None where the model has not been trained by it.
+        """
+        stream = getattr(self, "_stream", None)
+        return None if stream is None else stream.information(self._found_weights())
+
+    @property
     def n_rules_(self):
         """Number of rules."""
         return self._fitted_model().n_rules

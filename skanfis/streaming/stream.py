@@ -23,7 +23,7 @@ from .moments import Moments, blocks
 from .scales import Change
 from .speaking import Distinct, Speaking, row_keys
 
-__all__ = ["Solved", "Stream"]
+__all__ = ["Information", "Solved", "Stream"]
 
 # The weights of the penalty that premises which stay have.
 _FREE = ("agreement", "alpha", "slope")
@@ -42,6 +42,26 @@ class Solved:
     mean_squared_error: float  # of the standardised target, summed over outputs
     noise_variance: np.ndarray  # of every output, in its units squared
     redundant_rules: list[dict] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """How well rows have determined the consequents.
+
+    Parameters
+    ----------
+    matrix : ndarray of shape (n_rules * (1 + n_inputs), n_rules * (1 + n_inputs))
+        Phi' S Phi + W P, the inverse of the covariance of one output's consequents in variances of
+        the noise: rule by rule, of coefficients on 1 and (x - mean) / deviation.
+    inputs : ndarray of int of shape (n_inputs,)
+        The inputs that consequents are linear in.
+    weight : float
+        W, of all rows, as far as it has not faded.
+    """
+
+    matrix: np.ndarray
+    inputs: np.ndarray
+    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,12 +196,11 @@ class Stream:
         )
 
     def information(self, weights):
-        """Phi' S Phi + W P by coefficients on [1, (x - reference) / spread], for recursions.
-
-        Of one output, in units of the noise's variance.
-        """
+        """How well the consequents are determined, with the penalty of these weights."""
         problem, evaluation, _ = self._solve(weights)
-        return self.moments.weight * problem.information(evaluation)
+        moments = self.moments
+        matrix = moments.weight * problem.information(evaluation)
+        return Information(matrix, moments.consequent_inputs, moments.weight)
 
     def _solve(self, weights):
         free = [key for key in _FREE if key not in weights]
