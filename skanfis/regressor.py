@@ -228,6 +228,12 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     robust_weights_ : ndarray of shape (n_samples,) or None
         With ``loss="huber"``: the weight that was left to each row, 1 for those near the model;
         NaN for rows that had no part in the training.
+    n_samples_seen_ : int
+        After ``partial_fit``: rows with weight, of all calls.
+    noise_variance_ : float or ndarray of shape (n_outputs,)
+        After ``partial_fit``: variance of the noise, in the units of y squared.
+    information_ : skanfis.streaming.Information or None
+        After ``partial_fit``: how well the consequents are determined; None after ``fit``.
     n_features_in_ : int
         Number of inputs.
     feature_names_in_ : ndarray of shape (n_features,)
@@ -498,9 +504,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         Notes
         -----
         Weights of the penalty that are "auto" are found anew in every call, by the evidence of all
-        rows. ``n_samples_seen_`` counts the rows with weight; ``noise_variance_`` is the variance
-        of the noise, of shape (n_outputs,) where there are several, in the units of y squared;
-        ``readability_`` is of the latest chunk. :meth:`merge` adds what several machines have seen.
+        rows. ``readability_`` is of the latest chunk. :meth:`merge` adds what several machines have
+        seen. See :doc:`/streaming`.
 
         Examples
         --------

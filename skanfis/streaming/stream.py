@@ -19,11 +19,12 @@ from ..structure.tuning import FIRST_PENALTY, scaled, tune
 from ..training import RuleStatistics, redundant_rules
 from .farthest import Farthest
 from .held import HeldProblem
+from .information import Information
 from .moments import Moments, blocks
 from .scales import Change
 from .speaking import Distinct, Speaking, row_keys
 
-__all__ = ["Information", "Solved", "Stream"]
+__all__ = ["Solved", "Stream"]
 
 # The weights of the penalty that premises which stay have.
 _FREE = ("agreement", "alpha", "slope")
@@ -42,26 +43,6 @@ class Solved:
     mean_squared_error: float  # of the standardised target, summed over outputs
     noise_variance: np.ndarray  # of every output, in its units squared
     redundant_rules: list[dict] = field(default_factory=list)
-
-
-@dataclass(frozen=True, eq=False)
-class Information:
-    """How well rows have determined the consequents.
-
-    Parameters
-    ----------
-    matrix : ndarray of shape (n_rules * (1 + n_inputs), n_rules * (1 + n_inputs))
-        Phi' S Phi + W P, the inverse of the covariance of one output's consequents in variances of
-        the noise: rule by rule, of coefficients on 1 and (x - mean) / deviation.
-    inputs : ndarray of int of shape (n_inputs,)
-        The inputs that consequents are linear in.
-    weight : float
-        W, of all rows, as far as it has not faded.
-    """
-
-    matrix: np.ndarray
-    inputs: np.ndarray
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
