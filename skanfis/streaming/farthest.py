@@ -12,12 +12,15 @@ one may go, those first without which the hull is hardly smaller.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 __all__ = ["Farthest"]
 
 _MOST_CORNERS = 256
+# Parts of the range of u in the table that rows are held against first.
+_PARTS = 64
 # Directions in which the first corners are sought: whatever lies within these is none.
 _DIRECTIONS = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
 
@@ -58,6 +61,21 @@ class _Corners:
 
     u: np.ndarray = field(default_factory=lambda: np.zeros(1))
     v: np.ndarray = field(default_factory=lambda: np.zeros(1))
+
+    @cached_property
+    def _floor(self):
+        """What the hull is not below, in equal parts of u from 0 to 1; it is concave."""
+        edges = np.interp(np.arange(_PARTS + 2) / _PARTS, self.u, self.v, right=-np.inf)
+        return np.minimum(edges[:-1], edges[1:])
+
+    def __getstate__(self):
+        """The corners alone: the rest follows."""
+        return {"u": self.u, "v": self.v}
+
+    def plus_many(self, u, v, parts):
+        """With many points, of which a table tells most that are none; ``parts`` is that of u."""
+        beyond = np.flatnonzero(v > self._floor[parts])
+        return self.plus(u[beyond], v[beyond]) if beyond.size else self
 
     def plus(self, u, v):
         """With more points."""
@@ -105,6 +123,7 @@ class Farthest:
         """With rows: strengths (n_rules, n_rows), consequent inputs in their units."""
         root = np.sqrt(strengths)
         Z = (X - self.offset[:, None]) / self.scale[:, None]
+        parts = (_PARTS * root).astype(np.intp)
         above, below = [], []
         for place, (r, j) in enumerate(np.ndindex(self.n_rules, self.offset.size)):
             u, v = root[r], root[r] * Z[j]
@@ -112,8 +131,8 @@ class Farthest:
             if u.size > _DIRECTIONS.size and one.u.size == 1:
                 first = [np.argmax(np.cos(angle) * u + np.sin(angle) * v) for angle in _DIRECTIONS]
                 one, other = one.plus(u[first], v[first]), other.plus(u[first], -v[first])
-            above.append(one.plus(u, v))
-            below.append(other.plus(u, -v))
+            above.append(one.plus_many(u, v, parts[r]))
+            below.append(other.plus_many(u, -v, parts[r]))
         return replace(self, above=above, below=below)
 
     def distance(self, center):
