@@ -42,7 +42,10 @@ TABLE = {
     "cluster": (["_sklearn", "_validation"], LEARNING),
     "structure": ([*KERNEL, "_validation", "cluster"], [*NUMERIC, "sklearn"]),
     "training": ([*KERNEL, "_validation", "structure"], LEARNING),
-    "streaming": ([*KERNEL, "_validation", "structure", "training"], NUMERIC),
+    "streaming": (
+        [*KERNEL, "_sklearn", "_validation", "readable", "structure", "training"],
+        [*NUMERIC, "sklearn"],
+    ),
     "_anfis": ([*KERNEL, "_sklearn", "_validation", "structure", "training"], LEARNING),
     "regressor": (
         [
