@@ -249,10 +249,10 @@ def _feature_index(entry, names, parameter):
     )
 
 
-def positive_weights(sample_weight, n_rows):
+def positive_weights(sample_weight, n_rows, least=2):
     """Which rows have weight: a mask, or None where all have.
 
-    ValueError where a weight is negative, or where fewer than two rows are left.
+    ValueError where a weight is negative, or where fewer than ``least`` rows are left.
     """
     if np.any(sample_weight < 0):
         row = int(np.argmax(sample_weight < 0))
@@ -262,10 +262,10 @@ def positive_weights(sample_weight, n_rows):
         )
     keep = sample_weight > 0
     n_kept = int(np.count_nonzero(keep))
-    if n_kept < 2:
+    if n_kept < least:
         raise ValueError(
-            f"sample_weight leaves {n_kept} of {n_rows} rows with a positive weight; at least 2 "
-            "are needed."
+            f"sample_weight leaves {n_kept} of {n_rows} rows with a positive weight; at least "
+            f"{least} are needed."
         )
     return None if n_kept == n_rows else keep
 

@@ -2,6 +2,7 @@
 
 __all__ = [
     "ConstantInputWarning",
+    "ForgottenRowsWarning",
     "OutOfBoundsWarning",
     "ReadabilityWarning",
     "SplitLeakWarning",
@@ -11,6 +12,10 @@ __all__ = [
 
 class ConstantInputWarning(UserWarning):
     """An input never changes in the training data, so that nothing can be learnt of it."""
+
+
+class ForgottenRowsWarning(UserWarning):
+    """``partial_fit`` follows ``fit``, whose rows do not count any more."""
 
 
 class OutOfBoundsWarning(UserWarning):

@@ -52,6 +52,7 @@ __all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "S
 
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
 # a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
+_TINY = float(np.finfo(float).tiny)
 _BLOCK_BYTES = 2**22
 _FEWEST_ROWS, _MOST_ROWS = 128, 4096
 
@@ -277,7 +278,7 @@ class SeparableProblem:
         return Linearisation(-slope, gauss_newton, tuple(halves))
 
     def curvature(self, evaluation):
-        """As :meth:`linearise`, where the gradient is not asked for; of a sample if there is one."""
+        """As :meth:`linearise`, the gradient not being asked for; of a sample if there is one."""
         if self.on_sample is None:
             return self.linearise(evaluation)
         # The sample's own normal equations: D' S D and what is taken off are of the same rows.
@@ -318,6 +319,20 @@ class SeparableProblem:
                 for k in range(self.n_outputs):
                     target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
                 yield part, target, weight
+
+    def mean_squares(self, evaluation):
+        """Mean square of the residual of every standardised output, (n_outputs,)."""
+        if self.n_outputs == 1:
+            return np.array([evaluation.mean_squared_error])
+        if self.on_sample is not None:
+            # How the outputs share it shows on the sample; all of it is known of all rows.
+            found = self.on_sample.mean_squares(evaluation)
+            return found * (evaluation.mean_squared_error / max(found.sum(), _TINY))
+        total, total_weight = np.zeros(self.n_outputs), 0.0
+        for _, residual, weight in self.residuals(evaluation):
+            total += (residual**2).sum(axis=1) if weight is None else residual**2 @ weight
+            total_weight += residual.shape[1] if weight is None else weight.sum()
+        return total / total_weight
 
     def leverage(self, evaluation, part):
         """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,)."""

@@ -284,22 +284,16 @@ def _mean_squares(problem, evaluation, robust):
     By Huber's second proposal (1964): the mean of psi(r)^2, psi = w r, over what it is of a
     standard normal r.
     """
-    if robust is None and problem.n_outputs == 1:
-        return np.array([evaluation.mean_squared_error])
-    if robust is None and problem.on_sample is not None:
-        # How the outputs share it shows on the sample; all of it is known of all rows.
-        found = _mean_squares(problem.on_sample, evaluation, None)
-        return found * (evaluation.mean_squared_error / max(found.sum(), np.finfo(float).tiny))
+    if robust is None:
+        return problem.mean_squares(evaluation)
+    weights, c = robust
     total, total_weight = np.zeros(problem.n_outputs), 0.0
     for part, residual, weight in problem.residuals(evaluation):
-        left = 1.0 if robust is None else robust[0][part]
+        left = weights[part]
         weight = np.ones(residual.shape[1]) if weight is None else weight
         # The rows' weights have Huber's in them already.
         total += residual**2 @ (weight * left)
         total_weight += np.sum(weight / left)
-    if robust is None:
-        return total / total_weight
-    c = robust[1]
     beyond = 2.0 * ndtr(-c)
     density = np.exp(-0.5 * c**2) / np.sqrt(2.0 * np.pi)
     return total / total_weight / (1.0 - beyond - 2.0 * c * density + c**2 * beyond)

@@ -52,13 +52,16 @@ from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
+from .streaming.learning import LearnsFromChunksMixin
 from .structure import StructureRequest, check_inputs
 from .training import Callbacks, TrainingData, fit_rules, model_without_rules
 
 __all__ = ["ANFISRegressor"]
 
 
-class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseEstimator):
+class ANFISRegressor(
+    LearnsFromChunksMixin, RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseEstimator
+):
     r"""Adaptive neuro-fuzzy inference system for regression.
 
     A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN
@@ -216,6 +219,10 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     robust_weights_ : ndarray of shape (n_samples,) or None
         With ``loss="huber"``: the weight that was left to each row, 1 for those near the model;
         NaN for rows that had no part in the training.
+    n_samples_seen_ : int
+        After ``partial_fit``: rows with weight, of all calls.
+    information_ : skanfis.streaming.Information or None
+        After ``partial_fit``: how well the consequents are determined; None after ``fit``.
     n_features_in_ : int
         Number of inputs.
     feature_names_in_ : ndarray of shape (n_features,)
@@ -427,9 +434,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.n_iter_ = max(fitted.result.n_iter, 1)
         self.loss_curve_ = fitted.result.loss_curve
         self.status_ = fitted.result.message
-        posterior = self.model_.posterior
-        noise = None if posterior is None else posterior.noise
-        self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
+        self._tell_noise()
         penalty = fitted.start.penalty
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
@@ -441,6 +446,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
         self._start_parameters = self._those_of_the_start()
+        self._forget_chunks()
         if callbacks is not None:
             callbacks.end(self.model_)
         return self
@@ -645,11 +651,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _request(self, names):
         """What training starts from, with all names of columns and families resolved."""
         start, n_mfs = self._imported(names), self.n_mfs
-        solver = self._solver()
-        given = {"agreement": self.agreement, "alpha": self.alpha, "stiffness": solver.stiffness}
-        weights = {k: float(weight) for k, weight in given.items() if not isinstance(weight, str)}
-        if "alpha" in weights:
-            weights["slope"] = weights["alpha"]
+        solver, weights = self._solver(), self._given_weights()
         if self.warm_start and hasattr(self, "_start_parameters"):
             changed = [
                 name
@@ -663,13 +665,7 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 )
             start, n_mfs = self.model_, "auto"
             check_inputs(start, names, "warm_start=True")
-            before = {
-                "agreement": self.agreement_,
-                "alpha": self.alpha_,
-                "slope": self.slope_alpha_,
-                "stiffness": self.stiffness_,
-            }
-            weights = before | weights
+            weights = self._found_weights() | weights
         if self.order == 0 and self.consequent_features is not None:
             raise ValueError(
                 f"consequent_features={self.consequent_features!r} means nothing with order=0, "
@@ -698,6 +694,29 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
     def _solver(self) -> Solver:
         """The solver, by its word or as it is given."""
         return SOLVERS[self.solver]() if isinstance(self.solver, str) else self.solver
+
+    def _tell_noise(self):
+        posterior = self.model_.posterior
+        noise = None if posterior is None else posterior.noise
+        self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
+
+    def _given_weights(self):
+        """The weights of the penalty that are given, by their names in ``evidence.FREE``."""
+        stiffness = self._solver().stiffness
+        given = {"agreement": self.agreement, "alpha": self.alpha, "stiffness": stiffness}
+        weights = {k: float(weight) for k, weight in given.items() if not isinstance(weight, str)}
+        if "alpha" in weights:
+            weights["slope"] = weights["alpha"]
+        return weights
+
+    def _found_weights(self):
+        """The weights of the penalty that training has used, by the same names."""
+        return {
+            "agreement": self.agreement_,
+            "alpha": self.alpha_,
+            "slope": self.slope_alpha_,
+            "stiffness": self.stiffness_,
+        }
 
     def _those_of_the_start(self):
         """The parameters that a start depends on, in a form that can be compared."""
@@ -744,8 +763,8 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
             )
         return model
 
-    def _check_training_data(self, X, y, sample_weight, groups):
-        """The data, of all rows with weight."""
+    def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
+        """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
         refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
         X, y, sample_weight, groups = map(on_host, (X, y, sample_weight, groups))
         numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
@@ -755,8 +774,9 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
                 self,
                 X,
                 y,
+                reset=not (is_chunk and hasattr(self, "n_features_in_")),
                 validate_separately=(
-                    {**numeric, "ensure_min_samples": 2},
+                    {**numeric, "ensure_min_samples": 1 if is_chunk else 2},
                     {**numeric, "ensure_2d": False},
                 ),
             )
@@ -771,9 +791,13 @@ class ANFISRegressor(RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseE
         groups = None if groups is None else group_numbers(groups)
         keep = None
         if sample_weight is not None:
-            sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-            sample_weight = bearable_weights(sample_weight)
-            keep = positive_weights(sample_weight, X.shape[0])
+            # A chunk may be without any weight, which scikit-learn refuses from some version on.
+            if not (is_chunk and np.array_equal(sample_weight, np.zeros(X.shape[0]))):
+                sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+            sample_weight = np.asarray(sample_weight, dtype=float)
+            # Weights of chunks count against one another: they stay as they are.
+            sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
+            keep = positive_weights(sample_weight, X.shape[0], 0 if is_chunk else 2)
         if keep is not None:
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
             groups = None if groups is None else groups[keep]

@@ -22,7 +22,7 @@ import numpy as np
 from .antecedent import Antecedent
 from .rows import Rows, fingerprint
 
-__all__ = ["RuleSupport"]
+__all__ = ["SPEAKS", "RuleSupport", "inverse_factor"]
 
 # Rows of one block, however few values it needs; and the bytes that these may take.
 _MOST_ROWS, _FEWEST_ROWS = 4096, 64
@@ -30,7 +30,7 @@ _BLOCK_BYTES = 2**22
 # Standard deviation added to every standardised input.
 _THICKNESS = 0.1
 # A rule speaks on the rows on which it has at least this part of the strongest rule's strength.
-_SPEAKS = 0.5
+SPEAKS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ class RuleSupport:
         known = np.flatnonzero(distinct.counts)
         center, factor = np.zeros_like(first), np.zeros_like(second)
         center[known] = first[known] / mass[known, None]
-        factor[known] = _inverse_factor(second[known] / mass[known, None, None], center[known])
+        factor[known] = inverse_factor(second[known] / mass[known, None, None], center[known])
         radius = rows.reduce(
             partial(_radii, antecedent=antecedent, known=known, center=center, factor=factor),
             np.maximum,
@@ -149,7 +149,7 @@ def _radii(rows, antecedent, known, center, factor):
     for part in _blocks(rows, antecedent):
         Z, _, _ = rows.read(part)
         strengths = antecedent.strengths(Z)
-        speaks = strengths >= _SPEAKS * strengths.max(axis=0)
+        speaks = strengths >= SPEAKS * strengths.max(axis=0)
         for r in known[speaks[known].any(axis=1)]:
             away = factor[r] @ (Z[:, speaks[r]] - center[r][:, None])
             radius[r] = max(radius[r], np.sqrt(np.max(np.sum(away**2, axis=0))))
@@ -163,7 +163,7 @@ def _blocks(rows, antecedent):
     return [part for chunk in rows.chunks(n_rows) for part in chunk]
 
 
-def _inverse_factor(second, center):
+def inverse_factor(second, center):
     """Lower triangular W with W' W the inverse of the thickened covariances."""
     covariance = second - center[:, :, None] * center[:, None, :]
     covariance += _THICKNESS**2 * np.eye(center.shape[1])

@@ -56,6 +56,19 @@ TABLE = {
         [*KERNEL, "_threads", "_validation", "constraints", "options", "solvers", "structure"],
         LEARNING,
     ),
+    "streaming": (
+        [
+            *KERNEL,
+            "_sklearn",
+            "_validation",
+            "options",
+            "readable",
+            "solvers",
+            "structure",
+            "training",
+        ],
+        [*NUMERIC, "sklearn"],
+    ),
     "regressor": (
         [
             *KERNEL,
@@ -69,6 +82,7 @@ TABLE = {
             "export",
             "readable",
             "solvers",
+            "streaming",
             "structure",
             "training",
         ],

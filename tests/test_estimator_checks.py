@@ -13,6 +13,8 @@ from skanfis.solvers import SOLVERS, VariableProjection
 # what is wrong with that; to the checks, and under this project's settings, a warning is an error.
 pytestmark = [
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning"),
+    # A check calls partial_fit after fit.
+    pytest.mark.filterwarnings("ignore::skanfis.exceptions.ForgottenRowsWarning"),
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning"),
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning"),
     # Many short fits: MAX_ITER below, and KMeans on fewer distinct rows than clusters.

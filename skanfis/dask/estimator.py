@@ -228,9 +228,14 @@ class DaskANFISRegressor(ANFISRegressor):
                 f"{self.n_features_in_} features as input."
             )
 
-    def _check_training_data(self, X, y, sample_weight, groups):
+    def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
         if not any(is_collection(one) for one in (X, y, sample_weight, groups)):
-            return super()._check_training_data(X, y, sample_weight, groups)
+            return super()._check_training_data(X, y, sample_weight, groups, is_chunk=is_chunk)
+        if is_chunk:
+            raise TypeError(
+                "partial_fit takes rows that are at hand, and these are on a cluster: use fit, or "
+                "give X.compute()."
+            )
         data = ClusterData.of(Blocks.of(X, y, sample_weight, groups))
         layout = data.blocks.layout
         wishes = Wishes.read(

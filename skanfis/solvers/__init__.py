@@ -7,10 +7,11 @@ from .base import Solver
 from .gradient import GradientDescent
 from .hybrid import Hybrid
 from .lse import LeastSquares
-from .result import SolverResult
+from .result import MESSAGES, SolverResult
 from .varpro import VariableProjection
 
 __all__ = [
+    "MESSAGES",
     "SOLVERS",
     "GradientDescent",
     "Hybrid",

@@ -2,13 +2,15 @@
 
 from .fit import Fitted, SolverRun, TrainingData, fit_rules
 from .progress import Callbacks
-from .pruning import model_without_rules
+from .pruning import RuleStatistics, model_without_rules, redundant_rules
 
 __all__ = [
     "Callbacks",
     "Fitted",
+    "RuleStatistics",
     "SolverRun",
     "TrainingData",
     "fit_rules",
     "model_without_rules",
+    "redundant_rules",
 ]

@@ -102,6 +102,14 @@ class TrainingData:
         check_scales(rows.inputs, rows.targets, self.input_names, self.output_names)
         return rows
 
+    def spread_weights(self, weights):
+        """Weights of these rows as weights of all rows given, zero elsewhere."""
+        if self.kept is None:
+            return weights
+        given = np.zeros(self.kept.size)
+        given[self.kept] = 1.0 if weights is None else weights
+        return given
+
     def spread_over_rows(self, values, indices):
         """Values of some rows as values of all rows given, NaN elsewhere."""
         every = np.full(self.X.shape[0], np.nan)

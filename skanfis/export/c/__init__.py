@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 
 from .._fold import fold
-from .._numbers import Numbers
-from ._cost import CCost, cost
+from .._numbers import Numbers, as_held
+from ._cost import CCost, cost, with_learner
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._header import BITS, header
+from ._learner import LearningSource, learner_of, learning_test
 from ._saturation import read_limits
 from ._self_test import known_answers, self_test
 from ._source import Source
@@ -53,6 +54,7 @@ def export_c(
     std="c99",
     min_coverage=0.1,
     saturate=None,
+    forgetting=None,
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
@@ -88,6 +90,10 @@ def export_c(
         :func:`skanfis.bounds.bounds` has proven for the box that is specified, or others. Within
         proven limits nothing changes, until an input beyond the box, or a fault of the hardware,
         would give more. None holds nothing.
+    forgetting : float or None, default=None
+        A number above 0 and at most 1 adds recursive least squares, by which the consequents go on
+        learning on the device, with this forgetting factor; ``estimator`` is then an ANFISRegressor
+        trained by ``partial_fit``, which knows how sure its consequents are. None leaves it out.
 
     Returns
     -------
@@ -98,7 +104,8 @@ def export_c(
     ------
     ValueError
         If a parameter is none of the above, if ``estimator`` has a step that cannot be folded in,
-        or if the model's numbers go beyond what "float" holds.
+        if it cannot learn and ``forgetting`` is given, or if the model's numbers go beyond what
+        "float" holds.
 
     Notes
     -----
@@ -109,6 +116,14 @@ def export_c(
     leaves y as it is, so that a controller which keeps y holds its last value. "nan" writes NaN, or
     in C89, which has none, leaves y as it is. A row that is not finite gets no answer under any
     policy.
+
+    With ``forgetting``, a ``NAME_learner`` of fixed size, which is the caller's, holds what is
+    learnt: ``NAME_reset`` sets it to what training has left, ``NAME_learn(&q, x, t)`` takes in a
+    row x with its target t, ``NAME_predict_learnt(&q, x, y)`` answers, and ``NAME_freeze(&q, 1)``
+    holds it. Where the penalty is zero, that is what ``partial_fit`` would have learnt with the
+    same rows and forgetting factor; else the penalty stays as it was at the export, and fades.
+    Rows out of the range of the training data are not learnt from, and the status says so
+    (``NAME_NOT_LEARNT``, 16). See :doc:`/streaming`.
 
     With the macro ``NAME_SELF_TEST`` defined, ``int NAME_self_test(void)`` compares the function
     with what Python predicts, and returns zero if all is well; with ``NAME_SELF_TEST_MAIN`` too,
@@ -134,13 +149,22 @@ def export_c(
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
-    body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)
     answers = known_answers(model, numbers, min_coverage, BITS, limits)
-    price = cost(numbers, body)
+    declarations = test = ""
+    if forgetting is None:
+        body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)
+        price = cost(numbers, body)
+    else:
+        learner = learner_of(estimator, numbers, forgetting)
+        body = LearningSource(
+            numbers, dialect, model.out_of_bounds, min_coverage, learner, limits=limits
+        )
+        price = with_learner(cost(numbers, body), body)
+        declarations, test = body.declarations(), learning_test(as_held(model, numbers), body)
     code = CCode(
         name,
-        header(model, numbers, dialect, price, min_coverage, limits),
-        body.text(f"{stem}.h") + self_test(answers, dialect),
+        header(model, numbers, dialect, price, min_coverage, limits, declarations),
+        body.text(f"{stem}.h") + self_test(answers, dialect, test),
         price,
     )
     write_files(code, path)

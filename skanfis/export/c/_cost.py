@@ -1,15 +1,16 @@
 """What a C function costs: arithmetic per evaluation, memory."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ._families import BODIES
 from ._source import index_type
 
-__all__ = ["CCost", "cost"]
+__all__ = ["CCost", "cost", "with_learner"]
 
 # What C promises at least, and what there is nearly everywhere.
+_INT_BYTES = 4
 _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 
 
@@ -35,6 +36,11 @@ class CCost:
         covers the row, which is nearly everywhere amid data, it is one quadratic form, without
         exponential or root. Zero with ``min_coverage=None``.
 
+    learn_multiply_adds, learn_divisions, learn_stack_bytes : int
+        What it takes to learn a row, at most, beside an evaluation. Zero without a learner.
+    learner_bytes : int
+        What is learnt, in memory of the caller; zero without a learner.
+
     Examples
     --------
     >>> from skanfis import ANFISRegressor
@@ -54,6 +60,10 @@ class CCost:
     coverage_exponentials: int = 0
     coverage_square_roots: int = 0
     coverage_multiply_adds: int = 0
+    learn_multiply_adds: int = 0
+    learn_divisions: int = 0
+    learn_stack_bytes: int = 0
+    learner_bytes: int = 0
 
 
 def cost(numbers, code):
@@ -93,6 +103,27 @@ def cost(numbers, code):
         asked,
         asked,
         of_coverage,
+    )
+
+
+def with_learner(price, source):
+    """The cost with that of a LearningSource's learner besides."""
+    learner, numbers = source.learning, source.numbers
+    n, n_outputs, size = learner.n, numbers.n_outputs, numbers.dtype.itemsize
+    # Per column: the product with phi, two for every entry above, and four.
+    observation = 3 * n * (n - 1) // 2 + 4 * n
+    # Of forgetting, with its made-up observation: the variance, three per column.
+    observations, others = (2, 3 * n) if learner.forgets else (1, 0)
+    n_slopes = numbers.slope_inputs.size
+    evaluation = price.multiply_adds - numbers.coefficients.size + numbers.n_rules * 2 * n_slopes
+    tables = source.learning_tables().values()
+    return replace(
+        price,
+        learn_multiply_adds=evaluation + observations * observation + others + n * n_outputs,
+        learn_divisions=price.divisions + 2 * n * observations + n_outputs + observations - 1,
+        learn_stack_bytes=(2 * n + n_outputs) * size,
+        learner_bytes=(learner.packed.size + n * (1 + n_outputs)) * size + 2 * _INT_BYTES,
+        table_bytes=price.table_bytes + sum(table.nbytes for table in tables),
     )
 
 

@@ -20,12 +20,15 @@ _SILENT = {
     "nan": "there is no output: y becomes NaN, or stays as it is where C has no NaN",
 }
 
+_OF_A_LEARNER = """
+ * A learner is the caller's, and to be called for by one of them at a time."""
+
 _CODE = """/*
  * $title written by skanfis; generated, not to be edited.
  *
 $facts
  *
- * Constant tables, no heap, no state: safe to call from several threads and from interrupts.
+ * Constant tables, no heap, no state: safe to call from several threads and from interrupts.$but
  * Compile without -ffast-math, which takes away the check of the inputs.
  */
 #ifndef $NAME_H
@@ -47,7 +50,7 @@ extern "C" {
 
 /* Evaluates the model at x, writes y, returns the status. */
 int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS]);
-
+$declarations
 #ifdef $NAME_SELF_TEST
 /* Returns 0, or else the number of the first test row that fails, counted from 1. */
 int $name_self_test(void);
@@ -61,7 +64,7 @@ int $name_self_test(void);
 """
 
 
-def header(model, numbers, dialect, cost, min_coverage, limits=None):
+def header(model, numbers, dialect, cost, min_coverage, limits=None, declarations=""):
     """The header, whose first comment says what the model is and what it costs."""
     lines = [
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
@@ -69,6 +72,7 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None):
         f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions.",
         *coverage_line(cost),
         f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack.",
+        *learner_line(cost),
         "",
         "Inputs x, and their range in the training data:",
     ]
@@ -90,7 +94,17 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None):
     if min_coverage is not None:
         lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
-    return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
+    return header_of(title, lines, dialect, model.n_inputs, model.n_outputs, declarations)
+
+
+def learner_line(cost):
+    """What learning on the device takes besides, where it is there."""
+    if cost.learner_bytes:
+        yield (
+            f"To learn a row takes, beside an evaluation and at most, {cost.learn_multiply_adds} "
+            f"multiply-adds and {cost.learn_divisions} divisions, {cost.learn_stack_bytes} bytes "
+            f"on the stack, and {cost.learner_bytes} of a learner, which is the caller's."
+        )
 
 
 def policy_line(model, where):
@@ -131,7 +145,7 @@ def precision_lines(model, numbers):
     ]
 
 
-def header_of(title, lines, dialect, n_inputs, n_outputs):
+def header_of(title, lines, dialect, n_inputs, n_outputs, declarations=""):
     """The header with these lines in its first comment."""
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
@@ -140,4 +154,6 @@ def header_of(title, lines, dialect, n_inputs, n_outputs):
         title=title,
         n_inputs=n_inputs,
         n_outputs=n_outputs,
+        declarations=declarations,
+        but=_OF_A_LEARNER if declarations else "",
     )

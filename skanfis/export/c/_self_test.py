@@ -27,7 +27,7 @@ $status;
 /* As much as an output may be off. */
 static const $real $name_test_tolerance[$NAME_N_OUTPUTS] =
 $tolerance;
-$coarse
+$coarse$learner_test
 int $name_self_test(void)
 {
     int i, o;
@@ -49,7 +49,7 @@ int $name_self_test(void)
             }
         }
     }
-    return 0;
+    return $rest;
 }
 
 #ifdef $NAME_SELF_TEST_MAIN
@@ -72,14 +72,16 @@ _COARSE = """
 """
 
 
-def self_test(answers, dialect):
-    """The code, with what comes from :func:`known_answers`."""
+def self_test(answers, dialect, learner_test=""):
+    """The code, with what comes from :func:`known_answers`, and with the test of a learner."""
     X, y, status, tolerance = answers
     is_double = dialect.real == "double"
     allowed = "$name_test_tolerance[o]" + (" * $NAME_TEST_FACTOR" if is_double else "")
     template = _CODE.replace("$coarse", _COARSE if is_double else "").replace("$allowed", allowed)
     return dialect.write(
         template,
+        learner_test=learner_test,
+        rest="$name_learner_test()".replace("$name", dialect.name) if learner_test else "0",
         n=len(X),
         x=literals(X),
         y=literals(y),

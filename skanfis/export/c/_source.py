@@ -190,6 +190,12 @@ class Source:
     ``is_part`` whether the main function is for others in the same file.
     """
 
+    # What differs where consequents are learnt on the device: of the functions that read them the
+    # name and first argument.
+    suffix = ""
+    learner: tuple[str, ...] = ()
+    passes: tuple[str, ...] = ()
+
     def __init__(self, numbers, dialect, policy, min_coverage, *, is_part=False, limits=None):
         is_constant = not numbers.n_terms and not numbers.slope_inputs.size
         # The tangent of a constant is the constant; one of no length is its start.
@@ -209,6 +215,16 @@ class Source:
 
     def write(self, template, **words):
         return self.dialect.write(template, int=self.int, **words)
+
+    @property
+    def height(self):
+        """A rule's value at the reference."""
+        return "$name_consequents[r][o][0]"
+
+    @property
+    def slope(self):
+        """A rule's slope j, on input @."""
+        return "$name_consequents[r][o][1 + j]"
 
     @property
     def is_linear(self):
@@ -334,8 +350,9 @@ class Source:
     def predict(self):
         numbers = self.numbers
         lines = [
-            f"{self.linkage}int $name_predict("
-            "const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
+            f"{self.linkage}int $name_predict{self.suffix}("
+            + "".join(f"{argument}, " for argument in self.learner)
+            + "const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
             "{",
             "    /* Inputs in the box. */",
             f"    $real c[{numbers.n_inputs}], sum[{numbers.n_outputs}];",
@@ -379,14 +396,14 @@ class Source:
         ]
         lines += self.over_rules(self.add_rule, tangent=False)
         if self.is_linear:
-            values = [*self.places, "e", *self.shares]
+            values = [*self.passes, *self.places, "e", *self.shares]
             lines += [
                 "    if (status != $NAME_IN_RANGE) {",
                 "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
                 "            e[i] = x[i] - c[i];",
                 *([_LIMIT.strip("\n")] if self.has_limit else []),
                 "        }",
-                f"        $name_tangent({', '.join([*values, 'sum'])});",
+                f"        $name_tangent{self.suffix}({', '.join([*values, 'sum'])});",
                 "    }",
             ]
         lines += self.judge_coverage()
@@ -529,8 +546,8 @@ class Source:
         return [
             *lines,
             "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            "    $real f = $name_consequents[r][o][0];",
-            *self.slope_loop("f += $name_consequents[r][o][1 + j] * z[@];", "    "),
+            f"    $real f = {self.height};",
+            *self.slope_loop(f"f += {self.slope} * z[@];", "    "),
             f"    sum[o] += {strength} * f;",
             "}",
         ]
@@ -597,10 +614,11 @@ class Source:
     def tangent(self):
         """Add to ``sum`` its derivative along e, the way from the box to the input."""
         numbers = self.numbers
-        arguments = [f"const $real *{name}" for name in (*self.places, "e", *self.shares)]
+        values = [f"const $real *{name}" for name in (*self.places, "e", *self.shares)]
+        arguments = [*self.learner, *values]
         lines = [
             "/* Adds to every sum its derivative by the inputs times e, the way out of the box. */",
-            f"static void $name_tangent({', '.join(arguments)},",
+            f"static void $name_tangent{self.suffix}({', '.join(arguments)},",
             "    $real *sum)",
             "{",
         ]
@@ -628,11 +646,11 @@ class Source:
         return self.write("\n".join(lines) + "\n")
 
     def add_rule_change(self, strength, change):
-        along = "f += $name_consequents[r][o][1 + j] * z[@];"
-        ahead = "change_of_f += $name_consequents[r][o][1 + j] * e[@];"
+        along = f"f += {self.slope} * z[@];"
+        ahead = f"change_of_f += {self.slope} * e[@];"
         return [
             "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            "    $real f = $name_consequents[r][o][0];",
+            f"    $real f = {self.height};",
             *(["    $real change_of_f = 0.0R;"] if self.has_slopes else []),
             *self.slope_loop(along, "    "),
             *self.slope_loop(ahead, "    "),
