@@ -93,7 +93,7 @@ class _Exchange:
         if not is_proven:
             # A margin that does not help is not paid for.
             self.held.margin = _FIRST_MARGIN
-            solved = self._solve(evaluation)
+            solved = self._on_sample(evaluation)
             self._warn()
         ended = self._ended(evaluation, solved)
         report = {
