@@ -5,6 +5,7 @@ import math
 import pickle
 import threading
 import warnings
+from dataclasses import replace
 
 import joblib
 import numpy as np
@@ -217,6 +218,8 @@ def test_attributes_reproduce_the_predictions(settings, n_outputs):
     data = X / np.ptp(X, axis=0) * scale + offset
     targets = Y if n_outputs == 1 else np.column_stack([Y, 1e3 + np.cos(X[:, 1] / 40.0)])
     model = ANFISRegressor(solver=VariableProjection(tol=0.01), **settings).fit(data, targets)
+    # What the rules say, before it is held within the limits of the target.
+    model.model_ = replace(model.model_, target=None)
     # p0 + p1 x1 + ... cancels where x is far from the origin, by 10^6 spans for the first column.
     error = np.abs(textbook_predict(model, data) - model.predict(data)) / np.ptp(targets, axis=0)
     assert error.max() < 1e-8
@@ -588,7 +591,8 @@ def test_loaded_model_is_the_same_to_the_last_bit(settings, through, tmp_path):
         loaded = joblib.load(path)
     same_bits(loaded, model)
     assert loaded.get_params()["n_mfs"] == model.n_mfs
-    assert path.stat().st_size < 50_000
+    # Most of it is the posterior that standard deviations need.
+    assert path.stat().st_size < 90_000
     assert model.n_rules_ == (27 if "n_mfs" in settings else 4)
 
 

@@ -35,9 +35,10 @@ def _converter():
 
 def holding(model):
     """A fitted regressor with this model in it."""
-    estimator = ANFISRegressor(
-        out_of_bounds=model.out_of_bounds,
-    )
+    policy = model.out_of_bounds
+    if policy == "linear":
+        policy = LinearExtrapolation(model.max_extrapolation)
+    estimator = ANFISRegressor(out_of_bounds=policy)
     g = np.random.default_rng(0)
     y = g.normal(size=(20, model.n_outputs))
     estimator.set_params(n_mfs=1).fit(g.normal(size=(20, model.n_inputs)), y.squeeze())

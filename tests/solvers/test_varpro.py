@@ -231,7 +231,7 @@ class TestOnKnownProblems:
         result = varpro(problem, Box([-3], [3]), max_iter=50, tol=1e-9, start=np.array([-2.8]))
         lengths = np.abs(np.diff(np.ravel(problem.evaluated)))
         assert_allclose(lengths[:6], [0.3, 0.6, 1.0, 1.0, 1.0, 1.0], rtol=0.011)
-        assert result.n_iter <= 9
+        assert result.n_iter <= 10
 
     def test_settled_is_only_what_was_expected_to_be(self):
         # A Jacobian thirty times too large: little comes of each step, but much was promised.
