@@ -196,9 +196,10 @@ class ANFISRegressor(
         The values used; ``slope_alpha_`` is that on the slopes of the rules' common line.
     structures_ : list of dict
         The candidates that were compared where the structure was chosen by itself, best first:
-        "structure", "expected_error" on new rows like these in standard deviations of the target,
-        "log_evidence", "agreement", "alpha", "stiffness"; with groups "held_out_error" decides.
-        Empty where the structure was given.
+        "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
+        on new rows like these, "log_evidence", "agreement", "alpha", "stiffness"; with groups
+        "held_out_error" decides. Both errors are in standard deviations of the target. Empty where
+        the structure was given.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y: what remains of
         the residual after the effective number of parameters. None where

@@ -49,7 +49,7 @@ TABLE = {
     "bounds": ([*KERNEL, "export"], NUMERIC),
     "constraints": ([*KERNEL, "_validation", "bounds"], [*NUMERIC, "sklearn"]),
     "structure": (
-        [*KERNEL, "_callers", "_validation", "solvers", "cluster"],
+        [*KERNEL, "_callers", "_threads", "_validation", "solvers", "cluster"],
         [*NUMERIC, "sklearn"],
     ),
     "training": (
@@ -116,7 +116,7 @@ TABLE = {
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
-        [PUBLIC, "exceptions", "options", "inspection", "export", "datasets"],
+        [PUBLIC, "exceptions", "options", "inspection", "export", "datasets", "structure"],
         [*PLOTTING, "pandas", "allantools", "joblib", "pyarrow"],
     ),
     PUBLIC: (["exceptions", "regressor"], []),

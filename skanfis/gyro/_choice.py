@@ -1,22 +1,26 @@
 """The choice of law and terms: on all folds for the final model, and within each for its check.
 
 Figures of folds on which the structure was chosen flatter it. For every fold the structure is
-therefore chosen a second time, from the rows that the fold trains on alone: two of the other folds
-are held out there in turn. One fit without two folds serves the choice of both.
+therefore chosen a second time, from the rows that the fold trains on alone: some of the other folds
+are held out there in turn. The terms are those that the regressor's own search finds; beside the
+law, in what the law leaves.
 """
 
+import math
+import warnings
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
+from ..structure import search_terms
 from ._models import make_estimator
-from ._structure import errors_of_fold, grow_terms, held_out_rms
 
 __all__ = ["Choice", "choose", "choose_in_folds", "some_rows"]
 
 # For comparing structures; what neighbours in time say twice is left out.
 _SEARCH_ROWS = 6_000
+# Of the other folds, so many are held out within one.
+_N_INNER_FOLDS = 2
 
 
 @dataclass(frozen=True)
@@ -38,15 +42,13 @@ class Choice:
 
 def choose(X, target, folds, recipe, rng, tell):
     """The choice over all folds, for the model that is fitted to all rows."""
-    folds = [tuple(some_rows(rows, _SEARCH_ROWS, X, rng) for rows in fold) for fold in folds]
-
-    def score(terms, degree):
-        make = partial(make_estimator, recipe, (degree, terms))
-        return held_out_rms(partial(errors_of_fold, make, X, target), folds)
-
+    rows = some_rows(np.arange(len(X)), _SEARCH_ROWS, X, rng)
     if recipe.terms == "search":
-        tell(f"choosing the terms on {len(folds)} folds of {folds[0][0].size:,} rows")
-    choice = _choose(score, recipe, tell)
+        tell(f"choosing the terms on {len(folds)} folds of {rows.size:,} rows")
+    choice = _choose(X.iloc[rows], target[rows], _within(rows, folds, len(X)), recipe)
+    if choice.tried:
+        error = dict(choice.tried)[choice.terms]
+        tell(f"terms {','.join(map(str, choice.terms))}: held-out RMS {error:.4g} deg/s")
     if recipe.physics:
         tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
     return choice
@@ -56,84 +58,62 @@ def choose_in_folds(X, target, folds, recipe, tell):
     """A choice for each fold from its training rows alone; None where nothing is to be chosen."""
     if recipe.terms != "search" and not recipe.physics:
         return None
-    inner = _InnerFolds(X, target, folds, recipe)
     choices = []
-    for fold in range(len(folds)):
-        tell(f"choosing the terms within fold {fold + 1} of {len(folds)}")
-        choices.append(_choose(partial(inner.score, fold), recipe, lambda text: None))
+    for number, (train, _) in enumerate(folds):
+        tell(f"choosing the terms within fold {number + 1} of {len(folds)}")
+        rows = some_rows(train, _SEARCH_ROWS, X, np.random.default_rng(0))
+        others = _within(rows, _nearest(folds, number), len(X))[:_N_INNER_FOLDS]
+        choices.append(_choose(X.iloc[rows], target[rows], others, recipe))
     return choices
 
 
-def _choose(score, recipe, tell):
-    """By ``score(terms, degree)``: the degree on linear rules, then the terms."""
-    degree = 1
-    if recipe.physics:
-        linear = (1,) * len(recipe.inputs)
-        degree = min((1, 2), key=lambda d: score(linear, d))
-    if recipe.terms == "search":
-        grown = partial(score, degree=degree)
-        terms, tried = grow_terms(grown, len(recipe.inputs), recipe.max_rules, tell)
-        return Choice(degree, tuple(terms), tuple(tried))
-    terms = None if recipe.terms == "auto" else recipe.terms
-    return Choice(degree, terms, ())
+def _choose(X, target, folds, recipe):
+    """The degree by the error of linear rules, then the terms."""
+    linear, degree = (1,) * len(recipe.inputs), 1
+    with warnings.catch_warnings():
+        # What a candidate warns of, it is judged by.
+        warnings.simplefilter("ignore")
+        if recipe.physics:
+            degree = min((1, 2), key=lambda d: _held_out_rms(recipe, (d, linear), X, target, folds))
+        if recipe.terms != "search":
+            return Choice(degree, None if recipe.terms == "auto" else recipe.terms, ())
+        left = target
+        if recipe.physics:
+            law = make_estimator(recipe, (degree, linear)).fit(X, target).base_
+            left = target - law.predict(X)
+    found = search_terms(X.to_numpy(dtype=float), left, folds, recipe.max_rules)
+    return Choice(degree, found.terms, found.tried)
 
 
-class _InnerFolds:
-    """Scores of structures within the training rows of each fold."""
-
-    def __init__(self, X, target, folds, recipe):
-        self._X, self._target, self._recipe = X, target, recipe
-        self._rows = [tuple(_mask(rows, len(X)) for rows in fold) for fold in folds]
-        self._partners = [self._partners_of(fold) for fold in range(len(folds))]
-        self._errors: dict = {}
-
-    def score(self, fold, terms, degree):
-        """RMS over the inner folds of a fold."""
-        structure = (degree, tuple(terms))
-        found = [self._of_pair(fold, other, structure) for other in self._partners[fold]]
-        squares, count = (sum(parts) for parts in zip(*found, strict=True)) if found else (0.0, 0)
-        return float(np.sqrt(squares / count)) if count else np.inf
-
-    def _partners_of(self, fold):
-        """The next fold and the one before with rows to hold out within this one's training."""
-        n_folds = len(self._rows)
-        train = self._rows[fold][0]
-        found = []
-        for step in (1, -1):
-            for distance in range(1, n_folds):
-                other = (fold + step * distance) % n_folds
-                if (train & self._rows[other][1]).any() and (train & self._rows[other][0]).any():
-                    found.append(other)
-                    break
-        return sorted(set(found))
-
-    def _of_pair(self, fold, other, structure):
-        """Sum of squares and number of the other's test rows, by a model that saw neither's."""
-        pair = tuple(sorted((fold, other)))
-        key = (pair, structure)
-        if key not in self._errors:
-            self._errors[key] = self._fitted(pair, structure)
-        return self._errors[key][pair.index(fold)]
-
-    def _fitted(self, pair, structure):
-        trains, tests = zip(*(self._rows[fold] for fold in pair), strict=True)
-        rng = np.random.default_rng(0)
-        train = some_rows(np.flatnonzero(trains[0] & trains[1]), _SEARCH_ROWS, self._X, rng)
-        held_out = [np.flatnonzero(trains[0] & tests[1]), np.flatnonzero(trains[1] & tests[0])]
-        both = [some_rows(rows, _SEARCH_ROWS, self._X, rng) for rows in held_out]
-        make = partial(make_estimator, self._recipe, structure)
-        errors, inside = errors_of_fold(
-            make, self._X, self._target, train, np.concatenate(both), quiet=True
-        )
-        parts = np.split(np.where(inside, errors, 0.0), [both[0].size])
-        counts = [part.sum() for part in np.split(inside, [both[0].size])]
-        return [(float(np.sum(part**2)), int(n)) for part, n in zip(parts, counts, strict=True)]
+def _held_out_rms(recipe, structure, X, target, folds):
+    """RMS over the held-out rows of all folds that were in the range of what was trained on."""
+    squares, count = 0.0, 0
+    for train, test in folds:
+        estimator = make_estimator(recipe, structure).fit(X.iloc[train], target[train])
+        errors = estimator.predict(X.iloc[test]) - target[test]
+        low, high, tested = X.iloc[train].min(), X.iloc[train].max(), X.iloc[test]
+        inside = ((tested >= low) & (tested <= high)).all(axis=1).to_numpy() & np.isfinite(errors)
+        squares += float(np.sum(errors[inside] ** 2))
+        count += int(inside.sum())
+    return math.sqrt(squares / count) if count else math.inf
 
 
-def _mask(rows, n_rows):
-    mask = np.zeros(n_rows, dtype=bool)
-    mask[rows] = True
-    return mask
+def _nearest(folds, number):
+    """The other folds: the next one, the one before, and so on."""
+    steps = sorted(range(1, len(folds)), key=lambda step: min(step, len(folds) - step))
+    return [folds[(number + step) % len(folds)] for step in steps]
+
+
+def _within(rows, folds, n_rows):
+    """Folds as positions in ``rows``, which are some of so many; those with rows on both sides."""
+
+    def positions(part):
+        mask = np.zeros(n_rows, dtype=bool)
+        mask[part] = True
+        return np.flatnonzero(mask[rows])
+
+    inner = [(positions(train), positions(test)) for train, test in folds]
+    return [fold for fold in inner if all(part.size for part in fold)]
 
 
 def some_rows(rows, n_rows, X, rng):

@@ -7,6 +7,7 @@ from .request import StructureRequest, report_constant
 from .sample import SampleSize, effective_weight, representative_rows
 from .size import GridSize, term_counts
 from .start import Start
+from .terms import TermsFound, search_terms
 
 __all__ = [
     "GridSize",
@@ -14,6 +15,7 @@ __all__ = [
     "Spacing",
     "Start",
     "StructureRequest",
+    "TermsFound",
     "check_inputs",
     "clustered_antecedent",
     "effective_weight",
@@ -21,5 +23,6 @@ __all__ = [
     "imported_antecedent",
     "report_constant",
     "representative_rows",
+    "search_terms",
     "term_counts",
 ]

@@ -25,11 +25,11 @@ from .size import GridSize, RuleBaseSize, term_counts
 from .start import Start
 from .tuning import scaled, tuned_start
 
-__all__ = ["StructureRequest", "report_constant"]
+__all__ = ["OVERLAP", "StructureRequest", "report_constant"]
 
 # Neighbouring terms of a grid cross at this membership at the start. From the customary 0.5, Jang's
 # sinc gets stuck; elsewhere it makes little difference (benchmarks/start.py).
-_OVERLAP = 0.6
+OVERLAP = 0.6
 _MIB = 2**20
 
 
@@ -91,7 +91,7 @@ class StructureRequest:
                 self.consequent_inputs,
                 self.seed,
                 self.weights,
-                _OVERLAP,
+                OVERLAP,
                 self.other_families,
             ).run(self.partition)
         if isinstance(self.partition, TSKModel):
@@ -167,7 +167,7 @@ class StructureRequest:
         GridSize(counts, n_basis, rows.y.shape[1]).check_grid_fits(
             self.n_mfs, _memory_limit(), self.names
         )
-        return grid_antecedent(families, counts, Spacing(rows), _OVERLAP)
+        return grid_antecedent(families, counts, Spacing(rows), OVERLAP)
 
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""

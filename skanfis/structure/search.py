@@ -22,8 +22,8 @@ Beyond a thousand rows, the candidates see representative rows only: the search 
 longer, whatever the number of rows.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import prod
 
 import numpy as np
@@ -37,6 +37,7 @@ from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
 from ..rows import Rows
+from .candidate import Candidate
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .held_out import held_out_loss
@@ -44,7 +45,7 @@ from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
 from .tuning import FIRST_PENALTY, FIRST_STEPS, MOST_ROWS, Tuned, scaled, settled, tune
 
-__all__ = ["SEARCHED", "Candidate", "StructureSearch"]
+__all__ = ["SEARCHED", "StructureSearch"]
 
 # The partitions whose size the data decide on: which candidates each of them has.
 SEARCHED = ("auto", "grid", "subtractive", "fcm")
@@ -66,11 +67,6 @@ _TURNS = 4
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
-_IN_WORDS = {
-    "k-means": "{} scattered rules",
-    "fcm": "{} fuzzy clusters",
-    "subtractive": "clusters of radius {}",
-}
 _MOST_FOLDS = 5
 # What a larger model must gain in n log FPE: "very strong" in the words of Kass and Raftery (1995).
 # The best of many candidates gains up to this on a plane with noise. Where the score is an error, a
@@ -78,24 +74,6 @@ _MOST_FOLDS = 5
 _DECISIVE = 10.0
 _WORTHWHILE_ERROR = 0.005
 _ERROR_OF_ERROR = 0.5
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A structure to be tried: terms per input, or the clusters of a clustering."""
-
-    counts: tuple[int, ...] | None
-    size: float | None = None  # number of clusters, or the radius that they have
-    clustering: str = ""  # "k-means", "subtractive" or "fcm"
-    is_loose: bool = False  # whether its training begins with the premises (see ``tuning``)
-    family: type[Membership] | None = None  # where it is another one than that of the search
-
-    def describe(self):
-        """In words."""
-        family = "" if self.family is None else f", {self.family.name}"
-        if self.counts is not None:
-            return f"grid {list(self.counts)}{family}"
-        return _IN_WORDS[self.clustering].format(self.size) + family
 
 
 class StructureSearch:
@@ -118,6 +96,12 @@ class StructureSearch:
         Membership at which neighbouring terms of a grid cross.
     other_families : sequence of type of Membership
         For all inputs in place of ``families``, tried on the structure that is found.
+    max_rules : int, optional
+        Most rules of a candidate. Where it is not given, the number of consequent parameters is
+        bounded too.
+    split : callable
+        From the groups of some rows to training and held-out positions of every fold; none where
+        the groups say nothing.
     """
 
     def __init__(
@@ -131,6 +115,8 @@ class StructureSearch:
         fixed: dict,
         overlap: float,
         other_families: Sequence[type[Membership]] = (),
+        max_rules: int | None = None,
+        split: Callable | None = None,
     ):
         self.rows, self.families, self.order, self.seed = rows, families, order, seed
         self.consequent_inputs = consequent_inputs
@@ -146,10 +132,15 @@ class StructureSearch:
         self.parent: Tuned | None = None  # of the grids that are tried
         self.found: dict[Candidate, Tuned] = {}
         self.scores: dict[Candidate, float] = {}
-        self.folds = _folds(self.sample.groups)
+        self.max_rules = max_rules
+        self.folds = (split or _folds)(self.sample.groups)
 
     def run(self, partition):
-        """The best structure found; ``partition`` is one of ``SEARCHED``."""
+        """A start from the best structure found; ``partition`` is one of ``SEARCHED``."""
+        return self._start(self.choose(partition))
+
+    def choose(self, partition):
+        """The best candidate; all that were tried are keys of ``scores``, in the order of trial."""
         best = Candidate((1,) * self.rows.X.shape[1])
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
@@ -164,7 +155,7 @@ class StructureSearch:
         if best.counts is None or max(best.counts) > 1:
             for family in self.other_families:
                 best = self._better(best, replace(best, family=family))
-        return self._start(best)
+        return best
 
     def _grow_grid(self, best):
         self._score(best)
@@ -227,7 +218,8 @@ class StructureSearch:
     @property
     def _most_columns(self):
         of_many = min(_RULES_OF_MANY * self.n_basis, _MOST_OF_MANY)
-        return min(max(_MOST_COLUMNS, of_many), 2.0 * self.n_sample)
+        asked_for = (self.max_rules or 0) * self.n_basis
+        return min(max(_MOST_COLUMNS, of_many, asked_for), 2.0 * self.n_sample)
 
     def _is_small(self, candidate):
         n_rules = prod(candidate.counts)
@@ -235,7 +227,7 @@ class StructureSearch:
         return (
             max(candidate.counts) <= _MOST_TERMS
             and all(c == 1 or c <= self.spacing.n_values(j) for j, c in enumerate(candidate.counts))
-            and n_rules <= _MOST_RULES
+            and n_rules <= (self.max_rules or _MOST_RULES)
             and n_columns <= self._most_columns
         )
 
@@ -281,7 +273,7 @@ class StructureSearch:
         return KMeans(candidate.size, n_init=3, random_state=self.seed)
 
     def _score(self, candidate):
-        """N log FPE, or the error on groups left out; infinite where there are too few rows."""
+        """N log FPE, or the error on rows left out; infinite where there are too few rows."""
         if candidate not in self.scores:
             self.scores[candidate] = self._train_and_score(candidate)
         return self.scores[candidate]
@@ -295,6 +287,12 @@ class StructureSearch:
         tuned = self._tuned(candidate)
         with np.errstate(divide="ignore"):
             return self.n_sample * tuned.posterior.n_outputs * np.log(tuned.expected_error)
+
+    def error(self, candidate):
+        """RMS on the rows left out, or what is expected on new ones; of the standardised target."""
+        return (
+            self._score(candidate) if self.folds else np.sqrt(self._tuned(candidate).expected_error)
+        )
 
     def _tuned(self, candidate):
         if candidate not in self.found:
@@ -377,7 +375,8 @@ class StructureSearch:
         """Every candidate in words and numbers, best first."""
         lines = []
         for candidate in sorted(self.scores, key=self._score):
-            line: dict = {"structure": candidate.describe()}
+            counts = None if candidate.counts is None else list(candidate.counts)
+            line: dict = {"structure": candidate.describe(), "n_mfs": counts}
             if candidate in self.found:
                 found = self.found[candidate]
                 line["expected_error"] = float(np.sqrt(found.expected_error))

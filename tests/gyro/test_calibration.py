@@ -6,7 +6,7 @@ import pytest
 from sklearn.model_selection import GroupKFold
 
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._choice import choose_in_folds
+from skanfis.gyro._choice import choose, choose_in_folds
 from skanfis.gyro._headline import headline
 from skanfis.gyro._split import Split
 from skanfis.gyro._summary import errors_and_verdict
@@ -115,3 +115,15 @@ def test_what_a_fold_holds_out_has_no_say_in_its_structure():
     assert dict(again[1].tried) == pytest.approx(dict(found[1].tried), rel=1e-9)
     assert dict(again[0].tried) != pytest.approx(dict(found[0].tried), rel=1e-3)
     assert choose_in_folds(X, y, folds, Recipe(("temperature",), terms=(2,)), print) is None
+
+
+def test_terms_are_for_what_the_law_leaves():
+    log, told = log_of(law), []
+    X, rate = log[["temperature", "output"]], log["rate"].to_numpy()
+    recipe = Recipe(tuple(X), physics=True)
+    choice = choose(X, rate, folds_of(log), recipe, np.random.default_rng(0), told.append)
+    assert choice.structure == (1, (1, 1))
+    # That is the noise of the output, over the slope of a sine up to 0.8 rad.
+    error = dict(choice.tried)[1, 1]
+    assert error == pytest.approx(NOISE * np.sqrt(np.tan(0.8) / 0.8), rel=0.06)
+    assert f"terms 1,1: held-out RMS {error:.4g} deg/s" in told

@@ -121,6 +121,8 @@ def test_candidates_are_listed_from_the_best(rng):
     errors = [c["expected_error"] for c in model.structures_]
     assert errors == sorted(errors)
     assert all(set(c) == KEYS for c in model.structures_)
+    for c in model.structures_:
+        assert c["structure"] == f"grid {c['n_mfs']}" or c["n_mfs"] is None
     keys = ("agreement", "alpha", "stiffness")
     chosen = [
         c["expected_error"]
@@ -131,7 +133,7 @@ def test_candidates_are_listed_from_the_best(rng):
     assert min(chosen) <= 1.01 * errors[0]
 
 
-KEYS = {"structure", "expected_error", "log_evidence", "agreement", "alpha", "stiffness"}
+KEYS = {"structure", "n_mfs", "expected_error", "log_evidence", "agreement", "alpha", "stiffness"}
 
 
 def test_log_evidence_is_that_of_a_linear_model_averaged_out(rng):
