@@ -116,7 +116,7 @@ TABLE = {
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
-        [PUBLIC, "exceptions", "options", "inspection", "export", "datasets"],
+        [PUBLIC, "exceptions", "options", "inspection", "export", "bounds", "datasets"],
         [*PLOTTING, "pandas", "allantools", "joblib", "pyarrow"],
     ),
     PUBLIC: (["exceptions", "regressor"], []),
