@@ -116,7 +116,16 @@ TABLE = {
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
-        [PUBLIC, "exceptions", "options", "inspection", "export", "datasets", "structure"],
+        [
+            PUBLIC,
+            "exceptions",
+            "options",
+            "inspection",
+            "export",
+            "bounds",
+            "datasets",
+            "structure",
+        ],
         [*PLOTTING, "pandas", "allantools", "joblib", "pyarrow"],
     ),
     PUBLIC: (["exceptions", "regressor"], []),

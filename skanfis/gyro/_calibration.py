@@ -47,6 +47,7 @@ class Recipe:
     max_rules: int = 36
     fit_rows: int = 100_000
     n_jobs: int | None = None
+    box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
 
 
 @dataclass(frozen=True, eq=False)

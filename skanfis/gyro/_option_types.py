@@ -7,6 +7,7 @@ import math
 __all__ = [
     "MOST_RULES",
     "axis",
+    "box",
     "count",
     "encoding",
     "extent",
@@ -119,6 +120,19 @@ def axis(text):
     if not plain or bool(equals) != bool(name):
         raise argparse.ArgumentTypeError(f"{_shown(text)} must be such as x or x=NAME")
     return text
+
+
+def box(text):
+    name, _, ends = text.partition("=")
+    try:
+        low, high = map(float, ends.split(":"))
+    except ValueError:
+        low = high = math.nan
+    if not (name and -math.inf < low <= high < math.inf):
+        raise argparse.ArgumentTypeError(
+            f"{_shown(text)} must be INPUT=LOW:HIGH, two numbers, such as temperature=-40:85"
+        )
+    return name, low, high
 
 
 def share(text):

@@ -11,6 +11,7 @@ from ._layout import COLUMNS
 from ._option_types import (
     MOST_RULES,
     axis,
+    box,
     count,
     encoding,
     extent,
@@ -257,6 +258,17 @@ def _add_range(group):
         default=0.1,
         metavar="SHARE",
         help="rows that the data cover less are flagged (0.1)",
+    )
+    group.add_argument(
+        "--box",
+        nargs="+",
+        type=box,
+        action="extend",
+        default=[],
+        metavar="INPUT=LOW:HIGH",
+        help="box of inputs, such as temperature=-40:85, over which the report proves how large "
+        "the compensation can be; of others the range of the calibration. Units: s, degC, degC/s, "
+        "and that of the output",
     )
     group.add_argument(
         "--groups",

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ._budget import budget_of
+from ._certain import certain_of
 from ._dossier import Dossier
 from ._figures_of_merit import FIGURES_OF_ALLAN
 from ._rate_units import in_rate_unit
@@ -143,6 +145,16 @@ class Results:
     def readability(self):
         """Whether the rules can be read one by one."""
         return readability_of(self.calibration)
+
+    @cached_property
+    def budget(self):
+        """The parts of a row's uncertainty."""
+        return budget_of(self.calibration, rules_of(self.calibration))
+
+    @cached_property
+    def certain(self):
+        """What is proven over the box that was asked for."""
+        return certain_of(self.calibration)
 
     @cached_property
     def why_no_allan(self):

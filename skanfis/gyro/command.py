@@ -77,6 +77,7 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
+    _refuse_twice([name for name, *_ in options.box], "--box: {} is given twice.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
@@ -137,11 +138,19 @@ def _calibration(options, paths, task, tell, may_skip):
         max_rules=options.max_rules,
         fit_rows=options.fit_rows,
         n_jobs=options.jobs,
+        box=_box(options.box, inputs),
     )
     split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
     tell(f"inputs: {', '.join(inputs)}")
     tell(f"check: {split.sentence}")
     return calibrate(reading.log, split, recipe, tell, reading.name_row), reading.notes
+
+
+def _box(sides, inputs):
+    for name, *_ in sides:
+        if name not in inputs:
+            raise UsageError(f"--box: {name!r} is no input; these are {', '.join(inputs)}.")
+    return tuple(sides)
 
 
 def _named(paths):

@@ -10,6 +10,7 @@ from ._sections.instead import instead
 from ._sections.log import log
 from ._sections.merit import merit
 from ._sections.rules import reading, rules, rules_text
+from ._sections.sure import sure
 from ._sections.use import limits_of_use
 from ._sections.words import words
 
@@ -25,7 +26,7 @@ def report_page(calibration, title, dossier=None):
     results = Results(calibration, dossier)
     for section in (conclusion, cards, identity, check, instead, merit, _pictures):
         section(page, results)
-    for section in (limits_of_use, rules, reading, log):
+    for section in (limits_of_use, sure, rules, reading, log):
         section(page, results)
     page.footer(f"Made by {programs()}. Figures of merit in the terms of IEEE Std 952.")
     return page.render()

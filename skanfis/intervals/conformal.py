@@ -267,11 +267,42 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if self.method == "cross":
             lower, upper = self._cross_intervals(X, centers, coverage)
         else:
-            width = deviations * [
-                score_quantile(scores, self._masses, coverage) for scores in self._scores_by_row.T
-            ]
+            width = deviations * self._quantiles(coverage)
             lower, upper = centers - width, centers + width
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
+
+    def half_width(self, coverage=0.9):
+        """How far intervals reach to either side of the prediction, by ``method`` "split" or "loo".
+
+        Parameters
+        ----------
+        coverage : float, default=0.9
+            As of :meth:`predict_interval`.
+
+        Returns
+        -------
+        q : float or ndarray of shape (n_outputs,)
+            In standard deviations of ``predict(X, return_std=True)``; with ``scaled=False`` in the
+            target's units.
+
+        Raises
+        ------
+        ValueError
+            As :meth:`predict_interval` does; of ``method="cross"``, whose intervals are those of
+            several models.
+        """
+        check_is_fitted(self)
+        if self.method == "cross":
+            raise ValueError(
+                "method='cross' has no one half width: its intervals are by the models of all "
+                "folds. Use method='split' or 'loo'."
+            )
+        found = self._quantiles(self._checked_coverage(coverage))
+        return float(found[0]) if self._single_output else found
+
+    def _quantiles(self, coverage):
+        scores = self._scores_by_row.T
+        return np.array([score_quantile(one, self._masses, coverage) for one in scores])
 
     def _regressor(self):
         return ANFISRegressor() if self.estimator is None else self.estimator

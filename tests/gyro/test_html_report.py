@@ -109,6 +109,17 @@ def test_needs_nothing_from_elsewhere(page):
     assert not re.search(r"url\(|@import|https?://", page)
 
 
+def test_says_how_sure(calibration, page):
+    results = Results(calibration)
+    text = " ".join(" ".join(Outline(page).text).split())
+    told = text[text.rindex("How sure") : text.rindex("Can the rules be read?")]
+    budget = results.budget
+    for value in (budget.noise, budget.scatter, budget.scatter_high, budget.model, budget.combined):
+        assert results.shown(value) in told
+    assert f"{results.shown(results.certain.largest)} °/s" in told
+    assert "never against it proven" in told
+
+
 def test_every_picture_says_what_it_shows(page):
     outline = Outline(page)
     n_pictures = outline.tags.count("img")

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from .._fold import fold
 from .._numbers import Numbers, as_held
 from ._cost import CCost, cost, with_learner
+from ._deviation import DeviationSource, deviation_of, deviation_test, with_deviation
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._header import BITS, header
+from ._interval import check_deviation, read_interval
 from ._learner import LearningSource, learner_of, learning_test
 from ._saturation import read_limits
 from ._self_test import known_answers, self_test
@@ -55,6 +57,8 @@ def export_c(
     min_coverage=0.1,
     saturate=None,
     forgetting=None,
+    deviation=False,
+    coverage=None,
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
@@ -94,6 +98,15 @@ def export_c(
         A number above 0 and at most 1 adds recursive least squares, by which the consequents go on
         learning on the device, with this forgetting factor; ``estimator`` is then an ANFISRegressor
         trained by ``partial_fit``, which knows how sure its consequents are. None leaves it out.
+    deviation : bool, default=False
+        Whether to write ``int NAME_deviation(const double x[], double deviation[])`` too: the
+        standard deviation of :meth:`~skanfis.ANFISRegressor.predict`, with ``return_std=True``. Its
+        tables grow with the square of the number of coefficients.
+    coverage : float, default=None
+        Between 0 and 1: adds ``int NAME_interval(const double x[], double lower[], double
+        upper[])``, the ends of :meth:`~skanfis.intervals.ConformalRegressor.predict_interval` at
+        this coverage, and the deviation. ``estimator`` is then a fitted ConformalRegressor with
+        ``scaled=True`` and ``method="split"`` or ``"loo"``, whose intervals are those of one model.
 
     Returns
     -------
@@ -142,6 +155,8 @@ def export_c(
     (8, 88)
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
+    estimator, reach = read_interval(estimator, coverage)
+    deviation = check_deviation(deviation, forgetting) or reach is not None
     model = fold(estimator)
     if model.support is None:
         # Rules that come from elsewhere: no data to be near to or far from.
@@ -151,20 +166,31 @@ def export_c(
     limits = read_limits(saturate, numbers)
     answers = known_answers(model, numbers, min_coverage, BITS, limits)
     declarations = test = ""
-    if forgetting is None:
+    body: Source
+    call = "learner_test"
+    if deviation:
+        found = deviation_of(model, numbers, reach, coverage)
+        sure = DeviationSource(
+            numbers, dialect, model.out_of_bounds, min_coverage, found, limits=limits
+        )
+        price = with_deviation(cost(numbers, sure), sure)
+        test, call = deviation_test(as_held(model, numbers), sure, answers), "deviation_test"
+        declarations, body = sure.declarations(), sure
+    elif forgetting is None:
         body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)
         price = cost(numbers, body)
     else:
         learner = learner_of(estimator, numbers, forgetting)
-        body = LearningSource(
+        learning = LearningSource(
             numbers, dialect, model.out_of_bounds, min_coverage, learner, limits=limits
         )
-        price = with_learner(cost(numbers, body), body)
-        declarations, test = body.declarations(), learning_test(as_held(model, numbers), body)
+        price = with_learner(cost(numbers, learning), learning)
+        declarations, body = learning.declarations(), learning
+        test = learning_test(as_held(model, numbers), learning)
     code = CCode(
         name,
         header(model, numbers, dialect, price, min_coverage, limits, declarations),
-        body.text(f"{stem}.h") + self_test(answers, dialect, test),
+        body.text(f"{stem}.h") + self_test(answers, dialect, test, call),
         price,
     )
     write_files(code, path)

@@ -7,11 +7,11 @@ import numpy as np
 from ._families import BODIES
 from ._source import index_type
 
-__all__ = ["CCost", "cost", "with_learner"]
+__all__ = ["INDEX_BYTES", "CCost", "cost", "with_learner"]
 
 # What C promises at least, and what there is nearly everywhere.
 _INT_BYTES = 4
-_INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
+INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,9 @@ class CCost:
         What it takes to learn a row, at most, beside an evaluation. Zero without a learner.
     learner_bytes : int
         What is learnt, in memory of the caller; zero without a learner.
+    deviation_multiply_adds, deviation_stack_bytes : int
+        What a standard deviation in range takes, and its arrays on the stack; beyond the range it
+        takes four times as much. Its tables are among ``table_bytes``. Zero without it.
 
     Examples
     --------
@@ -64,6 +67,8 @@ class CCost:
     learn_divisions: int = 0
     learn_stack_bytes: int = 0
     learner_bytes: int = 0
+    deviation_multiply_adds: int = 0
+    deviation_stack_bytes: int = 0
 
 
 def cost(numbers, code):
@@ -141,7 +146,7 @@ def table_bytes(numbers, code):
     positions += [] if numbers.rule_terms is None else [numbers.rule_terms]
     positions += [numbers.slope_inputs] if code.selects_slopes else []
     return sum(table.nbytes for table in real) + sum(
-        table.size * _INDEX_BYTES[index_type(table)] for table in positions
+        table.size * INDEX_BYTES[index_type(table)] for table in positions
     )
 
 

@@ -73,6 +73,7 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None, declaration
         *coverage_line(cost),
         f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack.",
         *learner_line(cost),
+        *deviation_line(cost),
         "",
         "Inputs x, and their range in the training data:",
     ]
@@ -104,6 +105,15 @@ def learner_line(cost):
             f"To learn a row takes, beside an evaluation and at most, {cost.learn_multiply_adds} "
             f"multiply-adds and {cost.learn_divisions} divisions, {cost.learn_stack_bytes} bytes "
             f"on the stack, and {cost.learner_bytes} of a learner, which is the caller's."
+        )
+
+
+def deviation_line(cost):
+    """What a standard deviation takes, where it is there."""
+    if cost.deviation_multiply_adds:
+        yield (
+            f"A standard deviation in range takes {cost.deviation_multiply_adds} multiply-adds and "
+            f"{cost.deviation_stack_bytes} bytes on the stack; beyond it four times as many."
         )
 
 

@@ -72,8 +72,8 @@ _COARSE = """
 """
 
 
-def self_test(answers, dialect, learner_test=""):
-    """The code, with what comes from :func:`known_answers`, and with the test of a learner."""
+def self_test(answers, dialect, learner_test="", call="learner_test"):
+    """The code, with what comes from :func:`known_answers`, and with a further test."""
     X, y, status, tolerance = answers
     is_double = dialect.real == "double"
     allowed = "$name_test_tolerance[o]" + (" * $NAME_TEST_FACTOR" if is_double else "")
@@ -81,7 +81,7 @@ def self_test(answers, dialect, learner_test=""):
     return dialect.write(
         template,
         learner_test=learner_test,
-        rest="$name_learner_test()".replace("$name", dialect.name) if learner_test else "0",
+        rest=f"{dialect.name}_{call}()" if learner_test else "0",
         n=len(X),
         x=literals(X),
         y=literals(y),

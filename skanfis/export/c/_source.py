@@ -16,7 +16,7 @@ import numpy as np
 from ._families import BODIES, HELPERS
 from ._text import literals
 
-__all__ = ["FINITE_INPUT", "Source", "index_type", "rejection"]
+__all__ = ["CENTRE", "FINITE_INPUT", "INPUTS", "Source", "index_type", "rejection", "words_of"]
 
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
 _MOST_LOOPS = 12
@@ -45,7 +45,7 @@ static void $name_normalise($real *l, $int n)
 
 # Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
 # left of it would have no digits.
-_CENTRE = """
+CENTRE = """
 /* Subtracts from n derivatives their mean by the n shares. */
 static void $name_centre($real *s, const $real *share, $int n)
 {
@@ -135,7 +135,7 @@ FINITE_INPUT = """
         }
 """
 
-_INPUTS = """
+INPUTS = """
         c[i] = x[i];
         if (c[i] < $name_low[i]) {
             c[i] = $name_low[i];
@@ -169,7 +169,7 @@ def index_type(values):
     return next((kind for limit, kind in limits if largest <= limit), "unsigned long")
 
 
-def _words(terms):
+def words_of(terms):
     """What stands for the distances and constants of terms in their family's templates."""
     n, n_columns = terms.n_locations, terms.constants.shape[1]
     rest = [f" - p[{n + k}]" if terms.is_in_two else "" for k in range(n)]
@@ -322,7 +322,7 @@ class Source:
                 what = "Derivative of the logarithm" if suffix else "Logarithm"
                 head = f"/* {what} of a membership: {label}. */\n"
                 head += f"static $real $name_{label}{suffix}($real x, const $real *p)\n"
-                functions.append(self.write(f"{head}{{{body}}}\n", **_words(terms)))
+                functions.append(self.write(f"{head}{{{body}}}\n", **words_of(terms)))
         calls = "".join(functions)
         helpers = [
             self.write(code).lstrip()
@@ -336,7 +336,7 @@ class Source:
         if self.has_shares:
             parts.append(self.write(_NORMALISE).lstrip())
             if self.is_linear:
-                parts.append(self.write(_CENTRE).lstrip())
+                parts.append(self.write(CENTRE).lstrip())
         if self.judges_coverage:
             parts += [self.write(_NEAR).lstrip(), self.coverage()]
         if self.is_linear:
@@ -375,7 +375,7 @@ class Source:
             f"    $int {', '.join(self.loop_variables(tangent=False))};",
             "",
             FINITE_INPUT.strip("\n"),
-            _INPUTS.strip("\n"),
+            INPUTS.strip("\n"),
         ]
         if self.has_slopes:
             lines.append("        z[i] = c[i] - $name_reference[i];")

@@ -1,0 +1,211 @@
+"""Standard deviations and intervals in C are those of Python."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sklearn.cluster import KMeans
+from sklearn.frozen import FrozenEstimator
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.export import export_c
+from skanfis.intervals import ConformalRegressor
+from skanfis.options import LinearExtrapolation
+
+from .c_compiler import SANITIZE, STRICT, UNTOUCHED, gcc, needs_compiler, run
+
+pytestmark = [
+    # Models are not trained to the end, and asked out of their range.
+    pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning"),
+    pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning"),
+    pytest.mark.filterwarnings("ignore::skanfis.exceptions.ReadabilityWarning"),
+]
+
+# Writes what every function answers on every row.
+_DRIVER = """
+#include <stdio.h>
+{includes}
+static {real} x[{n_rows}][{n_inputs}];
+int main(void)
+{{
+    FILE *in = fopen("rows", "rb"), *out = fopen("answers", "wb");
+    int i, o;
+    if (!in || !out || fread(x, sizeof x, 1, in) != 1) {{
+        return 2;
+    }}
+{calls}
+    fclose(in);
+    return fclose(out) == 0 ? 0 : 2;
+}}
+"""
+_CALL = """
+    if ({name}_self_test() != 0) {{
+        printf("self-test of {name}: %d\\n", {name}_self_test());
+        return 3;
+    }}
+    for (i = 0; i < {n_rows}; ++i) {{
+        {real} s[{n_outputs}], spare[{n_outputs}];
+        (void)spare;
+        for (o = 0; o < {n_outputs}; ++o) {{
+            s[o] = ({real})-12345.0;
+        }}
+        {name}_{call};
+        fwrite(s, sizeof s, 1, out);
+    }}
+"""
+
+
+def surface(n_outputs=1, n_rows=150):
+    """Two inputs, one of them far from the origin for its spread."""
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (n_rows, 2)) * [300.0, 2.0] + [1e4, 0.0]
+    u, v = (X[:, 0] - 1e4) / 300.0, X[:, 1]
+    y = 5.0 + np.sin(3.0 * u) + u * v + 0.05 * g.normal(size=n_rows)
+    return X, np.column_stack([y, 1e-3 * (u - v**2) + 1e-4 * g.normal(size=n_rows)])[
+        :, :n_outputs
+    ].squeeze()
+
+
+def around(X, n_rows=300, dtype=np.float64):
+    low, high = X.min(axis=0), X.max(axis=0)
+    unit = np.random.default_rng(1).uniform(-0.4, 1.4, (n_rows, X.shape[1]))
+    unit[: n_rows // 2] = np.clip(unit[: n_rows // 2], 0.01, 0.99)
+    return (low + (high - low) * unit).astype(dtype)
+
+
+def answers(codes, X, folder, n_outputs, std="c99", call="deviation(x[i], s)", sanitize=()):
+    """What compiled models say, each (n_rows, n_outputs)."""
+    real = "float" if X.dtype == np.float32 else "double"
+    for code in codes:
+        (folder / f"{code.name}.h").write_text(code.header, encoding="ascii")
+        (folder / f"{code.name}.c").write_text(code.source, encoding="ascii")
+    includes = "".join(
+        f'#define {code.name.upper()}_SELF_TEST\n#include "{code.name}.c"\n' for code in codes
+    )
+    words = {"n_rows": len(X), "real": real, "n_outputs": n_outputs, "call": call}
+    calls = "".join(_CALL.format(name=code.name, **words) for code in codes)
+    text = _DRIVER.format(includes=includes, calls=calls, n_inputs=X.shape[1], **words)
+    (folder / "driver.c").write_text(text, encoding="ascii")
+    X.tofile(folder / "rows")
+    gcc([f"-std={std}", *STRICT, *sanitize, "driver.c", "-o", "driver", "-lm"], folder)
+    done = run(["./driver"], folder)
+    assert done.returncode == 0, (done.stdout + done.stderr)[:4000]
+    found = np.fromfile(folder / "answers", X.dtype)
+    return found.reshape(len(codes), len(X), n_outputs)
+
+
+def quick(mf="gaussian", policy="linear", **options):
+    return ANFISRegressor(
+        **{"n_mfs": [3, 2], "mf": mf, "out_of_bounds": policy, "max_iter": 3} | options
+    )
+
+
+FAMILIES = [
+    "gaussian", "bell", "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped",
+    "sigmoid_difference", "sigmoid_product", ["s_shaped", "z_shaped"],
+]  # fmt: skip
+OTHERS = {
+    "clusters": lambda: quick(n_mfs="auto", partition=KMeans(4, n_init=1, random_state=0)),
+    "order 0": lambda: quick(order=0),
+    "held": lambda: quick(policy="clip"),
+    "without end": lambda: quick(policy=LinearExtrapolation(np.inf)),
+    "plane": lambda: quick(n_mfs=1),
+    "premises given": lambda: quick(solver="lse"),
+    "a column without slopes": lambda: quick(consequent_features=[1]),
+    "behind a scaler": lambda: make_pipeline(StandardScaler(), quick(policy="clip")),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("std", ["c99", "c89"])
+def test_deviations_are_those_of_python(std, tmp_path):
+    X, y = surface(n_outputs=2)
+    kinds = [lambda mf=mf: quick(mf) for mf in FAMILIES] + list(OTHERS.values())
+    # C89 differs by its exp and log alone, in single precision.
+    fitted = [make().fit(X, y) for make in (kinds if std == "c99" else kinds[::5])]
+    sanitize = SANITIZE if std == "c89" else []
+    for dtype, tolerance in ((np.float64, 1e-9), (np.float32, 1e-2)):
+        # Straight flanks have corners, across which single precision takes no differences.
+        models = fitted
+        if dtype is np.float32:
+            models = [fitted[1], *fitted[5::5]] if std == "c99" else fitted
+        if std == "c89" and dtype is np.float64:
+            models = models[:1]
+        rows = around(X, dtype=dtype)
+        codes = [
+            export_c(
+                model,
+                name=f"m{i}",
+                dtype="double" if dtype is np.float64 else "float",
+                std=std,
+                min_coverage=None if i % 2 else 0.1,
+                deviation=True,
+            )
+            for i, model in enumerate(models)
+        ]
+        found = answers(codes, rows, tmp_path, 2, std, sanitize=sanitize)
+        for i, (model, one) in enumerate(zip(models, found, strict=True)):
+            wanted = model.predict(rows.astype(float), return_std=True)[1]
+            off = np.abs(one / wanted - 1.0).max()
+            assert off < tolerance, (i, dtype, off)
+
+
+@needs_compiler
+@pytest.mark.parametrize("policy", ["linear", "nan", "raise"])
+def test_interval_is_that_of_the_conformal_regressor(policy, tmp_path):
+    X, y = surface(n_outputs=2)
+    rules = quick(policy=policy, max_iter=2).fit(X, y)
+    sure = ConformalRegressor(FrozenEstimator(rules), method="split", calibration_fraction=1.0)
+    sure.fit(X, y + 0.05 * np.random.default_rng(2).standard_t(2, y.shape))
+    code = export_c(sure, name="m", coverage=0.9, min_coverage=None)
+    X = around(X)
+    inside = rules.in_bounds(X)
+    answered = inside if policy != "linear" else np.full(len(X), True)
+    lower, upper = sure.predict_interval(X[answered], 0.9)
+    real = [
+        answers([code], X, tmp_path, 2, call=call)[0]
+        for call in ("interval(x[i], s, spare)", "interval(x[i], spare, s)")
+    ]
+    np.testing.assert_allclose(real[0][answered], lower, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(real[1][answered], upper, rtol=1e-9, atol=1e-12)
+    left = UNTOUCHED if policy == "raise" else np.nan
+    np.testing.assert_array_equal(real[0][~answered], left)
+
+
+def test_deviation_takes_a_posterior_and_an_interval_one_model():
+    X, y = surface()
+    rules = quick(max_iter=1)
+    bare = replace(rules.fit(X, y).model_, posterior=None)
+    with pytest.raises(ValueError, match="knows of no posterior"):
+        export_c(bare, name="m", deviation=True)
+    flanks = quick("triangular", max_iter=1).fit(X, y)
+    with pytest.raises(ValueError, match="straight flanks takes dtype='double'"):
+        export_c(flanks, name="m", dtype="float", deviation=True)
+    with pytest.raises(ValueError, match="deviation='yes' must be True or False"):
+        export_c(rules, name="m", deviation="yes")
+    with pytest.raises(ValueError, match="give one of them"):
+        export_c(rules, name="m", deviation=True, forgetting=0.9)
+    with pytest.raises(ValueError, match="takes a fitted ConformalRegressor; got ANFISRegressor"):
+        export_c(rules, name="m", coverage=0.9)
+    cross = ConformalRegressor(rules, cv=2).fit(X, y)
+    with pytest.raises(ValueError, match="method='cross' has no one half width"):
+        export_c(cross, name="m", coverage=0.9)
+    plain = ConformalRegressor(rules, method="split", scaled=False).fit(X, y)
+    with pytest.raises(ValueError, match="one width for all rows"):
+        export_c(plain, name="m", coverage=0.9)
+    # And that width is what it says.
+    lower, upper = plain.predict_interval(X[:1], 0.9)
+    assert 0.5 * (upper - lower)[0] == pytest.approx(plain.half_width(0.9))
+
+
+def test_cost_counts_the_tables():
+    X, y = surface()
+    model = quick().fit(X, y)
+    plain, sure = (export_c(model, name="m", deviation=one).cost for one in (False, True))
+    # A triangle of 18, 10 displacements by 10 parameters and by 18 columns, the place of each
+    # parameter's term and of 2 inputs; noise, unit and its inverse.
+    numbers = 18 * 19 // 2 + 10 * 10 + 10 * 18 + 3
+    assert sure.table_bytes - plain.table_bytes == 8 * numbers + 10 + 2
+    assert plain.deviation_multiply_adds == 0 < sure.deviation_multiply_adds
