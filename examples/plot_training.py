@@ -53,7 +53,7 @@ def draw(panel, memberships, **style):
         panel.plot(x, np.exp(-0.5 * z**2), color=f"C{number}", **style)
 
 
-figure, panels = plt.subplots(1, 4, figsize=(10, 2.4), sharey=True, layout="constrained")
+figure, panels = plt.subplots(1, 3, figsize=(10, 2.8), sharey=True, layout="constrained")
 for panel, (name, model) in zip(panels, models.items(), strict=True):
     draw(panel, model.initial_memberships_, linestyle="--", alpha=0.5)
     draw(panel, model.memberships_)
