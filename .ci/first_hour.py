@@ -123,7 +123,10 @@ COMMANDS = {
     "plain, and what it gives as C": (["plain.csv", "--c", "c99"], "VERDICT"),
     "ISO 8601, semicolons, decimal commas": (["iso.csv"], "split into 4 runs"),
     "UTF-16, tabs, counts, a row without its temperature": (["utf16.txt"], "temp_c"),
-    "two runs in a file, a gap between them": (["two_runs.csv"], "split into 2 runs"),
+    "two runs in a file, a gap between them, the terms given": (
+        ["two_runs.csv", "--terms", "1,2,1,2"],
+        "split into 2 runs",
+    ),
     "raw counts, a file for each run": ([f"counts{run}.csv" for run in range(4)], "counts"),
     "a thermal cycle of a MEMS gyro at rest": (["mems.csv"], "hysteresis"),
 }
@@ -137,7 +140,7 @@ SHORT = {
 # And what is to end in one sentence.
 REFUSED = {
     "no such file": (["nowhere.csv"], "nowhere.csv"),
-    "a column that is not there": (["plain.csv", "--columns", "rate=truth"], "truth"),
+    "a column that is not there": (["plain.csv", "--columns", "rate=truth"], "rate=rate"),
     "more rules than atoms": (["plain.csv", "--terms", "99999999,1,1,1"], "--terms"),
     "the same file twice": (["plain.csv", "plain.csv"], "plain.csv"),
 }
