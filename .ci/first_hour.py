@@ -124,7 +124,7 @@ COMMANDS = {
     "ISO 8601, semicolons, decimal commas": (["iso.csv"], "split into 4 runs"),
     "UTF-16, tabs, counts, a row without its temperature": (["utf16.txt"], "temp_c"),
     "two runs in a file, a gap between them, the terms given": (
-        ["two_runs.csv", "--terms", "1,2,1,2"],
+        ["two_runs.csv", "--terms", "2,1,2"],
         "split into 2 runs",
     ),
     "raw counts, a file for each run": ([f"counts{run}.csv" for run in range(4)], "counts"),
