@@ -34,6 +34,8 @@ nitpick_ignore_regex = [
 ]
 
 autosummary_generate = True
+# Types stand in the tables of parameters, in words; twenty of them would bury a signature.
+autodoc_typehints = "none"
 # A class and a function whose names differ by a capital only would be one file on some systems.
 autosummary_filename_map = {
     "skanfis.inspection.readability": "skanfis.inspection.readability_function"

@@ -85,8 +85,9 @@ MembershipDisplay.from_estimator(model, X)
 # Which rules have data?
 # ----------------------
 #
-# The gyro warms fast only for a while after power-on. A full grid over temperature and its rate of
-# change has rules for which there are no data. They are hatched; what they say is extrapolation.
+# The gyro warms fast only for a while after power-on, so that a full grid over temperature and its
+# rate of change has rules with few rows. Those without any would be hatched: what they say is
+# extrapolation.
 
 warming = make_pipeline(
     StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], solver=VariableProjection(stiffness=0.1))
@@ -126,7 +127,9 @@ RuleContributionDisplay.from_estimator(model, "rate", held={"temperature": 40.0}
 # Training
 # --------
 #
-# The training error by iteration, of three solvers from the same start.
+# The training error by iteration, of three solvers. Of variable projection it is the last run,
+# after the weights of the penalties were found; Jang's rule climbs in the end, since nothing holds
+# back its steps.
 
 figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
 for solver in ("varpro", "hybrid", "gradient"):

@@ -160,11 +160,16 @@ def _check_plausible(values, part, unit):
     if bad.any():
         row = int(np.argmax(bad))
         others = plausible_units(values, part, unit, low, high)
-        advice = f"; is it in {' or '.join(others)}?" if others and bad.mean() > 0.5 else "."
         # More than half: the unit; few: glitches of the measurement.
+        is_unit = others and bad.mean() > 0.5
+        advice = (
+            f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+            if is_unit
+            else ""
+        )
         raise LogError(
             f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
-            f"are outside {low:g} to {high:g}){advice}",
+            f"are outside {low:g} to {high:g}){advice}.",
             part,
             row,
         )

@@ -12,7 +12,7 @@ __all__ = ["Guess", "guess_columns"]
 
 _WORDS = {
     "time": {
-        5: "time timestamp zeit uhrzeit datetime 时间",
+        5: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime 时间",
         4: "clock elapsed",
         3: "t sec secs seconds epoch utc tow ms millis us",
     },
@@ -129,6 +129,13 @@ class _Columns:
     def places(self):
         return list(self._sample)
 
+    def holds_moments(self, place):
+        """Whether the values are texts that tell times, and not one date alone."""
+        if self.numbers(place).size:
+            return False
+        texts = self.texts(place)
+        return texts.nunique() > 1 and Clock(texts).form != ""
+
     def can_be(self, part, place):
         """Whether the values do not speak against a part."""
         values = self.numbers(place)
@@ -221,9 +228,12 @@ def _by_behaviour(names, columns, guess):
             for place in free
             if _climbs(columns.numbers(place)) and not _AGAINST & set(names[place].words)
         ]
+        moments = [place for place in columns.places() if columns.holds_moments(place)]
         if len(climbing) == 1:
             _take(guess, "time", climbing[0], "because it climbs evenly")
             free.remove(climbing[0])
+        elif len(moments) == 1 and moments[0] not in guess.places.values():
+            _take(guess, "time", moments[0], "because it holds times")
     lacking = [part for part in ("output", "rate") if part not in guess.places]
     if lacking:
         # What is smooth follows a bias that follows the temperature: it is no table's rate. Nor

@@ -155,7 +155,7 @@ def _place(path, header, name, taken=()):
 
 def _no_column(part, name, header):
     found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
-    close = difflib.get_close_matches(name, header, n=1, cutoff=0.4)
+    close = [part] if part in header else difflib.get_close_matches(name, header, n=1, cutoff=0.4)
     advice = f"{part}={close[0]}" if close else f"{part}=NAME"
     return (
         f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "

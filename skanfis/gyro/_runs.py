@@ -46,12 +46,17 @@ def split_runs(log, max_gap):
     number[order] = np.cumsum(begins) - 1
     parts = []
     if gaps.any():
-        parts.append(f"at {int(gaps.sum())} gaps of the time longer than {longest:.4g} s")
+        parts.append(f"at {_times(gaps, 'gap')} of the time longer than {longest:.4g} s")
     if restarts.any():
-        parts.append(f"where the time begins anew ({int(restarts.sum())} times)")
+        parts.append(f"where the time begins anew ({_times(restarts, 'time')})")
     s = "s" if begins.sum() > 1 else ""
     why = f"the log is split into {int(begins.sum())} run{s}, {' and '.join(parts)}"
     return number, f"{why}; --max-gap says otherwise, inf for no such gap"
+
+
+def _times(flags, noun):
+    n = int(flags.sum())
+    return f"{n} {noun}{'s' if n > 1 else ''}"
 
 
 def _restarts(time, steps, first):

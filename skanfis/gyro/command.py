@@ -90,12 +90,13 @@ def _calibrate(options, tell):
         tasks = find_tasks(options, paths)
         for task in tasks[: len(tasks) if len(tasks) > 1 or tasks[0].axis else 0]:
             _refuse_overwriting(folder / task.axis, options)
-        done = []
+        done, left_out = [], []
         for task in tasks:
             if task.axis:
                 tell(f"axis {task.axis}: {', '.join(task.columns.values())}")
             calibration, notes = _calibration(options, paths, task, tell, len(tasks) > 1)
             if calibration is None:
+                left_out += notes
                 continue
             tell("drawing the report")
             target = staging.path / task.axis
@@ -103,14 +104,15 @@ def _calibrate(options, tell):
             _write(calibration, options, paths, target, task.axis)
             done.append((task, calibration, notes))
         if not done:
-            raise LogError("the output of no axis follows the rate; see the notes above.")
+            raise LogError(f"no axis follows the rate: {'; '.join(left_out)}")
         staging.publish()
     for task, calibration, notes in done:
         for message in calibration.warnings:
             tell(f"warning: {message}")
         if task.axis:
-            say([f"axis {task.axis}"])
+            say([f"axis {task.axis:<10}{', '.join(task.columns.values())}"])
         say(_summary(calibration, folder / task.axis, notes))
+    say(f"note           {sentence}" for sentence in left_out)
     cautions = any(calibration.cautions for _, calibration, _ in done)
     tell("done, but see the warnings" if cautions else "done")
 
@@ -121,8 +123,9 @@ def _calibration(options, paths, task, tell, may_skip):
         reading, inputs = read_task(options, paths, task, tell)
     except LogError as error:
         if may_skip and task.is_guessed and "does not follow the rate" in error.reason:
-            tell(f"note: axis {task.axis} is left out: {error}")
-            return None, []
+            sentence = f"axis {task.axis} is left out: {error}"
+            tell(f"note: {sentence}")
+            return None, [sentence]
         raise
     unit = reading.units["output"]
     recipe = Recipe(

@@ -84,6 +84,8 @@ def test_axes_that_the_table_did_not_turn_are_left_out_and_many_files_are_applie
     said, told = capsys.readouterr()
     assert [path.name for path in out.iterdir()] == ["x"]
     assert "axis y is left out: the log, column 'gyro_y' (output): does not follow the rate" in told
+    assert "axis y is left out" in said
+    assert "axis x         gyro_x, rate" in said
     assert "read 4 of 4" in told
     assert "whole runs held out (4 runs" in said
     model, target = str(out / "x" / "compensator.json"), tmp_path / "rates.csv"

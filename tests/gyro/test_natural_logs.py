@@ -50,7 +50,7 @@ WRITTEN = {
     ),
     "day first, tabs": (
         "%d.%m.%Y %H:%M:%S",
-        ("timestamp", "T[degC]", "Output", "table"),
+        ("Logged", "T[degC]", "Output", "table"),
         {"sep": "\t"},
     ),
     "month first, halves of the day": (
