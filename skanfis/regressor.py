@@ -39,7 +39,7 @@ from ._validation import (
 from .constraints import FixedPoint, OutputLimits
 from .constraints.wishes import Wishes
 from .exceptions import OutOfBoundsWarning
-from .export._fold import fold_with_rows, last_step
+from .export import fold_with_rows, last_step
 from .membership import (
     MEMBERSHIPS,
     NAMES_IN_MATLAB,

@@ -274,7 +274,7 @@ def _checked(model, box, tol, max_boxes):
     """The frozen model in the user's units, and the box."""
     if not isinstance(model, TSKModel):
         # What reads estimators stands above the models that training proves things of.
-        from ..export._fold import fold
+        from ..export import fold
 
         model = fold(model)
     for group in model.antecedent.groups:

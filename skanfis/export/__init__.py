@@ -2,6 +2,7 @@
 
 from .c import CCode, CCost, export_c
 from .fis import export_fis, read_fis, write_fis
+from .folding import fold, fold_with_reader, fold_with_rows, found_by_search, last_step
 from .model_json import export_json, read_json, write_json
 from .onnx import register_onnx_converter
 from .table import explain, memberships_table, rules_table
@@ -17,6 +18,11 @@ __all__ = [
     "export_fis",
     "export_json",
     "export_text",
+    "fold",
+    "fold_with_reader",
+    "fold_with_rows",
+    "found_by_search",
+    "last_step",
     "memberships_table",
     "read_fis",
     "read_json",

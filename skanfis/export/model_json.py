@@ -50,7 +50,6 @@ from ..antecedent import (
 from ..membership import MEMBERSHIPS
 from ..model import OUT_OF_BOUNDS, TargetRange, TSKModel
 from ..support import RuleSupport
-from ._fold import fold
 from ._limits import (
     LARGEST_NUMBER,
     SMALLEST_NUMBER,
@@ -60,6 +59,7 @@ from ._limits import (
     shown,
 )
 from ._posterior_json import posterior_item, read_posterior
+from .folding import fold
 
 __all__ = ["export_json", "read_json", "write_json"]
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._fold import fold, fold_with_rows
 from ._reading import (
     check_choice,
     choose_rules,
@@ -14,6 +13,7 @@ from ._reading import (
     consequents_about,
     premise_text,
 )
+from .folding import fold, fold_with_rows
 
 __all__ = ["explain", "memberships_table", "rules_table"]
 

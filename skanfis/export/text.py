@@ -4,7 +4,6 @@ from math import floor, log10
 
 import numpy as np
 
-from ._fold import fold
 from ._reading import (
     check_choice,
     check_count,
@@ -16,6 +15,7 @@ from ._reading import (
     renamed,
     round_reference,
 )
+from .folding import fold
 
 __all__ = ["consequent_text", "export_text", "range_text", "rows_text", "term_text"]
 

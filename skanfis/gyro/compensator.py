@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..exceptions import OutOfBoundsWarning
-from ..export import export_json
+from ..export import export_json, found_by_search
 from ..export._limits import SMALLEST_NUMBER, number, shown
 from ..export.model_json import parse_json
 from ._ask import ask
@@ -234,7 +234,7 @@ class GyroCompensator:
 
     def _parts(self):
         """The law, or None, and the rules."""
-        found = getattr(self.estimator, "best_estimator_", self.estimator)
+        found = found_by_search(self.estimator)
         if isinstance(found, ResidualRegressor):
             return law_and_rules(found)
         return None, FrozenRules.of(found, len(self.inputs))

@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 
-from ..export._fold import fold, last_step
+from ..export import fold, last_step
 from ..export._reading import (
     check_count,
     choose_rules,

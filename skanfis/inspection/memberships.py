@@ -4,7 +4,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ..export._fold import fold, fold_with_rows
+from ..export import fold, fold_with_rows
 from ..export._reading import check_count
 from ._common import colors, panels, position
 from .labels import as_label

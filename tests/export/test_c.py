@@ -18,8 +18,7 @@ from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.bounds import bounds
 from skanfis.exceptions import ConstantInputWarning
-from skanfis.export import export_c
-from skanfis.export._fold import fold
+from skanfis.export import export_c, fold
 from skanfis.export.c._header import BITS
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel

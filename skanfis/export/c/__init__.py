@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from .._fold import fold
 from .._numbers import Numbers, as_held
+from ..folding import fold
 from ._cost import CCost, cost, with_learner
 from ._dialect import Dialect
 from ._files import check_arguments, write_files

@@ -10,7 +10,9 @@ place of the column that it encodes.
 
 import operator
 from collections import UserList
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
@@ -34,10 +36,10 @@ from ..options import policy_of
 from ._column import Column
 from ._one_hot import indicators, part_of
 
-__all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
+__all__ = ["fold", "fold_with_reader", "fold_with_rows", "found_by_search", "last_step"]
 
 
-def fold(estimator):
+def fold(estimator) -> TSKModel:
     """Return the frozen model of an estimator, in the units of the columns it is given.
 
     Parameters
@@ -64,37 +66,149 @@ def fold(estimator):
         If a step cannot be folded; it is named.
     TypeError
         If ``estimator`` is no such estimator.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn.preprocessing import StandardScaler
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import fold
+    >>> X, y = make_jang_sinc()
+    >>> pipeline = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=3)).fit(X, y)
+    >>> model = fold(pipeline)
+    >>> bool(np.allclose(model.predict(X)[:, 0], pipeline.predict(X)))
+    True
     """
     return _Folding(estimator).model
 
 
-def fold_with_rows(estimator, X):
-    """:func:`fold`, and the rows of the model's inputs out of the table X that ``estimator`` takes.
+def fold_with_rows(estimator, X) -> tuple[TSKModel, np.ndarray]:
+    """Return what :func:`fold` does, and the rows of the model's inputs out of a table.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        As :func:`fold` takes it.
+    X : array-like or DataFrame of shape (n_rows, n_features)
+        A table that ``estimator`` takes.
 
     Returns
     -------
     model : TSKModel
     rows : ndarray of shape (n_rows, model.n_inputs)
         Finite, in raw units.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`fold` does; ValueError too where X has other columns than ``estimator`` was
+        trained on, or a value that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.export import fold_with_rows
+    >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
+    >>> model, rows = fold_with_rows(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2), X)
+    >>> model.strengths(rows).shape
+    (20, 2)
     """
     folding = _Folding(estimator)
     return folding.model, folding.rows(X)
 
 
-def fold_with_reader(estimator):
-    """:func:`fold`, and a function from a table that ``estimator`` takes to the model's inputs.
+def fold_with_reader(estimator) -> tuple[TSKModel, Callable[..., np.ndarray]]:
+    """Return what :func:`fold` does, and a function from tables to the model's inputs.
 
-    For tables that are read in parts; each comes out as :func:`fold_with_rows` gives it.
+    For tables that are read in parts.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        As :func:`fold` takes it.
+
+    Returns
+    -------
+    model : TSKModel
+    read : callable
+        ``read(X)`` gives the rows that :func:`fold_with_rows` gives, and raises what it raises.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.export import fold_with_reader
+    >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
+    >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
+    >>> [read(part).shape for part in (X[:5], X[5:])]
+    [(5, 1), (15, 1)]
     """
     folding = _Folding(estimator)
     return folding.model, folding.rows
 
 
-def last_step(estimator):
-    """The ANFIS estimator itself at the end of pipelines, wrappers and searches."""
+def last_step(estimator) -> Any:
+    """Return the ANFIS estimator itself at the end of pipelines, wrappers and searches.
+
+    Parameters
+    ----------
+    estimator : fitted estimator
+        As :func:`fold` takes it, but for the steps in front, which may be any.
+
+    Returns
+    -------
+    last : estimator
+        With a ``model_`` of rules.
+
+    Raises
+    ------
+    TypeError
+        If ``estimator`` does not end in an ANFIS estimator.
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import GridSearchCV
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import last_step
+    >>> search = GridSearchCV(ANFISRegressor(), {"n_mfs": [2]}, cv=2).fit(*make_jang_sinc())
+    >>> last_step(search).model_.n_rules
+    4
+    """
     label, last = _flat("", estimator)[-1]
     _model_of(label, last)
     return last
+
+
+def found_by_search(estimator) -> Any:
+    """Return the estimator that a search has kept, or one that is no search as it is.
+
+    Parameters
+    ----------
+    estimator : estimator
+        A fitted search such as GridSearchCV, or any other.
+
+    Returns
+    -------
+    found : estimator
+        Its ``best_estimator_``, of a search over searches that of the innermost.
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import GridSearchCV
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import found_by_search
+    >>> search = GridSearchCV(ANFISRegressor(), {"n_mfs": [2]}, cv=2).fit(*make_jang_sinc())
+    >>> found_by_search(search).n_mfs
+    2
+    """
+    while hasattr(estimator, "best_estimator_"):
+        estimator = estimator.best_estimator_
+    return estimator
 
 
 class _Folding:
@@ -174,8 +288,7 @@ def _values(column, X):
 
 def _flat(label, estimator):
     """The steps of nested pipelines one after the other, the model's estimator last."""
-    if hasattr(estimator, "best_estimator_"):
-        return _flat(label, estimator.best_estimator_)
+    estimator = found_by_search(estimator)
     if isinstance(estimator, TransformedTargetRegressor):
         check_is_fitted(estimator)
         return _flat(label, estimator.regressor_)
@@ -186,8 +299,7 @@ def _flat(label, estimator):
 
 def _targets(label, estimator):
     """The transformers of the target from the outermost to the innermost."""
-    if hasattr(estimator, "best_estimator_"):
-        return _targets(label, estimator.best_estimator_)
+    estimator = found_by_search(estimator)
     if isinstance(estimator, TransformedTargetRegressor):
         return [(label, estimator.transformer_), *_targets(label, estimator.regressor_)]
     if isinstance(estimator, Pipeline):
