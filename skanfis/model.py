@@ -29,14 +29,11 @@ import numpy as np
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .naming import default_term_names
+from .policies import MAX_EXTRAPOLATION, OUT_OF_BOUNDS
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
-__all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel", "TargetRange"]
-
-OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
-# How far the tangent is followed by default, in standard deviations of each input.
-MAX_EXTRAPOLATION = 0.5
+__all__ = ["TSKModel", "TargetRange"]
 
 # Of the target, in standard deviations, whatever the limit of inputs: what a peak between rows may
 # take beyond the range that was seen. The range has two deviations at least, so that this is a

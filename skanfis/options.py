@@ -11,7 +11,7 @@ from typing import ClassVar
 from sklearn.base import BaseEstimator
 
 from ._sklearn import Interval
-from .model import MAX_EXTRAPOLATION
+from .policies import MAX_EXTRAPOLATION
 
 __all__ = ["EarlyStopping", "Huber", "LinearExtrapolation", "policy_of"]
 

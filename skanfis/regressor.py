@@ -47,9 +47,10 @@ from .membership import (
     Membership,
     membership_families,
 )
-from .model import OUT_OF_BOUNDS, TSKModel
+from .model import TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
+from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
 from .streaming.learning import LearnsFromChunksMixin

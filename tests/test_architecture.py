@@ -27,6 +27,7 @@ KERNEL = [
     "naming",
     "support",
     "posterior",
+    "policies",
     "model",
 ]
 
@@ -43,7 +44,7 @@ TABLE = {
     "_callers": ([], LEARNING),
     "_validation": (["_sklearn", "_callers"], LEARNING),
     "_threads": ([], LEARNING),
-    "options": (["_sklearn", "model"], LEARNING),
+    "options": (["_sklearn", "policies"], LEARNING),
     "solvers": ([*KERNEL, "_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
     "bounds": ([*KERNEL, "export"], NUMERIC),
@@ -103,6 +104,7 @@ TABLE = {
             "naming",
             "support",
             "posterior",
+            "policies",
             "model",
             "options",
             "_validation",
@@ -116,7 +118,7 @@ TABLE = {
     "_notebook": (["inspection"], []),
     "datasets": ([], [*NUMERIC, "sklearn", "pandas"]),
     "gyro": (
-        [PUBLIC, "exceptions", "options", "inspection", "export", "datasets"],
+        [PUBLIC, "exceptions", "policies", "options", "inspection", "export", "datasets"],
         [*PLOTTING, "pandas", "allantools", "joblib", "pyarrow"],
     ),
     PUBLIC: (["exceptions", "regressor"], []),

@@ -48,9 +48,12 @@ from ..antecedent import (
     TermGroup,
 )
 from ..membership import MEMBERSHIPS
-from ..model import OUT_OF_BOUNDS, TargetRange, TSKModel
+from ..model import TargetRange, TSKModel
+from ..policies import OUT_OF_BOUNDS
 from ..support import RuleSupport
-from ._limits import (
+from ._posterior_json import posterior_item, read_posterior
+from .folding import fold
+from .limits import (
     LARGEST_NUMBER,
     SMALLEST_NUMBER,
     check_size,
@@ -58,8 +61,6 @@ from ._limits import (
     read_bytes,
     shown,
 )
-from ._posterior_json import posterior_item, read_posterior
-from .folding import fold
 
 __all__ = ["export_json", "read_json", "write_json"]
 

@@ -4,9 +4,9 @@ from math import floor, log10
 
 import numpy as np
 
-from ._reading import (
-    check_choice,
-    check_count,
+from .._validation import check_choice, check_count
+from .folding import fold
+from .rules import (
     choose_rules,
     conditions,
     consequents_about,
@@ -15,7 +15,6 @@ from ._reading import (
     renamed,
     round_reference,
 )
-from .folding import fold
 
 __all__ = ["consequent_text", "export_text", "range_text", "rows_text", "term_text"]
 

@@ -19,23 +19,19 @@ from ..export.c import CCode
 from ..export.c._cost import cost
 from ..export.c._dialect import Dialect
 from ..export.c._files import check_arguments, write_files
-from ..export.c._header import BITS, coverage_line, header_of, policy_line
+from ..export.c._header import coverage_line, header_of, policy_line
 from ..export.c._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c._source import FINITE_INPUT, Source, index_type, rejection
 from ..export.c._text import LONGEST_NAME, comment, literals
+from ..export.c.status import STATUS
+from ..policies import SILENT
 from ._frozen import FrozenRules, law_and_rules
+from ._law_text import past_phase
 from .physics import OpenLoopArcsineRegressor
 
 __all__ = ["export_c_physics"]
 
 _SUFFIX = "_r"
-_SILENT = ("nan", "raise")
-_PAST_PHASE = {
-    "clip": "the phase is held there",
-    "linear": "the law goes on along its tangent",
-    "raise": "there is no output",
-    "nan": "there is no output",
-}
 
 _RULES = """
 /* Of the rules. */
@@ -195,7 +191,7 @@ def export_c_physics(
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     law, rules = law_and_rules(estimator)
     policies = {law.out_of_bounds, rules.model.out_of_bounds}
-    if policies >= set(_SILENT):
+    if policies >= set(SILENT):
         raise ValueError(
             "One of base and residual has out_of_bounds='nan', the other 'raise': one C function "
             "leaves y as it is or writes NaN. Set both to one of the two."
@@ -338,7 +334,7 @@ def _law(dialect, composition, policies):
     ]
     asin = dialect.write("$ASIN(")
     parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
-    silent = next(iter(policies & set(_SILENT)), None)
+    silent = next(iter(policies & set(SILENT)), None)
     parts.append(dialect.write(rejection(silent, dialect.std)).lstrip() + "\n")
     parts.append(dialect.write(_POLYNOMIAL).lstrip())
 
@@ -347,7 +343,7 @@ def _law(dialect, composition, policies):
     if inputs.size > 1:
         lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
         temperature = f"x[{inputs[1]}]{lag} - {number(composition.reference)}"
-    refuses = law.out_of_bounds in _SILENT
+    refuses = law.out_of_bounds in SILENT
     template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
     template = template.replace("$temperature", temperature)
     template = template.replace("$beyond", _REFUSED if refuses else _BEYOND[law.out_of_bounds])
@@ -385,7 +381,7 @@ def _header(composition, dialect, price, min_coverage):
         "Outputs y:",
         "  [0] rate, in the unit of the training data",
         "",
-        f"Beyond a phase of {law.max_phase:g} rad {_PAST_PHASE[law.out_of_bounds]}.",
+        f"Beyond a phase of {law.max_phase:g} rad {past_phase(law.out_of_bounds, 'output')}.",
         policy_line(model, "Of the rules alone: outside their range"),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
@@ -440,15 +436,15 @@ def _known_answers(composition, numbers, min_coverage):
 
     beside = outside(composition.rules_inputs, numbers.low, numbers.high)
     out = beside | beyond | outside(composition.law_inputs, composition.low, composition.high)
-    silent = beyond & (law.out_of_bounds in _SILENT)
-    silent |= beside & (rules.model.out_of_bounds in _SILENT)
+    silent = beyond & (law.out_of_bounds in SILENT)
+    silent |= beside & (rules.model.out_of_bounds in SILENT)
     of_law = _answering(law).predict(whole)
     model, rows = _answering(rules.model), np.asarray(whole)[:, rules.positions]
     of_rules = model.predict(rows)
     silent |= ~np.isfinite(of_law.astype(composition.dtype))
-    status = BITS["OUT_OF_RANGE"] * out | BITS["NO_OUTPUT"] * silent
+    status = STATUS["OUT_OF_RANGE"] * out | STATUS["NO_OUTPUT"] * silent
     if min_coverage is not None:
-        status |= BITS["UNCOVERED"] * (~silent & (coverage < min_coverage))
+        status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
     y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
     # What rounding of the sine is magnified by, too.
     steepest = np.abs(of_law[~silent]).max(initial=0.0)

@@ -11,7 +11,8 @@ import pandas as pd
 
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json, found_by_search
-from ..export._limits import SMALLEST_NUMBER, number, shown
+from ..export.c.status import STATUS
+from ..export.limits import SMALLEST_NUMBER, number, shown
 from ..export.model_json import parse_json
 from ._ask import ask
 from ._frozen import FrozenRules, joined, law_and_rules
@@ -19,12 +20,9 @@ from ._law_json import law_document, read_law
 from .compose import ResidualRegressor
 from .features import ThermalRate, TimeSincePowerOn
 
-__all__ = ["STATUS", "GyroCompensator"]
+__all__ = ["GyroCompensator"]
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
-
-# The status word of the exported C code has the same bits.
-STATUS = {"OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
 _KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")

@@ -42,11 +42,10 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
+from ..policies import OUT_OF_BOUNDS
 from ._columns import check_weights
 
 __all__ = ["OpenLoopArcsineRegressor", "check_parameters"]
-
-_POLICIES = ("clip", "linear", "nan", "raise")
 
 # Phase at the largest rate [rad]. Below 0.01 the sine is a straight line to 20 ppm; from pi/2 on
 # two rates give one output.
@@ -435,8 +434,8 @@ def check_parameters(law):
         max_val=np.pi / 2.0,
         include_boundaries="neither",
     )
-    if law.out_of_bounds not in _POLICIES:
-        choices = ", ".join(_POLICIES)
+    if law.out_of_bounds not in OUT_OF_BOUNDS:
+        choices = ", ".join(OUT_OF_BOUNDS)
         raise ValueError(f"out_of_bounds={law.out_of_bounds!r} must be one of {choices}.")
     if law.reference_temperature is not None and not np.isfinite(law.reference_temperature):
         raise ValueError(f"reference_temperature={law.reference_temperature} must be finite.")

@@ -151,7 +151,7 @@ class Readability:
         """The rules; see the class."""
         import pandas as pd
 
-        from ..export._reading import conditions, premise_text
+        from ..export.rules import conditions, premise_text
 
         found, model = self.measures, self.model
         texts = [premise_text(model, rule) for rule in conditions(model)]

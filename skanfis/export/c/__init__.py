@@ -7,11 +7,12 @@ from ..folding import fold
 from ._cost import CCost, cost, with_learner
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
-from ._header import BITS, header
+from ._header import header
 from ._learner import LearningSource, learner_of, learning_test
 from ._saturation import read_limits
 from ._self_test import known_answers, self_test
 from ._source import Source
+from .status import STATUS
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -149,7 +150,7 @@ def export_c(
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
-    answers = known_answers(model, numbers, min_coverage, BITS, limits)
+    answers = known_answers(model, numbers, min_coverage, STATUS, limits)
     declarations = test = ""
     if forgetting is None:
         body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)
