@@ -23,6 +23,7 @@ TRUSTED_TYPES = [
     "skanfis.membership.sigmoid.SigmoidDifference",
     "skanfis.membership.sigmoid.SigmoidProduct",
     "skanfis.model.TSKModel",
+    "skanfis.model.TargetRange",
     "skanfis.posterior.Posterior",
     "skanfis.readable.measures.Measures",
     "skanfis.readable.report.Readability",
