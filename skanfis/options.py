@@ -52,7 +52,7 @@ class Huber(BaseEstimator):
         "epsilon": [Interval(Real, 0, None, closed="neither")],
     }
 
-    def __init__(self, epsilon: float = 1.35):
+    def __init__(self, epsilon: float = 1.35) -> None:
         self.epsilon = epsilon
 
 
@@ -95,7 +95,7 @@ class EarlyStopping(BaseEstimator):
 
     def __init__(
         self, validation_fraction: float = 0.1, n_iter_no_change: int = 10, tol: float = 1e-3
-    ):
+    ) -> None:
         self.validation_fraction = validation_fraction
         self.n_iter_no_change = n_iter_no_change
         self.tol = tol
@@ -136,7 +136,7 @@ class LinearExtrapolation(BaseEstimator):
         "max_extrapolation": [Interval(Real, 0, math.inf, closed="both")],
     }
 
-    def __init__(self, max_extrapolation: float = MAX_EXTRAPOLATION):
+    def __init__(self, max_extrapolation: float = MAX_EXTRAPOLATION) -> None:
         self.max_extrapolation = max_extrapolation
 
 

@@ -123,7 +123,7 @@ _WITHIN = "phase = $ASIN(sine);"
 
 def export_c_physics(
     estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1
-):
+) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 
     The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from

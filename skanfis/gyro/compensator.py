@@ -4,7 +4,7 @@ import json
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -80,7 +80,7 @@ class GyroCompensator:
     time_constant: float = 60.0
     min_coverage: float = 0.1
 
-    def features(self, log):
+    def features(self, log) -> pd.DataFrame:
         """The estimator's inputs.
 
         Parameters
@@ -94,7 +94,7 @@ class GyroCompensator:
         """
         return features(log, self.inputs, self.time_constant)
 
-    def indicated(self, log):
+    def indicated(self, log) -> np.ndarray:
         """The rate that the gyro indicates without compensation.
 
         Parameters
@@ -108,7 +108,7 @@ class GyroCompensator:
         """
         return log["output"].to_numpy() / self.scale_factor
 
-    def apply(self, log):
+    def apply(self, log) -> pd.DataFrame:
         """Compensate a log, and flag the rows in which that cannot be trusted.
 
         Parameters
@@ -148,7 +148,7 @@ class GyroCompensator:
             index=log.index,
         )
 
-    def compensate(self, indicated, predicted):
+    def compensate(self, indicated, predicted) -> np.ndarray:
         """The compensated rate from what the estimator predicts.
 
         Parameters
@@ -165,7 +165,7 @@ class GyroCompensator:
         """
         return indicated - predicted if self.predicts == "error" else predicted
 
-    def write_json(self, path):
+    def write_json(self, path) -> None:
         """Write it as text that runs nothing when it is read.
 
         Parameters
@@ -199,7 +199,7 @@ class GyroCompensator:
         Path(path).write_text(text, encoding="utf-8", newline="\n")
 
     @classmethod
-    def read_json(cls, path):
+    def read_json(cls, path) -> Self:
         """Read one that :meth:`write_json` has written.
 
         Parameters

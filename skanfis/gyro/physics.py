@@ -32,6 +32,7 @@ H. C. Lefevre, "The Fiber-Optic Gyroscope", Artech House.
 
 import warnings
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -173,19 +174,19 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        output=0,
-        temperature=1,
+        output: int | str = 0,
+        temperature: int | str | None = 1,
         *,
-        temperature_rate=None,
-        amplitude_degree=1,
-        sagnac_degree=1,
-        bias_degree=1,
-        fit_offset=False,
-        reference_temperature=None,
-        max_phase=1.2,
-        out_of_bounds="clip",
-        warn_out_of_bounds=True,
-    ):
+        temperature_rate: int | str | None = None,
+        amplitude_degree: int = 1,
+        sagnac_degree: int = 1,
+        bias_degree: int = 1,
+        fit_offset: bool = False,
+        reference_temperature: float | None = None,
+        max_phase: float = 1.2,
+        out_of_bounds: str = "clip",
+        warn_out_of_bounds: bool = True,
+    ) -> None:
         self.output = output
         self.temperature = temperature
         self.temperature_rate = temperature_rate
@@ -204,7 +205,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = True
         return tags
 
-    def fit(self, X, y, sample_weight=None):
+    def fit(self, X, y, sample_weight=None) -> Self:
         """Fit the law.
 
         Parameters
@@ -243,7 +244,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         self.minimum_, self.maximum_ = used.min(axis=0), used.max(axis=0)
         return self
 
-    def predict(self, X):
+    def predict(self, X) -> np.ndarray:
         """Predict the rate.
 
         Parameters
@@ -283,7 +284,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         difference = self._difference(used)
         return phase / polyval(difference, self.sagnac_factor_) - polyval(difference, self.bias_)
 
-    def phase(self, X):
+    def phase(self, X) -> np.ndarray:
         """Sagnac phase of each row, bias included.
 
         Parameters
@@ -299,7 +300,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         defined = np.abs(sine) <= 1.0
         return np.where(defined, np.arcsin(np.where(defined, sine, 0.0)), np.nan)
 
-    def in_bounds(self, X):
+    def in_bounds(self, X) -> np.ndarray:
         """Tell which rows lie in the range of the training data and within ``max_phase``.
 
         Parameters
