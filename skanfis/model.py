@@ -283,7 +283,7 @@ class TSKModel:
 
         N_r is the number of distinct training inputs on which rule r is the strongest, P the number
         of its coefficients, d_r the Mahalanobis distance from the centre of its data, D_r that of
-        the farthest row on which it speaks; see :class:`skanfis.support.RuleSupport`. Near one on
+        the farthest row on which it fires; see :class:`skanfis.support.RuleSupport`. Near one on
         the training rows of rules that have enough of them; falling to zero away from the box,
         where only rules without data speak, and off the rows, in empty corners of the box too. Zero
         everywhere where the model knows of no data.

@@ -1,6 +1,6 @@
 """Groups of rows that a split must not tear apart: runs, devices, and levels of a rate table.
 
-A rate table turns at a list of rates. A flexible model learns the list by heart: the output of the
+A rate table turns at a list of rates. A flexible model memorises the list: the output of the
 gyro tells which level it is, and the level's exact rate is known from training. It fails at every
 rate between the levels, and no split shows this that leaves each level in both of its parts. The
 groups here are integers, one per row: GroupKFold, LeaveOneGroupOut, GroupShuffleSplit and
@@ -344,7 +344,7 @@ def _no_levels(rate):
     return (
         f"rate has no levels: it changes continuously between {rate.min():g} and {rate.max():g}. "
         "If a table went from level to level, remove its way (clip_dwells), or give tolerance. If "
-        "not, no level can be learnt by heart: hold out runs or devices."
+        "not, no level can be memorised: hold out runs or devices."
     )
 
 

@@ -43,7 +43,7 @@ class LearnsFromChunksMixin:
     _request: Any
     _given_weights: Any
     _found_weights: Any
-    _those_of_the_start: Any
+    _structure_parameters: Any
 
     @available_if(can_learn_from_chunks)
     @fit_context(prefer_skip_nested_validation=False)
@@ -155,7 +155,7 @@ class LearnsFromChunksMixin:
         if holds:
             self.stiffness_, self.structures_ = 0.0, []
             self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
-            self._start_parameters = self._those_of_the_start()
+            self._start_parameters = self._structure_parameters()
             self._learn_from(stream)
             self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
         else:
