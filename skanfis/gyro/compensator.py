@@ -12,8 +12,8 @@ import pandas as pd
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json, found_by_search
 from ..export.c.status import STATUS
+from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, shown
-from ..export.model_json import parse_json
 from ._ask import ask
 from ._frozen import FrozenRules, joined, law_and_rules
 from ._law_json import law_document, read_law
