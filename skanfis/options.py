@@ -151,7 +151,7 @@ def policy_of(out_of_bounds: "str | LinearExtrapolation") -> tuple[str, float]:
     Returns
     -------
     policy : tuple of str and float
-        What :meth:`skanfis.model.TSKModel.with_out_of_bounds` takes.
+        What ``with_out_of_bounds`` of a TSKModel takes.
 
     Examples
     --------
