@@ -15,6 +15,8 @@ from ._callers import is_silent
 
 __all__ = [
     "bearable_weights",
+    "check_choice",
+    "check_count",
     "check_finite",
     "content_digest",
     "feature_indices",
@@ -313,3 +315,17 @@ def warn_user(message, category):
     ):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, category, stacklevel=level)
+
+
+def check_choice(parameter, value, choices):
+    """Raise ValueError if ``value`` is not one of ``choices``."""
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{parameter}={value!r} must be one of {', '.join(map(repr, choices))}.")
+
+
+def check_count(parameter, value, smallest, largest=None):
+    """Raise ValueError if ``value`` is not a whole number within its limits."""
+    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not is_whole or value < smallest or (largest is not None and value > largest):
+        limits = f"from {smallest} to {largest}" if largest else f"of {smallest} or more"
+        raise ValueError(f"{parameter}={value!r} must be a whole number {limits}.")

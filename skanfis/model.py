@@ -23,20 +23,18 @@ target, or half a one where L is less, of its range. Whatever the inputs, no ans
 
 from dataclasses import dataclass, replace
 from numbers import Real
+from typing import Self
 
 import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .naming import default_term_names
+from .policies import MAX_EXTRAPOLATION, OUT_OF_BOUNDS
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
-__all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "TSKModel", "TargetRange"]
-
-OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
-# How far the tangent is followed by default, in standard deviations of each input.
-MAX_EXTRAPOLATION = 0.5
+__all__ = ["TSKModel", "TargetRange"]
 
 # Of the target, in standard deviations, whatever the limit of inputs: what a peak between rows may
 # take beyond the range that was seen. The range has two deviations at least, so that this is a
@@ -143,22 +141,22 @@ class TSKModel:
         return f"TSKModel({self.n_rules} rules, {inputs} -> {outputs})"
 
     @property
-    def n_rules(self):
+    def n_rules(self) -> int:
         """Number of rules."""
         return self.coefficients.shape[0]
 
     @property
-    def n_inputs(self):
+    def n_inputs(self) -> int:
         """Number of inputs."""
         return self.reference.size
 
     @property
-    def n_outputs(self):
+    def n_outputs(self) -> int:
         """Number of outputs."""
         return self.coefficients.shape[2]
 
     @property
-    def order(self):
+    def order(self) -> int:
         """Order of the consequents, 0 or 1."""
         return int(self.coefficients.shape[1] > 1)
 
@@ -171,13 +169,13 @@ class TSKModel:
         return textbook
 
     @property
-    def output_limits(self):
+    def output_limits(self) -> np.ndarray:
         """Lowest and highest output that the model gives, (2, n_outputs); infinite if not held."""
         if self.target is None:
             return np.full((2, self.n_outputs), [[-np.inf], [np.inf]])
         return self.target.limits(self.max_extrapolation)
 
-    def memberships(self, trained=True):
+    def memberships(self, trained=True) -> list[dict]:
         """Memberships in the user's units, after training or before it.
 
         Returns
@@ -197,15 +195,15 @@ class TSKModel:
                 terms.append(term | numbers)
         return terms
 
-    def in_bounds(self, X):
+    def in_bounds(self, X) -> np.ndarray:
         """Whether each row lies in the box of the training data, shape (n_rows,)."""
         return ((self.minimum <= X) & (self.maximum >= X)).all(axis=1)
 
-    def strengths(self, X):
+    def strengths(self, X) -> np.ndarray:
         """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
         return self._by_block(X, self._strengths, self.n_rules)
 
-    def predict(self, X, inside=None):
+    def predict(self, X, inside=None) -> np.ndarray:
         """Outputs, shape (n_rows, n_outputs), by the policy for rows out of bounds.
 
         ``inside`` is what :meth:`in_bounds` gives, for a caller that has it already.
@@ -222,14 +220,14 @@ class TSKModel:
             outputs[~inside] = np.nan
         return outputs
 
-    def standard_deviation(self, X):
+    def standard_deviation(self, X) -> np.ndarray:
         """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``.
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
         return self.predict_with_deviation(X)[1]
 
-    def predict_with_deviation(self, X, inside=None):
+    def predict_with_deviation(self, X, inside=None) -> tuple[np.ndarray, np.ndarray]:
         """Outputs and their standard deviations, each of shape (n_rows, n_outputs)."""
         posterior = self.posterior
         if posterior is None:
@@ -263,7 +261,7 @@ class TSKModel:
             deviations[~inside] = self._by_block(X[~inside], beyond, n_outputs, n_values)
         return outputs, deviations
 
-    def gradient(self, X):
+    def gradient(self, X) -> np.ndarray:
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
 
         Rows out of the box are taken at its nearest point, and outputs before they are held.
@@ -276,7 +274,7 @@ class TSKModel:
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
-    def coverage(self, X):
+    def coverage(self, X) -> np.ndarray:
         r"""How well the training data cover each row, from 0 (not at all) to 1, (n_rows,).
 
         With c the nearest point of the box and delta its distance in standard deviations,
@@ -285,7 +283,7 @@ class TSKModel:
 
         N_r is the number of distinct training inputs on which rule r is the strongest, P the number
         of its coefficients, d_r the Mahalanobis distance from the centre of its data, D_r that of
-        the farthest row on which it speaks; see :class:`skanfis.support.RuleSupport`. Near one on
+        the farthest row on which it fires; see :class:`skanfis.support.RuleSupport`. Near one on
         the training rows of rules that have enough of them; falling to zero away from the box,
         where only rules without data speak, and off the rows, in empty corners of the box too. Zero
         everywhere where the model knows of no data.
@@ -318,14 +316,14 @@ class TSKModel:
             "data (solver='lse' fits the consequents and leaves the premises alone)."
         )
 
-    def way_out(self, X):
+    def way_out(self, X) -> np.ndarray:
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs).
 
         The way from the nearest point in the box, held at ``max_extrapolation``.
         """
         return self._held(X.T - self._clip(X.T)).T
 
-    def describe_out_of_bounds(self, X):
+    def describe_out_of_bounds(self, X) -> str:
         """Say which inputs leave the box of the training data, in how many rows, and how far."""
         parts = []
         for j, name in enumerate(self.input_names):
@@ -340,14 +338,14 @@ class TSKModel:
         return "X lies outside the training data: " + "; ".join(parts) + "."
 
     @property
-    def policy(self):
+    def policy(self) -> str:
         """The policy out of bounds as it is set: "out_of_bounds='clip'"."""
         text = f"out_of_bounds={self.out_of_bounds!r}"
         if self.out_of_bounds == "linear":
             text += f", max_extrapolation={float(self.max_extrapolation)!r}"
         return text
 
-    def with_out_of_bounds(self, policy, max_extrapolation=None):
+    def with_out_of_bounds(self, policy, max_extrapolation=None) -> Self:
         """Return the same model with another policy; the limit stays where None is given."""
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
         if policy == self.out_of_bounds and limit == self.max_extrapolation:

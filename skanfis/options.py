@@ -11,7 +11,7 @@ from typing import ClassVar
 from sklearn.base import BaseEstimator
 
 from ._sklearn import Interval
-from .model import MAX_EXTRAPOLATION
+from .policies import MAX_EXTRAPOLATION
 
 __all__ = ["EarlyStopping", "Huber", "LinearExtrapolation", "policy_of"]
 
@@ -52,7 +52,7 @@ class Huber(BaseEstimator):
         "epsilon": [Interval(Real, 0, None, closed="neither")],
     }
 
-    def __init__(self, epsilon: float = 1.35):
+    def __init__(self, epsilon: float = 1.35) -> None:
         self.epsilon = epsilon
 
 
@@ -95,7 +95,7 @@ class EarlyStopping(BaseEstimator):
 
     def __init__(
         self, validation_fraction: float = 0.1, n_iter_no_change: int = 10, tol: float = 1e-3
-    ):
+    ) -> None:
         self.validation_fraction = validation_fraction
         self.n_iter_no_change = n_iter_no_change
         self.tol = tol
@@ -136,7 +136,7 @@ class LinearExtrapolation(BaseEstimator):
         "max_extrapolation": [Interval(Real, 0, math.inf, closed="both")],
     }
 
-    def __init__(self, max_extrapolation: float = MAX_EXTRAPOLATION):
+    def __init__(self, max_extrapolation: float = MAX_EXTRAPOLATION) -> None:
         self.max_extrapolation = max_extrapolation
 
 
@@ -151,7 +151,7 @@ def policy_of(out_of_bounds: "str | LinearExtrapolation") -> tuple[str, float]:
     Returns
     -------
     policy : tuple of str and float
-        What ``TSKModel.with_out_of_bounds`` takes.
+        What ``with_out_of_bounds`` of a TSKModel takes.
 
     Examples
     --------

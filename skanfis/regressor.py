@@ -39,7 +39,7 @@ from ._validation import (
 from .constraints import FixedPoint, OutputLimits
 from .constraints.wishes import Wishes
 from .exceptions import OutOfBoundsWarning
-from .export._fold import fold_with_rows, last_step
+from .export import fold_with_rows, last_step
 from .membership import (
     MEMBERSHIPS,
     NAMES_IN_MATLAB,
@@ -47,9 +47,10 @@ from .membership import (
     Membership,
     membership_families,
 )
-from .model import OUT_OF_BOUNDS, TSKModel
+from .model import TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
+from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
 from .streaming.learning import LearnsFromChunksMixin
@@ -446,7 +447,7 @@ class ANFISRegressor(
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
-        self._start_parameters = self._those_of_the_start()
+        self._start_parameters = self._structure_parameters()
         self._forget_chunks()
         if callbacks is not None:
             callbacks.end(self.model_)
@@ -526,7 +527,7 @@ class ANFISRegressor(
 
         The sum over rules of strength times support, where a rule's support is the number of
         distinct training inputs on which it is the strongest over the number of its coefficients,
-        at most one, and falls with the distance from the rows on which it speaks, in the measure of
+        at most one, and falls with the distance from the rows on which it fires, in the measure of
         their covariance; times exp(-delta^2 / 2) with delta the distance from the training range in
         standard deviations. Training rows of rules that have enough of them are near one; an empty
         corner of the range is near zero.
@@ -656,7 +657,7 @@ class ANFISRegressor(
         if self.warm_start and hasattr(self, "_start_parameters"):
             changed = [
                 name
-                for name, value in self._those_of_the_start().items()
+                for name, value in self._structure_parameters().items()
                 if value != self._start_parameters[name]
             ]
             if changed:
@@ -719,8 +720,8 @@ class ANFISRegressor(
             "stiffness": self.stiffness_,
         }
 
-    def _those_of_the_start(self):
-        """The parameters that a start depends on, in a form that can be compared."""
+    def _structure_parameters(self):
+        """The parameters that the structure depends on, in a form that can be compared."""
         names = ("n_mfs", "partition", "mf", "premise_features")
         values = {name: getattr(self, name) for name in names}
         # Models are their numbers, wherever they were pickled; all else says in words what it is.

@@ -22,15 +22,15 @@ import numpy as np
 from .antecedent import Antecedent
 from .rows import Rows, fingerprint
 
-__all__ = ["SPEAKS", "RuleSupport", "inverse_factor"]
+__all__ = ["FIRES", "RuleSupport", "inverse_factor"]
 
 # Rows of one block, however few values it needs; and the bytes that these may take.
 _MOST_ROWS, _FEWEST_ROWS = 4096, 64
 _BLOCK_BYTES = 2**22
 # Standard deviation added to every standardised input.
 _THICKNESS = 0.1
-# A rule speaks on the rows on which it has at least this part of the strongest rule's strength.
-SPEAKS = 0.5
+# A rule fires on the rows on which it has at least this part of the strongest rule's strength.
+FIRES = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class RuleSupport:
         Lower triangular; the distance of x from the centre m is d = |factor (x - m)|, Mahalanobis'
         distance.
     radius : ndarray of shape (n_rules,)
-        The largest d of a training row on which the rule speaks.
+        The largest d of a training row on which the rule fires.
 
     Examples
     --------
@@ -144,14 +144,14 @@ def _merge(one, other):
 
 
 def _radii(rows, antecedent, known, center, factor):
-    """The largest distance at which each rule speaks."""
+    """The largest distance at which each rule fires."""
     radius = np.zeros(antecedent.n_rules)
     for part in _blocks(rows, antecedent):
         Z, _, _ = rows.read(part)
         strengths = antecedent.strengths(Z)
-        speaks = strengths >= SPEAKS * strengths.max(axis=0)
-        for r in known[speaks[known].any(axis=1)]:
-            away = factor[r] @ (Z[:, speaks[r]] - center[r][:, None])
+        fires = strengths >= FIRES * strengths.max(axis=0)
+        for r in known[fires[known].any(axis=1)]:
+            away = factor[r] @ (Z[:, fires[r]] - center[r][:, None])
             radius[r] = max(radius[r], np.sqrt(np.max(np.sum(away**2, axis=0))))
     return radius
 

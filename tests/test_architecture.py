@@ -27,6 +27,7 @@ KERNEL = [
     "naming",
     "support",
     "posterior",
+    "policies",
     "model",
 ]
 
@@ -43,7 +44,7 @@ TABLE = {
     "_callers": ([], LEARNING),
     "_validation": (["_sklearn", "_callers"], LEARNING),
     "_threads": ([], LEARNING),
-    "options": (["_sklearn", "model"], LEARNING),
+    "options": (["_sklearn", "policies"], LEARNING),
     "solvers": ([*KERNEL, "_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
     "bounds": ([*KERNEL, "export"], NUMERIC),
@@ -103,6 +104,7 @@ TABLE = {
             "naming",
             "support",
             "posterior",
+            "policies",
             "model",
             "options",
             "_validation",
@@ -119,6 +121,7 @@ TABLE = {
         [
             PUBLIC,
             "exceptions",
+            "policies",
             "options",
             "inspection",
             "export",
@@ -132,6 +135,15 @@ TABLE = {
 }
 ONLY_INSIDE_FUNCTIONS = {"dask", "matplotlib", "allantools", "onnx", "pyarrow", "skl2onnx"}
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
+# What has an underscore belongs to its layer, but for these modules of the root: they are of all
+# layers that the table lets take them, and none of the user's.
+SHARED = {
+    "_sklearn": "what scikit-learn may move is taken in one place, and handed on to nobody",
+    "_validation": "checks and warnings in one voice, by parameters and columns that it knows",
+    "_callers": "reads the frames of the calls above, which no user should rely on",
+    "_threads": "counts the fits that hold BLAS to one thread, which works only if all do",
+    "_notebook": "overrides private methods of scikit-learn's representation",
+}
 
 
 def violations(source, module):
@@ -159,6 +171,8 @@ def forbidden_import(name, layer, is_lazy):
     if top == "skanfis":
         if layer_of(name) not in [layer, *layers]:
             yield f"{name} is not below"
+        elif layer_of(name) != layer and is_private_to_its_layer(name):
+            yield f"{name} is private to {layer_of(name)}"
     elif top not in sys.stdlib_module_names:
         if top not in packages:
             yield f"{top} is not for this layer"
@@ -177,6 +191,14 @@ def layer_of(name):
 def is_layer(name):
     """Whether skanfis.name is a module, not an object that the package exports."""
     return name in TABLE or (PACKAGE / name).is_dir() or (PACKAGE / f"{name}.py").is_file()
+
+
+def is_private_to_its_layer(name):
+    """Whether a dotted name of skanfis has an underscore that no other layer may look behind."""
+    _, *parts = name.split(".")
+    if parts and parts[0] in SHARED:
+        parts = parts[1:]
+    return any(part.startswith("_") and not part.endswith("__") for part in parts)
 
 
 def imported_names(node, module):
@@ -248,6 +270,11 @@ def test_module_keeps_to_its_layer(module):
         ("skanfis.gyro.report", "from .. import model"),
         ("skanfis.gyro.report", "import matplotlib.pyplot as plt"),
         ("skanfis.gyro.report", "class Report:\n    from matplotlib import pyplot"),
+        ("skanfis.gyro.report", "from ..export._numbers import Numbers"),
+        ("skanfis.gyro.displays.error", "from ...export.c import _source"),
+        ("skanfis.gyro.report", "from .._validation import check_finite"),
+        ("skanfis.intervals.conformal", "from .._validation import _columns"),
+        ("skanfis.intervals.conformal", "def f():\n    from ..regressor import _part"),
         ("skanfis.inspection.surface", "print('done')"),
         ("skanfis.somewhere", ""),
         ("skanfis.regressor", "import somewhere"),
@@ -268,9 +295,23 @@ def test_checker_finds(module, source):
         ("skanfis._sklearn", "from sklearn.utils._param_validation import Interval"),
         ("skanfis.gyro.report", "from skanfis import ANFISRegressor"),
         ("skanfis.gyro.report", "from .. import ANFISRegressor"),
+        ("skanfis.gyro.report", "from .. import __version__"),
+        ("skanfis.gyro.displays.error", "from .._units import unit_of"),
+        ("skanfis.intervals.conformal", "from .._validation import check_finite"),
         ("skanfis.gyro.report", "def plot():\n    from matplotlib import pyplot"),
         ("skanfis.__init__", "from .regressor import ANFISRegressor"),
     ],
 )
 def test_checker_lets_pass(module, source):
     assert violations(source, module) == []
+
+
+def test_what_is_shared_is_used_and_not_by_the_gyro_wing():
+    layers = {name: set() for name in SHARED}
+    for module, path in SOURCES.items():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for name in imported_names(node, module):
+                if (taken := layer_of(name)) in layers and taken != module.split(".")[1]:
+                    layers[taken].add(module.split(".")[1])
+    assert all(layers.values())
+    assert not any("gyro" in users for users in layers.values())

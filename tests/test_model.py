@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian
-from skanfis.model import OUT_OF_BOUNDS, TargetRange, TSKModel
+from skanfis.model import TargetRange, TSKModel
+from skanfis.policies import OUT_OF_BOUNDS
 from skanfis.solvers import VariableProjection
 from skanfis.support import RuleSupport
 

@@ -15,7 +15,7 @@ from sklearn.preprocessing import RobustScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
 from skanfis.export import export_json
-from skanfis.export.model_json import parse_json
+from skanfis.export.json_reader import parse_json
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.options import LinearExtrapolation

@@ -27,8 +27,8 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor, objective, rows
 from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.membership import MEMBERSHIPS
-from skanfis.model import MAX_EXTRAPOLATION
 from skanfis.options import LinearExtrapolation
+from skanfis.policies import MAX_EXTRAPOLATION
 from skanfis.rows import Rows
 from skanfis.solvers import SOLVERS, VariableProjection
 

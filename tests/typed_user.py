@@ -1,11 +1,50 @@
-"""What a user writes: ``mypy`` checks it strictly, with the package (see pyproject.toml)."""
+"""What a user writes: ``mypy`` checks it strictly, with the package (see pyproject.toml).
+
+It is read, not run. The calls are those of the README, the examples and the pages of the guide.
+"""
 
 import numpy as np
+import pandas as pd
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.datasets import make_jang_sinc
-from skanfis.export import export_text
-from skanfis.inspection import LossCurveDisplay
+from skanfis.bounds import Bounds, bounds, gradient_bounds, monotonicity
+from skanfis.constraints import FixedPoint, OutputLimits
+from skanfis.dask import DaskANFISRegressor
+from skanfis.datasets import make_jang_sinc, make_ofog
+from skanfis.export import (
+    CCode,
+    explain,
+    export_c,
+    export_text,
+    fold,
+    fold_with_rows,
+    found_by_search,
+    last_step,
+    rules_table,
+)
+from skanfis.gyro import (
+    AllanDisplay,
+    ErrorDisplay,
+    GyroCompensator,
+    OpenLoopArcsineRegressor,
+    ResidualRegressor,
+    ThermalRate,
+    allan_coefficients,
+    allan_deviation,
+    bias,
+    check_split,
+    export_c_physics,
+    find_dwells,
+    group_by_rate_level,
+    gyro_report,
+    read_log,
+    reduction_factor,
+)
+from skanfis.inspection import LossCurveDisplay, MembershipDisplay, readability
+from skanfis.intervals import ConformalRegressor
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 from skanfis.solvers import Hybrid
 
@@ -23,5 +62,52 @@ ANFISRegressor(
 answers: np.ndarray = model.predict([[1.0, 2.0]])
 text: str = export_text(model.rename_terms({"x0": ["low", "medium", "high"]}))
 display: LossCurveDisplay = LossCurveDisplay(loss=model.loss_curve_)
+memberships: MembershipDisplay = MembershipDisplay.from_estimator(model)
+n_findings: int = len(readability(model, X).findings)
 # Were the type lost on the way, there would be nothing to ignore, which is an error too.
 wrong: str = model.predict(X)  # type: ignore[assignment]
+
+# Behind a pipeline or a search, the model itself.
+search = GridSearchCV(make_pipeline(StandardScaler(), ANFISRegressor()), {}).fit(X, y)
+folded = fold(search)
+outputs: np.ndarray = folded.predict(X)
+n_rules: int = fold_with_rows(found_by_search(search), X)[0].n_rules + last_step(search).n_rules_
+tables: pd.DataFrame = rules_table(model)
+told: pd.DataFrame = explain(model, X[:1])
+code: CCode = export_c(model, name="sinc", dtype="float", std="c89", saturate=bounds(model))
+wrong_code: str = code.cost.exponentials  # type: ignore[assignment]
+
+# What is known, and how sure.
+proven: Bounds = bounds(model, {"x0": (0.0, 1.0)}, tol=1e-3)
+slopes: Bounds = gradient_bounds(model, "x0")
+signs: np.ndarray = monotonicity(model, "x0")
+ANFISRegressor(constraints=[OutputLimits(0.0, 1.0), FixedPoint([0.0, 0.0], 1.0)])
+lower, upper = ConformalRegressor(model, method="split", n_jobs=1).fit(X, y).predict_interval(X)
+width: np.ndarray = upper - lower
+wrong_bounds: float = proven.tightness  # type: ignore[assignment]
+
+# Rows that keep coming, or that lie on a cluster.
+stream = ANFISRegressor(n_mfs=3).partial_fit(X[:60], y[:60]).partial_fit(X[60:], y[60:])
+whole = stream.merge(ANFISRegressor(partition=stream, solver="lse").partial_fit(X, y))
+matrix: np.ndarray | None = whole.information_ and whole.information_.matrix
+score: float = DaskANFISRegressor(n_mfs=3).fit(X, y).score(X, y)
+
+# A gyro.
+log = make_ofog(n_devices=1, n_runs=4, random_state=0)
+groups: np.ndarray = group_by_rate_level(log["rate"], n_groups=4)
+splits: pd.DataFrame = check_split(3, log["rate"], groups=groups)
+rates: np.ndarray = ThermalRate(60.0, time="time", run="run").fit_transform(log)
+law = OpenLoopArcsineRegressor("output", "temperature", bias_degree=2)
+composed = ResidualRegressor(law, ANFISRegressor(n_mfs=2)).fit(log, log["rate"])
+physics: CCode = export_c_physics(composed, name="gyro")
+compensator = GyroCompensator(composed, ("output", "temperature"), predicts="rate")
+compensator.write_json("compensator.json")
+applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read_log("a.csv"))
+report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
+offset: float = bias(log["error"]) * reduction_factor(log["error"], log["error"])
+curve = allan_deviation(log["error"], 1.0)
+walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
+dwells: np.ndarray = find_dwells(log["rate"])
+picture: ErrorDisplay = ErrorDisplay.from_estimator(composed, log, log["rate"])
+AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
+wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]

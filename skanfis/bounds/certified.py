@@ -67,14 +67,14 @@ class Bounds:
     output_names: tuple[str, ...]
 
     @property
-    def tightness(self):
+    def tightness(self) -> np.ndarray:
         """The larger gap of either side, as part of ``highest - lowest``, (n_outputs,)."""
         gap = np.maximum(self.upper - self.highest, self.lowest - self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(gap > 0.0, gap / (self.highest - self.lowest), 0.0)
 
     @property
-    def magnitude(self):
+    def magnitude(self) -> np.ndarray:
         """What no absolute value in the box is above, (n_outputs,)."""
         return np.maximum(np.abs(self.lower), np.abs(self.upper))
 
@@ -86,7 +86,7 @@ class Bounds:
         return f"Bounds({'; '.join(parts)})"
 
 
-def bounds(model, box=None, *, tol=0.01, max_boxes=200_000):
+def bounds(model, box=None, *, tol=0.01, max_boxes=200_000) -> Bounds:
     """Enclose every prediction of a model over a box of inputs.
 
     The enclosure is proven: by interval arithmetic on the rules, refined by branch and bound, with
@@ -151,7 +151,7 @@ def bounds(model, box=None, *, tol=0.01, max_boxes=200_000):
     return _gathered(found, box, model, model.output_names)
 
 
-def gradient_bounds(model, feature, box=None, *, tol=0.01, max_boxes=200_000):
+def gradient_bounds(model, feature, box=None, *, tol=0.01, max_boxes=200_000) -> Bounds:
     """Enclose the slope of the predictions by one input over a box of inputs.
 
     Proven as in :func:`bounds`. The slope is that of what the model predicts, beyond the range of
@@ -214,7 +214,7 @@ def gradient_bounds(model, feature, box=None, *, tol=0.01, max_boxes=200_000):
     return _gathered(found, box, model, tuple(f"d {y} / d {name}" for y in model.output_names))
 
 
-def monotonicity(model, feature, box=None, *, max_boxes=200_000):
+def monotonicity(model, feature, box=None, *, max_boxes=200_000) -> np.ndarray:
     """Prove that the predictions rise, or fall, with one input all over a box.
 
     Parameters
@@ -274,7 +274,7 @@ def _checked(model, box, tol, max_boxes):
     """The frozen model in the user's units, and the box."""
     if not isinstance(model, TSKModel):
         # What reads estimators stands above the models that training proves things of.
-        from ..export._fold import fold
+        from ..export import fold
 
         model = fold(model)
     for group in model.antecedent.groups:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import Any, Self
 
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
@@ -57,7 +58,7 @@ class DaskANFISRegressor(ANFISRegressor):
     dask.array<..., shape=(121,), dtype=float64, chunksize=(50,), chunktype=numpy.ndarray>
     """
 
-    def fit(self, X, y, sample_weight=None, groups=None):
+    def fit(self, X, y, sample_weight=None, groups=None) -> Self:
         """Train the model.
 
         Parameters
@@ -87,7 +88,7 @@ class DaskANFISRegressor(ANFISRegressor):
         """
         return super().fit(X, y, sample_weight=sample_weight, groups=groups)
 
-    def predict(self, X, return_std=False):
+    def predict(self, X, return_std=False) -> Any:
         """Predict the target, block by block and lazily where X is a dask collection.
 
         Parameters
@@ -114,7 +115,7 @@ class DaskANFISRegressor(ANFISRegressor):
             return y
         return y, self._lazily("_deviations", X, names, self.model_.output_names[0])
 
-    def coverage(self, X):
+    def coverage(self, X) -> Any:
         """Tell how well the training data cover each row, lazily where X is a dask collection.
 
         Parameters
@@ -128,7 +129,7 @@ class DaskANFISRegressor(ANFISRegressor):
         """
         return self._lazily("coverage", X) if is_collection(X) else super().coverage(X)
 
-    def in_bounds(self, X):
+    def in_bounds(self, X) -> Any:
         """Tell which rows lie in the range of training, lazily where X is a dask collection.
 
         Parameters
@@ -144,7 +145,7 @@ class DaskANFISRegressor(ANFISRegressor):
             self._lazily("in_bounds", X, dtype=bool) if is_collection(X) else super().in_bounds(X)
         )
 
-    def strengths(self, X):
+    def strengths(self, X) -> Any:
         """Tell how strongly each rule fires on each row, lazily where X is a dask collection.
 
         Parameters
@@ -160,7 +161,7 @@ class DaskANFISRegressor(ANFISRegressor):
             return super().strengths(X)
         return self._lazily("strengths", X, tuple(range(self.n_rules_)))
 
-    def score(self, X, y, sample_weight=None):
+    def score(self, X, y, sample_weight=None) -> float:
         """Coefficient of determination R², a reduction where X and y are dask collections.
 
         Parameters

@@ -62,7 +62,7 @@ def make_ofog(
     The split matters. Neighbouring rows are nearly equal: a random split of rows tests on what was
     trained on. Hold out whole runs (``run`` as the groups) or devices (``device``). With the rate
     levels of a table (``n_rate_levels``), which every run then meets, hold out levels too: a
-    flexible model learns the list of levels by heart, and an indicated rate tells which one it is.
+    flexible model memorises the list of levels, and an indicated rate tells which one it is.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ they are.
 import numpy as np
 
 from ..posterior import MOST_PARAMETERS, Posterior
-from ._limits import number, shown
+from .limits import number, shown
 
 __all__ = ["posterior_item", "read_posterior"]
 

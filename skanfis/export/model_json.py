@@ -34,60 +34,21 @@ On request there is a further object, "posterior"; see ``_posterior_json``.
 """
 
 import json
-from itertools import groupby
-from math import inf, isinf, prod
+from math import isinf
 from pathlib import Path
 
 import numpy as np
 
-from ..antecedent import (
-    Antecedent,
-    GridAntecedent,
-    RuleTableAntecedent,
-    ScatteredAntecedent,
-    TermGroup,
-)
 from ..membership import MEMBERSHIPS
-from ..model import OUT_OF_BOUNDS, TargetRange, TSKModel
-from ..support import RuleSupport
-from ._fold import fold
-from ._limits import (
-    LARGEST_NUMBER,
-    SMALLEST_NUMBER,
-    check_size,
-    number,
-    read_bytes,
-    shown,
-)
-from ._posterior_json import posterior_item, read_posterior
+from ..model import TSKModel
+from ._posterior_json import posterior_item
+from .folding import fold
+from .json_reader import FORMAT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
+from .limits import read_bytes
 
 __all__ = ["export_json", "read_json", "write_json"]
 
-_FORMAT = "skanfis-model"
-_VERSION = 1
 _MOST_BYTES = 2**24
-_KINDS: dict[type[Antecedent], str] = {
-    GridAntecedent: "grid",
-    ScatteredAntecedent: "scattered",
-    RuleTableAntecedent: "table",
-}
-_FILE = [
-    "format",
-    "version",
-    "inputs",
-    "outputs",
-    "out_of_bounds",
-    "max_extrapolation",
-    "rule_base",
-    "terms",
-    "rules",
-    "support",
-]
-_INPUT = ["name", "minimum", "maximum", "reference", "spread"]
-_OUTPUT = ["name", "minimum", "maximum", "spread"]
-_LARGEST_LOG = float(np.log(LARGEST_NUMBER))
-# Of weights, each of which is a part of the whole.
-_ROUNDING = 1e-6
 
 
 def export_json(estimator, *, posterior=False) -> str:
@@ -153,13 +114,13 @@ def export_json(estimator, *, posterior=False) -> str:
         )
     ]
     document = {
-        "format": _FORMAT,
-        "version": _VERSION,
+        "format": FORMAT,
+        "version": VERSION,
         "inputs": inputs,
         "outputs": _output_items(model),
         "out_of_bounds": model.out_of_bounds,
         "max_extrapolation": None if isinf(limit) else limit,
-        "rule_base": _KINDS[type(model.antecedent)],
+        "rule_base": KINDS[type(model.antecedent)],
         "terms": terms,
         "rules": rules,
         "support": None if model.support is None else _support_items(model.support),
@@ -172,7 +133,7 @@ def export_json(estimator, *, posterior=False) -> str:
             )
         document["posterior"] = posterior_item(model.posterior)
     try:
-        _model(document)
+        model_of(document)
     except ValueError as error:
         raise ValueError(f"the model cannot be written such that it can be read: {error}") from None
     return _laid_out(document)
@@ -260,71 +221,17 @@ def read_json(path) -> TSKModel:
         raise ValueError(f"{path}: {error}") from None
 
 
-def parse_json(text):
-    """The model that a JSON text describes; ValueError where it is none."""
-    return _model(json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition))
-
-
-def _model(document):
-    """The model that a file's content describes."""
-    _check_version(document)
-    posterior = document.get("posterior")
-    document = {key: value for key, value in document.items() if key != "posterior"}
-    _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
-        document, _FILE, "the file"
-    )
-    input_names, box = _inputs(_list(inputs, "inputs"))
-    output_names, target = _outputs(_list(outputs, "outputs"))
-    if policy not in OUT_OF_BOUNDS:
-        raise ValueError(f"out_of_bounds is {shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
-    limit = inf if limit is None else number(limit, "max_extrapolation", 0.0)
-    n_rules = len(_list(rules, "rules"))
-    check_size(n_rules, len(_list(terms, "terms", 0)), len(inputs), len(outputs))
-    groups, initial_groups, term_names = _read_terms(terms, len(inputs))
-    table, weights, rows, coefficients = _rules(rules, len(terms), len(inputs), len(outputs))
-    antecedent = _rule_base(kind, groups, table)
-    if not abs(weights.sum() - 1.0) <= _ROUNDING:
-        raise ValueError(f"rules[].weight: the sum over all rules is {weights.sum():g}, not 1.")
-    return TSKModel(
-        antecedent=antecedent,
-        initial_antecedent=_rule_base(kind, initial_groups, table),
-        coefficients=coefficients,
-        reference=box[2],
-        spread=box[3],
-        minimum=box[0],
-        maximum=box[1],
-        rule_weights=weights,
-        rule_rows=rows,
-        input_names=input_names,
-        out_of_bounds=policy,
-        max_extrapolation=limit,
-        support=None if support is None else _support(support, n_rules, len(inputs)),
-        term_names=term_names,
-        output_names=output_names,
-        target=target,
-        posterior=None
-        if posterior is None
-        else read_posterior(
-            posterior, antecedent, len(inputs), len(outputs), int(coefficients.shape[1] > 1)
-        ),
-    )
-
-
 def _terms(antecedent):
     """Every term's input, function and theta by name."""
     terms = []
     for group in antecedent.groups:
         if group.family not in MEMBERSHIPS.values():
             raise ValueError(f"the membership {group.family.name!r} is not one of skanfis' own.")
-        keys = [_key(parameter) for parameter in group.family.parameters]
+        keys = [key_of(parameter) for parameter in group.family.parameters]
         for j, theta in zip(group.inputs.tolist(), group.theta.T.tolist(), strict=True):
             numbers = dict(zip(keys, theta, strict=True))
             terms.append({"input": j, "function": group.family.name, **numbers})
     return terms
-
-
-def _key(parameter):
-    return parameter.name if parameter.kind == "location" else f"log_{parameter.name}"
 
 
 def _laid_out(document):
@@ -343,157 +250,16 @@ def _written(value):
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def _refuse(constant):
-    raise ValueError(f"{constant} is not a number of JSON; every number must be finite.")
-
-
-def _without_repetition(pairs):
-    members: dict = {}
-    for key, value in pairs:
-        if key in members:
-            raise ValueError(f"the key {shown(key)} stands twice in one object.")
-        members[key] = value
-    return members
-
-
-def _check_version(document):
-    if not isinstance(document, dict) or document.get("format") != _FORMAT:
-        raise ValueError(f'not a model of skanfis: it has no "format": "{_FORMAT}".')
-    version = document.get("version")
-    if type(version) is not int or version < 1:
-        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
-    if version > _VERSION:
-        raise ValueError(
-            f"the file is of version {shown(version)}, this skanfis reads version {_VERSION}: "
-            "upgrade skanfis to read it."
-        )
-
-
-def _inputs(inputs):
-    """Names, and minimum, maximum, reference, spread as rows."""
-    names, box = [], []
-    for j, item in enumerate(inputs):
-        where = f"inputs[{j}]"
-        name, *numbers = _members(item, _INPUT, where)
-        low, high, reference, spread = (
-            number(value, f"{where}.{key}", SMALLEST_NUMBER if key == "spread" else -LARGEST_NUMBER)
-            for key, value in zip(_INPUT[1:], numbers, strict=True)
-        )
-        if low > high:
-            raise ValueError(f"{where}: minimum is above maximum.")
-        names.append(_text(name, where))
-        box.append([low, high, reference, spread])
-    return tuple(names), np.array(box).T.copy()
-
-
 def _output_items(model):
     """Every output's name, and what the target was in training."""
     target = model.target
     if target is None:
-        return [dict.fromkeys(_OUTPUT) | {"name": name} for name in model.output_names]
+        return [dict.fromkeys(OUTPUT) | {"name": name} for name in model.output_names]
     numbers = (values.tolist() for values in (target.minimum, target.maximum, target.spread))
     return [
-        dict(zip(_OUTPUT, item, strict=True))
+        dict(zip(OUTPUT, item, strict=True))
         for item in zip(model.output_names, *numbers, strict=True)
     ]
-
-
-def _outputs(outputs):
-    """Names, and the range of the target, which is known of every output or of none."""
-    names, known = [], []
-    for k, item in enumerate(outputs):
-        where = f"outputs[{k}]"
-        name, *numbers = _members(item, _OUTPUT, where)
-        names.append(_text(name, where))
-        if all(value is None for value in numbers):
-            continue
-        low, high, spread = (
-            number(value, f"{where}.{key}", SMALLEST_NUMBER if key == "spread" else -LARGEST_NUMBER)
-            for key, value in zip(_OUTPUT[1:], numbers, strict=True)
-        )
-        if low > high:
-            raise ValueError(f"{where}: minimum is above maximum.")
-        known.append([low, high, spread])
-    if known and len(known) < len(names):
-        raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
-    return tuple(names), TargetRange(*np.array(known).T.copy()) if known else None
-
-
-def _read_terms(terms, n_inputs):
-    """Groups of terms after training, before it, and the terms' names."""
-    names, after, before = [], [], []
-    for t, item in enumerate(terms):
-        where = f"terms[{t}]"
-        function = item.get("function") if isinstance(item, dict) else None
-        family = MEMBERSHIPS.get(function) if isinstance(function, str) else None
-        if family is None:
-            raise ValueError(f'{where} has no "function" among {", ".join(MEMBERSHIPS)}.')
-        keys = [_key(parameter) for parameter in family.parameters]
-        name, j, _, start, *theta = _members(
-            item, ["name", "input", "function", "before_training", *keys], where
-        )
-        j = _whole(j, 0, n_inputs - 1, f'"input" of {where}')
-        names.append(_text(name, where))
-        after.append((j, family, _theta(family, theta, where)))
-        start = _members(start, keys, f'"before_training" of {where}')
-        before.append((j, family, _theta(family, start, f"{where}.before_training")))
-    return _groups(after), _groups(before), tuple(names)
-
-
-def _theta(family, theta, where):
-    numbers = []
-    for parameter, value in zip(family.parameters, theta, strict=True):
-        largest = LARGEST_NUMBER if parameter.kind == "location" else _LARGEST_LOG
-        numbers.append(number(value, f"{where}.{_key(parameter)}", -largest, largest))
-    return numbers
-
-
-def _groups(terms):
-    """Consecutive terms of one family together."""
-    groups = []
-    for family, members in groupby(terms, key=lambda term: term[1]):
-        inputs, _, theta = zip(*members, strict=True)
-        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
-    return tuple(groups)
-
-
-def _rules(rules, n_terms, n_inputs, n_outputs):
-    """Table of terms, weights, rows and coefficients."""
-    table, weights, rows, consequents = [], [], [], []
-    for r, item in enumerate(rules):
-        where = f"rules[{r}]"
-        own, weight, n_rows, by_output = _members(
-            item, ["terms", "weight", "rows", "consequents"], where
-        )
-        table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
-        weights.append(number(weight, f"{where}.weight", 0.0, 1.0 + _ROUNDING))
-        rows.append(number(n_rows, f"{where}.rows", 0.0))
-        by_output = [
-            [
-                number(value, f"{where}.consequents[{k}][{j}]")
-                for j, value in enumerate(_list(one, f"{where}.consequents[{k}]"))
-            ]
-            for k, one in enumerate(_list(by_output, f"{where}.consequents"))
-        ]
-        n_basis = len(by_output[0])
-        if len(by_output) != n_outputs or n_basis not in (1, 1 + n_inputs):
-            raise ValueError(
-                f'"consequents" of {where} must be one list per output, of 1 or {1 + n_inputs} '
-                "numbers."
-            )
-        consequents.append(by_output)
-        if [len(one) for one in by_output] != [len(consequents[0][0])] * n_outputs or len(
-            table[-1]
-        ) != len(table[0]):
-            raise ValueError(f"{where} has other numbers of terms or coefficients than rules[0].")
-    shape = (len(rules), len(table[0]))
-    coefficients = np.array(consequents).transpose(0, 2, 1).copy()
-    return (
-        np.array(table, dtype=int).reshape(shape),
-        np.array(weights),
-        np.array(rows),
-        coefficients,
-    )
 
 
 def _support_items(support):
@@ -509,93 +275,3 @@ def _support_items(support):
             strict=True,
         )
     ]
-
-
-def _support(items, n_rules, n_inputs):
-    """The support of the rules, out of an entry for each."""
-    n_factor = n_inputs * (n_inputs + 1) // 2
-    shares, radii, centers, factors = [], [], [], []
-    if len(_list(items, "support")) != n_rules:
-        raise ValueError(f"support has {len(items)} entries; the model has {n_rules} rules.")
-    for r, item in enumerate(items):
-        where = f"support[{r}]"
-        *numbers, middle, triangle = _members(item, ["share", "radius", "center", "factor"], where)
-        share = number(numbers[0], f"{where}.share", 0.0, 1.0)
-        radius = number(numbers[1], f"{where}.radius", 0.0)
-        if len(_list(middle, where)) != n_inputs or len(_list(triangle, where)) != n_factor:
-            raise ValueError(
-                f'"center" and "factor" of {where} must be lists of {n_inputs} and {n_factor} '
-                "numbers."
-            )
-        shares.append(share)
-        radii.append(radius)
-        centers.append([number(value, f"{where}.center") for value in middle])
-        factors.append([number(value, f"{where}.factor") for value in triangle])
-    # Asked for now that the file has shown to be as large.
-    factor = np.zeros((n_rules, n_inputs, n_inputs))
-    factor[:, *np.tril_indices(n_inputs)] = factors
-    return RuleSupport(np.array(shares), np.array(centers), factor, np.array(radii))
-
-
-def _rule_base(kind, groups, table):
-    """The rule base of a kind with these terms; ValueError where its rules are not the table's."""
-    inputs = np.concatenate([group.inputs for group in groups]) if groups else np.empty(0, int)
-    antecedent: Antecedent
-    if kind == "grid":
-        counts = tuple(len(list(run)) for _, run in groupby(inputs))
-        antecedent = GridAntecedent(groups, counts=counts)
-        fits = prod(counts) == len(table) and len(counts) == np.unique(inputs).size
-    elif kind == "scattered":
-        antecedent = ScatteredAntecedent(groups, n_premise_inputs=table.shape[1])
-        fits = 0 < table.size == inputs.size
-    elif kind == "table":
-        antecedent, fits = RuleTableAntecedent(groups, table), True
-    else:
-        raise ValueError(f'"rule_base" is {shown(kind)}, not {", ".join(_KINDS.values())}.')
-    if not fits or not np.array_equal(antecedent.rule_terms, table):
-        raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
-    _check_columns(inputs, table)
-    return antecedent
-
-
-def _check_columns(inputs, table):
-    """Each place in a rule is one input's, and no input has two."""
-    seen = []
-    for column in table.T:
-        own = np.unique(inputs[column[column >= 0]])
-        if own.size > 1:
-            raise ValueError("the terms at one place of the rules are of different inputs.")
-        seen += own.tolist()
-    if len(set(seen)) != len(seen):
-        raise ValueError("rules have two terms of one input.")
-
-
-def _members(item, keys, where):
-    """The values of exactly these keys."""
-    if not isinstance(item, dict):
-        raise ValueError(f"{where} is {shown(item)}, not an object.")
-    if missing := [key for key in keys if key not in item]:
-        raise ValueError(f"{where} has no {shown(missing[0])}.")
-    if unknown := [key for key in item if key not in keys]:
-        raise ValueError(f"{where} has the unknown key {shown(unknown[0])}.")
-    return [item[key] for key in keys]
-
-
-def _list(value, where, least=1):
-    if not isinstance(value, list) or len(value) < least:
-        raise ValueError(f"{where}: {shown(value)} is not a list of {least} or more.")
-    return value
-
-
-def _text(value, where):
-    if not isinstance(value, str):
-        raise ValueError(f"{where}: {shown(value)} is not a name in quotes.")
-    return value
-
-
-def _whole(value, lowest, highest, where):
-    if type(value) is not int or not lowest <= value <= highest:
-        raise ValueError(
-            f"{where}: {shown(value)} is not a whole number from {lowest} to {highest}."
-        )
-    return value

@@ -6,14 +6,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._fold import fold, fold_with_rows
-from ._reading import (
-    check_choice,
-    choose_rules,
-    conditions,
-    consequents_about,
-    premise_text,
-)
+from .._validation import check_choice
+from .folding import fold, fold_with_rows
+from .rules import choose_rules, conditions, consequents_about, premise_text
 
 __all__ = ["explain", "memberships_table", "rules_table"]
 

@@ -4,10 +4,9 @@ from math import floor, log10
 
 import numpy as np
 
-from ._fold import fold
-from ._reading import (
-    check_choice,
-    check_count,
+from .._validation import check_choice, check_count
+from .folding import fold
+from .rules import (
     choose_rules,
     conditions,
     consequents_about,

@@ -14,6 +14,7 @@ from .displays import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
+from .dwells import clip_dwells, find_dwells, resample_in_temperature
 from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
 from .groups import (
@@ -45,7 +46,6 @@ from .metrics import (
 )
 from .physics import OpenLoopArcsineRegressor
 from .report import gyro_report
-from .tidy import clip_dwells, find_dwells, resample_in_temperature
 
 __all__ = [
     "AllanCoefficients",

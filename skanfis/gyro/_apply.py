@@ -5,13 +5,14 @@ from pathlib import Path
 import joblib
 import numpy as np
 
+from ..export.c.status import STATUS
 from ._checks import check_log
 from ._console import UsageError, refuse_existing, say
 from ._files import check_different, find_logs
 from ._logs import read_for
 from ._staging import Staging
 from ._units import SIGNALS
-from .compensator import STATUS, GyroCompensator
+from .compensator import GyroCompensator
 from .errors import LogError
 
 __all__ = ["apply"]

@@ -37,7 +37,9 @@ _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _FOLLOWS = 0.9  # correlation of output with rate below which one of them is something else
 
 
-def check_log(log, *, inputs=("temperature", "output"), units=None, min_temperature_span=10.0):
+def check_log(
+    log, *, inputs=("temperature", "output"), units=None, min_temperature_span=10.0
+) -> pd.DataFrame:
     """Check that a log is fit for calibrating a compensator, and refuse it otherwise.
 
     Parameters

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
-from ..export._fold import fold_with_rows
+from ..export import fold_with_rows, found_by_search
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor, check_parameters
 
@@ -47,7 +47,7 @@ class FrozenRules:
 
 def law_and_rules(estimator):
     """Both parts of a fitted composition: OpenLoopArcsineRegressor, FrozenRules."""
-    found = getattr(estimator, "best_estimator_", estimator)
+    found = found_by_search(estimator)
     if not isinstance(found, ResidualRegressor):
         raise TypeError(
             "estimator must be a fitted ResidualRegressor of the arcsine law and an ANFIS, or a "

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..export._limits import SMALLEST_NUMBER, number, shown
+from ..export.limits import SMALLEST_NUMBER, number, shown
 from .physics import OpenLoopArcsineRegressor, check_parameters
 
 __all__ = ["law_document", "read_law"]

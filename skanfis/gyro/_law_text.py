@@ -1,13 +1,8 @@
 """The arcsine law as one line to be read, or typed into a spreadsheet."""
 
-__all__ = ["law_text"]
+from ..policies import SILENT
 
-_POLICIES = {
-    "clip": "the phase is held there",
-    "linear": "the law goes on along its tangent",
-    "nan": "there is no rate",
-    "raise": "there is no rate",
-}
+__all__ = ["law_text", "past_phase"]
 
 
 def law_text(law, names, unit="deg/s"):
@@ -26,8 +21,15 @@ def law_text(law, names, unit="deg/s"):
     if len(names) > 1:
         lag = _term(law.thermometer_lag_, f" s * {names[2]} [degC/s]") if len(names) > 2 else ""
         formula += f", t = {names[1]} [degC]{lag}{_term(-law.reference_temperature_)}"
-    policy = _POLICIES[law.out_of_bounds]
+    policy = past_phase(law.out_of_bounds, "rate")
     return f"{formula}\nBeyond a phase (the arcsin) of {law.max_phase:g} rad {policy}."
+
+
+def past_phase(policy, what):
+    """What happens beyond the largest phase, as a clause; ``what`` there is none of in silence."""
+    if policy in SILENT:
+        return f"there is no {what}"
+    return "the phase is held there" if policy == "clip" else "the law goes on along its tangent"
 
 
 def _polynomial(coefficients):

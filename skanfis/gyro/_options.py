@@ -275,7 +275,7 @@ def _add_range(group):
         choices=KINDS,
         default="auto",
         help="what to hold out in the check; by default (auto) devices where there are three or "
-        "more, else runs, and rate levels where these could be learnt by heart; of a single run "
+        "more, else runs, and rate levels where these could be memorised; of a single run "
         "legs of the temperature's cycles, or pieces of them",
     )
 

@@ -18,7 +18,7 @@ _FEWEST = {"device": 3, "run": 3, "level": 5, "leg": 4, "piece": 2}
 _N_FOLDS = 5
 # Of the levels, where runs are held out too: every fold then trains on two thirds of them.
 _N_LEVEL_FOLDS_BESIDE = 3
-# More levels than a few per term of any model cannot be learnt by heart.
+# More levels than a few per term of any model cannot be memorised.
 _MOST_LEVELS = 100
 _SHARED = 0.1
 _ROWS_PER_LEVEL = 3
@@ -98,7 +98,7 @@ def _choose(numbers, levels, legs):
                 return kind, "too few runs to hold out"
         raise LogError(_nothing_to_hold_out(numbers, levels))
     if few and _share_levels(numbers[whole], levels):
-        return f"{whole}+level", f"the {whole}s share rate levels, which could be learnt by heart"
+        return f"{whole}+level", f"the {whole}s share rate levels, which could be memorised"
     return whole, f"rows of one {whole} are alike"
 
 

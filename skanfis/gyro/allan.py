@@ -28,7 +28,7 @@ _SLOPE_TOLERANCE = 0.15
 ROWS_PER_TIME = 10
 
 
-def allan_deviation(error, sampling_interval, *, run=None):
+def allan_deviation(error, sampling_interval, *, run=None) -> pd.DataFrame:
     """Overlapping Allan deviation of the error, in octaves up to a tenth of the run.
 
     Computed by allantools (``allantools.oadev``), an optional dependency. The runs of one log give
@@ -125,7 +125,7 @@ class AllanCoefficients:
     notes: dict = field(default_factory=dict)
 
 
-def allan_coefficients(averaging_time, deviation):
+def allan_coefficients(averaging_time, deviation) -> AllanCoefficients:
     """Read angle random walk, bias instability and rate random walk off an Allan curve.
 
     A slope counts as found where a line through three neighbouring points has it within 0.15; the

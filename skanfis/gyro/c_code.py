@@ -14,40 +14,35 @@ import pandas as pd
 from numpy.polynomial import Polynomial
 from scipy.stats import qmc
 
-from ..export._numbers import Numbers, as_held
 from ..export.c import CCode
-from ..export.c._cost import cost
-from ..export.c._dialect import Dialect
-from ..export.c._files import check_arguments, write_files
-from ..export.c._header import BITS, coverage_line, header_of, policy_line
-from ..export.c._self_test import ROWS, TOLERANCE, self_test, size_of_sum
-from ..export.c._source import FINITE_INPUT, Source, index_type, rejection
-from ..export.c._text import LONGEST_NAME, comment, literals
+from ..export.c.builder import (
+    FINITE_INPUT,
+    LONGEST_NAME,
+    ROWS,
+    STATUS,
+    TOLERANCE,
+    Dialect,
+    RulesPart,
+    check_arguments,
+    comment,
+    coverage_line,
+    header_of,
+    index_type,
+    literals,
+    policy_line,
+    rejection,
+    self_test,
+    size_of_sum,
+    write_files,
+)
+from ..policies import SILENT
 from ._frozen import FrozenRules, law_and_rules
+from ._law_text import past_phase
 from .physics import OpenLoopArcsineRegressor
 
 __all__ = ["export_c_physics"]
 
 _SUFFIX = "_r"
-_SILENT = ("nan", "raise")
-_PAST_PHASE = {
-    "clip": "the phase is held there",
-    "linear": "the law goes on along its tangent",
-    "raise": "there is no output",
-    "nan": "there is no output",
-}
-
-_RULES = """
-/* Of the rules. */
-#define $RULES_N_INPUTS $n_rules_inputs
-#define $RULES_N_OUTPUTS 1
-#define $RULES_IN_RANGE $NAME_IN_RANGE
-#define $RULES_OUT_OF_RANGE $NAME_OUT_OF_RANGE
-#define $RULES_NOT_FINITE $NAME_NOT_FINITE
-#define $RULES_UNCOVERED $NAME_UNCOVERED
-#define $RULES_NO_OUTPUT $NAME_NO_OUTPUT
-
-"""
 
 _POLYNOMIAL = """
 static $real $name_polynomial(const $real *c, int n, $real t)
@@ -128,7 +123,7 @@ _WITHIN = "phase = $ASIN(sine);"
 
 def export_c_physics(
     estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1
-):
+) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 
     The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from
@@ -195,36 +190,26 @@ def export_c_physics(
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     law, rules = law_and_rules(estimator)
     policies = {law.out_of_bounds, rules.model.out_of_bounds}
-    if policies >= set(_SILENT):
+    if policies >= set(SILENT):
         raise ValueError(
             "One of base and residual has out_of_bounds='nan', the other 'raise': one C function "
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
-    if rules.model.support is None:
-        min_coverage = None
     dialect = Dialect(name, dtype, std)
-    numbers = Numbers.of(rules.model, dialect.dtype)
-    body = Source(
-        numbers,
-        Dialect(name + _SUFFIX, dtype, std),
-        rules.model.out_of_bounds,
-        min_coverage,
-        is_part=True,
-    )
+    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage)
     columns = np.union1d(law.columns_, rules.positions)
     composition = _Composition(law, rules, columns, dialect.dtype)
     source = "".join(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
-            _write(dialect, _RULES, composition),
-            body.body(),
+            part.text(),
             "\n",
             _law(dialect, composition, policies),
-            self_test(_known_answers(composition, numbers, min_coverage), dialect),
+            self_test(_known_answers(composition, part), dialect),
         ]
     )
-    price = _cost(cost(numbers, body), composition)
-    code = CCode(name, _header(composition, dialect, price, min_coverage), source, price)
+    price = _cost(part.cost, composition)
+    code = CCode(name, _header(composition, dialect, price, part.min_coverage), source, price)
     write_files(code, path)
     return code
 
@@ -338,7 +323,7 @@ def _law(dialect, composition, policies):
     ]
     asin = dialect.write("$ASIN(")
     parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
-    silent = next(iter(policies & set(_SILENT)), None)
+    silent = next(iter(policies & set(SILENT)), None)
     parts.append(dialect.write(rejection(silent, dialect.std)).lstrip() + "\n")
     parts.append(dialect.write(_POLYNOMIAL).lstrip())
 
@@ -347,7 +332,7 @@ def _law(dialect, composition, policies):
     if inputs.size > 1:
         lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
         temperature = f"x[{inputs[1]}]{lag} - {number(composition.reference)}"
-    refuses = law.out_of_bounds in _SILENT
+    refuses = law.out_of_bounds in SILENT
     template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
     template = template.replace("$temperature", temperature)
     template = template.replace("$beyond", _REFUSED if refuses else _BEYOND[law.out_of_bounds])
@@ -385,7 +370,7 @@ def _header(composition, dialect, price, min_coverage):
         "Outputs y:",
         "  [0] rate, in the unit of the training data",
         "",
-        f"Beyond a phase of {law.max_phase:g} rad {_PAST_PHASE[law.out_of_bounds]}.",
+        f"Beyond a phase of {law.max_phase:g} rad {past_phase(law.out_of_bounds, 'output')}.",
         policy_line(model, "Of the rules alone: outside their range"),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
@@ -409,13 +394,13 @@ def _cost(of_rules, composition):
     )
 
 
-def _known_answers(composition, numbers, min_coverage):
+def _known_answers(composition, part):
     """Rows, rates, status and tolerance, as for rules alone; some rows lie far up the sine.
 
     Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
     """
     law, rules = composition.law, composition.rules
-    rules = replace(rules, model=as_held(rules.model, numbers))
+    rules, min_coverage = replace(rules, model=part.model), part.min_coverage
     low, high = composition.box
     points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
     kind = np.arange(len(points)) % 4
@@ -438,17 +423,17 @@ def _known_answers(composition, numbers, min_coverage):
     def outside(inputs, least, most):
         return ((X[:, inputs] < least) | (X[:, inputs] > most)).any(axis=1)
 
-    beside = outside(composition.rules_inputs, numbers.low, numbers.high)
+    beside = outside(composition.rules_inputs, part.low, part.high)
     out = beside | beyond | outside(composition.law_inputs, composition.low, composition.high)
-    silent = beyond & (law.out_of_bounds in _SILENT)
-    silent |= beside & (rules.model.out_of_bounds in _SILENT)
+    silent = beyond & (law.out_of_bounds in SILENT)
+    silent |= beside & (rules.model.out_of_bounds in SILENT)
     of_law = _answering(law).predict(whole)
     model, rows = _answering(rules.model), np.asarray(whole)[:, rules.positions]
     of_rules = model.predict(rows)
     silent |= ~np.isfinite(of_law.astype(composition.dtype))
-    status = BITS["OUT_OF_RANGE"] * out | BITS["NO_OUTPUT"] * silent
+    status = STATUS["OUT_OF_RANGE"] * out | STATUS["NO_OUTPUT"] * silent
     if min_coverage is not None:
-        status |= BITS["UNCOVERED"] * (~silent & (coverage < min_coverage))
+        status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
     y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
     # What rounding of the sine is magnified by, too.
     steepest = np.abs(of_law[~silent]).max(initial=0.0)

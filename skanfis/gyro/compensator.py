@@ -4,27 +4,25 @@ import json
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 
 from ..exceptions import OutOfBoundsWarning
-from ..export import export_json
-from ..export._limits import SMALLEST_NUMBER, number, shown
-from ..export.model_json import parse_json
+from ..export import export_json, found_by_search
+from ..export.c.status import STATUS
+from ..export.json_reader import parse_json
+from ..export.limits import SMALLEST_NUMBER, number, shown
 from ._ask import ask
 from ._frozen import FrozenRules, joined, law_and_rules
 from ._law_json import law_document, read_law
 from .compose import ResidualRegressor
 from .features import ThermalRate, TimeSincePowerOn
 
-__all__ = ["STATUS", "GyroCompensator"]
+__all__ = ["GyroCompensator"]
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
-
-# The status word of the exported C code has the same bits.
-STATUS = {"OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
 _KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
@@ -82,7 +80,7 @@ class GyroCompensator:
     time_constant: float = 60.0
     min_coverage: float = 0.1
 
-    def features(self, log):
+    def features(self, log) -> pd.DataFrame:
         """The estimator's inputs.
 
         Parameters
@@ -96,7 +94,7 @@ class GyroCompensator:
         """
         return features(log, self.inputs, self.time_constant)
 
-    def indicated(self, log):
+    def indicated(self, log) -> np.ndarray:
         """The rate that the gyro indicates without compensation.
 
         Parameters
@@ -110,7 +108,7 @@ class GyroCompensator:
         """
         return log["output"].to_numpy() / self.scale_factor
 
-    def apply(self, log):
+    def apply(self, log) -> pd.DataFrame:
         """Compensate a log, and flag the rows in which that cannot be trusted.
 
         Parameters
@@ -150,7 +148,7 @@ class GyroCompensator:
             index=log.index,
         )
 
-    def compensate(self, indicated, predicted):
+    def compensate(self, indicated, predicted) -> np.ndarray:
         """The compensated rate from what the estimator predicts.
 
         Parameters
@@ -167,7 +165,7 @@ class GyroCompensator:
         """
         return indicated - predicted if self.predicts == "error" else predicted
 
-    def write_json(self, path):
+    def write_json(self, path) -> None:
         """Write it as text that runs nothing when it is read.
 
         Parameters
@@ -201,7 +199,7 @@ class GyroCompensator:
         Path(path).write_text(text, encoding="utf-8", newline="\n")
 
     @classmethod
-    def read_json(cls, path):
+    def read_json(cls, path) -> Self:
         """Read one that :meth:`write_json` has written.
 
         Parameters
@@ -234,7 +232,7 @@ class GyroCompensator:
 
     def _parts(self):
         """The law, or None, and the rules."""
-        found = getattr(self.estimator, "best_estimator_", self.estimator)
+        found = found_by_search(self.estimator)
         if isinstance(found, ResidualRegressor):
             return law_and_rules(found)
         return None, FrozenRules.of(found, len(self.inputs))

@@ -1,5 +1,7 @@
 """Two regressors in a row: the second learns what the first leaves."""
 
+from typing import Any, Self
+
 import numpy as np
 from sklearn import get_config
 from sklearn.base import BaseEstimator, RegressorMixin, clone
@@ -90,7 +92,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     True
     """
 
-    def __init__(self, base=None, residual=None, *, n_rounds=1):
+    def __init__(self, base: Any = None, residual: Any = None, *, n_rounds: int = 1) -> None:
         self.base = base
         self.residual = residual
         self.n_rounds = n_rounds
@@ -101,7 +103,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         tags.input_tags.sparse = all(get_tags(part).input_tags.sparse for part in self._unfitted())
         return tags
 
-    def get_metadata_routing(self):
+    def get_metadata_routing(self) -> MetadataRouter:
         """Metadata routing of this object, with both parts; see scikit-learn's user guide.
 
         Returns
@@ -113,7 +115,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         router = MetadataRouter(owner=type(self).__name__)
         return router.add(base=base, residual=residual, method_mapping=to_both)
 
-    def fit(self, X, y, sample_weight=None):
+    def fit(self, X, y, sample_weight=None) -> Self:
         """Fit the base, then the residual model.
 
         Parameters
@@ -152,7 +154,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
             learnt = self.residual_.predict(X)
         return self
 
-    def predict(self, X):
+    def predict(self, X) -> np.ndarray:
         """Predict the target, as the sum of both parts.
 
         Parameters

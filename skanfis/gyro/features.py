@@ -20,6 +20,8 @@ nothing. In C, with the state {rate, previous} of one run, on every sample after
 where h is constant, the gain 1 - exp(-h / tau) is a constant too.
 """
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
@@ -30,6 +32,9 @@ from ._scalars import check_number
 
 __all__ = ["ThermalLag", "ThermalRate", "TimeSincePowerOn"]
 
+# By position in X, or by name.
+Column = int | str | None
+
 
 class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     """A feature that is computed run by run, from the past rows of the run alone.
@@ -37,7 +42,7 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     Subclasses have the parameters ``time`` and ``run``, the columns that are no quantities.
     """
 
-    def fit(self, X, y=None):
+    def fit(self, X, y=None) -> Self:
         """Take note of the columns, and check them; nothing is learnt.
 
         Parameters
@@ -64,7 +69,7 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self._rows_by_run(names, columns)  # what transform refuses, fit refuses
         return self
 
-    def transform(self, X):
+    def transform(self, X) -> np.ndarray:
         """Compute the feature.
 
         Parameters
@@ -134,12 +139,12 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 class _ThermalFilter(_RunFeature):
     """A low-pass of every column that is neither time nor run."""
 
-    def __init__(self, time_constant, *, time, run):
+    def __init__(self, time_constant, *, time, run) -> None:
         self.time_constant = time_constant
         self.time = time
         self.run = run
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features=None) -> np.ndarray:
         """Names of the new columns.
 
         Parameters
@@ -251,7 +256,9 @@ class ThermalRate(_ThermalFilter):
 
     _suffix = "rate"
 
-    def __init__(self, time_constant=60.0, *, time=None, run=None):
+    def __init__(
+        self, time_constant: float = 60.0, *, time: Column = None, run: Column = None
+    ) -> None:
         super().__init__(time_constant, time=time, run=run)
 
     def _compute(self, quantities, steps, starts):
@@ -302,7 +309,9 @@ class ThermalLag(_ThermalFilter):
 
     _suffix = "lagged"
 
-    def __init__(self, time_constant=300.0, *, time=None, run=None):
+    def __init__(
+        self, time_constant: float = 300.0, *, time: Column = None, run: Column = None
+    ) -> None:
         super().__init__(time_constant, time=time, run=run)
 
     def _compute(self, quantities, steps, starts):
@@ -342,11 +351,11 @@ class TimeSincePowerOn(_RunFeature):
 
     _n_features_out = 1
 
-    def __init__(self, *, time=None, run=None):
+    def __init__(self, *, time: Column = None, run: Column = None) -> None:
         self.time = time
         self.run = run
 
-    def get_feature_names_out(self, input_features=None):
+    def get_feature_names_out(self, input_features=None) -> np.ndarray:
         """Name of the new column.
 
         Parameters

@@ -1,6 +1,6 @@
 """Groups of rows that a split must not tear apart: runs, devices, and levels of a rate table.
 
-A rate table turns at a list of rates. A flexible model learns the list by heart: the output of the
+A rate table turns at a list of rates. A flexible model memorises the list: the output of the
 gyro tells which level it is, and the level's exact rate is known from training. It fails at every
 rate between the levels, and no split shows this that leaves each level in both of its parts. The
 groups here are integers, one per row: GroupKFold, LeaveOneGroupOut, GroupShuffleSplit and
@@ -41,7 +41,7 @@ _FEW_ROWS = 0.1
 _SHARE_BY_CHANCE = 0.1
 
 
-def find_rate_levels(rate, *, tolerance=None):
+def find_rate_levels(rate, *, tolerance=None) -> np.ndarray:
     """Find the levels of a rate table in its log.
 
     The rates are sorted; a gap wider than the tolerance separates two levels. Where there are far
@@ -89,7 +89,7 @@ def find_rate_levels(rate, *, tolerance=None):
     return pd.Series(rate).groupby(labels).median().to_numpy()
 
 
-def group_by_rate_level(rate, *, n_groups=None, signed=False, tolerance=None):
+def group_by_rate_level(rate, *, n_groups=None, signed=False, tolerance=None) -> np.ndarray:
     """Groups that hold a level of the rate table together.
 
     Parameters
@@ -145,7 +145,7 @@ def group_by_rate_level(rate, *, n_groups=None, signed=False, tolerance=None):
     return labels % n_groups
 
 
-def group_by_run(time, *, max_gap=None):
+def group_by_run(time, *, max_gap=None) -> np.ndarray:
     """Groups of rows from one power-on to the next, in a log that does not number them.
 
     Parameters
@@ -179,7 +179,7 @@ def group_by_run(time, *, max_gap=None):
     return np.concatenate([[0], np.cumsum(begins)])
 
 
-def combine_groups(*labels):
+def combine_groups(*labels) -> np.ndarray:
     """Groups of the rows that agree in several labels, such as device and run.
 
     Parameters
@@ -217,7 +217,7 @@ def combine_groups(*labels):
     return table.groupby(list(table), observed=True).ngroup().to_numpy()
 
 
-def check_split(cv, rate, *, y=None, groups=None, run=None, tolerance=None):
+def check_split(cv, rate, *, y=None, groups=None, run=None, tolerance=None) -> pd.DataFrame:
     """Check that a split does not test on what it was trained on, and warn if it does.
 
     Parameters
@@ -344,7 +344,7 @@ def _no_levels(rate):
     return (
         f"rate has no levels: it changes continuously between {rate.min():g} and {rate.max():g}. "
         "If a table went from level to level, remove its way (clip_dwells), or give tolerance. If "
-        "not, no level can be learnt by heart: hold out runs or devices."
+        "not, no level can be memorised: hold out runs or devices."
     )
 
 

@@ -29,7 +29,7 @@ _PIECES_TOLD = 10
 
 def read_log(
     paths, *, columns=None, units=None, require=None, separator=None, decimal=None, encoding=None
-):
+) -> pd.DataFrame:
     r"""Read one log from one or several files.
 
     Only the columns that play a part are read. Without a column for the run, each file is a run.

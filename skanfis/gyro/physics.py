@@ -13,49 +13,25 @@ tau, and the thermal rate in the same units, rho,
 
     tau = tau_s + lag rho .
 
-The fit minimises the squared error of the *output*: there the noise is white and of one size, and
-the law is defined for every rate. It works on s = A k_0 in place of A, the scale factor at rest:
-where the sine is nearly straight, A and K cannot be told apart but s can. With A = s / k_0 its
-Jacobian is exact,
-
-    dV/ds_i  = tau^i sin(phi) / k_0
-    dV/dk_i  = tau^i A cos(phi) (Omega + b) - [i = 0] A sin(phi) / k_0
-    dV/db_i  = tau^i A K cos(phi)
-    dV/dlag  = rho {A' sin(phi) + A cos(phi) [K' (Omega + b) + K b']}
-    dV/dV0   = 1
-
-For given K the law is linear in A cos(K b) and A sin(K b), which makes a start: of a range of
-phases at the largest rate, the one that linear least squares likes best.
-
 H. C. Lefevre, "The Fiber-Optic Gyroscope", Artech House.
 """
 
 import warnings
-from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.polynomial.polynomial import polyder, polyval, polyvander
-from scipy.optimize import least_squares, root
+from numpy.polynomial.polynomial import polyval
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
+from ..policies import OUT_OF_BOUNDS
 from ._columns import check_weights
+from ._law_fit import MAX_EVALUATIONS, Shape, check_log_fits, fit_law, standardise
 
 __all__ = ["OpenLoopArcsineRegressor", "check_parameters"]
-
-_POLICIES = ("clip", "linear", "nan", "raise")
-
-# Phase at the largest rate [rad]. Below 0.01 the sine is a straight line to 20 ppm; from pi/2 on
-# two rates give one output.
-_SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
-_STARTING_PHASES = np.linspace(0.1, 1.5, 15)
-_ROWS_FOR_START = 2000
-_ROWS_FOR_TRIAL = 10_000
-_MAX_EVALUATIONS = 200
-_NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 
 
 class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
@@ -174,19 +150,19 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        output=0,
-        temperature=1,
+        output: int | str = 0,
+        temperature: int | str | None = 1,
         *,
-        temperature_rate=None,
-        amplitude_degree=1,
-        sagnac_degree=1,
-        bias_degree=1,
-        fit_offset=False,
-        reference_temperature=None,
-        max_phase=1.2,
-        out_of_bounds="clip",
-        warn_out_of_bounds=True,
-    ):
+        temperature_rate: int | str | None = None,
+        amplitude_degree: int = 1,
+        sagnac_degree: int = 1,
+        bias_degree: int = 1,
+        fit_offset: bool = False,
+        reference_temperature: float | None = None,
+        max_phase: float = 1.2,
+        out_of_bounds: str = "clip",
+        warn_out_of_bounds: bool = True,
+    ) -> None:
         self.output = output
         self.temperature = temperature
         self.temperature_rate = temperature_rate
@@ -205,7 +181,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = True
         return tags
 
-    def fit(self, X, y, sample_weight=None):
+    def fit(self, X, y, sample_weight=None) -> Self:
         """Fit the law.
 
         Parameters
@@ -232,19 +208,19 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         weights = check_weights(sample_weight, len(y))
         self.columns_ = self._find_columns()
         used, y, weights = X[weights > 0][:, self.columns_], y[weights > 0], weights[weights > 0]
-        log = _standardise(used, y.astype(float), weights)
-        shape = _Shape(self._degrees(used), used.shape[1] == 3, self.fit_offset)
-        _check_log(log, shape)
-        fitted = _fit(log, shape)
+        log = standardise(used, y.astype(float), weights)
+        shape = Shape(self._degrees(used), used.shape[1] == 3, self.fit_offset)
+        check_log_fits(log, shape)
+        fitted = fit_law(log, shape)
         if fitted.status == 0:
-            message = f"The law did not settle within {_MAX_EVALUATIONS} evaluations."
+            message = f"The law did not settle within {MAX_EVALUATIONS} evaluations."
             warnings.warn(message, ConvergenceWarning, stacklevel=2)
         self.n_iter_ = fitted.nfev
         self._keep(log, shape.law(fitted.x))
         self.minimum_, self.maximum_ = used.min(axis=0), used.max(axis=0)
         return self
 
-    def predict(self, X):
+    def predict(self, X) -> np.ndarray:
         """Predict the rate.
 
         Parameters
@@ -284,7 +260,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         difference = self._difference(used)
         return phase / polyval(difference, self.sagnac_factor_) - polyval(difference, self.bias_)
 
-    def phase(self, X):
+    def phase(self, X) -> np.ndarray:
         """Sagnac phase of each row, bias included.
 
         Parameters
@@ -300,7 +276,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         defined = np.abs(sine) <= 1.0
         return np.where(defined, np.arcsin(np.where(defined, sine, 0.0)), np.nan)
 
-    def in_bounds(self, X):
+    def in_bounds(self, X) -> np.ndarray:
         """Tell which rows lie in the range of the training data and within ``max_phase``.
 
         Parameters
@@ -435,202 +411,8 @@ def check_parameters(law):
         max_val=np.pi / 2.0,
         include_boundaries="neither",
     )
-    if law.out_of_bounds not in _POLICIES:
-        choices = ", ".join(_POLICIES)
+    if law.out_of_bounds not in OUT_OF_BOUNDS:
+        choices = ", ".join(OUT_OF_BOUNDS)
         raise ValueError(f"out_of_bounds={law.out_of_bounds!r} must be one of {choices}.")
     if law.reference_temperature is not None and not np.isfinite(law.reference_temperature):
         raise ValueError(f"reference_temperature={law.reference_temperature} must be finite.")
-
-
-@dataclass(frozen=True)
-class _Log:
-    """A calibration log, standardised: what the fit sees."""
-
-    output: np.ndarray
-    rate: np.ndarray
-    tau: np.ndarray
-    rho: np.ndarray
-    root_weights: np.ndarray
-    output_unit: float
-    rate_unit: float
-    lag_unit: float
-    mean: float
-    std: float
-
-    def thinned(self, n_rows):
-        """Every so many rows, evenly, that about ``n_rows`` are left."""
-        rows = slice(None, None, max(1, self.rate.size // n_rows))
-        columns = ("output", "rate", "tau", "rho", "root_weights")
-        return replace(self, **{name: getattr(self, name)[rows] for name in columns})
-
-
-def _standardise(used, rate, weights):
-    """The log with outputs of RMS 1, rates up to 1, and temperature about 0 with spread 1."""
-    output_unit = np.sqrt(np.average(used[:, 0] ** 2, weights=weights)) or 1.0
-    rate_unit = np.abs(rate).max() or 1.0
-    nothing = np.zeros(len(rate))
-    temperature = used[:, 1] if used.shape[1] > 1 else nothing
-    mean = np.average(temperature, weights=weights)
-    std = np.sqrt(np.average((temperature - mean) ** 2, weights=weights))
-    if np.ptp(temperature) == 0:
-        mean, std = temperature[0], 1.0
-    thermal_rate = used[:, 2] if used.shape[1] == 3 else nothing
-    thermal_unit = np.abs(thermal_rate).max() or 1.0
-    return _Log(
-        output=used[:, 0] / output_unit,
-        rate=rate / rate_unit,
-        tau=(temperature - mean) / std,
-        rho=thermal_rate / thermal_unit,
-        root_weights=np.sqrt(weights),
-        output_unit=output_unit,
-        rate_unit=rate_unit,
-        lag_unit=std / thermal_unit,
-        mean=mean,
-        std=std,
-    )
-
-
-def _check_log(log, shape):
-    if len(log.rate) < shape.n_coefficients:
-        raise ValueError(
-            f"The law has {shape.n_coefficients} coefficients; n_samples = {len(log.rate)} rows "
-            "cannot tell them. Give more rows, or lower the degrees."
-        )
-    for name, values in (("the output", log.output), ("the rate (y)", log.rate)):
-        if np.ptp(values) == 0:
-            raise ValueError(f"No scale factor can be found: {name} never changes.")
-
-
-@dataclass(frozen=True)
-class _Law:
-    """The law's coefficients in standardised units: of A = s / k_0, K and b."""
-
-    a: np.ndarray
-    k: np.ndarray
-    b: np.ndarray
-    lag: float
-    offset: float
-
-
-@dataclass(frozen=True)
-class _Shape:
-    """Degrees of A, K and b in temperature, and whether there is a lag and an offset."""
-
-    degrees: tuple[int, int, int]
-    has_lag: bool
-    has_offset: bool
-
-    @property
-    def amplitude(self):
-        return self.degrees[0]
-
-    @property
-    def sagnac(self):
-        return self.degrees[1]
-
-    @property
-    def n_coefficients(self):
-        return sum(self.degrees) + 3 + self.has_lag + self.has_offset
-
-    def law(self, parameters):
-        """From the vector that the solver works on: s, k, b; lag and offset where there are any."""
-        s, k, b, rest = np.split(parameters, np.cumsum([degree + 1 for degree in self.degrees]))
-        lag = rest[0] if self.has_lag else 0.0
-        return _Law(s / k[0], k, b, lag, rest[-1] if self.has_offset else 0.0)
-
-
-def _fit(log, shape):
-    """The solution of the least-squares problem, as SciPy gives it."""
-    if log.rate.size > 2 * _ROWS_FOR_TRIAL:
-        # Few steps on all rows are left where a part of them has shown the way.
-        start = _fit(log.thinned(_ROWS_FOR_TRIAL), shape).x
-    else:
-        start = _start(log.thinned(_ROWS_FOR_START), shape)
-    lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
-    first_of_sagnac = shape.amplitude + 1
-    lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
-    found = least_squares(
-        _misfit,
-        start,
-        jac=_jacobian,
-        bounds=(lower, upper),
-        x_scale="jac",
-        # Tight, and not by the cost: where the law fits badly, that is flat long before the end.
-        ftol=None,
-        xtol=1e-12,
-        gtol=1e-13,
-        max_nfev=_MAX_EVALUATIONS,
-        args=(log, shape),
-    )
-    at_bound = not lower[first_of_sagnac] < found.x[first_of_sagnac] < upper[first_of_sagnac]
-    # On a large log the noise is far above the eighth digit, and every pass has its price.
-    if not at_bound and log.rate.size <= 2 * _ROWS_FOR_TRIAL:
-        found.x = _polish(found.x, log, shape)
-    return found
-
-
-def _polish(parameters, log, shape):
-    """The nearby zero of the gradient.
-
-    A trust region compares costs, and near the minimum these differ by less than their rounding
-    errors as soon as the parameters are right to eight digits. The gradient goes on to tell.
-    """
-
-    def gradient(trial):
-        return _jacobian(trial, log, shape).T @ _misfit(trial, log, shape)
-
-    found = root(gradient, parameters, method="hybr", options={"xtol": 1e-14, "maxfev": 60}).x
-    return found if np.abs(found - parameters).max() < _NEARBY else parameters
-
-
-def _misfit(parameters, log, shape):
-    """Modelled minus measured output, by the root of the weight."""
-    law = shape.law(parameters)
-    tau = log.tau + law.lag * log.rho
-    phase = polyval(tau, law.k) * (log.rate + polyval(tau, law.b))
-    output = polyval(tau, law.a) * np.sin(phase) + law.offset
-    return log.root_weights * (output - log.output)
-
-
-def _jacobian(parameters, log, shape):
-    law = shape.law(parameters)
-    tau = log.tau + law.lag * log.rho
-    amplitude, factor = polyval(tau, law.a), polyval(tau, law.k)
-    biased = log.rate + polyval(tau, law.b)
-    sine, cosine = np.sin(factor * biased), np.cos(factor * biased)
-    by_polynomial = (sine / law.k[0], amplitude * cosine * biased, amplitude * cosine * factor)
-    blocks = [
-        polyvander(tau, degree) * derivative[:, None]
-        for degree, derivative in zip(shape.degrees, by_polynomial, strict=True)
-    ]
-    blocks[1][:, 0] -= amplitude * sine / law.k[0]
-    if shape.has_lag:
-        a, k, b = (polyval(tau, polyder(of)) for of in (law.a, law.k, law.b))
-        blocks.append(
-            (log.rho * (a * sine + amplitude * cosine * (k * biased + factor * b)))[:, None]
-        )
-    if shape.has_offset:
-        blocks.append(np.ones((tau.size, 1)))
-    return log.root_weights[:, None] * np.hstack(blocks)
-
-
-def _start(log, shape):
-    """The best of several phases, the rest of the law by linear least squares; no lag."""
-    weights, powers = log.root_weights, polyvander(log.tau, shape.amplitude)
-    lowest = np.inf
-    for candidate in _STARTING_PHASES:
-        sines = powers * np.sin(candidate * log.rate)[:, None]
-        cosine = np.cos(candidate * log.rate)[:, None]
-        design = weights[:, None] * np.hstack([sines, cosine])
-        target = weights * log.output
-        found = np.linalg.lstsq(design, target, rcond=None)[0]
-        misfit = np.sum((design @ found - target) ** 2)
-        if misfit < lowest:
-            lowest, phase, solution = misfit, candidate, found
-    start = np.zeros(shape.n_coefficients)
-    start[: shape.amplitude + 1] = phase * solution[:-1]
-    start[shape.amplitude + 1] = phase
-    # tan(K b) = (A sin K b) / (A cos K b); a bias beyond the largest rate is no start.
-    bias = np.arctan2(solution[-1] * np.sign(solution[0]), np.abs(solution[0])) / phase
-    start[shape.amplitude + shape.sagnac + 2] = np.clip(bias, -1.0, 1.0)
-    return start

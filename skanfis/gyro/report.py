@@ -34,7 +34,7 @@ def gyro_report(
     n_resamples=200,
     rate_unit=None,
     random_state=None,
-):
+) -> pd.DataFrame:
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
 
     Give held-out predictions: the figures of rows that a compensator was fitted to say nothing.

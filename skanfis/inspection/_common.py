@@ -5,7 +5,7 @@ from numbers import Integral, Real
 
 import numpy as np
 
-from ..export._reading import conditions, knows_data
+from ..export.rules import conditions, knows_data
 
 __all__ = [
     "COVERED",

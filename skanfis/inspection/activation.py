@@ -4,8 +4,8 @@ from typing import Self
 
 import numpy as np
 
-from ..export._fold import fold, fold_with_rows
-from ..export._reading import knows_data
+from ..export import fold, fold_with_rows
+from ..export.rules import knows_data
 from ..export.text import rows_text
 from ._common import one_axes, premises
 from .labels import as_label

@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from ..export._fold import fold
-from ..export._reading import check_count
+from .._validation import check_count
+from ..export import fold
 from ..export.table import rule_values
 from ._common import (
     COVERED,

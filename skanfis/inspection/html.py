@@ -5,14 +5,9 @@ from html import escape
 
 import numpy as np
 
-from ..export._fold import fold, last_step
-from ..export._reading import (
-    check_count,
-    choose_rules,
-    consequents_about,
-    knows_data,
-    round_reference,
-)
+from .._validation import check_count
+from ..export import fold, last_step
+from ..export.rules import choose_rules, consequents_about, knows_data, round_reference
 from ..export.text import consequent_text, range_text, term_text
 from ..model import TSKModel
 from ..readable import findings_without_rows

@@ -4,7 +4,7 @@ from typing import Self
 
 import numpy as np
 
-from ..export._fold import last_step
+from ..export import last_step
 from ._common import one_axes
 from .labels import as_label
 

@@ -4,8 +4,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ..export._fold import fold, fold_with_rows
-from ..export._reading import check_count
+from .._validation import check_count
+from ..export import fold, fold_with_rows
 from ._common import colors, panels, position
 from .labels import as_label
 

@@ -5,9 +5,8 @@ from typing import Self
 import numpy as np
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
-from .._validation import check_finite, positive_weights
-from ..export._fold import fold_with_reader
-from ..export._reading import check_count
+from .._validation import check_count, check_finite, positive_weights
+from ..export import fold_with_reader
 from ..export.table import rule_values
 from ..export.text import range_text
 from ..readable import (

@@ -4,8 +4,8 @@ from typing import Self
 
 import numpy as np
 
-from ..export._fold import fold, fold_with_rows
-from ..export._reading import check_choice, check_count
+from .._validation import check_choice, check_count
+from ..export import fold, fold_with_rows
 from ._common import COVERED, coverage_if_known, held_row, one_axes, position
 from .labels import as_label
 

@@ -4,7 +4,7 @@ import inspect
 import warnings
 from collections.abc import Iterable
 from numbers import Integral, Real
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -138,15 +138,15 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     def __init__(
         self,
-        estimator=None,
+        estimator: Any = None,
         *,
-        method="cross",
-        scaled=True,
-        cv=10,
-        calibration_fraction=0.25,
-        random_state=None,
-        n_jobs=None,
-    ):
+        method: str = "cross",
+        scaled: bool = True,
+        cv: Any = 10,
+        calibration_fraction: float = 0.25,
+        random_state: int | np.random.RandomState | None = None,
+        n_jobs: int | None = None,
+    ) -> None:
         self.estimator = estimator
         self.method = method
         self.scaled = scaled
@@ -162,14 +162,14 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         tags.regressor_tags = inner.regressor_tags
         return tags
 
-    def get_metadata_routing(self):
+    def get_metadata_routing(self) -> MetadataRouter:
         """Say which metadata go where: groups and weights are used here and passed to ``fit``."""
         mapping = MethodMapping().add(caller="fit", callee="fit")
         router = MetadataRouter(owner=type(self).__name__).add_self_request(self)
         return router.add(estimator=self._regressor(), method_mapping=mapping)
 
     @fit_context(prefer_skip_nested_validation=False)
-    def fit(self, X, y, sample_weight=None, groups=None):
+    def fit(self, X, y, sample_weight=None, groups=None) -> Self:
         """Train the regressor, and find the scores of rows that it has not seen.
 
         Parameters
@@ -204,7 +204,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self._single_output, self._is_by_group = targets.ndim == 1, numbers is not None
         self._floor = _LEAST_DEVIATION * np.atleast_1d(np.ptp(targets, axis=0))
         held_out = np.arange(len(targets))
-        self.estimators_, self._folds = [], []
+        self.estimators_: list[Any] = []
+        self._folds: list[np.ndarray] = []
         if self.method == "split":
             training, held_out = self._split(len(targets), numbers)
             self.estimator_ = data.fitted(self._regressor(), training)
@@ -226,7 +227,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
                 setattr(self, name, getattr(self.estimator_, name))
         return self
 
-    def predict(self, X):
+    def predict(self, X) -> np.ndarray:
         """Predict the target by ``estimator_``.
 
         Parameters
@@ -240,7 +241,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return self.estimator_.predict(X)
 
-    def predict_interval(self, X, coverage=0.9):
+    def predict_interval(self, X, coverage=0.9) -> tuple[np.ndarray, np.ndarray]:
         """Predict intervals that cover the target as often as asked.
 
         Parameters

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from ..exceptions import ReadabilityWarning
 from ..model import TSKModel
 from .measures import Measures, Source, measure
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = [
     "GREATEST_ALONE",
@@ -130,7 +133,7 @@ class Readability:
     }
 
     @property
-    def terms(self):
+    def terms(self) -> "pd.DataFrame":
         """The terms; see the class."""
         import pandas as pd
 
@@ -147,11 +150,11 @@ class Readability:
         )
 
     @property
-    def rules(self):
+    def rules(self) -> "pd.DataFrame":
         """The rules; see the class."""
         import pandas as pd
 
-        from ..export._reading import conditions, premise_text
+        from ..export.rules import conditions, premise_text
 
         found, model = self.measures, self.model
         texts = [premise_text(model, rule) for rule in conditions(model)]
@@ -176,7 +179,7 @@ class Readability:
         return pd.concat(tables).sort_index(kind="stable")
 
     @property
-    def outputs(self):
+    def outputs(self) -> "pd.DataFrame":
         """What holds of all rules together; see the class."""
         import pandas as pd
 
@@ -192,14 +195,14 @@ class Readability:
         )
 
     @property
-    def summary(self):
+    def summary(self) -> "pd.Series":
         """The worst of each figure, over terms and outputs."""
         import pandas as pd
 
         return pd.Series(self._summary(), name="readability")
 
     @property
-    def findings(self):
+    def findings(self) -> list[str]:
         """What is not fit to be read, in sentences; an empty list if all is well."""
         found, model = self.measures, self.model
         own = own_terms(model.antecedent)
@@ -212,7 +215,7 @@ class Readability:
         return sentences
 
     @property
-    def line(self):
+    def line(self) -> str:
         """The summary as one line of text."""
         found = self._summary()
         parts = [
@@ -244,7 +247,7 @@ class Readability:
             + f"{more}</div>"
         )
 
-    def html(self):
+    def html(self) -> str:
         """The summary and the findings as HTML.
 
         Returns

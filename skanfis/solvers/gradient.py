@@ -25,6 +25,7 @@ from ..objective import JointGradient
 from .base import Solver
 from .hybrid import NaturalPremise, Point, descend
 from .lse import lse
+from .result import SolverResult
 
 __all__ = ["GradientDescent", "gradient"]
 
@@ -167,13 +168,15 @@ class GradientDescent(Solver):
         error_goal: float | None = None,
         tol: float = 1e-3,
         stiffness: str | float = "auto",
-    ):
+    ) -> None:
         self.step_size = step_size
         self.error_goal = error_goal
         self.tol = tol
         self.stiffness = stiffness
 
-    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
         return gradient(
             problem,
             premise,

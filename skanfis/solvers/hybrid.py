@@ -292,13 +292,15 @@ class Hybrid(Solver):
         error_goal: float | None = None,
         tol: float = 1e-3,
         stiffness: str | float = "auto",
-    ):
+    ) -> None:
         self.step_size = step_size
         self.error_goal = error_goal
         self.tol = tol
         self.stiffness = stiffness
 
-    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
         return hybrid(
             problem,
             premise,

@@ -55,5 +55,7 @@ class LeastSquares(Solver):
 
     moves_premises: ClassVar[bool] = False
 
-    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
         return lse(problem, premise, start=start, on_iteration=on_iteration)

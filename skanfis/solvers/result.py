@@ -50,11 +50,11 @@ class SolverResult:
     status: str
 
     @property
-    def converged(self):
+    def converged(self) -> bool:
         """Whether the solver stopped of its own accord."""
         return self.status != "max_iter"
 
     @property
-    def message(self):
+    def message(self) -> str:
         """The status in words."""
         return MESSAGES[self.status]

@@ -222,11 +222,13 @@ class VariableProjection(Solver):
         "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
     }
 
-    def __init__(self, *, tol: float = 1e-3, stiffness: str | float = "auto"):
+    def __init__(self, *, tol: float = 1e-3, stiffness: str | float = "auto") -> None:
         self.tol = tol
         self.stiffness = stiffness
 
-    def solve(self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None):
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
         return varpro(
             problem,
             premise,

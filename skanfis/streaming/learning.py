@@ -2,7 +2,7 @@
 
 from copy import copy
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from sklearn.utils.metaestimators import available_if
@@ -24,6 +24,7 @@ from .asked import (
     structure_settings,
     warn_of_fit,
 )
+from .information import Information
 from .merging import check_same_premises, stream_of
 from .stream import Stream
 
@@ -42,11 +43,11 @@ class LearnsFromChunksMixin:
     _request: Any
     _given_weights: Any
     _found_weights: Any
-    _those_of_the_start: Any
+    _structure_parameters: Any
 
     @available_if(can_learn_from_chunks)
     @fit_context(prefer_skip_nested_validation=False)
-    def partial_fit(self, X, y, sample_weight=None, *, forgetting=1.0):
+    def partial_fit(self, X, y, sample_weight=None, *, forgetting: float = 1.0) -> Self:
         r"""Learn from a chunk of rows, going on from those before; premises stay.
 
         The first call is ``fit`` on its rows, which finds the structure and the premises; or, with
@@ -154,7 +155,7 @@ class LearnsFromChunksMixin:
         if holds:
             self.stiffness_, self.structures_ = 0.0, []
             self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
-            self._start_parameters = self._those_of_the_start()
+            self._start_parameters = self._structure_parameters()
             self._learn_from(stream)
             self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
         else:
@@ -180,7 +181,7 @@ class LearnsFromChunksMixin:
         for name in ("_stream", "_stream_settings", "n_samples_seen_"):
             self.__dict__.pop(name, None)
 
-    def merge(self, *others):
+    def merge(self, *others) -> Self:
         """Add up what models trained apart by ``partial_fit`` have seen.
 
         Parameters
@@ -226,7 +227,7 @@ class LearnsFromChunksMixin:
         return merged
 
     @property
-    def information_(self):
+    def information_(self) -> Information | None:
         """How well ``partial_fit`` has determined the consequents.
 
         None where the model has not been trained by it.

@@ -19,11 +19,11 @@ from ..rows import Rows, check_scales
 from ..structure.tuning import FIRST_PENALTY, scaled, tune
 from ..training import RuleStatistics, redundant_rules
 from .farthest import Farthest
+from .firing import Distinct, RuleFiring, row_keys
 from .held import HeldProblem
 from .information import Information
 from .moments import Moments, blocks
 from .scales import Change
-from .speaking import Distinct, Speaking, row_keys
 
 __all__ = ["Solved", "Stream"]
 
@@ -54,7 +54,7 @@ class Stream:
     base : TSKModel
         Whose premises and names hold; its consequents are not looked at.
     moments : Moments
-    speaking : Speaking
+    firing : RuleFiring
     farthest : Farthest
     distinct : Distinct
         Distinct rows, all of one class.
@@ -70,7 +70,7 @@ class Stream:
 
     base: TSKModel
     moments: Moments
-    speaking: Speaking
+    firing: RuleFiring
     farthest: Farthest
     distinct: Distinct
     n_rows: int
@@ -104,7 +104,7 @@ class Stream:
         return cls(
             base,
             Moments.of(rows, antecedent, consequent_inputs),
-            Speaking.of(rows, antecedent, parts),
+            RuleFiring.of(rows, antecedent, parts),
             farthest,
             distinct,
             rows.n_rows,
@@ -131,9 +131,7 @@ class Stream:
         """The same rows with all weights times a factor."""
         if factor == 1.0:
             return self
-        return replace(
-            self, moments=self.moments.faded(factor), speaking=self.speaking.faded(factor)
-        )
+        return replace(self, moments=self.moments.faded(factor), firing=self.firing.faded(factor))
 
     def plus(self, other):
         """The rows of both."""
@@ -145,7 +143,7 @@ class Stream:
         return replace(
             self,
             moments=moments,
-            speaking=self.speaking.on(one).plus(other.speaking.on(two), inputs),
+            firing=self.firing.on(one).plus(other.firing.on(two), inputs),
             farthest=self.farthest.plus(other.farthest),
             distinct=self.distinct.plus(other.distinct.classes, other.distinct.keys),
             n_rows=self.n_rows + other.n_rows,
@@ -161,7 +159,7 @@ class Stream:
         moments = self.moments
         overlap = moments.gram[:: moments.n_basis, :: moments.n_basis] / moments.weight
         statistics = RuleStatistics(
-            overlap, self.speaking.strongest / moments.weight, self.speaking.peak
+            overlap, self.firing.strongest / moments.weight, self.firing.peak
         )
         return Solved(
             self._model(problem, evaluation),
@@ -230,7 +228,7 @@ class Stream:
             coefficients[:, 0] = solved[:, 0]
             coefficients[:, 1 + own] = solved[:, 1:] / inputs.scale[own, None]
         n_coefficients = 1 + int(np.sum(~inputs.is_constant[own]))
-        strongest = self.speaking.strongest
+        strongest = self.firing.strongest
         return replace(
             self.base,
             coefficients=coefficients,
@@ -240,7 +238,7 @@ class Stream:
             maximum=inputs.maximum,
             rule_weights=evaluation.masses,
             rule_rows=strongest * (self.n_rows / moments.weight),
-            support=self.speaking.support(inputs, n_coefficients),
+            support=self.firing.support(inputs, n_coefficients),
             target=TargetRange(targets.minimum, targets.maximum, targets.scale),
             # Premises stay: what is not known of them is not counted.
             posterior=Posterior.of(problem, None, evaluation, moments.effective_weight),

@@ -10,7 +10,8 @@ import numpy as np
 
 from skanfis.antecedent import RuleTableAntecedent, TermGroup
 from skanfis.membership import MEMBERSHIPS, Gaussian
-from skanfis.model import OUT_OF_BOUNDS, TSKModel
+from skanfis.model import TSKModel
+from skanfis.policies import OUT_OF_BOUNDS
 
 from ..oracles import random_grid, random_scattered
 from .rule_bases import OFFSET, SCALE, build, narrow_target

@@ -18,9 +18,8 @@ from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.bounds import bounds
 from skanfis.exceptions import ConstantInputWarning
-from skanfis.export import export_c
-from skanfis.export._fold import fold
-from skanfis.export.c._header import BITS
+from skanfis.export import export_c, fold
+from skanfis.export.c.status import STATUS
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 from skanfis.solvers import VariableProjection
@@ -36,11 +35,11 @@ def expected_status(model, X, std):
     """From the definitions in the header; and where rounding decides."""
     outside = ~model.in_bounds(X)
     coverage = model.coverage(X)
-    status = outside * BITS["OUT_OF_RANGE"]
+    status = outside * STATUS["OUT_OF_RANGE"]
     if model.out_of_bounds in ("nan", "raise"):
-        status = status | outside * BITS["NO_OUTPUT"]
-    answered = (status & BITS["NO_OUTPUT"]) == 0
-    status = status | (answered & (coverage < MIN_COVERAGE)) * BITS["UNCOVERED"]
+        status = status | outside * STATUS["NO_OUTPUT"]
+    answered = (status & STATUS["NO_OUTPUT"]) == 0
+    status = status | (answered & (coverage < MIN_COVERAGE)) * STATUS["UNCOVERED"]
     return status, np.abs(coverage - MIN_COVERAGE) < 1e-4
 
 
@@ -48,10 +47,10 @@ def expected_outputs(model, X, status, std):
     if model.out_of_bounds != "raise":
         y = model.predict(X)
         if model.out_of_bounds == "nan" and std == "c89":
-            y[status & BITS["NO_OUTPUT"] > 0] = UNTOUCHED
+            y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
         return y
     y = model.with_out_of_bounds("clip").predict(X)
-    y[status & BITS["NO_OUTPUT"] > 0] = UNTOUCHED
+    y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
     return y
 
 
@@ -75,7 +74,7 @@ def test_every_model_answers_as_predict(dtype, tolerance, std, tmp_path, capsys)
         expected, unsure = expected_status(case.model, Z, std)
         assert (status == expected)[~unsure].all(), case.label
         wanted = expected_outputs(case.model, Z, expected, std)
-        answered = (expected & BITS["NO_OUTPUT"]) == 0
+        answered = (expected & STATUS["NO_OUTPUT"]) == 0
         assert np.array_equal(y[~answered], wanted[~answered], equal_nan=True), case.label
         difference = np.abs(y[answered] - wanted[answered]) / full_scale(wanted[answered])
         differences.append(difference.max())
@@ -146,7 +145,7 @@ def test_trained_model_answers_as_predict(kind, n_outputs, tmp_path):
         wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
         scale = np.maximum(full_scale(wanted), size_of_sum(fold(estimator), Z))
         assert (np.abs(found - wanted) / scale).max() < tolerance
-        assert set(status) == {BITS["IN_RANGE"], BITS["OUT_OF_RANGE"]}
+        assert set(status) == {STATUS["IN_RANGE"], STATUS["OUT_OF_RANGE"]}
 
 
 @needs_compiler
@@ -201,7 +200,7 @@ def test_single_precision_bears_an_offset(tmp_path):
     found, status = answers_of(code, Z, tmp_path)
     # All that is lost is the last digit of 1e4.
     assert np.abs(found[:, 0] - estimator.predict(X)).max() < 2 * np.spacing(np.float32(1e4))
-    assert (status == BITS["IN_RANGE"]).all()
+    assert (status == STATUS["IN_RANGE"]).all()
 
 
 @needs_compiler
@@ -215,7 +214,7 @@ def test_row_that_is_not_finite_gets_no_answer(policy, bad, tmp_path):
     found, status = answers_of(export_c(estimator, name="m"), Z, tmp_path)
     none = UNTOUCHED if policy != "nan" else np.nan
     assert np.array_equal(found[::2, 0], np.full(3, none), equal_nan=True)
-    assert (status[::2] == BITS["NOT_FINITE"] + BITS["NO_OUTPUT"]).all()
+    assert (status[::2] == STATUS["NOT_FINITE"] + STATUS["NO_OUTPUT"]).all()
     np.testing.assert_allclose(found[1::2, 0], estimator.predict(X[:3]), rtol=1e-10)
 
 
@@ -230,7 +229,7 @@ def test_largest_numbers_are_answered(policy, tmp_path):
     )
     wanted = model.predict(Z[: len(found)])
     np.testing.assert_allclose(found, wanted, rtol=1e-10)
-    assert (status == BITS["OUT_OF_RANGE"] + BITS["UNCOVERED"]).all()
+    assert (status == STATUS["OUT_OF_RANGE"] + STATUS["UNCOVERED"]).all()
 
 
 @needs_compiler
@@ -577,7 +576,7 @@ def test_rows_on_a_thin_diagonal_are_covered_and_its_corners_are_not(dtype, min_
     _, status = answers_of(code, Z, tmp_path)
     coverage = estimator.coverage(Z.astype(float))
     sure = np.abs(coverage - min_coverage) > 1e-3
-    uncovered = (status & BITS["UNCOVERED"]) > 0
+    uncovered = (status & STATUS["UNCOVERED"]) > 0
     np.testing.assert_array_equal(uncovered[sure], (coverage < min_coverage)[sure])
     # Where rules share a row, one with little say may have it beyond its own.
     assert uncovered[-600:].mean() < (0.2 if min_coverage > 0.9 else 1e-9)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from skanfis import ANFISRegressor
-from skanfis.export import export_c
-from skanfis.export._fold import fold
+from skanfis.export import export_c, fold
 from skanfis.export._numbers import Numbers
 from skanfis.export.c._learner import learner_of
 

@@ -16,7 +16,7 @@ from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_fis, read_fis, write_fis
 from skanfis.export.fis.reader import parse_fis
 from skanfis.membership import MEMBERSHIPS, Gaussian
-from skanfis.model import OUT_OF_BOUNDS
+from skanfis.policies import OUT_OF_BOUNDS
 
 from .. import oracles
 from .rule_bases import MODELS, build, rows_of

@@ -30,7 +30,7 @@ from sklearn.preprocessing import (
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning
-from skanfis.export._fold import fold, fold_with_rows
+from skanfis.export import fold, fold_with_rows
 from skanfis.options import LinearExtrapolation
 
 NAMES = ["hours", "kelvin", "rate"]

@@ -11,9 +11,10 @@ from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.export import export_json, export_text, read_json, write_json
-from skanfis.export.model_json import parse_json
+from skanfis.export.json_reader import parse_json
 from skanfis.membership import MEMBERSHIPS, Gaussian
-from skanfis.model import OUT_OF_BOUNDS, TSKModel
+from skanfis.model import TSKModel
+from skanfis.policies import OUT_OF_BOUNDS
 
 from .. import oracles
 from .json_mutations import mutated_numbers, with_number

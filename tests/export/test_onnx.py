@@ -13,8 +13,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.export import register_onnx_converter
-from skanfis.export._fold import fold
+from skanfis.export import fold, register_onnx_converter
 from skanfis.options import LinearExtrapolation
 
 from .every_model import CASES, full_scale, print_differences, rows, size_of_sum

@@ -7,7 +7,7 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
-from skanfis.gyro import physics
+from skanfis.gyro import _law_fit
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
 
 REFERENCE = 20.0
@@ -70,11 +70,11 @@ def test_phase_is_that_of_the_planted_law(rng):
 def test_jacobian_is_that_of_the_misfit(rng, has_lag, has_offset):
     X, rate = calibration(rng, n_rows=40)
     thermal_rate = rng.normal(size=(40, int(has_lag)))
-    log = physics._standardise(np.hstack([X, thermal_rate]), rate, rng.uniform(0.5, 2.0, 40))
-    shape = physics._Shape((2, 1, 3), has_lag, has_offset)
+    log = _law_fit.standardise(np.hstack([X, thermal_rate]), rate, rng.uniform(0.5, 2.0, 40))
+    shape = _law_fit.Shape((2, 1, 3), has_lag, has_offset)
     # Far from the optimum, where no term of the derivative is hidden by a small residual.
     point = rng.uniform(0.2, 0.8, shape.n_coefficients)
-    exact = physics._jacobian(point, log, shape)
+    exact = _law_fit.jacobian(point, log, shape)
     for j, column in enumerate(exact.T):
         step = np.zeros(point.size, dtype=complex)
         step[j] = 1e-30j
@@ -91,7 +91,7 @@ def complex_misfit(parameters, log, shape):
     phase = value(tau, k) * (log.rate + value(tau, b))
     output = value(tau, s) / k[0] * np.sin(phase) + (rest[-1] if shape.has_offset else 0.0)
     misfit = log.root_weights * (output - log.output)
-    found = physics._misfit(parameters.real, log, shape)
+    found = _law_fit.misfit(parameters.real, log, shape)
     np.testing.assert_allclose(found, misfit.real, atol=1e-13)
     return misfit
 

@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.export import rules_table
-from skanfis.export._fold import fold
+from skanfis.export import fold, rules_table
 from skanfis.inspection import RuleActivationDisplay
 
 from ..export.rule_bases import MODELS

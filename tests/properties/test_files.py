@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.export import export_fis, export_json
 from skanfis.export.fis.reader import parse_fis
 from skanfis.export.fis.syntax import text_of
-from skanfis.export.model_json import parse_json
+from skanfis.export.json_reader import parse_json
 
 from ..export.json_mutations import HOSTILE_NUMBERS, number_paths, with_number
 from ..export.mutations import mutated, seeds

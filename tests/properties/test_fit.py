@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.export import export_json, export_text
-from skanfis.export.model_json import parse_json
+from skanfis.export.json_reader import parse_json
 from skanfis.rows import column_statistics
 
 from .strategies import settings_of_fit, tables

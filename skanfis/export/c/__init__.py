@@ -2,18 +2,19 @@
 
 from dataclasses import dataclass
 
-from .._fold import fold
 from .._numbers import Numbers, as_held
+from ..folding import fold
 from ._cost import CCost, cost, with_learner
 from ._deviation import DeviationSource, deviation_of, deviation_test, with_deviation
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
-from ._header import BITS, header
+from ._header import header
 from ._interval import check_deviation, read_interval
 from ._learner import LearningSource, learner_of, learning_test
 from ._saturation import read_limits
 from ._self_test import known_answers, self_test
 from ._source import Source
+from .status import STATUS
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -164,7 +165,7 @@ def export_c(
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
-    answers = known_answers(model, numbers, min_coverage, BITS, limits)
+    answers = known_answers(model, numbers, min_coverage, STATUS, limits)
     declarations = test = ""
     body: Source
     call = "learner_test"

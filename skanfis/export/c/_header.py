@@ -5,15 +5,14 @@ import textwrap
 import numpy as np
 from scipy.stats import qmc
 
-from .._reading import policy_in_words
+from ...policies import policy_in_words
 from ._text import comment
+from .status import status_lines
 
-__all__ = ["BITS", "coverage_line", "header", "header_of", "policy_line"]
+__all__ = ["coverage_line", "header", "header_of", "policy_line"]
 
 # Where the slopes are looked at.
 _ROWS = 256
-
-BITS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
 _SILENT = {
     "raise": "there is no output: y stays as it is",
@@ -42,11 +41,7 @@ extern "C" {
 #define $NAME_N_OUTPUTS $n_outputs
 
 /* The status is the sum of these. */
-#define $NAME_IN_RANGE 0
-#define $NAME_OUT_OF_RANGE 1 /* an input lies outside the range of the training data */
-#define $NAME_NOT_FINITE 2 /* an input is infinite or not a number */
-#define $NAME_UNCOVERED 4 /* hardly any training data lie near the inputs */
-#define $NAME_NO_OUTPUT 8 /* y holds no answer */
+$status_lines
 
 /* Evaluates the model at x, writes y, returns the status. */
 int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS]);
@@ -159,7 +154,7 @@ def header_of(title, lines, dialect, n_inputs, n_outputs, declarations=""):
     """The header with these lines in its first comment."""
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
-        _CODE,
+        _CODE.replace("$status_lines", status_lines()),
         facts="\n".join(f" * {line}".rstrip() for line in facts),
         title=title,
         n_inputs=n_inputs,

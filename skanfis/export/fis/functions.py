@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...membership import MEMBERSHIPS
-from .._limits import LARGEST_NUMBER
+from ..limits import LARGEST_NUMBER
 from .syntax import shown
 
 __all__ = ["function_of", "theta_of"]

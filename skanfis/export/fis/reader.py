@@ -9,7 +9,7 @@ import numpy as np
 
 from ...antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ...model import TSKModel
-from .._limits import check_size, read_bytes
+from ..limits import check_size, read_bytes
 from .functions import theta_of
 from .syntax import sections_of, shown, text_of
 

@@ -6,7 +6,7 @@ Every pattern is anchored and passes over its line once, whatever the line holds
 import re
 from dataclasses import dataclass, field
 
-from .._limits import LARGEST_NUMBER
+from ..limits import LARGEST_NUMBER
 
 __all__ = ["Entry", "Section", "sections_of", "shown", "text_of"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..._validation import warn_user
-from .._fold import fold
+from ..folding import fold
 from .functions import function_of
 from .reader import parse_fis
 

@@ -1,6 +1,6 @@
 """Where the compensator may be used."""
 
-from ...export._reading import policy_in_words
+from ...policies import policy_in_words
 from .._pictures import draw_coverage
 from .words import unit_of, words
 

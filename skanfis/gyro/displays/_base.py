@@ -1,7 +1,7 @@
 """What the Displays of a compensation have in common: where their numbers come from."""
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 import pandas as pd
@@ -31,7 +31,7 @@ class CompensationDisplay:
     @classmethod
     def from_estimator(
         cls, estimator, X, rate, *, output="output", predicts="error", ax=None, **options
-    ):
+    ) -> Self:
         """Compute from a fitted estimator, and draw.
 
         Parameters

@@ -1,6 +1,7 @@
 """AllanDisplay: the Allan deviation of the error, before and after compensation."""
 
 import textwrap
+from typing import Self
 
 import numpy as np
 import pandas as pd
@@ -65,14 +66,14 @@ class AllanDisplay(CompensationDisplay):
 
     _PER_ROW = ("run",)
 
-    def __init__(self, *, before, after):
+    def __init__(self, *, before, after) -> None:
         self.before = before
         self.after = after
 
     @classmethod
     def from_predictions(
         cls, rate, before, after, *, sampling_interval, run=None, unit="deg/h", ax=None
-    ):
+    ) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -101,7 +102,7 @@ class AllanDisplay(CompensationDisplay):
         ]
         return cls(before=curves[0], after=curves[1]).plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/h"):
+    def plot(self, ax=None, *, unit="deg/h") -> Self:
         """Draw.
 
         Parameters
@@ -145,7 +146,7 @@ class AllanDisplay(CompensationDisplay):
         self.ax_.set_title("\n".join(textwrap.wrap(CAUTION, 76)), loc="left", fontsize="small")
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.
 
         Returns
@@ -171,22 +172,23 @@ class AllanDisplay(CompensationDisplay):
             return
         factor = PER_UNIT[self.unit_] / _PER_HOUR
         read = allan_coefficients(time, deviation / factor)
-        if _is_read_at_short_times(read.angle_random_walk, time, deviation / factor):
+        walk, instability = read.angle_random_walk, read.bias_instability
+        if walk is not None and _is_read_at_short_times(walk, time, deviation / factor):
             line = np.array([1.0, time[np.argmin(deviation)]])
-            level = factor * _PER_ROOT_HOUR * read.angle_random_walk / np.sqrt(line)
+            level = factor * _PER_ROOT_HOUR * walk / np.sqrt(line)
             self.ax_.plot(line, level, ":", color=color, linewidth=1.2)
             self.ax_.annotate(
-                f"N = {figures(read.angle_random_walk)} °/√h",
+                f"N = {figures(walk)} °/√h",
                 (line[0], level[0]),
                 xytext=(6, 4),
                 textcoords="offset points",
                 color=color,
                 fontsize="small",
             )
-        if read.allan_minimum is not None:
+        if instability is not None:
             place = np.argmin(deviation)
             self.ax_.annotate(
-                f"B = {figures(factor * read.bias_instability)} {SYMBOL[self.unit_]}",
+                f"B = {figures(factor * instability)} {SYMBOL[self.unit_]}",
                 (time[place], deviation[place]),
                 xytext=(0, -14),
                 textcoords="offset points",
@@ -198,7 +200,5 @@ class AllanDisplay(CompensationDisplay):
 
 def _is_read_at_short_times(walk, time, deviation):
     """Whether a slope of -1/2 was found at the short end: elsewhere it is no white noise."""
-    if walk is None:
-        return False
     expected = _PER_ROOT_HOUR * walk / np.sqrt(time[0])
     return abs(deviation[0] / expected - 1.0) < _NEARLY

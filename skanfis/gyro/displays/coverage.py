@@ -1,5 +1,7 @@
 """CoverageDisplay: where the compensator knows what it says, and where it only goes on."""
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 
@@ -67,7 +69,7 @@ class CoverageDisplay:
 
     def __init__(
         self, *, x, y, coverage, inside, rows, x_edges, y_edges, counts, min_coverage, names
-    ):
+    ) -> None:
         self.x = x
         self.y = y
         self.coverage = coverage
@@ -94,7 +96,7 @@ class CoverageDisplay:
         min_coverage=0.1,
         margin=0.15,
         ax=None,
-    ):
+    ) -> Self:
         """Compute from a fitted estimator, and draw.
 
         Parameters
@@ -162,7 +164,7 @@ class CoverageDisplay:
         )
         return display.plot(ax=ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax=None) -> Self:
         """Draw.
 
         Parameters
@@ -220,7 +222,7 @@ class CoverageDisplay:
         self.ax_.grid(False)
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn.
 
         Returns

@@ -1,5 +1,7 @@
 """ErrorDisplay: the error against time, temperature or anything else, before and after."""
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 
@@ -73,7 +75,7 @@ class ErrorDisplay(CompensationDisplay):
         range_after,
         rms,
         position_label="time [s]",
-    ):
+    ) -> None:
         self.position = position
         self.before = before
         self.after = after
@@ -94,7 +96,7 @@ class ErrorDisplay(CompensationDisplay):
         position_label="time [s]",
         unit="deg/s",
         ax=None,
-    ):
+    ) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -134,7 +136,7 @@ class ErrorDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/s"):
+    def plot(self, ax=None, *, unit="deg/s") -> Self:
         """Draw.
 
         Parameters
@@ -178,7 +180,7 @@ class ErrorDisplay(CompensationDisplay):
         self.axes_[1].set_xlabel(self.position_label)
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.
 
         Returns

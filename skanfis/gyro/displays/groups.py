@@ -1,5 +1,7 @@
 """GroupResidualDisplay: the residual of every group that was held out."""
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 
@@ -48,13 +50,13 @@ class GroupResidualDisplay(CompensationDisplay):
 
     _PER_ROW = ("groups",)
 
-    def __init__(self, *, groups, before, after):
+    def __init__(self, *, groups, before, after) -> None:
         self.groups = groups
         self.before = before
         self.after = after
 
     @classmethod
-    def from_predictions(cls, rate, before, after, *, groups, unit="deg/s", ax=None):
+    def from_predictions(cls, rate, before, after, *, groups, unit="deg/s", ax=None) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -85,7 +87,7 @@ class GroupResidualDisplay(CompensationDisplay):
         display = cls(groups=labels[order], before=results[0][order], after=results[1][order])
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/s"):
+    def plot(self, ax=None, *, unit="deg/s") -> Self:
         """Draw.
 
         Parameters
@@ -132,7 +134,7 @@ class GroupResidualDisplay(CompensationDisplay):
         self.ax_.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in; groups that are not drawn, too.
 
         Returns

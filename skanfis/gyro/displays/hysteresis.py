@@ -1,5 +1,7 @@
 """HysteresisDisplay: bias against temperature, warming and cooling apart."""
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 
@@ -60,7 +62,7 @@ class HysteresisDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature", "temperature_rate")
 
-    def __init__(self, *, temperature, before, after):
+    def __init__(self, *, temperature, before, after) -> None:
         self.temperature = temperature
         self.before = before
         self.after = after
@@ -77,7 +79,7 @@ class HysteresisDisplay(CompensationDisplay):
         least_rate_of_change=0.05,
         unit="deg/h",
         ax=None,
-    ):
+    ) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -121,16 +123,16 @@ class HysteresisDisplay(CompensationDisplay):
         return display.plot(ax=ax, unit=unit)
 
     @property
-    def gap_before_(self):
+    def gap_before_(self) -> float:
         """Largest distance between the branches before compensation [deg/h]."""
         return _gap(self.before)
 
     @property
-    def gap_after_(self):
+    def gap_after_(self) -> float:
         """Largest distance between the branches after compensation [deg/h]."""
         return _gap(self.after)
 
-    def plot(self, ax=None, *, unit="deg/h"):
+    def plot(self, ax=None, *, unit="deg/h") -> Self:
         """Draw.
 
         Parameters
@@ -170,7 +172,7 @@ class HysteresisDisplay(CompensationDisplay):
         self.axes_[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.
 
         Returns

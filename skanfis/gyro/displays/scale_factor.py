@@ -1,5 +1,7 @@
 """ScaleFactorErrorDisplay: what is left of the scale factor's error, by rate and temperature."""
 
+from typing import Self
+
 import numpy as np
 import pandas as pd
 
@@ -59,14 +61,16 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature",)
 
-    def __init__(self, *, rate, before, after, temperature_edges):
+    def __init__(self, *, rate, before, after, temperature_edges) -> None:
         self.rate = rate
         self.before = before
         self.after = after
         self.temperature_edges = temperature_edges
 
     @classmethod
-    def from_predictions(cls, rate, before, after, *, temperature, n_temperatures=3, ax=None):
+    def from_predictions(
+        cls, rate, before, after, *, temperature, n_temperatures=3, ax=None
+    ) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -113,7 +117,7 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax)
 
-    def plot(self, ax=None):
+    def plot(self, ax=None) -> Self:
         """Draw.
 
         Parameters
@@ -157,7 +161,7 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
         _legend(self.axes_[0])
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn.
 
         Returns

@@ -1,6 +1,9 @@
 """ResidualSurfaceDisplay: where over temperature and rate error is left, and where data are."""
 
+from typing import Self
+
 import numpy as np
+import pandas as pd
 
 from ._base import CompensationDisplay, binned, cells_table, check_rows, check_unit
 from ._style import (
@@ -58,7 +61,7 @@ class ResidualSurfaceDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature",)
 
-    def __init__(self, *, temperature_edges, rate_edges, residual, counts):
+    def __init__(self, *, temperature_edges, rate_edges, residual, counts) -> None:
         self.temperature_edges = temperature_edges
         self.rate_edges = rate_edges
         self.residual = residual
@@ -67,7 +70,7 @@ class ResidualSurfaceDisplay(CompensationDisplay):
     @classmethod
     def from_predictions(
         cls, rate, before, after, *, temperature, n_bins=(24, 24), unit="deg/s", ax=None
-    ):
+    ) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -111,7 +114,7 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/s"):
+    def plot(self, ax=None, *, unit="deg/s") -> Self:
         """Draw.
 
         Parameters
@@ -153,7 +156,7 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         dress(self.axes_[1], "temperature [°C]", title=f"data: {empty:.0%} of the cells empty")
         return self
 
-    def tables(self):
+    def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.
 
         Returns

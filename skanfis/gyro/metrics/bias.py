@@ -24,7 +24,7 @@ _HYSTERESIS_BINS = 20
 _ROWS_PER_MEAN = 5
 
 
-def input_error(rate, output):
+def input_error(rate, output) -> np.ndarray:
     """Error in units of the input: the output over its scale factor, less the true rate.
 
     This takes the scale factor out of the bias figures. At one rate (at rest) there is no line to
@@ -59,7 +59,7 @@ def input_error(rate, output):
     return output / line(rate, output)[0] - rate
 
 
-def bias(error):
+def bias(error) -> float:
     """Bias: mean error.
 
     Parameters
@@ -86,7 +86,7 @@ def bias(error):
     return float(_SECONDS_PER_HOUR * np.mean(check_column(error, "error")))
 
 
-def bias_repeatability(error, run):
+def bias_repeatability(error, run) -> float:
     """Bias repeatability: standard deviation of the mean errors of several power-ups.
 
     Parameters
@@ -115,7 +115,7 @@ def bias_repeatability(error, run):
     return spread_of_bias(error_by_run(error, run))
 
 
-def bias_temperature_sensitivity(error, temperature, *, temperature_rate=None):
+def bias_temperature_sensitivity(error, temperature, *, temperature_rate=None) -> float:
     """Bias temperature sensitivity: slope of the error in temperature, D_T.
 
     Parameters
@@ -147,7 +147,7 @@ def bias_temperature_sensitivity(error, temperature, *, temperature_rate=None):
     return _bias_slopes(error, temperature, temperature_rate)[0]
 
 
-def bias_ramp_sensitivity(error, temperature_rate, *, temperature=None):
+def bias_ramp_sensitivity(error, temperature_rate, *, temperature=None) -> float:
     """Bias temperature-ramp sensitivity: slope of the error in the thermal rate, D_Tdot.
 
     Parameters
@@ -180,7 +180,7 @@ def bias_ramp_sensitivity(error, temperature_rate, *, temperature=None):
     return _bias_slopes(error, temperature, temperature_rate)[1]
 
 
-def hysteresis(error, temperature, temperature_rate):
+def hysteresis(error, temperature, temperature_rate) -> float:
     """Hysteresis: largest gap between warming and cooling at equal temperature.
 
     The range that both share is cut into 20 bins, and in each the mean errors of at least five rows

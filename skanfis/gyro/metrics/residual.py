@@ -8,7 +8,7 @@ from ._lines import rms
 __all__ = ["reduction_factor", "residual_peak", "residual_peak_to_peak", "residual_rms"]
 
 
-def residual_rms(error):
+def residual_rms(error) -> float:
     """Root mean square of what is left of the error.
 
     Parameters
@@ -35,7 +35,7 @@ def residual_rms(error):
     return float(rms(check_column(error, "error")))
 
 
-def residual_peak(error):
+def residual_peak(error) -> float:
     """Largest size of what is left of the error.
 
     Parameters
@@ -62,7 +62,7 @@ def residual_peak(error):
     return float(np.abs(check_column(error, "error")).max())
 
 
-def residual_peak_to_peak(error):
+def residual_peak_to_peak(error) -> float:
     """Distance from the smallest to the largest of what is left of the error.
 
     Parameters
@@ -89,7 +89,7 @@ def residual_peak_to_peak(error):
     return float(np.ptp(check_column(error, "error")))
 
 
-def reduction_factor(before, after):
+def reduction_factor(before, after) -> float:
     """Reduction factor: RMS of the error before compensation over that after it.
 
     Parameters

@@ -19,7 +19,7 @@ __all__ = [
 _PPM = 1e6
 
 
-def scale_factor(rate, output):
+def scale_factor(rate, output) -> float:
     """Scale factor: slope of the least-squares line of the output against the true rate.
 
     Parameters
@@ -49,7 +49,7 @@ def scale_factor(rate, output):
     return float(line(rate, output)[0])
 
 
-def scale_factor_error(rate, output, *, nominal=1.0):
+def scale_factor_error(rate, output, *, nominal=1.0) -> float:
     """Scale factor error: relative deviation of the scale factor from its nominal value.
 
     Parameters
@@ -82,7 +82,7 @@ def scale_factor_error(rate, output, *, nominal=1.0):
     return float(_PPM * (scale_factor(rate, output) / nominal - 1.0))
 
 
-def scale_factor_nonlinearity(rate, output, *, statistic="max", full_scale=None):
+def scale_factor_nonlinearity(rate, output, *, statistic="max", full_scale=None) -> float:
     """Scale factor nonlinearity: deviation of the output from its least-squares line.
 
     The output's noise is in it: give means over dwells where the rows are noisy.
@@ -127,7 +127,7 @@ def scale_factor_nonlinearity(rate, output, *, statistic="max", full_scale=None)
     return float(_PPM * size / (abs(slope) * full_scale))
 
 
-def scale_factor_asymmetry(rate, output):
+def scale_factor_asymmetry(rate, output) -> float:
     """Scale factor asymmetry: difference of the scale factors for rates of either sign.
 
     Each side is fitted by a line of its own, rows at rest on both; the difference, positive less
@@ -165,7 +165,7 @@ def scale_factor_asymmetry(rate, output):
     return float(_PPM * (slopes[0] - slopes[1]) / np.mean(slopes))
 
 
-def scale_factor_repeatability(rate, output, run):
+def scale_factor_repeatability(rate, output, run) -> float:
     """Scale factor repeatability: standard deviation of the scale factors of several runs.
 
     Parameters
@@ -196,7 +196,7 @@ def scale_factor_repeatability(rate, output, run):
     return relative_spread(scale_factor_by_run(rate, output, run))
 
 
-def scale_factor_temperature_sensitivity(rate, output, temperature):
+def scale_factor_temperature_sensitivity(rate, output, temperature) -> float:
     """Scale factor temperature sensitivity: slope of the scale factor in temperature.
 
     By least squares, output = (S + S_T dT) rate + c + c_T dT with dT the temperature less its mean;

@@ -10,7 +10,7 @@ __all__ = ["bias_stability", "pooled_deviation", "squares_by_run"]
 _SECONDS_PER_HOUR = 3600.0
 
 
-def bias_stability(error, time, *, averaging_time=10.0, run=None):
+def bias_stability(error, time, *, averaging_time=10.0, run=None) -> float:
     """Bias stability: standard deviation of means over 10 s, or any other time, within the runs.
 
     This is Chinese practice (GJB 2426), and not the minimum of the Allan deviation, to which it has

@@ -8,36 +8,24 @@ A OneHotEncoder makes numbers of what is none: its indicators are inputs of the 
 place of the column that it encodes.
 """
 
-import operator
-from collections import UserList
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
-from sklearn.feature_selection import SelectorMixin
-from sklearn.pipeline import Pipeline
-from sklearn.preprocessing import (
-    FunctionTransformer,
-    MaxAbsScaler,
-    MinMaxScaler,
-    OneHotEncoder,
-    RobustScaler,
-    StandardScaler,
-)
 from sklearn.utils import check_array
-from sklearn.utils.validation import check_is_fitted
 
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
-from ..options import policy_of
 from ._column import Column
-from ._one_hot import indicators, part_of
+from ._one_hot import part_of
+from ._steps import columns_after, is_passthrough, refuse_step
+from .unwrapping import model_of, steps_of, target_steps
 
-__all__ = ["fold", "fold_with_reader", "fold_with_rows", "last_step"]
+__all__ = ["fold", "fold_with_reader", "fold_with_rows"]
 
 
-def fold(estimator):
+def fold(estimator) -> TSKModel:
     """Return the frozen model of an estimator, in the units of the columns it is given.
 
     Parameters
@@ -64,37 +52,88 @@ def fold(estimator):
         If a step cannot be folded; it is named.
     TypeError
         If ``estimator`` is no such estimator.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from sklearn.preprocessing import StandardScaler
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import fold
+    >>> X, y = make_jang_sinc()
+    >>> pipeline = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=3)).fit(X, y)
+    >>> model = fold(pipeline)
+    >>> bool(np.allclose(model.predict(X)[:, 0], pipeline.predict(X)))
+    True
     """
     return _Folding(estimator).model
 
 
-def fold_with_rows(estimator, X):
-    """:func:`fold`, and the rows of the model's inputs out of the table X that ``estimator`` takes.
+def fold_with_rows(estimator, X) -> tuple[TSKModel, np.ndarray]:
+    """Return what :func:`fold` does, and the rows of the model's inputs out of a table.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        As :func:`fold` takes it.
+    X : array-like or DataFrame of shape (n_rows, n_features)
+        A table that ``estimator`` takes.
 
     Returns
     -------
     model : TSKModel
     rows : ndarray of shape (n_rows, model.n_inputs)
         Finite, in raw units.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`fold` does; ValueError too where X has other columns than ``estimator`` was
+        trained on, or a value that is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.export import fold_with_rows
+    >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
+    >>> model, rows = fold_with_rows(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2), X)
+    >>> model.strengths(rows).shape
+    (20, 2)
     """
     folding = _Folding(estimator)
     return folding.model, folding.rows(X)
 
 
-def fold_with_reader(estimator):
-    """:func:`fold`, and a function from a table that ``estimator`` takes to the model's inputs.
+def fold_with_reader(estimator) -> tuple[TSKModel, Callable[..., np.ndarray]]:
+    """Return what :func:`fold` does, and a function from tables to the model's inputs.
 
-    For tables that are read in parts; each comes out as :func:`fold_with_rows` gives it.
+    For tables that are read in parts.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        As :func:`fold` takes it.
+
+    Returns
+    -------
+    model : TSKModel
+    read : callable
+        ``read(X)`` gives the rows that :func:`fold_with_rows` gives, and raises what it raises.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.export import fold_with_reader
+    >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
+    >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
+    >>> [read(part).shape for part in (X[:5], X[5:])]
+    [(5, 1), (15, 1)]
     """
     folding = _Folding(estimator)
     return folding.model, folding.rows
-
-
-def last_step(estimator):
-    """The ANFIS estimator itself at the end of pipelines, wrappers and searches."""
-    label, last = _flat("", estimator)[-1]
-    _model_of(label, last)
-    return last
 
 
 class _Folding:
@@ -106,21 +145,21 @@ class _Folding:
             self.names, self.is_named = estimator.input_names, True
             self.inputs = [Column(j) for j in range(estimator.n_inputs)]
             return
-        *steps, (label, last) = _flat("", estimator)
-        model = _model_of(label, last)
-        first = next((step for _, step in steps if not _is_passthrough(step)), last)
+        *steps, (label, last) = steps_of("", estimator)
+        model = model_of(label, last)
+        first = next((step for _, step in steps if not is_passthrough(step)), last)
         n_raw = first.n_features_in_
         names = getattr(first, "feature_names_in_", None)
         self.is_named = names is not None
         self.names = tuple(f"x{j}" for j in range(n_raw)) if names is None else tuple(names)
         columns = [Column(j) for j in range(n_raw)]
         for label, step in steps:
-            columns = _through(label, step, columns, self.names)
+            columns = columns_after(label, step, columns, self.names)
         self._check_once(columns)
         order = np.array(sorted(range(len(columns)), key=lambda j: columns[j].key))
         self.inputs = [columns[j] for j in order]
         model = _with_raw_inputs(model, columns, order, [self._name(one) for one in self.inputs])
-        for label, transformer in reversed(_targets("", estimator)):
+        for label, transformer in reversed(target_steps("", estimator)):
             model = _with_raw_target(model, label, transformer)
         self.model = model
 
@@ -170,143 +209,6 @@ def _values(column, X):
     if column.indicator is not None:
         return column.indicator.values(X)
     return _as_numbers(part_of(X, [column.source]))[:, 0]
-
-
-def _flat(label, estimator):
-    """The steps of nested pipelines one after the other, the model's estimator last."""
-    if hasattr(estimator, "best_estimator_"):
-        return _flat(label, estimator.best_estimator_)
-    if isinstance(estimator, TransformedTargetRegressor):
-        check_is_fitted(estimator)
-        return _flat(label, estimator.regressor_)
-    if isinstance(estimator, Pipeline):
-        return [part for name, step in estimator.steps for part in _flat(name, step)]
-    return [(label, estimator)]
-
-
-def _targets(label, estimator):
-    """The transformers of the target from the outermost to the innermost."""
-    if hasattr(estimator, "best_estimator_"):
-        return _targets(label, estimator.best_estimator_)
-    if isinstance(estimator, TransformedTargetRegressor):
-        return [(label, estimator.transformer_), *_targets(label, estimator.regressor_)]
-    if isinstance(estimator, Pipeline):
-        return _targets(*estimator.steps[-1])
-    return []
-
-
-def _model_of(label, estimator):
-    """The frozen model of the last step, with the policy that its parameters ask for now."""
-    if isinstance(estimator, type) or not hasattr(estimator, "fit"):
-        raise TypeError(
-            f"estimator must be a fitted ANFIS estimator, a Pipeline that ends in one, or a "
-            f"TSKModel; got {estimator!r}."
-        )
-    model = getattr(estimator, "model_", None)
-    if not isinstance(model, TSKModel):
-        check_is_fitted(estimator)
-        raise TypeError(
-            f"estimator must be or end in an ANFIS estimator; {_describe(label, estimator)} has no "
-            "rules."
-        )
-    if not hasattr(estimator, "out_of_bounds"):
-        return model
-    return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
-
-
-def _describe(label, step):
-    return f"step {label!r} ({type(step).__name__})" if label else type(step).__name__
-
-
-def _refuse(label, step, reason):
-    raise ValueError(
-        f"{_describe(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
-        "MinMaxScaler, MaxAbsScaler, RobustScaler, OneHotEncoder, column selections and "
-        "ColumnTransformers of these can. For rules in the units of that step's output, give the "
-        "ANFIS estimator alone."
-    )
-
-
-def _is_passthrough(step):
-    return step is None or (isinstance(step, str) and step == "passthrough")
-
-
-def _through(label, step, columns, names=()):
-    """The columns after a step; ``names`` are those of the user's table."""
-    if not columns or _is_passthrough(step):
-        return columns
-    if isinstance(step, Pipeline):
-        for name, part in step.steps:
-            columns = _through(name, part, columns, names)
-        return columns
-    if type(step) is OneHotEncoder:
-        return _one_hot(label, step, columns, names)
-    if isinstance(step, SelectorMixin):
-        return [columns[j] for j in step.get_support(indices=True)]
-    if type(step) is ColumnTransformer:
-        return [
-            column
-            for name, part, chosen in step.transformers_
-            if not (isinstance(part, str) and part == "drop")
-            for column in _through(
-                name, part, [columns[j] for j in _positions(chosen, step)], names
-            )
-        ]
-    operations = _scaler_operations(label, step)
-    return [
-        column.then([(operation, float(numbers[k])) for operation, numbers in operations])
-        for k, column in enumerate(columns)
-    ]
-
-
-def _one_hot(label, encoder, columns, names):
-    """Indicators in the place of the columns that an encoder is given."""
-    if any(column.operations or column.indicator for column in columns):
-        _refuse(label, encoder, "it must be given columns of the table as they are")
-    sources = [column.source for column in columns]
-    found = indicators(encoder, sources, [names[j] for j in sources])
-    return [Column(source, indicator=one) for source, one in found]
-
-
-def _positions(chosen, transformer):
-    """Positions of the columns that a ColumnTransformer's entry takes."""
-    names = list(getattr(transformer, "feature_names_in_", []))
-    if isinstance(chosen, slice):
-        first, last = chosen.start, chosen.stop
-        if isinstance(first, str) or isinstance(last, str):
-            # By name, the last is included.
-            first = names.index(first) if first is not None else None
-            last = names.index(last) + 1 if last is not None else None
-        return np.arange(transformer.n_features_in_)[first : last : chosen.step]
-    if isinstance(chosen, UserList):
-        # The columns of a remainder, before scikit-learn 1.7: to look at one issues a warning.
-        chosen = chosen.data
-    chosen = np.atleast_1d(np.asarray(chosen, dtype=object if len(names) else None))
-    if all(isinstance(one, str) for one in chosen):
-        return [names.index(one) for one in chosen]
-    kind = bool if all(isinstance(one, bool | np.bool_) for one in chosen) else int
-    return np.arange(transformer.n_features_in_)[chosen.astype(kind)]
-
-
-def _scaler_operations(label, scaler):
-    """What a scaler does, in its own arithmetic: pairs of operation and one number per column."""
-    kind = type(scaler)
-    if kind is FunctionTransformer and scaler.func is None and scaler.inverse_func is None:
-        return []
-    if getattr(scaler, "clip", False):
-        _refuse(label, scaler, "clip=True bends it at the edge; out_of_bounds='clip' does the same")
-    if kind is StandardScaler:
-        mean = scaler.mean_ if scaler.with_mean else None
-        steps = [(operator.sub, mean), (operator.truediv, scaler.scale_)]
-    elif kind is RobustScaler:
-        steps = [(operator.sub, scaler.center_), (operator.truediv, scaler.scale_)]
-    elif kind is MaxAbsScaler:
-        steps = [(operator.truediv, scaler.scale_)]
-    elif kind is MinMaxScaler:
-        steps = [(operator.mul, scaler.scale_), (operator.add, scaler.min_)]
-    else:
-        _refuse(label, scaler, "it does not map every column alone by a positive scale")
-    return [(operation, numbers) for operation, numbers in steps if numbers is not None]
 
 
 def _with_raw_inputs(model, columns, order, names):
@@ -359,9 +261,9 @@ def _with_raw_posterior(model, scale, order):
 
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
-    columns = _through(label, transformer, [Column(k) for k in range(model.n_outputs)])
+    columns = columns_after(label, transformer, [Column(k) for k in range(model.n_outputs)])
     if [column.source for column in columns] != list(range(model.n_outputs)):
-        _refuse(label, transformer, "it drops or moves columns of the target")
+        refuse_step(label, transformer, "it drops or moves columns of the target")
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T
     coefficients = model.coefficients * scale
     coefficients[:, 0] += offset

@@ -12,10 +12,10 @@ import numpy as np
 
 from ..antecedent import Antecedent
 from ..rows import Rows
-from ..support import SPEAKS, RuleSupport, inverse_factor
+from ..support import FIRES, RuleSupport, inverse_factor
 from .scales import Change
 
-__all__ = ["Distinct", "Speaking"]
+__all__ = ["Distinct", "RuleFiring"]
 
 _ODD = np.uint64(0x9E3779B97F4A7C15)
 
@@ -67,7 +67,7 @@ class Distinct:
 
 
 @dataclass(frozen=True, eq=False)
-class Speaking:
+class RuleFiring:
     """How the rules have fired.
 
     Attributes
@@ -108,12 +108,12 @@ class Speaking:
             distinct = distinct.plus(best, row_keys(raw.T))
             strongest += np.bincount(best, weights=weight, minlength=n_rules)
             np.maximum(peak, strengths.max(axis=1), out=peak)
-            speaks = strengths >= SPEAKS * top
+            fires = strengths >= FIRES * top
             if weight is not None:
                 strengths *= weight
             for r in range(n_rules):
                 second[r] += (strengths[r] * basis) @ basis.T
-                own = np.flatnonzero(speaks[r])
+                own = np.flatnonzero(fires[r])
                 rules.append(np.full(own.size, r))
                 far.append(raw.T[own])
             rules, far = _outermost(rules, far, second, rows.inputs)
@@ -131,7 +131,7 @@ class Speaking:
         """Of the rows of both, which are on this scale."""
         second = self.second + other.second
         rules, rows = _outermost([self.rules, other.rules], [self.rows, other.rows], second, scale)
-        return Speaking(
+        return RuleFiring(
             second,
             self.strongest + other.strongest,
             np.maximum(self.peak, other.peak),

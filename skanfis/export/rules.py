@@ -1,19 +1,18 @@
 """What text, tables and pictures have in common: how a model's rules are told and chosen."""
 
 from dataclasses import replace
-from numbers import Integral, Real
+from numbers import Real
 
 import numpy as np
 
+from .._validation import check_choice, check_count
+
 __all__ = [
     "SORT_BY",
-    "check_choice",
-    "check_count",
     "choose_rules",
     "conditions",
     "consequents_about",
     "knows_data",
-    "policy_in_words",
     "premise_text",
     "renamed",
     "round_reference",
@@ -25,21 +24,6 @@ SORT_BY = ("weight", "rows", "rule")
 def knows_data(model):
     """Whether the model remembers training data; one read from a .fis file has none."""
     return bool(np.any(model.rule_rows))
-
-
-def policy_in_words(policy, max_extrapolation):
-    """What is answered outside the range of the training data, as a clause."""
-    if policy in ("nan", "raise"):
-        return "there is no value"
-    if policy == "clip" or max_extrapolation == 0.0:
-        return "the value at the edge is held"
-    tangent = "the model goes on along its tangent"
-    if np.isinf(max_extrapolation):
-        return tangent
-    return (
-        f"{tangent}, for each input up to {max_extrapolation:g} of its standard deviations, and "
-        "holds the value reached there"
-    )
 
 
 def conditions(model):
@@ -115,17 +99,3 @@ def _check_names(parameter, names, count, what):
     if len(set(names)) != len(names):
         raise ValueError(f"{parameter} repeats a name: {list(names)!r}.")
     return names
-
-
-def check_choice(parameter, value, choices):
-    """Raise ValueError if ``value`` is not one of ``choices``."""
-    if not isinstance(value, str) or value not in choices:
-        raise ValueError(f"{parameter}={value!r} must be one of {', '.join(map(repr, choices))}.")
-
-
-def check_count(parameter, value, smallest, largest=None):
-    """Raise ValueError if ``value`` is not a whole number within its limits."""
-    is_whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if not is_whole or value < smallest or (largest is not None and value > largest):
-        limits = f"from {smallest} to {largest}" if largest else f"of {smallest} or more"
-        raise ValueError(f"{parameter}={value!r} must be a whole number {limits}.")

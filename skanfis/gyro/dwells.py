@@ -13,7 +13,7 @@ __all__ = ["clip_dwells", "find_dwells", "resample_in_temperature"]
 _TOLERANCE = 1e-3
 
 
-def find_dwells(rate, *, run=None, tolerance=None):
+def find_dwells(rate, *, run=None, tolerance=None) -> np.ndarray:
     """Number the dwells of a rate table: stretches of rows at one rate.
 
     Parameters
@@ -62,7 +62,9 @@ def find_dwells(rate, *, run=None, tolerance=None):
     return np.array(dwells)
 
 
-def clip_dwells(log, lead, trail=0.0, *, rate="rate", time="time", run=None, tolerance=None):
+def clip_dwells(
+    log, lead, trail=0.0, *, rate="rate", time="time", run=None, tolerance=None
+) -> pd.DataFrame:
     """Leave out the beginning and the end of every dwell, and the table's way between them.
 
     Parameters
@@ -119,7 +121,7 @@ def clip_dwells(log, lead, trail=0.0, *, rate="rate", time="time", run=None, tol
     return log[kept]
 
 
-def resample_in_temperature(log, step, *, temperature="temperature", by=()):
+def resample_in_temperature(log, step, *, temperature="temperature", by=()) -> pd.DataFrame:
     """Average the rows that lie within one step of the temperature.
 
     A chamber lingers at its soaks, and most rows of a log are there: a fit would care for little

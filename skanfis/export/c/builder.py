@@ -1,0 +1,103 @@
+"""Rules as a part of a larger C function: for code that writes C around them, as skanfis.gyro does.
+
+What surrounds the rules is written in the same :class:`Dialect`, under the same status word, with
+the same header and self-test; :func:`skanfis.export.export_c` is made of the same parts.
+"""
+
+from .._numbers import Numbers, as_held
+from ._cost import CCost, cost
+from ._dialect import Dialect
+from ._files import check_arguments, write_files
+from ._header import coverage_line, header_of, policy_line
+from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
+from ._source import FINITE_INPUT, Source, index_type, rejection
+from ._text import LONGEST_NAME, comment, literals
+from .status import STATUS
+
+__all__ = [
+    "FINITE_INPUT",
+    "LONGEST_NAME",
+    "ROWS",
+    "STATUS",
+    "TOLERANCE",
+    "CCost",
+    "Dialect",
+    "RulesPart",
+    "check_arguments",
+    "comment",
+    "coverage_line",
+    "header_of",
+    "index_type",
+    "literals",
+    "policy_line",
+    "rejection",
+    "self_test",
+    "size_of_sum",
+    "write_files",
+]
+
+
+class RulesPart:
+    """The rules of a model as static functions of a larger C file, which share its status word.
+
+    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is :attr:`name`.
+
+    Parameters
+    ----------
+    model : TSKModel
+        What :func:`skanfis.export.fold` gives.
+    dialect : Dialect
+        Of the file.
+    suffix : str
+        What the identifiers of the rules have after the prefix of the file, such as "_r".
+    min_coverage : float or None
+        Rows are uncovered where the coverage is below this. None leaves coverage out; it is left
+        out too where the rules have never seen data.
+
+    Attributes
+    ----------
+    name : str
+        What the identifiers of the rules start with.
+    model : TSKModel
+        The model as its rounded numbers hold it, for answers to compare the C code with.
+    low, high : ndarray of shape (n_inputs,)
+        The box of the training data, in the type of the file.
+    min_coverage : float or None
+    cost : CCost
+        Of the rules alone.
+
+    Raises
+    ------
+    ValueError
+        If the type cannot hold the numbers of the model.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import fold
+    >>> from skanfis.export.c.builder import Dialect, RulesPart
+    >>> model = fold(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()))
+    >>> part = RulesPart(model, Dialect("plant", "double", "c99"), "_r", None)
+    >>> "static int plant_r_predict(" in part.text()
+    True
+    """
+
+    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage: float | None) -> None:
+        self.name = dialect.name + suffix
+        self.min_coverage = None if model.support is None else min_coverage
+        numbers = Numbers.of(model, dialect.dtype)
+        own = Dialect(self.name, dialect.real, dialect.std)
+        self._source = Source(numbers, own, model.out_of_bounds, self.min_coverage, is_part=True)
+        self.model = as_held(model, numbers)
+        self.low, self.high = numbers.low, numbers.high
+        self.cost: CCost = cost(numbers, self._source)
+        self._outer = dialect.name.upper()
+
+    def text(self) -> str:
+        """The C code, for after the lines that include other files."""
+        prefix = self.name.upper()
+        sizes = {"N_INPUTS": self.model.n_inputs, "N_OUTPUTS": self.model.n_outputs}
+        macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
+        macros += [f"#define {prefix}_{key} {self._outer}_{key}\n" for key in STATUS]
+        return f"\n/* Of the rules. */\n{''.join(macros)}\n{self._source.body()}"
