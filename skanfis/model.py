@@ -233,13 +233,15 @@ class TSKModel:
         if posterior is None:
             raise ValueError(self._why_no_posterior())
         inside = self.in_bounds(X) if inside is None else inside
-        n_outputs, n_values = self.n_outputs, posterior.values_per_row(self)
+        n_outputs, n_values = self.n_outputs, posterior.values_per_row(beyond=False)
+
+        low, high = self.output_limits[:, :, None]
 
         def within(Z):
             outputs, deviations = posterior.inside(self, Z)
             if posterior.inputs.size < self.coefficients.shape[1] - 1:
                 outputs = self._outputs(Z)
-            return np.vstack([self._hold(outputs), deviations])
+            return np.vstack([np.minimum(np.maximum(outputs, low), high), deviations])
 
         def beyond(Z):
             nearest = self._clip(Z)
@@ -257,7 +259,7 @@ class TSKModel:
             found = self._by_block(X[inside], within, 2 * n_outputs, n_values)
             deviations[inside] = found[:, n_outputs:]
         if self.out_of_bounds != "nan":
-            n_values += self._n_slopes
+            n_values = posterior.values_per_row(beyond=True) + self._n_slopes
             deviations[~inside] = self._by_block(X[~inside], beyond, n_outputs, n_values)
         return outputs, deviations
 

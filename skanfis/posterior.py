@@ -185,7 +185,9 @@ class Posterior:
         for k, change in enumerate(changes):
             by_basis = (slopes[k] @ strengths).reshape(basis_rows.shape[0], -1, Z.shape[1])
             half = self.premises @ change
-            half -= np.einsum("iqn,in->qn", by_basis, basis_rows)
+            # The first basis function is one.
+            half -= by_basis[0]
+            half -= np.einsum("iqn,in->qn", by_basis[1:], basis_rows[1:])
             half /= unit[k]
             found[k] += np.einsum("qn,qn->n", half, half)
         return outputs, np.sqrt(found) * unit
@@ -210,10 +212,13 @@ class Posterior:
         found = (self.noise[:, None] / unit) ** 2 + self._products(halves, halves) + growth
         return np.sqrt(found + (unfollowed / unit) ** 2) * unit
 
-    def values_per_row(self, model):
-        """Numbers that a row takes while its variance is found."""
+    def values_per_row(self, beyond):
+        """Numbers that a row takes while its variance is found, in range or ``beyond``.
+
+        In range far from all, and not u: larger blocks cost less than what the cache lacks.
+        """
         n_columns, n_parameters = self.consequents.shape[0], self.premises.shape[1]
-        return n_columns + 3 * n_parameters
+        return 3 * n_parameters + (n_columns if beyond else 0)
 
     def _tables(self, model):
         """What ``inside`` needs of F and B_k, found once: moments, table of F' F, B_k F."""

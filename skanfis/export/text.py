@@ -61,8 +61,8 @@ def export_text(
         Write only rules that fire on at least this part of the weight of the training data, from 0
         to 1.
     show_terms : bool, default=True
-        Whether to write the terms' parameters, the ranges of the inputs and the policy outside
-        them.
+        Whether to write the terms' parameters, the ranges of the inputs, the policy outside them,
+        and the noise, where a fit has found it.
     feature_names : sequence of str, default=None
         Names of the inputs; None for those in training.
     output_names : sequence of str, default=None
@@ -108,6 +108,7 @@ def export_text(
         high: gaussian, center 10, width 4.95
     Outside these ranges: out_of_bounds='linear', max_extrapolation=0.5.
     Held within the limits of its training: drift, 0.023 to 5.469.
+    Standard deviation of the noise about the rules: drift 0.483.
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))
@@ -227,4 +228,8 @@ def _legend(model, precision):
         if np.isfinite([low, high]).all():
             ends = " to ".join(place(end, precision, high - low) for end in (low, high))
             lines.append(f"Held within the limits of its training: {name}, {ends}.")
+    if model.posterior is not None:
+        noise = zip(model.output_names, model.posterior.noise, strict=True)
+        told = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
+        lines.append(f"Standard deviation of the noise about the rules: {told}.")
     return "\n".join(lines)

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.export import export_text
@@ -20,6 +22,19 @@ from .rule_bases import MODELS, NAMES, build, rows_of
 ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 NUMBER = r"[-\d.e+]+"
+
+
+def test_noise_is_told_in_the_units_of_the_target():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1, 1, size=(2000, 1))
+    y = 3e3 * (np.sin(3 * X[:, 0]) + 0.1 * rng.standard_normal(2000))
+    model = ANFISRegressor(n_mfs=3)
+    scaled = TransformedTargetRegressor(model, transformer=StandardScaler()).fit(X, y)
+    *_, last = export_text(scaled, output_names=["drift"]).splitlines()
+    told = re.fullmatch(r"Standard deviation of the noise about the rules: drift (.*)\.", last)
+    assert float(told[1]) == pytest.approx(300.0, rel=4.0 / np.sqrt(2 * 2000))
+    # A model that was taken as it was given knows of none.
+    assert "noise" not in export_text(replace(model.fit(X, y).model_, posterior=None))
 
 
 def rules_read(text):

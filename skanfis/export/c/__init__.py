@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from .._numbers import Numbers, as_held
 from ..folding import fold
 from ._cost import CCost, cost, with_learner
-from ._deviation import DeviationSource, deviation_of, deviation_test, with_deviation
+from ._deviation import DeviationSource, deviation_test, with_deviation
+from ._deviation_tables import deviation_of
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._header import header

@@ -51,7 +51,8 @@ def _budget(page, results):
 def _certain(page, results):
     calibration, certain = results.calibration, results.certain
     page.heading("What is proven")
-    what = "what the rules add to the arcsine law" if calibration.recipe.physics else "compensation"
+    has_law = calibration.recipe.physics
+    what = "addition of the rules to the arcsine law" if has_law else "compensation"
     size, place = certain.attained
     box = certain.found.box
     # What rounding leaves of zero, where the box is in the units before a scaler, is zero.

@@ -1,0 +1,96 @@
+"""The posterior of a model as the constant tables that its deviation in C reads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...membership import Trapezoidal, Triangular
+
+__all__ = ["Deviation", "deviation_of", "fitting"]
+
+_HAVE_CORNERS = {Triangular, Trapezoidal}
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation:
+    """Tables of a posterior, in the type of the code; and what intervals reach, in deviations.
+
+    ``noise``, ``cross`` are over ``unit``, a power of two near the noise of every output.
+    """
+
+    inputs: np.ndarray
+    noise: np.ndarray
+    unit: np.ndarray
+    factor: np.ndarray
+    premises: np.ndarray
+    cross: np.ndarray
+    terms: np.ndarray
+    reach: np.ndarray | None = None
+    coverage: float | None = None
+
+    @property
+    def n(self):
+        """Columns of the design."""
+        return self.factor.shape[0]
+
+    @property
+    def q(self):
+        """Displacements of the premises."""
+        return self.premises.shape[0]
+
+
+def _answers_beyond(model):
+    return model.out_of_bounds in ("clip", "linear")
+
+
+def deviation_of(model, numbers, reach=None, coverage=None):
+    """The tables of a model's posterior; ValueError where it has none."""
+    posterior = model.posterior
+    if posterior is None:
+        # Says why there is none.
+        model.standard_deviation(model.reference[None])
+    families = {group.family for group in model.antecedent.groups}
+    if _HAVE_CORNERS & families and numbers.dtype == np.float32 and _answers_beyond(model):
+        raise ValueError(
+            "deviation=True with straight flanks takes dtype='double': out of the range it goes by "
+            "differences, which single precision can only take across corners. Or use "
+            "out_of_bounds='nan' or 'raise'."
+        )
+    factor, shift = posterior.consequents.copy(), numbers.reference.astype(float) - model.reference
+    by_rule = factor.reshape(len(factor), model.n_rules, -1)
+    by_rule[:, :, 0] += by_rule[:, :, 1:] @ shift[posterior.inputs]
+    unit = np.ldexp(1.0, np.frexp(posterior.noise)[1])
+    # Python has parameters group by group and kind by kind; here they are term by term.
+    order: list[np.ndarray] = []
+    terms: list[np.ndarray] = []
+    start = term = 0
+    for group in model.antecedent.groups:
+        n_parameters, n_terms = group.theta.shape
+        places = start + np.arange(group.theta.size).reshape(n_parameters, n_terms)
+        order.append(places.T.ravel())
+        terms.append(term + np.repeat(np.arange(n_terms), n_parameters))
+        start, term = start + group.theta.size, term + n_terms
+    return Deviation(
+        posterior.inputs,
+        posterior.noise / unit,
+        unit,
+        factor,
+        posterior.premises[:, np.concatenate([[], *order]).astype(int)],
+        (posterior.cross @ factor) / unit[:, None, None],
+        np.concatenate([[], *terms]).astype(int),
+        reach,
+        coverage,
+    )
+
+
+def fitting(values, dtype):
+    """Values in a type; ValueError where it does not hold them."""
+    largest = np.abs(values).max(initial=0.0)
+    limits = np.finfo(dtype)
+    if not largest <= float(limits.max):
+        raise ValueError(
+            f"dtype='float' cannot hold the posterior of this model, {largest:g}: scale the data, "
+            "or export the deviation in double precision."
+        )
+    # Subnormal numbers have fewer digits.
+    return np.where(np.abs(values) < float(limits.tiny), 0.0, values).astype(dtype)
