@@ -120,7 +120,7 @@ LOGS = """
 """
 # Arguments, and a part of what is to be told.
 COMMANDS = {
-    "plain, and what it gives as C": (["plain.csv", "--c", "c99"], "VERDICT"),
+    "plain, and what it gives as C": (["plain.csv", "--c", "c99"], "--physics --terms 1,1,1,1"),
     "ISO 8601, semicolons, decimal commas": (["iso.csv"], "split into 4 runs"),
     "UTF-16, tabs, counts, a row without its temperature": (["utf16.txt"], "temp_c"),
     "two runs in a file, a gap between them, the terms given": (

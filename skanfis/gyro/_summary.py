@@ -7,6 +7,9 @@ from ._reading import readability_of
 
 __all__ = ["errors_and_verdict"]
 
+# What makes the files of a simpler compensation: a single rule is a straight line.
+_OPTIONS = {"straight line": "--terms {ones}", "arcsine law": "--physics --terms {ones}"}
+
 
 def errors_and_verdict(calibration):
     """Lines: the error before and after, on the same rows, and which compensation to use."""
@@ -27,9 +30,18 @@ def errors_and_verdict(calibration):
         )
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason.replace('°', 'deg')}")
+    lines += _what_next(calibration)
     if findings := readability_of(calibration).findings:
         lines.append(f"rules          not fit to be read one by one. {findings[0]}")
     return lines
+
+
+def _what_next(calibration):
+    inputs, options = calibration.recipe.inputs, _OPTIONS.get(calibration.verdict.recommended)
+    if options is None:
+        return []
+    wanted = options.format(ones=",".join("1" * len(inputs)))
+    return [f"instead        {wanted} writes the files of it; the report has its formula"]
 
 
 def _rms(errors):
