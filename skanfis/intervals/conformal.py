@@ -272,7 +272,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             lower, upper = centers - width, centers + width
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
 
-    def half_width(self, coverage=0.9):
+    def half_width(self, coverage=0.9) -> float | np.ndarray:
         """How far intervals reach to either side of the prediction, by ``method`` "split" or "loo".
 
         Parameters
