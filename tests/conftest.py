@@ -5,6 +5,9 @@ import sys
 import numpy as np
 import pytest
 
+# It is read by mypy, and run by nobody.
+collect_ignore = ["typed_user.py"]
+
 
 @pytest.fixture
 def rng():
