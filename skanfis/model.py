@@ -22,6 +22,7 @@ target, or half a one where L is less, of its range. Whatever the inputs, no ans
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from numbers import Real
 from typing import Self
 
@@ -211,8 +212,7 @@ class TSKModel:
         inside = self.in_bounds(X) if inside is None else inside
         if inside.all():
             return self._by_block(X, self._outputs, self.n_outputs)
-        if self.out_of_bounds == "raise":
-            raise ValueError(self.describe_out_of_bounds(X))
+        self._refuse(X, inside)
         if self.out_of_bounds == "linear" and self.max_extrapolation > 0.0:
             return self._by_block(X, self._outputs_linear, self.n_outputs, self._n_slopes)
         outputs = self._by_block(X, self._outputs_clipped, self.n_outputs)
@@ -235,13 +235,11 @@ class TSKModel:
         inside = self.in_bounds(X) if inside is None else inside
         n_outputs, n_values = self.n_outputs, posterior.values_per_row(beyond=False)
 
-        low, high = self.output_limits[:, :, None]
-
         def within(Z):
             outputs, deviations = posterior.inside(self, Z)
             if posterior.inputs.size < self.coefficients.shape[1] - 1:
                 outputs = self._outputs(Z)
-            return np.vstack([np.minimum(np.maximum(outputs, low), high), deviations])
+            return np.vstack([self._hold(outputs), deviations])
 
         def beyond(Z):
             nearest = self._clip(Z)
@@ -253,11 +251,12 @@ class TSKModel:
         if inside.all():
             found = self._by_block(X, within, 2 * n_outputs, n_values)
             return found[:, :n_outputs], found[:, n_outputs:]
-        outputs = self.predict(X, inside)
-        deviations = np.full(outputs.shape, np.nan)
+        self._refuse(X, inside)
+        outputs, deviations = np.full((2, X.shape[0], n_outputs), np.nan)
+        outputs[~inside] = self.predict(X[~inside])
         if inside.any():
             found = self._by_block(X[inside], within, 2 * n_outputs, n_values)
-            deviations[inside] = found[:, n_outputs:]
+            outputs[inside], deviations[inside] = found[:, :n_outputs], found[:, n_outputs:]
         if self.out_of_bounds != "nan":
             n_values = posterior.values_per_row(beyond=True) + self._n_slopes
             deviations[~inside] = self._by_block(X[~inside], beyond, n_outputs, n_values)
@@ -304,6 +303,11 @@ class TSKModel:
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
         return self._by_block(X, of_block, 1, n_distances)[:, 0]
+
+    def _refuse(self, X, inside):
+        """Raise ValueError where the policy says so for rows out of bounds."""
+        if self.out_of_bounds == "raise" and not inside.all():
+            raise ValueError(self.describe_out_of_bounds(X))
 
     def _why_no_posterior(self):
         n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
@@ -393,8 +397,13 @@ class TSKModel:
         """Outputs (n_outputs, n_rows) within their limits."""
         if self.target is None:
             return outputs
-        low, high = self.output_limits[:, :, None]
+        low, high = self._limits_of_columns
         return np.minimum(np.maximum(outputs, low), high)
+
+    @cached_property
+    def _limits_of_columns(self):
+        """The limits as columns; for a single row they are a sixth of what the rest takes."""
+        return self.output_limits[:, :, None]
 
     def _strengths(self, Z):
         return self.antecedent.strengths(self._clip(Z))
