@@ -15,17 +15,12 @@ of step suits all of them. It is here for comparison with what it is the ancesto
 """
 
 from dataclasses import dataclass
-from numbers import Real
-from typing import ClassVar
 
 import numpy as np
 
-from .._sklearn import Interval, StrOptions
 from ..objective import JointGradient
-from .base import Solver
-from .hybrid import NaturalPremise, Point, descend
+from .hybrid import DescentSolver, NaturalPremise, Point, descend
 from .lse import lse
-from .result import SolverResult
 
 __all__ = ["GradientDescent", "gradient"]
 
@@ -116,7 +111,7 @@ def gradient(
     )
 
 
-class GradientDescent(Solver):
+class GradientDescent(DescentSolver):
     """Back-propagation: steepest descent on premises and consequents together.
 
     Parameters
@@ -154,37 +149,4 @@ class GradientDescent(Solver):
     {'solver__step_size': 0.1}
     """
 
-    _parameter_constraints: ClassVar[dict] = {
-        "step_size": [Interval(Real, 0, None, closed="neither")],
-        "error_goal": [Interval(Real, 0, None, closed="left"), None],
-        "tol": [Interval(Real, 0, None, closed="left")],
-        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-    }
-
-    def __init__(
-        self,
-        *,
-        step_size: float = 0.01,
-        error_goal: float | None = None,
-        tol: float = 1e-3,
-        stiffness: str | float = "auto",
-    ) -> None:
-        self.step_size = step_size
-        self.error_goal = error_goal
-        self.tol = tol
-        self.stiffness = stiffness
-
-    def solve(
-        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
-    ) -> SolverResult:
-        return gradient(
-            problem,
-            premise,
-            max_iter=max_iter,
-            tol=self.tol,
-            stiffness=stiffness,
-            start=start,
-            on_iteration=on_iteration,
-            step_size=self.step_size,
-            error_goal=self.error_goal,
-        )
+    _run = staticmethod(gradient)

@@ -20,6 +20,7 @@ without square matrices gives (``SeparableProblem.joint``): an epoch is that pas
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 from typing import ClassVar
@@ -32,7 +33,15 @@ from .base import Solver
 from .lse import lse
 from .result import SolverResult
 
-__all__ = ["Hybrid", "NaturalPremise", "Point", "StepSize", "descend", "hybrid"]
+__all__ = [
+    "DescentSolver",
+    "Hybrid",
+    "NaturalPremise",
+    "Point",
+    "StepSize",
+    "descend",
+    "hybrid",
+]
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
@@ -239,7 +248,48 @@ def hybrid(
     )
 
 
-class Hybrid(Solver):
+class DescentSolver(Solver):
+    """A solver whose epochs are steps of steepest descent, with its settings."""
+
+    _run: ClassVar[Callable[..., SolverResult]]  # the function that minimises
+
+    _parameter_constraints: ClassVar[dict] = {
+        "step_size": [Interval(Real, 0, None, closed="neither")],
+        "error_goal": [Interval(Real, 0, None, closed="left"), None],
+        "tol": [Interval(Real, 0, None, closed="left")],
+        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+    }
+
+    def __init__(
+        self,
+        *,
+        step_size: float = 0.01,
+        error_goal: float | None = None,
+        tol: float = 1e-3,
+        stiffness: str | float = "auto",
+    ) -> None:
+        self.step_size = step_size
+        self.error_goal = error_goal
+        self.tol = tol
+        self.stiffness = stiffness
+
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
+        return self._run(
+            problem,
+            premise,
+            max_iter=max_iter,
+            tol=self.tol,
+            stiffness=stiffness,
+            start=start,
+            on_iteration=on_iteration,
+            step_size=self.step_size,
+            error_goal=self.error_goal,
+        )
+
+
+class Hybrid(DescentSolver):
     """Jang's hybrid rule: least squares for the consequents, steepest descent for the premises.
 
     Parameters
@@ -278,37 +328,4 @@ class Hybrid(Solver):
     {'solver__step_size': 0.1}
     """
 
-    _parameter_constraints: ClassVar[dict] = {
-        "step_size": [Interval(Real, 0, None, closed="neither")],
-        "error_goal": [Interval(Real, 0, None, closed="left"), None],
-        "tol": [Interval(Real, 0, None, closed="left")],
-        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-    }
-
-    def __init__(
-        self,
-        *,
-        step_size: float = 0.01,
-        error_goal: float | None = None,
-        tol: float = 1e-3,
-        stiffness: str | float = "auto",
-    ) -> None:
-        self.step_size = step_size
-        self.error_goal = error_goal
-        self.tol = tol
-        self.stiffness = stiffness
-
-    def solve(
-        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
-    ) -> SolverResult:
-        return hybrid(
-            problem,
-            premise,
-            max_iter=max_iter,
-            tol=self.tol,
-            stiffness=stiffness,
-            start=start,
-            on_iteration=on_iteration,
-            step_size=self.step_size,
-            error_goal=self.error_goal,
-        )
+    _run = staticmethod(hybrid)
