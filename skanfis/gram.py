@@ -17,6 +17,7 @@ product gives all moments: for that grid 4,320 flops per row instead of 11,664. 
 together from the moments once per pass, by indexing.
 """
 
+from functools import cache, lru_cache
 from math import prod
 
 import numpy as np
@@ -37,11 +38,28 @@ def pairs(rows, others):
     return out
 
 
+@cache
 def _pair_index(n):
-    """The row of :func:`pairs` that holds pair (i, j) or (j, i), shape (n, n)."""
-    index = np.zeros((n, n), dtype=int)
+    """The row of :func:`pairs` that holds pair (i, j) or (j, i), shape (n, n); not to be changed."""
+    index = np.zeros((n, n), dtype=np.int32)
     index[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
     return np.maximum(index, index.T)
+
+
+@lru_cache(maxsize=4)
+def _moment_of_pair(lengths):
+    """Which moment is the entry of two columns, (n_columns, n_columns); not to be changed.
+
+    Half the size of the matrix itself. It is looked up once per pass, and a search goes to and fro
+    between few structures; no part of the object, which travels to the workers of a cluster.
+    """
+    place = np.zeros((1, 1), dtype=np.int32)
+    for length in lengths:
+        # Digits of a mixed radix: of the two columns, and of the moments.
+        size = length * (length + 1) // 2
+        place = place[:, None, :, None] * np.int32(size) + _pair_index(length)[None, :, None, :]
+        place = place.reshape(place.shape[0] * length, -1)
+    return place
 
 
 def _products(groups, n_rows):
@@ -117,9 +135,4 @@ class DesignMoments:
 
     def gram(self, sums):
         """Phi' S Phi out of the sums, (n_columns, n_columns)."""
-        moments = np.ascontiguousarray(sums).reshape(self._sizes)
-        every_pair = moments[np.ix_(*(_pair_index(n).ravel() for n in self._lengths))]
-        sides = [side for n in self._lengths for side in (n, n)]
-        axes = [*range(0, len(sides), 2), *range(1, len(sides), 2)]
-        n_columns = prod(self._lengths)
-        return every_pair.reshape(sides).transpose(axes).reshape(n_columns, n_columns)
+        return np.ascontiguousarray(sums).ravel()[_moment_of_pair(self._lengths)]
