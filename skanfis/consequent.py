@@ -142,17 +142,16 @@ class NormalFactor:
 
     def solve(self, right_side):
         """(G + P)^-1 times right_side."""
-        return linalg.cho_solve((self._lower, True), right_side, check_finite=False)
+        # LAPACK itself: around it, scipy.linalg takes longer than what is solved mostly does.
+        return linalg.lapack.dpotrs(self._lower, right_side, lower=1)[0]
 
     def half_solve(self, right_side):
         """L^-1 times right_side, so that (.)' (.) is the quadratic form of the inverse."""
-        return linalg.solve_triangular(self._lower, right_side, lower=True, check_finite=False)
+        return linalg.lapack.dtrtrs(self._lower, right_side, lower=1)[0]
 
     def back_solve(self, right_side):
         """L'^-1 times right_side."""
-        return linalg.solve_triangular(
-            self._lower, right_side, lower=True, trans="T", check_finite=False
-        )
+        return linalg.lapack.dtrtrs(self._lower, right_side, lower=1, trans=1)[0]
 
     def log_determinant(self):
         """log |G + P|."""

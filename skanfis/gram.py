@@ -40,7 +40,7 @@ def pairs(rows, others):
 
 @cache
 def _pair_index(n):
-    """The row of :func:`pairs` that holds pair (i, j) or (j, i), shape (n, n); not to be changed."""
+    """The row of :func:`pairs` that holds pair (i, j) or (j, i), (n, n); not to be changed."""
     index = np.zeros((n, n), dtype=np.int32)
     index[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
     return np.maximum(index, index.T)
