@@ -394,3 +394,16 @@ def test_rows_are_not_read_again_for_the_sums_at_the_start(case, monkeypatch):
             expected.cost,
             expected.mean_squared_error,
         )
+
+
+def test_reference_leaves_nothing_behind_where_only_the_shift_holds():
+    # Two rules that are the same, and no penalty: their difference changes no residual. What it is
+    # in the reference must not come back.
+    g = np.random.default_rng(3)
+    problem = SeparableProblem(oracles.bumpy_rows(g, 250), duplicated_rule(g), 1, Penalty())
+    start = problem.antecedent.parameters
+    reference = np.zeros((4, 3, 1))
+    reference[1, 0], reference[3, 0] = 1.0, -1.0
+    found = problem.evaluate(start, reference.reshape(12, 1)).coefficients.reshape(4, 3)
+    # Of the shift, which is at the level of rounding, rounding leaves the first digit.
+    assert abs(found[1, 0] - found[3, 0]) < 0.5

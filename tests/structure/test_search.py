@@ -10,7 +10,8 @@ from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
-from skanfis.membership import TRIED_FAMILIES
+from skanfis.membership import TRIED_FAMILIES, Gaussian
+from skanfis.rows import Rows
 from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
 
@@ -393,3 +394,16 @@ def test_searched_structure_is_tried_with_every_family(rng):
     # What is trained is what promised most.
     name = model.model_.antecedent.groups[0].family.name
     assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"
+
+
+def test_score_counts_rows_by_weight_and_all_outputs(rng):
+    # n m log FPE, from which what a larger model must gain is taken.
+    X = inputs(rng, 120, 1)
+    y = np.column_stack([np.sin(3.0 * X[:, 0]), X[:, 0]]) + 0.1 * rng.standard_normal((120, 2))
+    times = rng.integers(1, 4, 120)
+    rows, used = Rows.standardised(X, y, times.astype(float)), np.arange(1)
+    found = search.StructureSearch(rows, [Gaussian], 1, used, used, 0, {}, overlap=0.6)
+    found.choose("grid")
+    assert len(found.scores) > 1
+    for candidate, score in found.scores.items():
+        assert_allclose(score, times.sum() * 2 * np.log(found.error(candidate) ** 2), rtol=1e-12)
