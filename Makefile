@@ -20,6 +20,7 @@ WORKERS ?= auto
 DEMO := .venv
 DEV := .venv-dev
 FLOORS := .venv-floors
+MUTANTS := .venv-mutants
 DOCS := .venv-docs
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -39,12 +40,13 @@ endef
 # than four where their number is left open: each pays for its imports.
 pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
 
-.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour release clean
+.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour mutants release clean
 
 help:
 	@echo "make demo         run the gyro example and save its pictures in figures/"
 	@echo "make test         all tests and docstring examples, newest dependencies"
 	@echo "make fuzz         the properties alone, on fifty times as much that is drawn anew"
+	@echo "make mutants      would the tests of the kernel and of structure notice small changes?"
 	@echo "make lint         style, format, types"
 	@echo "make format       put style and format right where a tool can"
 	@echo "make test-floors  all tests at the oldest dependencies that pyproject.toml allows"
@@ -73,6 +75,11 @@ $(FLOORS)/.installed: pyproject.toml .ci/floors.py
 	$(FLOORS)/bin/python -m pip install --editable ".[plot,allan,onnx,dask]" --group test --constraint $(FLOORS)/floors.txt
 	@touch $@
 
+$(MUTANTS)/.installed: pyproject.toml
+	$(call make-venv,$(MUTANTS),$(PYTHON),>=)
+	$(MUTANTS)/bin/python -m pip install --editable "." --group mutants
+	@touch $@
+
 $(DOCS)/.installed: pyproject.toml
 	$(call make-venv,$(DOCS),$(PYTHON),>=)
 	$(DOCS)/bin/python -m pip install --editable ".[docs]"
@@ -86,6 +93,9 @@ test: $(DEV)/.installed
 
 fuzz: $(DEV)/.installed
 	$(call pytest,$(DEV)) tests/properties --hypothesis-profile fuzz --hypothesis-show-statistics
+
+mutants: $(MUTANTS)/.installed
+	$(MUTANTS)/bin/python .ci/mutants.py $(MODULES)
 
 lint: $(DEV)/.installed
 	$(DEV)/bin/ruff check
@@ -141,7 +151,7 @@ benchmarks: $(DEV)/.installed
 	$(DEV)/bin/python -m benchmarks
 
 clean:
-	rm -rf $(DEMO) $(DEV) $(FLOORS) $(DOCS) build dist figures
+	rm -rf $(DEMO) $(DEV) $(FLOORS) $(MUTANTS) $(DOCS) build dist figures
 	rm -rf .mypy_cache .pytest_cache .ruff_cache
 	rm -rf docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst
 	find skanfis tests examples benchmarks docs -type d -name __pycache__ -exec rm -rf {} +

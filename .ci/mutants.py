@@ -11,6 +11,7 @@ changes neither), and the words of messages.
 import argparse
 import ast
 import collections
+import difflib
 import json
 import os
 import random
@@ -24,80 +25,88 @@ from pathlib import Path
 from mutmut.mutation.file_mutation import mutate_file_contents
 
 ROOT = Path(__file__).resolve().parent.parent
-KERNEL = ["test_objective.py", "test_penalty.py", "test_consequent.py"]
-FAMILIES = [f"membership/test_{name}.py" for name in ("families", "flanked", "profiles", "sigmoid")]
-STRUCTURE = [f"structure/test_{name}.py" for name in ("search", "terms", "request")]
-# Every module with the tests that mirror it.
-TESTS = {
-    "membership/__init__": FAMILIES,
-    "membership/base": FAMILIES,
-    "membership/bell": FAMILIES,
-    "membership/flanked": FAMILIES,
-    "membership/gaussian": FAMILIES,
-    "membership/profiles": FAMILIES,
-    "membership/sigmoid": FAMILIES,
-    "antecedent/base": ["antecedent/test_antecedent.py"],
-    "antecedent/grid": ["antecedent/test_antecedent.py"],
-    "antecedent/rule_table": ["antecedent/test_antecedent.py"],
-    "antecedent/scattered": ["antecedent/test_antecedent.py"],
-    "consequent": KERNEL,
-    "gram": KERNEL,
-    "rows": ["test_rows.py", "test_extremes.py"],
-    "passes": KERNEL,
-    "penalty": ["test_penalty.py"],
-    "objective": KERNEL,
-    "premise": ["test_premise.py"],
-    "evidence": ["test_evidence.py"],
-    "posterior": ["test_posterior.py"],
-    "structure/candidate": STRUCTURE,
-    "structure/clusters": ["structure/test_clusters.py"],
-    "structure/grid": ["structure/test_grid.py"],
-    "structure/held_out": STRUCTURE,
-    "structure/imported": STRUCTURE,
-    "structure/request": ["structure/test_request.py", "structure/test_size.py"],
-    "structure/sample": ["structure/test_size.py", "structure/test_clusters.py"],
-    "structure/search": STRUCTURE,
-    "structure/size": ["structure/test_size.py"],
-    "structure/terms": STRUCTURE,
-    "structure/tuning": STRUCTURE,
-}
+# Modules, and the tests that mirror them: these are run once for all of a group before any mutant.
+GROUPS = [
+    (
+        ["membership/base", "membership/bell", "membership/flanked", "membership/gaussian"]
+        + ["membership/profiles", "membership/sigmoid"],
+        [f"membership/test_{name}.py" for name in ("families", "flanked", "profiles", "sigmoid")],
+    ),
+    (
+        ["antecedent/base", "antecedent/grid", "antecedent/rule_table", "antecedent/scattered"],
+        ["antecedent/test_antecedent.py"],
+    ),
+    (["rows"], ["test_rows.py", "test_extremes.py"]),
+    (
+        ["consequent", "gram", "passes", "penalty", "objective"],
+        ["test_consequent.py", "test_penalty.py", "test_objective.py", "solvers/test_gradient.py"]
+        + ["test_posterior.py", "training/test_many_rows.py"],
+    ),
+    (["premise"], ["test_premise.py"]),
+    (["evidence"], ["test_evidence.py"]),
+    (["posterior"], ["test_posterior.py"]),
+    (
+        ["structure/clusters", "structure/grid", "structure/sample", "structure/size"],
+        [f"structure/test_{name}.py" for name in ("clusters", "grid", "size")],
+    ),
+    (
+        ["membership/__init__", "structure/imported", "structure/request"],
+        ["structure/test_request.py", "structure/test_size.py"],
+    ),
+    (
+        ["structure/candidate", "structure/held_out", "structure/search", "structure/terms"]
+        + ["structure/tuning"],
+        ["structure/test_search.py", "structure/test_terms.py"],
+    ),
+]
+MODULES = [module for modules, _ in GROUPS for module in modules]
 # pytest's exit status of a mutant's tests, or mutmut's own.
-KILLED, SURVIVED, WITHOUT_TESTS = (1, 3), (0,), (5, 33)
+KINDS = {0: "survived", 1: "killed", 3: "killed", 5: "untested", 33: "untested"}
 COLUMNS = ("mutants", "drawn", "killed", "timed out", "survived", "untested")
 
 
 class _WithoutWords(ast.NodeTransformer):
     """Strings with a space in them are for people."""
 
-    def visit_Constant(self, node):  # noqa: N802
+    def visit_Constant(self, node):
         words = isinstance(node.value, str) and " " in node.value
         return ast.Constant("") if words else node
 
 
-def mutants(path):
-    """Names of the module's mutants, but for those that differ in words alone."""
+def path_of(module):
+    return Path("skanfis", f"{module}.py")
+
+
+def mutants(module):
+    """What is changed, by the mutants' names; but for those that differ in words alone."""
+    path = path_of(module)
     mutated = mutate_file_contents(str(path), (ROOT / path).read_text())
-    bodies = {}
+    source, trees = {}, {}
     for node in ast.walk(ast.parse(mutated.code)):
         if isinstance(node, ast.FunctionDef) and "__mutmut_" in node.name:
             name, node.name = node.name, ""
-            bodies[name] = ast.dump(_WithoutWords().visit(node))
-    module = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
-    return [
-        f"{module}.{name}"
-        for name in mutated.mutant_names
-        if bodies[name] != bodies[re.sub(r"\d+$", "orig", name)]
-    ]
+            source[name] = [
+                line.replace(name, name.split("__mutmut_")[0])
+                for line in mutated.code.splitlines()[node.lineno - 1 : node.end_lineno]
+            ]
+            trees[name] = ast.dump(_WithoutWords().visit(node))
+    found = {}
+    for name in mutated.mutant_names:
+        original = re.sub(r"\d+$", "orig", name)
+        if trees[name] != trees[original]:
+            lines = difflib.unified_diff(source[original], source[name], n=1, lineterm="")
+            full = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+            found[f"{full}.{name}"] = "\n".join(list(lines)[3:])
+    return found
 
 
-def project(folder, path, tests):
-    """A project of one module to mutate, and the tests that it meets."""
+def project(folder, modules, tests):
+    """A project of a few modules to mutate, and the tests that their mutants meet."""
     for name in ("skanfis", "tests"):
         (folder / name).symlink_to(ROOT / name)
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]
     own = {
-        "source_paths": ["skanfis"],
-        "only_mutate": [str(path)],
+        "only_mutate": [str(path_of(module)) for module in modules],
         "pytest_add_cli_args_test_selection": [f"tests/{name}" for name in tests],
     }
     tables = {
@@ -111,58 +120,65 @@ def project(folder, path, tests):
     (folder / "pyproject.toml").write_text("\n".join(lines))
 
 
-def mutmut(folder, *arguments):
+def exit_codes(folder, modules, names):
+    """Run the tests of the named mutants; the exit status of each."""
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     # The order in which a mutant meets its tests is that of a set.
-    environment |= {"PYTHONHASHSEED": "0", "COLUMNS": "100"}
-    return subprocess.run(
-        [sys.executable, "-m", "mutmut", *arguments],
+    environment["PYTHONHASHSEED"] = "0"
+    run = subprocess.run(
+        [sys.executable, "-m", "mutmut", "run", "--max-children", "1", *names],
         cwd=folder,
         env=environment,
         capture_output=True,
         text=True,
     )
+    if run.returncode:
+        # Before a carriage return stands what its progress overwrites.
+        said = re.sub(r".*\r", "", run.stdout + run.stderr)
+        sys.exit(f"mutmut failed for {', '.join(modules)}\n{said[-4000:]}")
+    codes = {}
+    for module in modules:
+        found = json.loads((folder / "mutants" / f"{path_of(module)}.meta").read_text())
+        codes |= found["exit_code_by_key"]
+    return codes
 
 
-def tried(module, sample, seed):
-    """One line of the table."""
-    path = Path("skanfis", f"{module}.py")
-    every = mutants(path)
-    # A larger sample holds the smaller one, and no module's depends on another's.
-    random.Random(f"{seed} {module}").shuffle(every)
-    drawn = sorted(every[:sample])
+def tried(modules, tests, sample, seed):
+    """One line of the table per module."""
+    every, drawn = {}, {}
+    for module in modules:
+        every[module] = mutants(module)
+        # A larger sample holds the smaller one, and no module's depends on another's.
+        names = list(every[module])
+        random.Random(f"{seed} {module}").shuffle(names)
+        drawn[module] = sorted(names[:sample])
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        project(folder, path, TESTS[module])
-        run = mutmut(folder, "run", "--max-children", "1", *drawn)
-        found = folder / "mutants" / f"{path}.meta"
-        if run.returncode or not found.exists():
-            sys.exit(f"{module}: mutmut failed\n{run.stdout[-4000:]}{run.stderr[-4000:]}")
-        codes = json.loads(found.read_text())["exit_code_by_key"]
-        counts = collections.Counter(_kind(codes[mutant]) for mutant in drawn)
-        for mutant in drawn:
-            if _kind(codes[mutant]) != "killed":
-                print(mutmut(folder, "show", mutant).stdout, flush=True)
-    return {"mutants": len(every), "drawn": len(drawn), **counts}
-
-
-def _kind(code):
-    for kind, codes in (("killed", KILLED), ("survived", SURVIVED), ("untested", WITHOUT_TESTS)):
-        if code in codes:
-            return kind
-    return "timed out"
+        project(folder, modules, tests)
+        codes = exit_codes(folder, modules, [name for names in drawn.values() for name in names])
+    lines = {}
+    for module, names in drawn.items():
+        kinds = {name: KINDS.get(codes[name], "timed out") for name in names}
+        for name, kind in kinds.items():
+            if kind != "killed":
+                print(f"{kind}: {name}\n{every[module][name]}\n")
+        counts = collections.Counter(kinds.values())
+        lines[module] = {"mutants": len(every[module]), "drawn": len(names), **counts}
+    return lines
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("modules", nargs="*", help=f"of {', '.join(TESTS)}; all if none is given")
+    parser.add_argument("modules", nargs="*", help=f"of {', '.join(MODULES)}; all if none is given")
     parser.add_argument("--sample", type=int, default=25, help="mutants drawn of every module")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     rows = {}
-    for module in given.modules or TESTS:
-        rows[module] = tried(module, given.sample, given.seed)
-        print(module, rows[module], flush=True)
+    for modules, tests in GROUPS:
+        chosen = [module for module in modules if module in (given.modules or MODULES)]
+        if chosen:
+            rows |= tried(chosen, tests, given.sample, given.seed)
+            print("done:", ", ".join(chosen), "\n", flush=True)
     rows["all"] = {c: sum(row.get(c, 0) for row in rows.values()) for c in COLUMNS}
     print("| module |", " | ".join(COLUMNS), "| score |")
     print("|---" * (len(COLUMNS) + 2) + "|")

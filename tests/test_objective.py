@@ -382,6 +382,30 @@ def test_residuals_are_those_of_the_dense_design(case):
     assert_allclose(found, expected, atol=1e-10)
 
 
+@pytest.mark.parametrize("name", ["grid of both", "scattered bells", "grid, order 0, outputs"])
+def test_leverage_and_mean_squares_are_those_of_the_dense_design(name):
+    case = Case.named(name, FULL)
+    evaluation = case.problem.evaluate(case.point)
+    matrix, phi = case.dense.residual_matrix(case.point), case.dense.design(case.point)
+    hat = phi @ np.linalg.solve(matrix.T @ matrix, phi.T) / case.rows.total_weight
+    part = slice(3, 40)
+    assert_allclose(case.problem.leverage(evaluation, part), np.diag(hat)[part], rtol=1e-8)
+    squares = (case.dense.y - phi @ evaluation.coefficients) ** 2
+    found = case.problem.mean_squares(evaluation)
+    assert_allclose(found, case.dense.weight @ squares, rtol=1e-9)
+
+
+def test_outputs_share_the_error_of_all_rows_as_they_share_that_of_the_sample():
+    case = Case.named("grid of both", FULL)
+    sample = case.rows.part(np.arange(0, 250, 2))
+    alone = SeparableProblem(sample, case.problem.antecedent, 1, FULL)
+    problem = alone.on_all(case.rows)
+    evaluation = problem.evaluate(case.point)
+    found, of_sample = problem.mean_squares(evaluation), alone.mean_squares(evaluation)
+    assert_allclose(found.sum(), evaluation.mean_squared_error, rtol=1e-12)
+    assert_allclose(found / found.sum(), of_sample / of_sample.sum(), rtol=1e-12)
+
+
 def test_rows_are_not_read_again_for_the_sums_at_the_start(case, monkeypatch):
     problem = case.problem
     start = problem.antecedent.parameters
