@@ -185,6 +185,15 @@ def test_traces_give_the_effective_parameters(rng, alpha):
     assert_allclose(of_gram + of_penalty, 6.0, rtol=1e-10)
 
 
+def test_traces_of_large_matrices_are_exact_where_no_sign_matters(rng):
+    # z' M^-1 A z is the trace for any signs z where M^-1 A is diagonal.
+    diagonal, other = rng.uniform(0.5, 2.0, (2, 600))
+    found = NormalFactor(np.diag(diagonal)).traces([np.diag(other), np.diag(diagonal)])
+    assert_allclose(found, [np.sum(other / diagonal), 600.0], rtol=1e-9)
+    dense = positive_definite(rng, 600)
+    assert_allclose(NormalFactor(dense).traces([dense]), [600.0], rtol=1e-6)
+
+
 def test_traces_leave_the_factor_as_it_was(rng):
     matrix, right = positive_definite(rng), rng.normal(size=(12, 1))
     factor = NormalFactor(matrix)
