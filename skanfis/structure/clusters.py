@@ -37,9 +37,7 @@ def clustered_antecedent(families, rows: Rows, label, premise_inputs, share_term
     table, weight, _ = representative_rows(rows)
     n_inputs = rows.X.shape[1]
     inputs = premise_inputs[~rows.inputs.is_constant[premise_inputs]]
-    seen = table
-    if premise_inputs.size < n_inputs:
-        seen = np.hstack([table[:, premise_inputs], table[:, n_inputs:]])
+    seen = np.hstack([table[:, premise_inputs], table[:, n_inputs:]])
     labels = np.asarray(label(seen, weight))
     found = np.unique(labels[labels >= 0])
     if found.size == 0:

@@ -214,3 +214,11 @@ def test_without_terms_one_rule_always_fires(Z):
         antecedent.change_units(np.ones(3), np.ones(3)),
     ]:
         assert_array_equal(same.strengths(Z), np.ones((1, 60)))
+
+
+def test_without_terms_there_is_nothing_that_the_output_could_be_sensitive_to(Z, rng):
+    antecedent = no_terms()
+    values = rng.normal(size=(1, 60))
+    _, shares = antecedent.strengths_and_shares(Z)
+    assert antecedent.sum_over_rules(values).shape == (0, 60)
+    assert antecedent.term_sensitivity(values, values[0], shares).shape == (0, 60)

@@ -14,6 +14,8 @@ from skanfis.structure import SampleSize, clustered_antecedent, representative_r
 from skanfis.structure.clusters import _HIGHEST_CROSSING
 from skanfis.structure.sample import effective_weight, search_sample
 
+from .. import oracles
+
 
 def blobs(rng, n_per_blob=80, n_inputs=2):
     """Three blobs far apart in both inputs and target, their labels, and weights."""
@@ -230,6 +232,40 @@ class TestRules:
         assert model.n_rules_ == 1
         assert_allclose(model.predict(np.ones((1, 2))), 0.5)
 
+    def test_of_several_families_each_rule_has_terms_of_its_own(self, rng):
+        X, y, *_ = blobs(rng)
+        rows = Rows.standardised(X, y)
+        mixed = clustered_antecedent([Gaussian, Bell], rows, by_k_means, np.arange(2))
+        assert_array_equal(mixed.rule_terms, [[0, 3], [1, 4], [2, 5]])
+        for j, family in enumerate([Gaussian, Bell]):
+            alone = clustered_antecedent([family] * 2, rows, by_k_means, np.arange(2))
+            assert_array_equal(mixed.groups[j].inputs, j)
+            assert_allclose(mixed.groups[j].theta, alone.groups[0].theta[:, j::2])
+        Z = rng.normal(size=(2, 50))
+        expected = oracles.strengths(mixed, mixed.parameters, Z)
+        assert_allclose(mixed.strengths(Z), expected, rtol=1e-10)
+
+    def test_labels_are_asked_for_by_weight(self, rng):
+        X, y, times = many(rng)
+        asked = []
+
+        def label(table, weight):
+            asked.append((table, weight))
+            return np.zeros(len(table), dtype=int)
+
+        rows = Rows.standardised(X, y, times.astype(float))
+        clustered_antecedent([Gaussian] * 2, rows, label, np.array([1]))
+        (table, weight), (every, share, _) = asked[0], representative_rows(rows)
+        assert_array_equal(table, every[:, [1, 2]])
+        assert_array_equal(weight, share)
+        assert weight.sum() == times.sum()
+
+    def test_of_clusters_that_no_input_tells_apart_one_rule_without_terms_is_left(self, rng):
+        X, y = rng.normal(size=(200, 1)), rng.normal(size=(200, 1))
+        rows = Rows.standardised(X, y)
+        found = rules_of(Gaussian, rows, lambda t, w: np.arange(len(t)) % 2)
+        assert (found.n_rules, found.n_terms) == (1, 0)
+
 
 def many(rng, n_rows=300):
     """Rows of whole numbers, some of them equal, with whole weights."""
@@ -380,3 +416,10 @@ class TestSampleSize:
         # Already in the units of all rows: what they are is not standardised again.
         assert_array_equal(weighted.inputs.scale, 1.0)
         assert_array_equal(weighted.inputs.offset, 0.0)
+
+    def test_a_search_knows_the_group_of_each_of_its_rows(self, rng):
+        X, y = rng.normal(size=(500, 2)), rng.normal(size=(500, 1))
+        rows = Rows.standardised(X, y, groups=np.arange(500))
+        sample = search_sample(rows, 60)
+        assert sample.n_rows == 60
+        assert_array_equal(np.hstack([sample.X, sample.y]), rows.table(sample.groups))

@@ -147,6 +147,13 @@ class TestSpacing:
         found = spacing.centers(1, 2) * rows.inputs.scale[1] + rows.inputs.offset[1]
         assert_allclose(found, [0.0, 1.0], atol=1e-9)
 
+    @pytest.mark.parametrize("flip", [False, True])
+    def test_of_an_input_of_two_a_value_of_a_single_row_is_kept(self, flip):
+        x = np.arange(200) == 0
+        rows = rows_of(x ^ flip)
+        found = Spacing(rows).centers(0, 2) * rows.inputs.scale + rows.inputs.offset
+        assert_allclose(found, [0.0, 1.0], atol=1e-9)
+
 
 def rows_of_one(x, times=None):
     """One input, and a target that goes with it."""

@@ -74,6 +74,11 @@ def test_size_of_a_grid_is_that_of_its_matrices():
     assert size.n_bytes >= 2 * 8 * 32**2
 
 
+def test_one_output_is_meant_where_none_is_named():
+    assert GridSize([3, 2], 3).n_bytes == GridSize([3, 2], 3, 1).n_bytes
+    assert RuleBaseSize(6, 5, 3).n_bytes == RuleBaseSize(6, 5, 3, 1).n_bytes
+
+
 def test_size_of_a_grid_is_not_far_from_what_training_takes(rng):
     X = rng.normal(size=(1000, 3))
     y = np.sin(X[:, 0]) + rng.normal(size=1000)
