@@ -26,40 +26,34 @@ from mutmut.mutation.file_mutation import mutate_file_contents
 
 ROOT = Path(__file__).resolve().parent.parent
 # Modules, and the tests that mirror them: these are run once for all of a group before any mutant.
-GROUPS = [
-    (
-        ["membership/base", "membership/bell", "membership/flanked", "membership/gaussian"]
-        + ["membership/profiles", "membership/sigmoid"],
-        [f"membership/test_{name}.py" for name in ("families", "flanked", "profiles", "sigmoid")],
+GROUPS = {
+    "membership/base membership/bell membership/flanked membership/gaussian membership/profiles "
+    "membership/sigmoid": (
+        "membership/test_families.py membership/test_flanked.py membership/test_profiles.py "
+        "membership/test_sigmoid.py"
     ),
-    (
-        ["antecedent/base", "antecedent/grid", "antecedent/rule_table", "antecedent/scattered"],
-        ["antecedent/test_antecedent.py"],
+    "antecedent/base antecedent/grid antecedent/rule_table antecedent/scattered": (
+        "antecedent/test_antecedent.py"
     ),
-    (["rows"], ["test_rows.py", "test_extremes.py"]),
-    (
-        ["consequent", "gram", "passes", "penalty", "objective"],
-        ["test_consequent.py", "test_penalty.py", "test_objective.py", "solvers/test_gradient.py"]
-        + ["test_posterior.py", "training/test_many_rows.py"],
+    "rows": "test_rows.py test_extremes.py",
+    "consequent gram passes penalty objective": (
+        "test_consequent.py test_penalty.py test_objective.py solvers/test_gradient.py "
+        "test_posterior.py training/test_many_rows.py"
     ),
-    (["premise"], ["test_premise.py"]),
-    (["evidence"], ["test_evidence.py"]),
-    (["posterior"], ["test_posterior.py"]),
-    (
-        ["structure/clusters", "structure/grid", "structure/sample", "structure/size"],
-        [f"structure/test_{name}.py" for name in ("clusters", "grid", "size")],
+    "premise": "test_premise.py",
+    "evidence": "test_evidence.py",
+    "posterior": "test_posterior.py",
+    "structure/clusters structure/grid structure/sample structure/size": (
+        "structure/test_clusters.py structure/test_grid.py structure/test_size.py"
     ),
-    (
-        ["membership/__init__", "structure/imported", "structure/request"],
-        ["structure/test_request.py", "structure/test_size.py"],
+    "membership/__init__ structure/imported structure/request": (
+        "structure/test_request.py structure/test_size.py"
     ),
-    (
-        ["structure/candidate", "structure/held_out", "structure/search", "structure/terms"]
-        + ["structure/tuning"],
-        ["structure/test_search.py", "structure/test_terms.py"],
+    "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (
+        "structure/test_search.py structure/test_terms.py"
     ),
-]
-MODULES = [module for modules, _ in GROUPS for module in modules]
+}
+MODULES = " ".join(GROUPS).split()
 # pytest's exit status of a mutant's tests, or mutmut's own.
 KINDS = {0: "survived", 1: "killed", 3: "killed", 5: "untested", 33: "untested"}
 COLUMNS = ("mutants", "drawn", "killed", "timed out", "survived", "untested")
@@ -169,15 +163,17 @@ def tried(modules, tests, sample, seed):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("modules", nargs="*", help=f"of {', '.join(MODULES)}; all if none is given")
+    parser.add_argument("modules", nargs="*", metavar="MODULE", help="all if none is given")
     parser.add_argument("--sample", type=int, default=25, help="mutants drawn of every module")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    if unknown := set(given.modules) - set(MODULES):
+        parser.error(f"no {', '.join(sorted(unknown))} among {', '.join(MODULES)}")
     rows = {}
-    for modules, tests in GROUPS:
-        chosen = [module for module in modules if module in (given.modules or MODULES)]
+    for modules, tests in GROUPS.items():
+        chosen = [module for module in modules.split() if module in (given.modules or MODULES)]
         if chosen:
-            rows |= tried(chosen, tests, given.sample, given.seed)
+            rows |= tried(chosen, tests.split(), given.sample, given.seed)
             print("done:", ", ".join(chosen), "\n", flush=True)
     rows["all"] = {c: sum(row.get(c, 0) for row in rows.values()) for c in COLUMNS}
     print("| module |", " | ".join(COLUMNS), "| score |")
