@@ -50,7 +50,8 @@ GROUPS = {
         "structure/test_request.py structure/test_size.py"
     ),
     "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (
-        "structure/test_search.py structure/test_terms.py structure/test_held_out.py"
+        "structure/test_search.py structure/test_terms.py structure/test_held_out.py "
+        "structure/test_tuning.py"
     ),
 }
 MODULES = " ".join(GROUPS).split()
