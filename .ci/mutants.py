@@ -51,7 +51,7 @@ GROUPS = {
     ),
     "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (
         "structure/test_search.py structure/test_terms.py structure/test_held_out.py "
-        "structure/test_tuning.py"
+        "structure/test_tuning.py structure/test_candidate.py"
     ),
 }
 MODULES = " ".join(GROUPS).split()

@@ -14,6 +14,7 @@ from skanfis.membership import TRIED_FAMILIES, Gaussian
 from skanfis.rows import Rows
 from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
+from skanfis.structure.candidate import Candidate
 
 
 def inputs(rng, n_rows=400, n_inputs=3):
@@ -243,6 +244,29 @@ def test_screened_inputs_hold_those_that_matter(monkeypatch):
     with_terms = {int(term["input"].removeprefix("x")) for term in model.memberships_}
     assert 2 in with_terms
     assert with_terms <= {0, 1, 2, 3, 4}
+
+
+def test_screening_is_by_correlations_of_weighted_rows(rng):
+    # The formula term by term, the share as that of two Gaussians that cross at the overlap.
+    X, every = inputs(rng, 150, 18), np.arange(18)
+    y = np.sin(3.0 * X[:, [0]]) + X[:, [5]] * X[:, [3]] + 0.3 * rng.standard_normal((150, 1))
+    rows = Rows.standardised(X, y, rng.integers(1, 9, 150).astype(float))
+    found = search.StructureSearch(rows, [Gaussian] * 18, 1, every, every, 0, {}, overlap=0.6)
+    linear = Candidate((1,) * 18)
+    z, s = found.sample.X, found.sample.sample_weight
+    basis = np.column_stack([np.ones(len(z)), z])
+    r = found.sample.y[:, 0] - basis @ found._tuned(linear).evaluation.coefficients[:, 0]
+    statistic = []
+    for j in every:
+        centers = found.spacing.centers(j, 2)
+        width = 0.5 * (centers[1] - centers[0]) / np.sqrt(-2.0 * np.log(0.6))
+        mu = np.exp(-0.5 * ((z[:, [j]] - centers) / width) ** 2)
+        w = mu[:, 1] / mu.sum(axis=1)
+        w -= np.average(w, weights=s)
+        parts = [(s * w * b) @ r / np.sqrt(s @ (w * b) ** 2) for b in basis.T]
+        statistic.append(np.sum(np.square(parts)))
+    best = np.argsort(statistic)[::-1][: search._MOST_GROWING]
+    assert found._screened(linear) == list(best)
 
 
 def test_no_more_terms_than_values(rng):
