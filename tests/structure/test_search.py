@@ -250,7 +250,8 @@ def test_screening_is_by_correlations_of_weighted_rows(rng):
     # The formula term by term, the share as that of two Gaussians that cross at the overlap.
     X, every = inputs(rng, 150, 18), np.arange(18)
     y = np.sin(3.0 * X[:, [0]]) + X[:, [5]] * X[:, [3]] + 0.3 * rng.standard_normal((150, 1))
-    rows = Rows.standardised(X, y, rng.integers(1, 9, 150).astype(float))
+    # Weights that go with the inputs: the mean of a share is far from its plain mean.
+    rows = Rows.standardised(X, y, np.ceil(np.exp(X.sum(axis=1))))
     found = search.StructureSearch(rows, [Gaussian] * 18, 1, every, every, 0, {}, overlap=0.6)
     linear = Candidate((1,) * 18)
     z, s = found.sample.X, found.sample.sample_weight
