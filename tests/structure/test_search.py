@@ -11,6 +11,7 @@ from sklearn.linear_model import LinearRegression
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
 from skanfis.membership import TRIED_FAMILIES, Gaussian
+from skanfis.premise import Premise
 from skanfis.rows import Rows
 from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
@@ -268,6 +269,22 @@ def test_screening_is_by_correlations_of_weighted_rows(rng):
         statistic.append(np.sum(np.square(parts)))
     best = np.argsort(statistic)[::-1][: search._MOST_GROWING]
     assert found._screened(linear) == list(best)
+
+
+def test_a_grid_starts_from_where_the_terms_of_its_parent_are(rng):
+    X, used = inputs(rng, 200, 2), np.arange(2)
+    y = np.sin(3.0 * X[:, [0]]) + np.cos(4.0 * X[:, [1]]) + 0.05 * rng.standard_normal((200, 1))
+    rows = Rows.standardised(X, y)
+    found = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
+    found.parent = found._train(Candidate((3, 2)), found.sample)
+    child = found._antecedent(Candidate((3, 3)), found.sample)
+    premise = Premise.of(child, found.sample.inputs.minimum, found.sample.inputs.maximum)
+    started = child.with_parameters(premise.parameters(found._inherited(child, premise)))
+    before, (own,), (start,) = found.parent.evaluation.antecedent, started.groups, child.groups
+    assert np.abs(before.groups[0].theta[:, :3] - start.theta[:, :3]).max() > 0.05
+    assert_allclose(own.theta[:, :3], before.groups[0].theta[:, :3], atol=1e-9)
+    # Of the input that has one more term nothing is inherited.
+    assert_allclose(own.theta[:, 3:], start.theta[:, 3:], atol=1e-9)
 
 
 def test_no_more_terms_than_values(rng):
