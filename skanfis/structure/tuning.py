@@ -173,8 +173,7 @@ def tune(
     if is_loose:
         penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
     evaluation = problem.evaluate(premise.parameters(x))
-    consequents = [key for key in free if key != "stiffness"]
-    posterior = improved(evaluation, penalty, 0 if is_loose else first_steps, consequents)
+    posterior = improved(evaluation, penalty, 0 if is_loose else first_steps, free)
     penalty = posterior.penalty
     if premise.size == 0 or turns == 0:
         return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)

@@ -2,9 +2,36 @@
 
 import numpy as np
 
+from skanfis.evidence import FREE
 from skanfis.membership import Gaussian
+from skanfis.objective import SeparableProblem
+from skanfis.premise import Premise
 from skanfis.rows import Rows
 from skanfis.structure import Spacing, grid_antecedent, tuning
+
+
+def test_large_models_take_few_turns_of_one_step(monkeypatch, rng):
+    x = rng.uniform(-1.0, 1.0, (100, 1))
+    rows = Rows.standardised(x, np.sin(3.0 * x) + 0.1 * rng.normal(size=(100, 1)))
+    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
+    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    made = []
+    for name in ("varpro", "reestimated"):
+        whole = getattr(tuning, name)
+        monkeypatch.setattr(
+            tuning,
+            name,
+            lambda *args, name=name, whole=whole, **more: made.append(name) or whole(*args, **more),
+        )
+    monkeypatch.setattr(tuning, "_MOST_COLUMNS", problem.n_columns - 1)
+    tuning.tune(problem, premise, FREE, 100.0)
+    # Three before the premises move; then the premises, and the weights, twice.
+    assert made == 3 * ["reestimated"] + 2 * ["varpro", "reestimated"]
+    made.clear()
+    monkeypatch.setattr(tuning, "_MOST_COLUMNS", problem.n_columns)
+    tuning.tune(problem, premise, FREE, 100.0, turns=1)
+    assert made == 5 * ["reestimated"] + ["varpro"] + 2 * ["reestimated"]
 
 
 def test_a_kink_that_was_taken_for_noise_is_found_with_the_premises_first(monkeypatch, rng):
