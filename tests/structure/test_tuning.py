@@ -1,8 +1,10 @@
 """Weights and premises in turns: what is taken for noise, and what is found instead."""
 
 import numpy as np
+import pytest
+from numpy.testing import assert_allclose
 
-from skanfis.evidence import FREE
+from skanfis.evidence import FREE, PRIOR_DISPLACEMENT
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.premise import Premise
@@ -10,12 +12,32 @@ from skanfis.rows import Rows
 from skanfis.structure import Spacing, grid_antecedent, tuning
 
 
-def test_large_models_take_few_turns_of_one_step(monkeypatch, rng):
+@pytest.fixture
+def two_rules(rng):
+    """A problem of 100 rows, and its premise."""
     x = rng.uniform(-1.0, 1.0, (100, 1))
     rows = Rows.standardised(x, np.sin(3.0 * x) + 0.1 * rng.normal(size=(100, 1)))
     antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
     problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
-    premise = Premise.of(antecedent, *rows.inputs.box)
+    return problem, Premise.of(antecedent, *rows.inputs.box)
+
+
+def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
+    # n kappa / sigma^2 x0^2 = 1; but where they come first, next to nothing holds them.
+    noise = tuning.tune(*two_rules, FREE, 100.0, turns=0).posterior.noise_variance
+    begun, varpro = [], tuning.varpro
+    monkeypatch.setattr(
+        tuning,
+        "varpro",
+        lambda *args, **more: begun.append(more["stiffness"]) or varpro(*args, **more),
+    )
+    for is_loose in (False, True):
+        tuning.tune(*two_rules, FREE, 100.0, turns=1, is_loose=is_loose)
+    assert_allclose(begun, [noise / (100.0 * PRIOR_DISPLACEMENT**2), 1e-12])
+
+
+def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
+    problem, premise = two_rules
     made = []
     for name in ("varpro", "reestimated"):
         whole = getattr(tuning, name)
