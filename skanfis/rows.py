@@ -99,7 +99,7 @@ def column_statistics(values, sample_weight=None):
     scale = np.ldexp(span * np.sqrt(second / total), -shift)
     return Scale(
         np.where(constant, minimum, np.ldexp(mean, -shift)),
-        np.where(constant | (scale == 0.0), 1.0, scale),
+        np.where(scale == 0.0, 1.0, scale),
         minimum,
         maximum,
     )

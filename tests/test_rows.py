@@ -100,6 +100,33 @@ def test_column_that_changes_once_is_not_constant():
     assert_allclose(found.scale, 1e-9 / np.sqrt(N_ROWS), rtol=1e-3)
 
 
+def test_column_that_varies_by_less_than_floats_can_halve_has_scale_one():
+    found = column_statistics(np.array([[0.0], [5e-324]]))
+    assert not found.is_constant[0]
+    assert found.scale[0] == 1.0
+
+
+def test_sums_that_overflow_on_either_side_are_taken_again():
+    # One block of rows adds up to infinity, the next to minus infinity.
+    n, largest = rows._READ_ROWS, 1.7e308
+    found = column_statistics(np.repeat([0.0, largest, -largest], [1, n, n])[:, None])
+    assert_allclose(found.offset / largest, 0.0, atol=1e-12)
+    assert_allclose(found.scale / largest, np.sqrt(2 * n / (2 * n + 1)), rtol=1e-12)
+
+
+def test_part_of_the_rows_keeps_scales_weights_and_groups(rng):
+    values, weight = table(rng, 40), rng.uniform(0.5, 2.0, 40)
+    whole = Rows.standardised(values, values[:, :2] ** 2, weight, groups=np.arange(40) // 4)
+    some = np.array([31, 2, 7, 7])
+    part = whole.part(some)
+    assert_array_equal(part.table(slice(None)), whole.table(some))
+    assert_array_equal(part.sample_weight, weight[some])
+    assert_array_equal(part.groups, some // 4)
+    plain = Rows.standardised(values, values).part(some)
+    assert plain.sample_weight is None
+    assert plain.groups is None
+
+
 def test_single_precision_is_summed_in_double(rng):
     values = (rng.normal(size=(N_ROWS, 1)) + 1e4).astype(np.float32)
     found = column_statistics(values)
