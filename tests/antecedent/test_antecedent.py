@@ -222,3 +222,10 @@ def test_without_terms_there_is_nothing_that_the_output_could_be_sensitive_to(Z,
     _, shares = antecedent.strengths_and_shares(Z)
     assert antecedent.sum_over_rules(values).shape == (0, 60)
     assert antecedent.term_sensitivity(values, values[0], shares).shape == (0, 60)
+
+
+def test_a_family_and_an_input_for_every_theta():
+    theta = Gaussian.start(np.array([-1.0, 1.0]), np.ones(2), 0.6)
+    for families, places in (([Gaussian], [0, 1]), ([Gaussian] * 2, [0])):
+        with pytest.raises(ValueError, match="zip"):
+            GridAntecedent.build(families, places, [theta] * 2)

@@ -311,3 +311,11 @@ def test_bell_of_any_slope(rng, slope):
     # Steep shoulders: (1 % off the width)^60 magnifies rounding of the distance 60 times.
     assert_allclose(np.exp(log_mu), Bell.value(x, theta), rtol=1e-12)
     assert_allclose(gradient, gradient_by_complex_step(Bell, x, theta), rtol=1e-10, atol=1e-14)
+
+
+def test_parameters_of_another_family_are_refused():
+    one_too_many = np.zeros((3, 2))
+    with pytest.raises(ValueError, match="zip"):
+        Gaussian.natural(one_too_many)
+    with pytest.raises(ValueError, match="zip"):
+        Gaussian.change_units(one_too_many, np.zeros(2), np.ones(2))
