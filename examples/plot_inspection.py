@@ -36,7 +36,7 @@ from skanfis.solvers import VariableProjection
 data = make_ofog(n_devices=1, n_runs=12, random_state=0)
 X, error = data[["temperature", "rate"]], data["error"]
 model = make_pipeline(
-    StandardScaler(), ANFISRegressor(n_mfs=[2, 4], solver=VariableProjection(stiffness=1e-3))
+    StandardScaler(), ANFISRegressor(n_mfs=[2, 4], solver=VariableProjection(stiffness=3e-3))
 )
 model.fit(X, error)
 print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X)).std():.3f} °/s")

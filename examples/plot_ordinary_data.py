@@ -82,9 +82,9 @@ MembershipDisplay.from_estimator(model, X_train)
 #
 # Where the strongest rule alone says what all say together, points lie on the diagonal. Here they
 # do not: two lines, blended along the inductance, make a product of frequency and inductance, and
-# neither line stands for anything alone. The model says so itself. Its predictions are as good as
-# they were; but read the picture of the response below, not the rules. :doc:`/reading_rules` says
-# what may be believed of a rule, and when.
+# neither line stands for anything alone. The model says so itself, and has warned above. Its
+# predictions are as good as they were; but read the picture of the response below, not the rules.
+# :doc:`/reading_rules` says what may be believed of a rule, and when.
 
 print(model[-1].readability_)
 ReadabilityDisplay.from_estimator(model, X_train, y_train)

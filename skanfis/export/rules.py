@@ -5,7 +5,10 @@ from numbers import Real
 
 import numpy as np
 
-from .._validation import check_choice, check_count
+from .._validation import check_choice, check_count, warn_user
+from ..exceptions import ReadabilityWarning
+from ..model import TSKModel
+from .unwrapping import last_step
 
 __all__ = [
     "SORT_BY",
@@ -14,8 +17,10 @@ __all__ = [
     "consequents_about",
     "knows_data",
     "premise_text",
+    "readability_in_training",
     "renamed",
     "round_reference",
+    "warn_if_unreadable",
 ]
 
 SORT_BY = ("weight", "rows", "rule")
@@ -24,6 +29,33 @@ SORT_BY = ("weight", "rows", "rule")
 def knows_data(model):
     """Whether the model remembers training data; one read from a .fis file has none."""
     return bool(np.any(model.rule_rows))
+
+
+def readability_in_training(estimator, model):
+    """What the fit found of its rules on its rows; None where nothing is known of it.
+
+    It has no units, and terms and rules keep their order when scalers are folded in: with the names
+    of ``model``, the whole, its sentences speak of the whole's columns.
+    """
+    if isinstance(estimator, TSKModel):
+        return None
+    found = getattr(last_step(estimator), "readability_", None)
+    return None if found is None else replace(found, model=model)
+
+
+def warn_if_unreadable(estimator, model):
+    """Issue a ReadabilityWarning where the fit found that its rules cannot be read one by one."""
+    found = readability_in_training(estimator, model)
+    if found is not None and found.findings:
+        lines = [
+            "The rules are not fit to be read one by one:",
+            *(f"- {sentence}" for sentence in found.findings),
+            "The predictions may be good all the same. For rules that can be read, let them agree "
+            "more (agreement=0.01, say; it costs some accuracy), or take fewer terms (n_mfs) or "
+            "inputs (premise_features, consequent_features). skanfis.inspection.readability has "
+            "the figures.",
+        ]
+        warn_user("\n".join(lines), ReadabilityWarning)
 
 
 def conditions(model):

@@ -8,7 +8,13 @@ import pandas as pd
 
 from .._validation import check_choice
 from .folding import fold, fold_with_rows
-from .rules import choose_rules, conditions, consequents_about, premise_text
+from .rules import (
+    choose_rules,
+    conditions,
+    consequents_about,
+    premise_text,
+    warn_if_unreadable,
+)
 
 __all__ = ["explain", "memberships_table", "rules_table"]
 
@@ -50,6 +56,11 @@ def rules_table(
     TypeError
         If ``estimator`` has no rules.
 
+    Warns
+    -----
+    ReadabilityWarning
+        If the fit found that the rules cannot be read one by one; see ``readability_``.
+
     Examples
     --------
     >>> from skanfis import ANFISRegressor
@@ -71,6 +82,7 @@ def rules_table(
     """
     check_choice("about", about, ("origin", "mean"))
     model = fold(estimator)
+    warn_if_unreadable(estimator, model)
     chosen = choose_rules(model, sort_by, max_rules, min_weight)
     reference = model.reference if about == "mean" else 0.0 * model.reference
     consequents = consequents_about(model, reference)

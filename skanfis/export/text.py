@@ -14,6 +14,7 @@ from .rules import (
     premise_text,
     renamed,
     round_reference,
+    warn_if_unreadable,
 )
 
 __all__ = ["consequent_text", "export_text", "range_text", "rows_text", "term_text"]
@@ -83,6 +84,11 @@ def export_text(
     TypeError
         If ``estimator`` has no rules.
 
+    Warns
+    -----
+    ReadabilityWarning
+        If the fit found that the rules cannot be read one by one; see ``readability_``.
+
     Examples
     --------
     >>> import numpy as np
@@ -90,17 +96,17 @@ def export_text(
     >>> from skanfis.export import export_text
     >>> hours = np.linspace(0.0, 10.0, 41).reshape(-1, 1)
     >>> drift = 0.1 * hours[:, 0] + 5.0 * np.exp(-hours[:, 0])
-    >>> model = ANFISRegressor(n_mfs=2, solver="lse").fit(hours, drift)
+    >>> model = ANFISRegressor(n_mfs=2, solver="lse", agreement=0.1).fit(hours, drift)
     >>> print(export_text(model, precision=3, feature_names=["hours"], output_names=["drift"]))
     2 rules, 1 input.
     <BLANKLINE>
     Rule 0, 50 % of the weight, strongest on 21 rows:
       IF hours is low
-      THEN drift = -1.09 - 0.886 * (hours - 5)
+      THEN drift = 0.338 - 0.555 * (hours - 5)
     <BLANKLINE>
     Rule 1, 50 % of the weight, strongest on 20 rows:
       IF hours is high
-      THEN drift = 1.74 + 0.0903 * (hours - 5)
+      THEN drift = 0.649 + 0.195 * (hours - 5)
     <BLANKLINE>
     Terms:
       hours, trained from 0 to 10
@@ -108,11 +114,12 @@ def export_text(
         high: gaussian, center 10, width 4.95
     Outside these ranges: out_of_bounds='linear', max_extrapolation=0.5.
     Held within the limits of its training: drift, 0.023 to 5.469.
-    Standard deviation of the noise about the rules: drift 0.483.
+    Standard deviation of the noise about the rules: drift 0.548.
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))
     model = renamed(fold(estimator), feature_names, output_names)
+    warn_if_unreadable(estimator, model)
     chosen = choose_rules(model, sort_by, max_rules, min_weight)
     reference = round_reference(model) if about == "mean" else 0.0 * model.reference
     consequents = consequents_about(model, reference)

@@ -1,15 +1,19 @@
 """The rules at a glance, as HTML for notebooks: one piece, no script, nothing loaded."""
 
-from dataclasses import replace
 from html import escape
 
 import numpy as np
 
 from .._validation import check_count
-from ..export import fold, last_step
-from ..export.rules import choose_rules, consequents_about, knows_data, round_reference
+from ..export import fold
+from ..export.rules import (
+    choose_rules,
+    consequents_about,
+    knows_data,
+    readability_in_training,
+    round_reference,
+)
 from ..export.text import consequent_text, range_text, term_text
-from ..model import TSKModel
 from ..readable import findings_without_rows
 from ._common import premises
 
@@ -74,14 +78,10 @@ def rules_html(estimator, *, max_rules=10, precision=4) -> str:
 
 def _how_to_read(estimator, model):
     """What the fit found of its rules on its rows; else what can be said without rows."""
-    found = None
-    if not isinstance(estimator, TSKModel):
-        found = getattr(last_step(estimator), "readability_", None)
+    found = readability_in_training(estimator, model)
     if found is None:
         return "".join(f"<div>{escape(line)}</div>" for line in findings_without_rows(model))
-    # What was found has no units, and terms and rules keep their order when scalers are folded in:
-    # with the names of the whole, the sentences speak of its columns.
-    return replace(found, model=model).html()
+    return found.html()
 
 
 def _count(number_of, what):

@@ -10,7 +10,6 @@ from .report import (
     Readability,
     findings_without_rows,
     readability_of_rows,
-    warn_if_unreadable,
 )
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
 
@@ -32,5 +31,4 @@ __all__ = [
     "own_terms",
     "readability_of_rows",
     "rule_sums",
-    "warn_if_unreadable",
 ]

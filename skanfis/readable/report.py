@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from .._validation import warn_user
-from ..exceptions import ReadabilityWarning
 from ..model import TSKModel
 from .measures import Measures, Source, measure
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
@@ -25,7 +23,6 @@ __all__ = [
     "Readability",
     "findings_without_rows",
     "readability_of_rows",
-    "warn_if_unreadable",
 ]
 
 # A term that is never truer than this is, on every row, more false than true: its name describes
@@ -296,22 +293,6 @@ def readability_of_rows(model, X, y=None, sample_weight=None):
     """
     source = Source(X.shape[0], lambda part: X[part], y, sample_weight)
     return Readability(model, measure(model, source))
-
-
-def warn_if_unreadable(readability):
-    """Issue a ReadabilityWarning with the findings, if there are any.
-
-    Parameters
-    ----------
-    readability : Readability
-    """
-    findings = readability.findings
-    if findings:
-        warn_user(
-            f"The rules are not fit to be read one by one. {' '.join(findings)} "
-            "skanfis.inspection.readability has the tables.",
-            ReadabilityWarning,
-        )
 
 
 def findings_without_rows(model):

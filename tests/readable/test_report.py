@@ -3,14 +3,12 @@
 import pickle
 import subprocess
 import sys
-import warnings
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.exceptions import ReadabilityWarning
 from skanfis.export import rules_table
 from skanfis.readable import (
     GREATEST_ALONE,
@@ -22,7 +20,6 @@ from skanfis.readable import (
     crossings,
     findings_without_rows,
     readability_of_rows,
-    warn_if_unreadable,
 )
 
 from ..export.rule_bases import MODELS, rows_of
@@ -196,22 +193,12 @@ def test_names_are_escaped_in_html():
     assert "and 2 more lines" in html  # of twelve rules
 
 
-def test_the_warning_has_the_findings_and_points_at_the_caller():
-    report = changed("alone", 7.0)
-    with pytest.warns(ReadabilityWarning, match="not fit to be read one by one. No rule") as caught:
-        warn_if_unreadable(report)
-    assert caught[0].filename == __file__
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        warn_if_unreadable(all_well(A_GRID))
-
-
 def test_measuring_needs_no_export():
     # It may run in every fit: exports and pandas, where scikit-learn does not load it, take longer
     # to load than a fit.
     code = (
         "import sys, numpy as np; from skanfis import ANFISRegressor; "
-        "from skanfis.readable import readability_of_rows, warn_if_unreadable; "
+        "from skanfis.readable import readability_of_rows; "
         "X = np.linspace(0, 1, 30)[:, None]; before = set(sys.modules); "
         "model = ANFISRegressor(n_mfs=2, solver='lse').fit(X, X[:, 0]).model_; "
         "str(readability_of_rows(model, X, X)); "

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...export import export_text
+from ...export import export_text, fold
 from .._pictures import draw_memberships
 from .._reading import readability_of
 from ..displays._style import figures
@@ -75,11 +75,12 @@ def rules_text(calibration, found=None):
     if found.findings:
         caution = "\n".join([f"{_NOT_FIT}:", *found.findings, "", ""])
     estimator = calibration.compensator.estimator
+    # Folded, a model knows of no readability in training, and the text has the caution once.
     if calibration.recipe.physics:
-        rules = export_text(estimator.residual_, output_names=["rate beyond the law"])
+        rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
         law = law_formula(estimator.base_, calibration.recipe)
         return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
-    return f"{caution}{export_text(estimator, output_names=['error'])}\n"
+    return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
 
 
 def _on_board(compensator):
