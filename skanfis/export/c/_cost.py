@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ._families import BODIES
-from ._source import index_type
+from ._text import index_type
 
 __all__ = ["INDEX_BYTES", "CCost", "cost", "with_learner"]
 

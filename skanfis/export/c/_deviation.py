@@ -34,8 +34,10 @@ from ._deviation_code import (
     TEST,
 )
 from ._deviation_tables import fitting
-from ._source import CENTRE, FINITE_INPUT, INPUTS, Source, index_type, words_of
-from ._text import literals
+from ._families import words_of
+from ._fragments import CENTRE, FINITE_INPUT, INPUTS
+from ._source import Source
+from ._text import index_type, literals
 
 __all__ = ["DeviationSource", "deviation_test", "with_deviation"]
 

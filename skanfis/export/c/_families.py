@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from ...membership import MEMBERSHIPS
 
-__all__ = ["BODIES", "HELPERS", "FamilyInC"]
+__all__ = ["BODIES", "HELPERS", "FamilyInC", "words_of"]
 
 
 @dataclass(frozen=True)
@@ -231,3 +231,12 @@ _BY_NAME = {
 
 # By the class, since another class may go by the same name.
 BODIES = {MEMBERSHIPS[name]: in_c for name, in_c in _BY_NAME.items()}
+
+
+def words_of(terms):
+    """What stands for the distances and constants of terms in their family's templates."""
+    n, n_columns = terms.n_locations, terms.constants.shape[1]
+    rest = [f" - p[{n + k}]" if terms.is_in_two else "" for k in range(n)]
+    first = n * (1 + terms.is_in_two)
+    distances = {f"d{k}": f"(x - p[{k}]{rest[k]})" for k in range(n)}
+    return distances | {f"p{k - first}": f"p[{k}]" for k in range(first, n_columns)}

@@ -4,7 +4,15 @@ import re
 
 import numpy as np
 
-__all__ = ["LONGEST_NAME", "check_file_name", "check_name", "comment", "literal", "literals"]
+__all__ = [
+    "LONGEST_NAME",
+    "check_file_name",
+    "check_name",
+    "comment",
+    "index_type",
+    "literal",
+    "literals",
+]
 
 # Of C89, C99, C11, C23 and C++: the files may be compiled as any of them.
 _KEYWORDS = """
@@ -21,6 +29,13 @@ _KEYWORDS = """
 LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
 _LONGEST_COMMENT = 60
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
+
+
+def index_type(values):
+    """The smallest unsigned type that holds these positions whatever the width of a char is."""
+    largest = max(map(int, np.ravel(values)), default=0)
+    limits = [(255, "unsigned char"), (65535, "unsigned short")]
+    return next((kind for limit, kind in limits if largest <= limit), "unsigned long")
 
 
 def literal(value):

@@ -8,10 +8,11 @@ from .._numbers import Numbers, as_held
 from ._cost import CCost, cost
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
+from ._fragments import FINITE_INPUT, rejection
 from ._header import coverage_line, header_of, policy_line
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
-from ._source import FINITE_INPUT, Source, index_type, rejection
-from ._text import LONGEST_NAME, comment, literals
+from ._source import Source
+from ._text import LONGEST_NAME, comment, index_type, literals
 from .status import STATUS
 
 __all__ = [
