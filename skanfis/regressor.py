@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils import check_random_state
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from ._callers import is_silent, pipelines_above
@@ -27,8 +26,6 @@ from ._threads import one_blas_thread
 from ._validation import (
     bearable_weights,
     check_finite,
-    content_digest,
-    feature_indices,
     group_numbers,
     named_refusals,
     on_host,
@@ -43,18 +40,16 @@ from .export import fold_with_rows, last_step
 from .membership import (
     MEMBERSHIPS,
     NAMES_IN_MATLAB,
-    TRIED_FAMILIES,
     Membership,
-    membership_families,
 )
 from .model import TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
+from .parameters import structure_parameters, structure_request
 from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
 from .streaming.learning import LearnsFromChunksMixin
-from .structure import StructureRequest, check_inputs
 from .training import Callbacks, TrainingData, fit_rules, model_without_rules
 
 __all__ = ["ANFISRegressor"]
@@ -420,7 +415,7 @@ class ANFISRegressor(
                 if isinstance(option, BaseEstimator):
                     check_parameters(option)
             data = self._check_training_data(X, y, sample_weight, groups)
-            request = self._request(data.input_names)
+            request = structure_request(self, data.input_names)
             callbacks = None
             if context is not None:
                 metadata = None if sample_weight is None else {"sample_weight": sample_weight}
@@ -447,7 +442,7 @@ class ANFISRegressor(
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
-        self._start_parameters = self._structure_parameters()
+        self._start_parameters = structure_parameters(self)
         self._forget_chunks()
         if callbacks is not None:
             callbacks.end(self.model_)
@@ -650,120 +645,10 @@ class ANFISRegressor(
         names = getattr(self, "feature_names_in_", None)
         return [f"x{j}" for j in range(self.n_features_in_)] if names is None else list(names)
 
-    def _request(self, names):
-        """What training starts from, with all names of columns and families resolved."""
-        start, n_mfs = self._imported(names), self.n_mfs
-        solver, weights = self._solver(), self._given_weights()
-        if self.warm_start and hasattr(self, "_start_parameters"):
-            changed = [
-                name
-                for name, value in self._structure_parameters().items()
-                if value != self._start_parameters[name]
-            ]
-            if changed:
-                raise ValueError(
-                    f"warm_start=True goes on from the rules of the fit before, but {changed[0]} "
-                    "has been changed since: set warm_start=False to start anew."
-                )
-            start, n_mfs = self.model_, "auto"
-            check_inputs(start, names, "warm_start=True")
-            weights = self._found_weights() | weights
-        if self.order == 0 and self.consequent_features is not None:
-            raise ValueError(
-                f"consequent_features={self.consequent_features!r} means nothing with order=0, "
-                "whose consequents are constants: leave it at None."
-            )
-        consequent = feature_indices(self.consequent_features, names, "consequent_features")
-        # random_state=None stands for one fixed seed: the same data give the same model.
-        state = self.random_state
-        seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
-        return StructureRequest(
-            n_mfs=n_mfs,
-            partition=start,
-            families=membership_families(self.mf, names),
-            order=self.order,
-            premise_inputs=feature_indices(self.premise_features, names, "premise_features"),
-            consequent_inputs=consequent if self.order == 1 else consequent[:0],
-            weights=weights,
-            premises_move=solver.moves_premises and self.max_iter > 0,
-            seed=seed,
-            names=names,
-            other_families=TRIED_FAMILIES[1:]
-            if isinstance(self.mf, str) and self.mf == "auto"
-            else (),
-        )
-
-    def _solver(self) -> Solver:
-        """The solver, by its word or as it is given."""
-        return SOLVERS[self.solver]() if isinstance(self.solver, str) else self.solver
-
     def _tell_noise(self):
         posterior = self.model_.posterior
         noise = None if posterior is None else posterior.noise
         self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
-
-    def _given_weights(self):
-        """The weights of the penalty that are given, by their names in ``evidence.FREE``."""
-        stiffness = self._solver().stiffness
-        given = {"agreement": self.agreement, "alpha": self.alpha, "stiffness": stiffness}
-        weights = {k: float(weight) for k, weight in given.items() if not isinstance(weight, str)}
-        if "alpha" in weights:
-            weights["slope"] = weights["alpha"]
-        return weights
-
-    def _found_weights(self):
-        """The weights of the penalty that training has used, by the same names."""
-        return {
-            "agreement": self.agreement_,
-            "alpha": self.alpha_,
-            "slope": self.slope_alpha_,
-            "stiffness": self.stiffness_,
-        }
-
-    def _structure_parameters(self):
-        """The parameters that the structure depends on, in a form that can be compared."""
-        names = ("n_mfs", "partition", "mf", "premise_features")
-        values = {name: getattr(self, name) for name in names}
-        # Models are their numbers, wherever they were pickled; all else says in words what it is.
-        return {
-            name: content_digest(getattr(value, "model_", value))
-            if hasattr(value, "strengths")
-            else repr(value)
-            for name, value in values.items()
-        }
-
-    def _imported(self, names):
-        """``partition``, with the model in place of the estimator that holds it."""
-        given = self.partition
-        if isinstance(given, type):
-            raise ValueError(
-                f"partition={given!r} is a class: give an object of it, {given.__name__}(...)."
-            )
-        if isinstance(given, str) or hasattr(given, "fit_predict"):
-            return given
-        model = getattr(given, "model_", given)
-        if not isinstance(model, TSKModel):
-            raise ValueError(
-                f"partition={given!r} has no rules: it has not been fitted, or was cloned, which "
-                "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
-            )
-        check_inputs(model, names, "partition")
-        if self.max_iter == 0 and (self.monotonic_cst is not None or self.constraints is not None):
-            raise ValueError(
-                "monotonic_cst and constraints mean nothing where imported rules are taken as they "
-                "are (max_iter=0): leave them at None, or use solver='lse'."
-            )
-        if self.premise_features is not None:
-            raise ValueError(
-                f"premise_features={self.premise_features!r} means nothing to imported rules, "
-                "which are on the inputs that they are on: leave it at None."
-            )
-        if self.max_iter == 0 and self.consequent_features is not None:
-            raise ValueError(
-                f"consequent_features={self.consequent_features!r} means nothing where imported "
-                "rules are taken as they are (max_iter=0): leave it at None, or use solver='lse'."
-            )
-        return model
 
     def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
         """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""

@@ -10,6 +10,13 @@ from sklearn.utils.metaestimators import available_if
 from .._sklearn import fit_context
 from ..model import TSKModel
 from ..options import policy_of
+from ..parameters import (
+    found_weights,
+    given_weights,
+    solver_of,
+    structure_parameters,
+    structure_request,
+)
 from ..readable import readability_of_rows
 from ..solvers import MESSAGES
 from .asked import (
@@ -37,13 +44,8 @@ class LearnsFromChunksMixin:
     # What the estimator brings.
     fit: Any
     out_of_bounds: Any
-    _solver: Any
     _tell_noise: Any
     _check_training_data: Any
-    _request: Any
-    _given_weights: Any
-    _found_weights: Any
-    _structure_parameters: Any
 
     @available_if(can_learn_from_chunks)
     @fit_context(prefer_skip_nested_validation=False)
@@ -136,10 +138,10 @@ class LearnsFromChunksMixin:
     def _first_chunk(self, X, y, data, weight):
         """The stream of a first chunk, whose model is learnt."""
         check_first_chunk(self, data.X.shape[0])
-        request = self._request(data.input_names)
+        request = structure_request(self, data.input_names)
         after_fit = hasattr(self, "model_")
         holds = after_fit or (
-            not self._solver().moves_premises and isinstance(request.partition, TSKModel)
+            not solver_of(self).moves_premises and isinstance(request.partition, TSKModel)
         )
         if after_fit:
             warn_of_fit(self)
@@ -155,7 +157,7 @@ class LearnsFromChunksMixin:
         if holds:
             self.stiffness_, self.structures_ = 0.0, []
             self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
-            self._start_parameters = self._structure_parameters()
+            self._start_parameters = structure_parameters(self)
             self._learn_from(stream)
             self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
         else:
@@ -164,7 +166,7 @@ class LearnsFromChunksMixin:
 
     def _learn_from(self, stream):
         """The model of a stream."""
-        solved = stream.solved(self._given_weights())
+        solved = stream.solved(given_weights(self))
         policy, limit = policy_of(self.out_of_bounds)
         self.model_ = replace(solved.model, out_of_bounds=policy, max_extrapolation=limit)
         self.n_iter_ = 1
@@ -233,4 +235,4 @@ class LearnsFromChunksMixin:
         None where the model has not been trained by it.
         """
         stream = getattr(self, "_stream", None)
-        return None if stream is None else stream.information(self._found_weights())
+        return None if stream is None else stream.information(found_weights(self))

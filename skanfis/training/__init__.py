@@ -1,6 +1,7 @@
 """Training: one fit in a straight line (``fit``), and what it uses on the way."""
 
-from .fit import Fitted, SolverRun, TrainingData, fit_rules
+from .data import TrainingData
+from .fit import Fitted, SolverRun, fit_rules
 from .progress import Callbacks
 from .pruning import RuleStatistics, model_without_rules, redundant_rules
 

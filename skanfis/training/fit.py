@@ -20,14 +20,13 @@ from sklearn.exceptions import ConvergenceWarning
 from .._threads import map_in_threads
 from .._validation import warn_user
 from ..constraints.exchange import constrained
-from ..constraints.wishes import Wishes
 from ..model import TargetRange, TSKModel
 from ..objective import Evaluation, SeparableProblem
 from ..options import EarlyStopping, Huber, policy_of
 from ..penalty import Penalty
 from ..posterior import Posterior
 from ..premise import Premise
-from ..rows import Rows, check_scales
+from ..rows import Rows
 from ..sampling import is_many, with_sample
 from ..solvers import SOLVERS, LeastSquares, Solver, SolverResult, VariableProjection
 from ..structure import (
@@ -39,6 +38,7 @@ from ..structure import (
     report_constant,
 )
 from ..support import RuleSupport
+from .data import TrainingData
 from .progress import Callbacks, Printer, watch_all
 from .pruning import RuleStatistics, redundant_rules, rule_statistics
 from .restarts import displaced_starts, leave_one_out_error
@@ -52,7 +52,7 @@ from .robust import (
 )
 from .stopping import ValidationLoss, hold_out
 
-__all__ = ["Fitted", "SolverRun", "TrainingData", "fit_rules"]
+__all__ = ["Fitted", "SolverRun", "fit_rules"]
 
 # Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
 # what is left to do is done on all rows.
@@ -65,60 +65,6 @@ _MOST_TURNS = 20
 _SETTLED = 1e-3
 # The first start, one that sees the outliers less, and further ones where that is of another size.
 _MOST_STARTS = 5
-
-
-@dataclass(frozen=True, eq=False)
-class TrainingData:
-    """Validated data.
-
-    Parameters
-    ----------
-    X : ndarray of shape (n_rows, n_inputs)
-    y : ndarray of shape (n_rows, n_outputs)
-    sample_weight : ndarray of shape (n_rows,) or None
-        Positive.
-    groups : ndarray of shape (n_rows,) or None
-    input_names, output_names : sequence of str
-    kept : ndarray of bool of shape (n_given_rows,), optional
-        Which of the rows given have weight and are here, if not all.
-    wishes : Wishes, optional
-        What is known of the target, in the user's units.
-    """
-
-    X: np.ndarray
-    y: np.ndarray
-    sample_weight: np.ndarray | None
-    groups: np.ndarray | None
-    input_names: tuple[str, ...]
-    output_names: tuple[str, ...]
-    kept: np.ndarray | None = None
-    wishes: Wishes | None = None
-
-    def rows(self, indices=slice(None)):
-        """Some of the rows, on scales of their own."""
-        weight = None if self.sample_weight is None else self.sample_weight[indices]
-        groups = None if self.groups is None else self.groups[indices]
-        rows = Rows.standardised(self.X[indices], self.y[indices], weight, groups)
-        check_scales(rows.inputs, rows.targets, self.input_names, self.output_names)
-        return rows
-
-    def spread_weights(self, weights):
-        """Weights of these rows as weights of all rows given, zero elsewhere."""
-        if self.kept is None:
-            return weights
-        given = np.zeros(self.kept.size)
-        given[self.kept] = 1.0 if weights is None else weights
-        return given
-
-    def spread_over_rows(self, values, indices):
-        """Values of some rows as values of all rows given, NaN elsewhere."""
-        every = np.full(self.X.shape[0], np.nan)
-        every[indices] = values
-        if self.kept is None:
-            return every
-        given = np.full(self.kept.size, np.nan)
-        given[self.kept] = every
-        return given
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,139 @@
+"""What the parameters of an estimator ask for, in the words of structure and training.
+
+Names of columns, families and solvers are resolved here, and parameters that contradict one another
+refused; what each may be by itself, scikit-learn checks before.
+"""
+
+from sklearn.utils import check_random_state
+
+from ._validation import content_digest, feature_indices
+from .membership import TRIED_FAMILIES, membership_families
+from .model import TSKModel
+from .solvers import SOLVERS, Solver
+from .structure import StructureRequest, check_inputs
+
+__all__ = [
+    "found_weights",
+    "given_weights",
+    "solver_of",
+    "structure_parameters",
+    "structure_request",
+]
+
+
+def structure_request(estimator, names):
+    """What training starts from, with all names of columns and families resolved."""
+    start, n_mfs = _imported(estimator, names), estimator.n_mfs
+    solver, weights = solver_of(estimator), given_weights(estimator)
+    if estimator.warm_start and hasattr(estimator, "_start_parameters"):
+        changed = [
+            name
+            for name, value in structure_parameters(estimator).items()
+            if value != estimator._start_parameters[name]
+        ]
+        if changed:
+            raise ValueError(
+                f"warm_start=True goes on from the rules of the fit before, but {changed[0]} "
+                "has been changed since: set warm_start=False to start anew."
+            )
+        start, n_mfs = estimator.model_, "auto"
+        check_inputs(start, names, "warm_start=True")
+        weights = found_weights(estimator) | weights
+    if estimator.order == 0 and estimator.consequent_features is not None:
+        raise ValueError(
+            f"consequent_features={estimator.consequent_features!r} means nothing with order=0, "
+            "whose consequents are constants: leave it at None."
+        )
+    consequent = feature_indices(estimator.consequent_features, names, "consequent_features")
+    # random_state=None stands for one fixed seed: the same data give the same model.
+    state = estimator.random_state
+    seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
+    return StructureRequest(
+        n_mfs=n_mfs,
+        partition=start,
+        families=membership_families(estimator.mf, names),
+        order=estimator.order,
+        premise_inputs=feature_indices(estimator.premise_features, names, "premise_features"),
+        consequent_inputs=consequent if estimator.order == 1 else consequent[:0],
+        weights=weights,
+        premises_move=solver.moves_premises and estimator.max_iter > 0,
+        seed=seed,
+        names=names,
+        other_families=TRIED_FAMILIES[1:]
+        if isinstance(estimator.mf, str) and estimator.mf == "auto"
+        else (),
+    )
+
+
+def solver_of(estimator) -> Solver:
+    """The solver, by its word or as it is given."""
+    return SOLVERS[estimator.solver]() if isinstance(estimator.solver, str) else estimator.solver
+
+
+def given_weights(estimator):
+    """The weights of the penalty that are given, by their names in ``evidence.FREE``."""
+    stiffness = solver_of(estimator).stiffness
+    given = {"agreement": estimator.agreement, "alpha": estimator.alpha, "stiffness": stiffness}
+    weights = {k: float(weight) for k, weight in given.items() if not isinstance(weight, str)}
+    if "alpha" in weights:
+        weights["slope"] = weights["alpha"]
+    return weights
+
+
+def found_weights(estimator):
+    """The weights of the penalty that training has used, by the same names."""
+    return {
+        "agreement": estimator.agreement_,
+        "alpha": estimator.alpha_,
+        "slope": estimator.slope_alpha_,
+        "stiffness": estimator.stiffness_,
+    }
+
+
+def structure_parameters(estimator):
+    """The parameters that the structure depends on, in a form that can be compared."""
+    names = ("n_mfs", "partition", "mf", "premise_features")
+    values = {name: getattr(estimator, name) for name in names}
+    # Models are their numbers, wherever they were pickled; all else says in words what it is.
+    return {
+        name: content_digest(getattr(value, "model_", value))
+        if hasattr(value, "strengths")
+        else repr(value)
+        for name, value in values.items()
+    }
+
+
+def _imported(estimator, names):
+    """``partition``, with the model in place of the estimator that holds it."""
+    given = estimator.partition
+    if isinstance(given, type):
+        raise ValueError(
+            f"partition={given!r} is a class: give an object of it, {given.__name__}(...)."
+        )
+    if isinstance(given, str) or hasattr(given, "fit_predict"):
+        return given
+    model = getattr(given, "model_", given)
+    if not isinstance(model, TSKModel):
+        raise ValueError(
+            f"partition={given!r} has no rules: it has not been fitted, or was cloned, which "
+            "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
+        )
+    check_inputs(model, names, "partition")
+    if estimator.max_iter == 0 and not (
+        estimator.monotonic_cst is None and estimator.constraints is None
+    ):
+        raise ValueError(
+            "monotonic_cst and constraints mean nothing where imported rules are taken as they "
+            "are (max_iter=0): leave them at None, or use solver='lse'."
+        )
+    if estimator.premise_features is not None:
+        raise ValueError(
+            f"premise_features={estimator.premise_features!r} means nothing to imported rules, "
+            "which are on the inputs that they are on: leave it at None."
+        )
+    if estimator.max_iter == 0 and estimator.consequent_features is not None:
+        raise ValueError(
+            f"consequent_features={estimator.consequent_features!r} means nothing where imported "
+            "rules are taken as they are (max_iter=0): leave it at None, or use solver='lse'."
+        )
+    return model
