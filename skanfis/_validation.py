@@ -18,6 +18,7 @@ __all__ = [
     "check_choice",
     "check_count",
     "check_finite",
+    "check_not_negative",
     "content_digest",
     "feature_indices",
     "group_numbers",
@@ -251,17 +252,22 @@ def _feature_index(entry, names, parameter):
     )
 
 
-def positive_weights(sample_weight, n_rows, least=2):
-    """Which rows have weight: a mask, or None where all have.
-
-    ValueError where a weight is negative, or where fewer than ``least`` rows are left.
-    """
+def check_not_negative(sample_weight):
+    """Raise ValueError that names the first row of negative weight, if there is one."""
     if np.any(sample_weight < 0):
         row = int(np.argmax(sample_weight < 0))
         raise ValueError(
             f"Negative values in sample_weight: {sample_weight[row]:g} at row {row}; weights must "
             "be zero or positive."
         )
+
+
+def positive_weights(sample_weight, n_rows, least=2):
+    """Which rows have weight: a mask, or None where all have.
+
+    ValueError where a weight is negative, or where fewer than ``least`` rows are left.
+    """
+    check_not_negative(sample_weight)
     keep = sample_weight > 0
     n_kept = int(np.count_nonzero(keep))
     if n_kept < least:

@@ -1,4 +1,4 @@
-"""Pages to be pasted run as they stand, from the top, and print what they say that they print."""
+"""The code on the pages runs, and prints what they say that it prints."""
 
 import doctest
 import re
@@ -9,6 +9,8 @@ import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("quickstart", "from_matlab")
+# How many lines of code there are at least: a page that lost them is no page that works.
+WITH_PROMPTS = {"files": 5, "how_sure": 15, "reading_rules": 15, "training": 20}
 if not (DOCS / f"{PAGES[0]}.rst").is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
 
@@ -37,3 +39,12 @@ def test_page_as_pasted(page, tmp_path, monkeypatch, capsys):
             )
             printed = ""
     assert not printed
+
+
+@pytest.mark.parametrize("page", WITH_PROMPTS)
+def test_page_with_prompts(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = str(DOCS / f"{page}.rst")
+    failed, tried = doctest.testfile(path, module_relative=False, optionflags=LOOSELY)
+    assert tried > WITH_PROMPTS[page]
+    assert failed == 0

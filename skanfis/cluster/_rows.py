@@ -11,7 +11,7 @@ from sklearn.utils import gen_batches
 from sklearn.utils.validation import validate_data
 
 from .._sklearn import check_sample_weight
-from .._validation import check_finite
+from .._validation import check_finite, check_not_negative
 
 __all__ = ["check_rows", "distance_blocks", "distinct_rows", "nearest", "numbers_that_fit"]
 
@@ -32,12 +32,7 @@ def check_rows(estimator, X, reset=False):
 def distinct_rows(X, sample_weight):
     """Distinct rows of positive weight, in lexicographic order, and the weight of each."""
     weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-    if np.any(weight < 0):
-        row = int(np.argmax(weight < 0))
-        raise ValueError(
-            f"Negative values in sample_weight: {weight[row]:g} at row {row}; weights must be zero "
-            "or positive."
-        )
+    check_not_negative(weight)
     keep = weight > 0
     if not keep.any():
         raise ValueError("Every sample_weight is zero: no row is left to cluster.")

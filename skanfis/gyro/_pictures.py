@@ -44,31 +44,26 @@ def draw_error_by_time(results):
     """None where the log has no time."""
     if results.time is None:
         return None
-    figure, axes = _panels(2)
-    display = ErrorDisplay.from_predictions(
-        *_rates(results),
-        position=results.since_power_on,
-        position_label="time since power-on [s]",
-        unit=results.unit,
-        ax=axes,
-    )
     caption = "Error against time. Bands reach from the smallest to the largest error."
-    alt = "Error against time, before and after"
-    return Picture(figure, alt, caption, _files("error-by-time", display.tables()))
+    return _error_by("time", results, results.since_power_on, "time since power-on [s]", caption)
 
 
 def draw_error_by_temperature(results):
+    caption = "Error against temperature."
+    return _error_by("temperature", results, results.temperature, "temperature [°C]", caption)
+
+
+def _error_by(what, results, position, position_label, caption):
     figure, axes = _panels(2)
     display = ErrorDisplay.from_predictions(
         *_rates(results),
-        position=results.temperature,
-        position_label="temperature [°C]",
+        position=position,
+        position_label=position_label,
         unit=results.unit,
         ax=axes,
     )
-    alt = "Error against temperature, before and after"
-    files = _files("error-by-temperature", display.tables())
-    return Picture(figure, alt, "Error against temperature.", files)
+    alt = f"Error against {what}, before and after"
+    return Picture(figure, alt, caption, _files(f"error-by-{what}", display.tables()))
 
 
 def draw_scale_factor_error(results):

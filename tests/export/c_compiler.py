@@ -19,7 +19,7 @@ SANITIZE = [
     "-g0",
 ]
 
-# Reads rows from one file, evaluates every model on all of them, writes outputs and status.
+# Reads rows from one file, and writes to another what the calls make of them.
 _DRIVER = """
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,12 +28,11 @@ _DRIVER = """
 
 typedef {real} real;
 static real x[{n_rows}][{n_inputs}];
-static real y[{n_rows}][{most_outputs}];
-static int status[{n_rows}];
+{arrays}
 
-int main(int argc, char **argv)
+int main(void)
 {{
-    FILE *in = fopen(argv[argc - 2], "rb"), *out = fopen(argv[argc - 1], "wb");
+    FILE *in = fopen("rows", "rb"), *out = fopen("answers", "wb");
     int i, o;
     if (!in || !out || fread(x, sizeof x, 1, in) != 1) {{
         return 2;
@@ -43,14 +42,16 @@ int main(int argc, char **argv)
     return fclose(out) == 0 ? 0 : 2;
 }}
 """
-_CALL = """
+_SELF_TEST = """
     if ({name}_self_test() != 0) {{
         printf("self-test of {name}: row %d\\n", {name}_self_test());
         return 3;
     }}
+"""
+_CALL = """
     for (i = 0; i < {n_rows}; ++i) {{
         for (o = 0; o < {n_outputs}; ++o) {{
-            y[i][o] = ({real})-12345.0;
+            y[i][o] = (real)-12345.0;
         }}
         status[i] = {name}_predict(x[i], y[i]);
     }}
@@ -78,34 +79,48 @@ def run(command, folder):
     )
 
 
-def evaluate_all(codes, X, folder, std, n_outputs):
-    """What compiled models answer: per model outputs (n_rows, n_outputs) and status (n_rows,)."""
-    real = "float" if X.dtype == np.float32 else "double"
+def run_on_rows(codes, X, folder, std, calls, flags=SANITIZE, arrays=""):
+    """What ``calls``, a piece of C for each model, write of the rows, after the models' self-tests.
+
+    All models are in one translation unit: nothing of one may clash with another.
+    """
     for code in codes:
         (folder / f"{code.name}.h").write_text(code.header, encoding="ascii")
         (folder / f"{code.name}.c").write_text(code.source, encoding="ascii")
-    # All in one translation unit: nothing of one model may clash with another.
-    includes = "".join(
-        f'#define {code.name.upper()}_SELF_TEST\n#include "{code.name}.c"\n' for code in codes
-    )
-    common = {"n_rows": len(X), "real": real}
-    calls = "".join(
-        _CALL.format(name=code.name, n_outputs=n, **common)
-        for code, n in zip(codes, n_outputs, strict=True)
-    )
     driver = _DRIVER.format(
-        includes=includes,
-        calls=calls,
+        includes="".join(
+            f'#define {code.name.upper()}_SELF_TEST\n#include "{code.name}.c"\n' for code in codes
+        ),
+        real="float" if X.dtype == np.float32 else "double",
+        n_rows=len(X),
         n_inputs=X.shape[1],
-        most_outputs=max(n_outputs),
-        **common,
+        arrays=arrays,
+        calls="".join(
+            _SELF_TEST.format(name=code.name) + call
+            for code, call in zip(codes, calls, strict=True)
+        ),
     )
     (folder / "driver.c").write_text(driver, encoding="ascii")
     X.tofile(folder / "rows")
-    gcc([f"-std={std}", *STRICT, *SANITIZE, "driver.c", "-o", "driver", "-lm"], folder)
-    done = run(["./driver", "rows", "answers"], folder)
+    gcc([f"-std={std}", *STRICT, *flags, "driver.c", "-o", "driver", "-lm"], folder)
+    done = run(["./driver"], folder)
     assert done.returncode == 0, (done.stdout + done.stderr)[:4000]
-    data, answers, place = (folder / "answers").read_bytes(), [], 0
+    return (folder / "answers").read_bytes()
+
+
+def evaluate_all(codes, X, folder, std, n_outputs, flags=SANITIZE):
+    """What compiled models answer: per model outputs (n_rows, n_outputs) and status (n_rows,).
+
+    The sanitizers make compiling six times as long; what they find is in the text of the code, not
+    in its numbers, so that of a long list of models a part may have them.
+    """
+    calls = [
+        _CALL.format(name=code.name, n_rows=len(X), n_outputs=n)
+        for code, n in zip(codes, n_outputs, strict=True)
+    ]
+    arrays = f"static real y[{len(X)}][{max(n_outputs)}];\nstatic int status[{len(X)}];"
+    data = run_on_rows(codes, X, folder, std, calls, flags, arrays)
+    answers, place = [], 0
     for n in n_outputs:
         y = np.frombuffer(data, X.dtype, len(X) * n, place).reshape(-1, n)
         place += y.nbytes

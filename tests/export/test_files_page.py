@@ -1,6 +1,5 @@
-"""The page on files: its code runs, and it says what is supported."""
+"""The page on files says what is supported."""
 
-import doctest
 from pathlib import Path
 
 import pytest
@@ -11,13 +10,6 @@ from skanfis.membership import MEMBERSHIPS
 PAGE = Path(__file__).parents[2] / "docs" / "files.rst"
 if not PAGE.is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
-
-
-def test_the_code_on_the_page_works(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    failed, tried = doctest.testfile(str(PAGE), module_relative=False)
-    assert tried > 5
-    assert failed == 0
 
 
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
