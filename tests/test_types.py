@@ -51,6 +51,21 @@ def test_what_is_public_says_what_it_returns(named):
     assert untyped == []
 
 
+# The method solve() of a solver takes what training gives it, and is none of the user's.
+@pytest.mark.parametrize(
+    "named", [one for one in public() if not one.values[0].__module__.startswith("skanfis.solvers")]
+)
+def test_what_is_public_says_what_it_takes(named):
+    functions = own_functions(named) if inspect.isclass(named) else [named]
+    untyped = [
+        f"{function.__qualname__}: {name}"
+        for function in map(inspect.unwrap, functions)
+        for name, parameter in inspect.signature(function).parameters.items()
+        if parameter.annotation is parameter.empty and name not in ("self", "cls")
+    ]
+    assert untyped == []
+
+
 def test_every_parameter_of_the_estimator_has_a_type():
     parameters = inspect.signature(skanfis.ANFISRegressor).parameters
     assert len(parameters) <= 20

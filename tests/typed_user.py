@@ -3,6 +3,8 @@
 It is read, not run. The calls are those of the README, the examples and the pages of the guide.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 from sklearn.model_selection import GridSearchCV
@@ -23,7 +25,9 @@ from skanfis.export import (
     fold_with_rows,
     found_by_search,
     last_step,
+    read_json,
     rules_table,
+    write_json,
 )
 from skanfis.gyro import (
     AllanDisplay,
@@ -35,7 +39,9 @@ from skanfis.gyro import (
     allan_coefficients,
     allan_deviation,
     bias,
+    bias_stability,
     check_split,
+    combine_groups,
     export_c_physics,
     find_dwells,
     group_by_rate_level,
@@ -43,7 +49,15 @@ from skanfis.gyro import (
     read_log,
     reduction_factor,
 )
-from skanfis.inspection import LossCurveDisplay, MembershipDisplay, readability
+from skanfis.inspection import (
+    LossCurveDisplay,
+    MembershipDisplay,
+    Readability,
+    ReadabilityDisplay,
+    ResponseSurfaceDisplay,
+    RuleActivationDisplay,
+    readability,
+)
 from skanfis.intervals import ConformalRegressor
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 from skanfis.solvers import Hybrid
@@ -111,3 +125,29 @@ dwells: np.ndarray = find_dwells(log["rate"])
 picture: ErrorDisplay = ErrorDisplay.from_estimator(composed, log, log["rate"])
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
 wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]
+
+# What the parameters take: arrays, lists, frames and files; and what they do not.
+frame = pd.DataFrame(X, columns=["x0", "x1"])
+weights: list[float] = [1.0] * len(frame)
+model.fit(frame, y, sample_weight=weights, groups=frame["x0"])
+r2: float = model.score(frame, y)
+inside: np.ndarray = model.in_bounds([[0.0, 0.0]])
+covered: np.ndarray = model.coverage(frame)
+mean, deviation = model.predict(frame, return_std=True)
+either: np.ndarray | tuple[np.ndarray, np.ndarray] = model.predict(frame, return_std=bool(r2 > 0))
+told_short: str = export_text(model, precision=3, max_rules=4, feature_names=["rate", "time"])
+write_json(model, Path("model.json"))
+restored: np.ndarray = read_json("model.json").predict(X)
+found: Readability = readability(model, frame, y, sample_weight=weights)
+ReadabilityDisplay.from_estimator(model, frame, y, max_rows=100).plot(colormap="Greys")
+ResponseSurfaceDisplay.from_estimator(model, frame, features=("x0", "x1"), held={"x1": 0.0})
+RuleActivationDisplay.from_estimator(model, frame)
+sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
+half: float | np.ndarray = sure.half_width(coverage=0.95)
+model.partial_fit(frame, y, forgetting=0.99)
+stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
+labels: np.ndarray = combine_groups(log["run"], dwells)
+export_text(model, precision="many")  # type: ignore[arg-type]
+export_c(model, coverage="most")  # type: ignore[arg-type]
+model.coverage(None)  # type: ignore[arg-type]
+check_split(3, log["rate"], groups=groups, tolerance="small")  # type: ignore[arg-type]

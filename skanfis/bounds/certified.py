@@ -1,8 +1,10 @@
 """Bounds of predictions and of their slopes over a box: what a user calls."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from ..model import TSKModel
@@ -86,7 +88,13 @@ class Bounds:
         return f"Bounds({'; '.join(parts)})"
 
 
-def bounds(model, box=None, *, tol=0.01, max_boxes=200_000) -> Bounds:
+def bounds(
+    model: Any,
+    box: ArrayLike | dict[str, Any] | None = None,
+    *,
+    tol: float = 0.01,
+    max_boxes: int = 200_000,
+) -> Bounds:
     """Enclose every prediction of a model over a box of inputs.
 
     The enclosure is proven: by interval arithmetic on the rules, refined by branch and bound, with
@@ -151,7 +159,14 @@ def bounds(model, box=None, *, tol=0.01, max_boxes=200_000) -> Bounds:
     return _gathered(found, box, model, model.output_names)
 
 
-def gradient_bounds(model, feature, box=None, *, tol=0.01, max_boxes=200_000) -> Bounds:
+def gradient_bounds(
+    model: Any,
+    feature: str | int,
+    box: ArrayLike | dict[str, Any] | None = None,
+    *,
+    tol: float = 0.01,
+    max_boxes: int = 200_000,
+) -> Bounds:
     """Enclose the slope of the predictions by one input over a box of inputs.
 
     Proven as in :func:`bounds`. The slope is that of what the model predicts, beyond the range of
@@ -214,7 +229,13 @@ def gradient_bounds(model, feature, box=None, *, tol=0.01, max_boxes=200_000) ->
     return _gathered(found, box, model, tuple(f"d {y} / d {name}" for y in model.output_names))
 
 
-def monotonicity(model, feature, box=None, *, max_boxes=200_000) -> np.ndarray:
+def monotonicity(
+    model: Any,
+    feature: str | int,
+    box: ArrayLike | dict[str, Any] | None = None,
+    *,
+    max_boxes: int = 200_000,
+) -> np.ndarray:
     """Prove that the predictions rise, or fall, with one input all over a box.
 
     Parameters

@@ -21,7 +21,7 @@ _BLOCK_SIZE = 32_768
 _ARRAYS_PER_BLOCK = 5
 
 
-def check_rows(estimator, X, reset=False):
+def check_rows(estimator, X, reset=False) -> np.ndarray:
     """X as a finite array of float64, or ValueError that names the column."""
     X = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
     names = getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(X.shape[1])])

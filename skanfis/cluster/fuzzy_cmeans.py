@@ -33,6 +33,7 @@ from numbers import Integral, Real
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.distance import pdist, squareform
 from sklearn.base import (
     BaseEstimator,
@@ -237,14 +238,14 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
 
     def __init__(
         self,
-        n_clusters=3,
+        n_clusters: int = 3,
         *,
-        m=2.0,
-        tol=1e-4,
-        max_iter=1000,
-        n_init=3,
-        init="k-means++",
-        random_state=None,
+        m: Any = 2.0,
+        tol: float = 1e-4,
+        max_iter: int = 1000,
+        n_init: int = 3,
+        init: str | ArrayLike = "k-means++",
+        random_state: int | np.random.RandomState | None = None,
     ) -> None:
         self.n_clusters = n_clusters
         self.m = m
@@ -255,7 +256,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         self.random_state = random_state
 
     @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, sample_weight=None) -> Self:
+    def fit(self, X: ArrayLike, y: Any = None, sample_weight: ArrayLike | None = None) -> Self:
         """Find the centres.
 
         Parameters
@@ -301,7 +302,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         self._n_features_out = self.n_clusters
         return self
 
-    def predict(self, X) -> Any:
+    def predict(self, X: ArrayLike) -> Any:
         """Find the cluster of largest membership.
 
         Parameters
@@ -316,7 +317,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         check_is_fitted(self)
         return nearest(check_rows(self, X), self.cluster_centers_)
 
-    def transform(self, X) -> Any:
+    def transform(self, X: ArrayLike) -> Any:
         """Find the memberships.
 
         Parameters

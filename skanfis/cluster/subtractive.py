@@ -20,6 +20,7 @@ from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils import gen_batches
@@ -174,7 +175,13 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
     }
 
     def __init__(
-        self, radius=0.5, *, squash=1.25, accept=0.5, reject=0.15, max_clusters=None
+        self,
+        radius: float | ArrayLike = 0.5,
+        *,
+        squash: float = 1.25,
+        accept: float = 0.5,
+        reject: float = 0.15,
+        max_clusters: int | None = None,
     ) -> None:
         self.radius = radius
         self.squash = squash
@@ -183,7 +190,7 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         self.max_clusters = max_clusters
 
     @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X, y=None, sample_weight=None) -> Self:
+    def fit(self, X: ArrayLike, y: Any = None, sample_weight: ArrayLike | None = None) -> Self:
         """Find the clusters.
 
         Parameters
@@ -224,7 +231,7 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         self.labels_ = self._labels(X)
         return self
 
-    def predict(self, X) -> Any:
+    def predict(self, X: ArrayLike) -> Any:
         """Find the nearest centre.
 
         Parameters

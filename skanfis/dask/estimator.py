@@ -58,7 +58,7 @@ class DaskANFISRegressor(ANFISRegressor):
     dask.array<..., shape=(121,), dtype=float64, chunksize=(50,), chunktype=numpy.ndarray>
     """
 
-    def fit(self, X, y, sample_weight=None, groups=None) -> Self:
+    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> Self:
         """Train the model.
 
         Parameters
@@ -88,7 +88,7 @@ class DaskANFISRegressor(ANFISRegressor):
         """
         return super().fit(X, y, sample_weight=sample_weight, groups=groups)
 
-    def predict(self, X, return_std=False) -> Any:
+    def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict the target, block by block and lazily where X is a dask collection.
 
         Parameters
@@ -115,7 +115,7 @@ class DaskANFISRegressor(ANFISRegressor):
             return y
         return y, self._lazily("_deviations", X, names, self.model_.output_names[0])
 
-    def coverage(self, X) -> Any:
+    def coverage(self, X: Any) -> Any:
         """Tell how well the training data cover each row, lazily where X is a dask collection.
 
         Parameters
@@ -129,7 +129,7 @@ class DaskANFISRegressor(ANFISRegressor):
         """
         return self._lazily("coverage", X) if is_collection(X) else super().coverage(X)
 
-    def in_bounds(self, X) -> Any:
+    def in_bounds(self, X: Any) -> Any:
         """Tell which rows lie in the range of training, lazily where X is a dask collection.
 
         Parameters
@@ -145,7 +145,7 @@ class DaskANFISRegressor(ANFISRegressor):
             self._lazily("in_bounds", X, dtype=bool) if is_collection(X) else super().in_bounds(X)
         )
 
-    def strengths(self, X) -> Any:
+    def strengths(self, X: Any) -> Any:
         """Tell how strongly each rule fires on each row, lazily where X is a dask collection.
 
         Parameters
@@ -161,7 +161,7 @@ class DaskANFISRegressor(ANFISRegressor):
             return super().strengths(X)
         return self._lazily("strengths", X, tuple(range(self.n_rules_)))
 
-    def score(self, X, y, sample_weight=None) -> float:
+    def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
         """Coefficient of determination R², a reduction where X and y are dask collections.
 
         Parameters

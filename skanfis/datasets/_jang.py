@@ -9,7 +9,7 @@ from ._validation import check_choice, check_count, check_real
 __all__ = ["make_jang_sinc", "make_jang_three_input", "make_mackey_glass"]
 
 
-def make_jang_sinc(n_points=11, *, midpoints=False) -> tuple[np.ndarray, np.ndarray]:
+def make_jang_sinc(n_points: int = 11, *, midpoints: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Make Jang's first problem: the two-dimensional sinc surface on a regular grid.
 
     The target is y = sin(x1) / x1 * sin(x2) / x2 on [-10, 10] x [-10, 10].
@@ -57,7 +57,7 @@ def make_jang_sinc(n_points=11, *, midpoints=False) -> tuple[np.ndarray, np.ndar
     return X, np.sinc(X / np.pi).prod(axis=1)
 
 
-def make_jang_three_input(subset="train") -> tuple[np.ndarray, np.ndarray]:
+def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
     """Make Jang's second problem: a nonlinear function of three inputs.
 
     The target is y = (1 + x1^0.5 + x2^-1 + x3^-1.5)^2, from Takagi and Hayashi.
@@ -103,7 +103,7 @@ def make_jang_three_input(subset="train") -> tuple[np.ndarray, np.ndarray]:
 
 
 def make_mackey_glass(
-    subset="train", *, tau=17, initial_value=1.2, step=0.1
+    subset: str = "train", *, tau: float = 17, initial_value: float = 1.2, step: float = 0.1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Make Jang's fourth problem: predict the chaotic Mackey-Glass series.
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
 from ._ofog_chamber import PROFILES, Schedule, thermal_history
@@ -29,26 +30,26 @@ _COLDEST, _HOTTEST = -60.0, 100.0  # degC
 
 def make_ofog(
     *,
-    preset="open_loop",
-    profile="constant",
-    n_devices=3,
-    n_runs=8,
-    n_power_ups=1,
-    off_time=600.0,
-    duration=None,
-    sampling_interval=None,
-    max_rate=None,
-    n_rate_levels=None,
-    rates=None,
-    rate_order="random",
-    dwell_time=None,
-    ambient_range=None,
-    n_soaks=5,
-    max_residual_heat=0.5,
-    noise=1.0,
-    device_spread=1.0,
-    coefficients=None,
-    random_state=None,
+    preset: str = "open_loop",
+    profile: str = "constant",
+    n_devices: int = 3,
+    n_runs: int = 8,
+    n_power_ups: int = 1,
+    off_time: float = 600.0,
+    duration: float | None = None,
+    sampling_interval: float | None = None,
+    max_rate: float | None = None,
+    n_rate_levels: int | None = None,
+    rates: ArrayLike | None = None,
+    rate_order: str = "random",
+    dwell_time: float | None = None,
+    ambient_range: Any = None,
+    n_soaks: int = 5,
+    max_residual_heat: float = 0.5,
+    noise: float = 1.0,
+    device_spread: float = 1.0,
+    coefficients: dict[str, Any] | None = None,
+    random_state: int | np.random.RandomState | None = None,
 ) -> Any:
     r"""Simulate thermal runs of open-loop fiber-optic gyros on a rate table (regression).
 

@@ -61,7 +61,7 @@ Do not judge a model by its fit to this table:
 """
 
 
-def load_ofog(*, return_X_y=False, as_frame=True) -> Any:
+def load_ofog(*, return_X_y: bool = False, as_frame: bool = True) -> Any:
     """Load Table 1 of the founding paper: 19 rows of an open-loop fiber-optic gyro (regression).
 
     The table is a historical document, not a benchmark. It is kept exactly as printed, and what is

@@ -10,6 +10,7 @@ place of the column that it encodes.
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from sklearn.utils import check_array
@@ -25,7 +26,7 @@ from .unwrapping import model_of, steps_of, target_steps
 __all__ = ["fold", "fold_with_reader", "fold_with_rows"]
 
 
-def fold(estimator) -> TSKModel:
+def fold(estimator: Any) -> TSKModel:
     """Return the frozen model of an estimator, in the units of the columns it is given.
 
     Parameters
@@ -70,7 +71,7 @@ def fold(estimator) -> TSKModel:
     return _Folding(estimator).model
 
 
-def fold_with_rows(estimator, X) -> tuple[TSKModel, np.ndarray]:
+def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     """Return what :func:`fold` does, and the rows of the model's inputs out of a table.
 
     Parameters
@@ -106,7 +107,7 @@ def fold_with_rows(estimator, X) -> tuple[TSKModel, np.ndarray]:
     return folding.model, folding.rows(X)
 
 
-def fold_with_reader(estimator) -> tuple[TSKModel, Callable[..., np.ndarray]]:
+def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray]]:
     """Return what :func:`fold` does, and a function from tables to the model's inputs.
 
     For tables that are read in parts.

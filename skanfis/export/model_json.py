@@ -35,7 +35,9 @@ On request there is a further object, "posterior"; see ``_posterior_json``.
 
 import json
 from math import isinf
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +53,7 @@ __all__ = ["export_json", "read_json", "write_json"]
 _MOST_BYTES = 2**24
 
 
-def export_json(estimator, *, posterior=False) -> str:
+def export_json(estimator: Any, *, posterior: bool = False) -> str:
     """Give a trained model as JSON text, exact to the last bit.
 
     Parameters
@@ -139,7 +141,7 @@ def export_json(estimator, *, posterior=False) -> str:
     return _laid_out(document)
 
 
-def write_json(estimator, path, *, posterior=False) -> None:
+def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = False) -> None:
     """Write a trained model to a JSON file, as :func:`export_json` gives it.
 
     Parameters
@@ -176,7 +178,7 @@ def write_json(estimator, path, *, posterior=False) -> None:
     Path(path).write_text(text, encoding="utf-8", newline="\n")
 
 
-def read_json(path) -> TSKModel:
+def read_json(path: str | PathLike[str]) -> TSKModel:
     """Read a model that :func:`write_json` has written; no pickle, nothing is ever run.
 
     Parameters

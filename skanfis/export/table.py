@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from .._validation import check_choice
 from .folding import fold, fold_with_rows
@@ -20,7 +21,12 @@ __all__ = ["explain", "memberships_table", "rules_table"]
 
 
 def rules_table(
-    estimator, *, about="origin", sort_by="rule", max_rules=None, min_weight=0.0
+    estimator: Any,
+    *,
+    about: str = "origin",
+    sort_by: str = "rule",
+    max_rules: int | None = None,
+    min_weight: float = 0.0,
 ) -> Any:
     """Tabulate the rules: what they ask, how much of the data they hold for, what they say.
 
@@ -106,7 +112,7 @@ def _terms_by_input(model):
     }
 
 
-def memberships_table(estimator, *, trained=True) -> Any:
+def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
     """Tabulate the membership functions.
 
     Parameters
@@ -147,7 +153,7 @@ def memberships_table(estimator, *, trained=True) -> Any:
     return table.rename_axis(index="term")
 
 
-def explain(estimator, X, *, min_strength=0.0) -> Any:
+def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     """Tell for each row which rules fired, by how much, and what each contributed.
 
     Parameters

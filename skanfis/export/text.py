@@ -1,6 +1,8 @@
 """Rules as text."""
 
+from collections.abc import Sequence
 from math import floor, log10
+from typing import Any
 
 import numpy as np
 
@@ -23,16 +25,16 @@ _MOST_DIGITS = 17
 
 
 def export_text(
-    estimator,
+    estimator: Any,
     *,
-    precision=4,
-    about="mean",
-    sort_by="weight",
-    max_rules=None,
-    min_weight=0.0,
-    show_terms=True,
-    feature_names=None,
-    output_names=None,
+    precision: int = 4,
+    about: str = "mean",
+    sort_by: str = "weight",
+    max_rules: int | None = None,
+    min_weight: float = 0.0,
+    show_terms: bool = True,
+    feature_names: Sequence[str] | None = None,
+    output_names: Sequence[str] | None = None,
 ) -> str:
     """Write the rules as IF-THEN sentences in the units of the data.
 

@@ -12,7 +12,7 @@ from ..options import policy_of
 __all__ = ["described", "found_by_search", "last_step", "model_of", "steps_of", "target_steps"]
 
 
-def last_step(estimator) -> Any:
+def last_step(estimator: Any) -> Any:
     """Return the ANFIS estimator itself at the end of pipelines, wrappers and searches.
 
     Parameters
@@ -45,7 +45,7 @@ def last_step(estimator) -> Any:
     return last
 
 
-def found_by_search(estimator) -> Any:
+def found_by_search(estimator: Any) -> Any:
     """Return the estimator that a search has kept, or one that is no search as it is.
 
     Parameters

@@ -1,5 +1,8 @@
 """Refusing a log that no compensator should learn from."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -38,7 +41,11 @@ _FOLLOWS = 0.9  # correlation of output with rate below which one of them is som
 
 
 def check_log(
-    log, *, inputs=("temperature", "output"), units=None, min_temperature_span=10.0
+    log: pd.DataFrame,
+    *,
+    inputs: Sequence[str] = ("temperature", "output"),
+    units: dict[str, Any] | None = None,
+    min_temperature_span: float = 10.0,
 ) -> pd.DataFrame:
     """Check that a log is fit for calibrating a compensator, and refuse it otherwise.
 

@@ -5,7 +5,7 @@ import numpy as np
 __all__ = ["check_column", "check_labels", "check_weights"]
 
 
-def check_column(values, name, n_rows=None):
+def check_column(values, name, n_rows=None) -> np.ndarray:
     """Return ``values`` as a float array of shape (n_rows,), or raise ValueError that names it."""
     try:
         column = np.asarray(values, dtype=float)
@@ -21,14 +21,14 @@ def check_column(values, name, n_rows=None):
     return column
 
 
-def check_labels(values, name, n_rows):
+def check_labels(values, name, n_rows) -> np.ndarray:
     """Return labels, of any type, as an array of shape (n_rows,)."""
     labels = np.asarray(values)
     _check_shape(labels, name, n_rows)
     return labels
 
 
-def check_weights(sample_weight, n_rows):
+def check_weights(sample_weight, n_rows) -> np.ndarray:
     """Return weights of mean 1, shape (n_rows,): ones where ``sample_weight`` is None."""
     if sample_weight is None:
         return np.ones(n_rows)

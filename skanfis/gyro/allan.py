@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._columns import check_column
 from .metrics import rows_by_run
@@ -28,7 +29,9 @@ _SLOPE_TOLERANCE = 0.15
 ROWS_PER_TIME = 10
 
 
-def allan_deviation(error, sampling_interval, *, run=None) -> pd.DataFrame:
+def allan_deviation(
+    error: ArrayLike, sampling_interval: float, *, run: ArrayLike | None = None
+) -> pd.DataFrame:
     """Overlapping Allan deviation of the error, in octaves up to a tenth of the run.
 
     Computed by allantools (``allantools.oadev``), an optional dependency. The runs of one log give
@@ -125,7 +128,7 @@ class AllanCoefficients:
     notes: dict = field(default_factory=dict)
 
 
-def allan_coefficients(averaging_time, deviation) -> AllanCoefficients:
+def allan_coefficients(averaging_time: ArrayLike, deviation: ArrayLike) -> AllanCoefficients:
     """Read angle random walk, bias instability and rate random walk off an Allan curve.
 
     A slope counts as found where a line through three neighbouring points has it within 0.15; the

@@ -7,6 +7,7 @@ heap, no state, the status word.
 
 from copy import copy
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -122,7 +123,13 @@ _WITHIN = "phase = $ASIN(sine);"
 
 
 def export_c_physics(
-    estimator, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1
+    estimator: Any,
+    path: str | PathLike[str] | None = None,
+    *,
+    name: str | None = None,
+    dtype: str = "double",
+    std: str = "c99",
+    min_coverage: float | None = 0.1,
 ) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 

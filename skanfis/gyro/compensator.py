@@ -3,6 +3,7 @@
 import json
 import warnings
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, Self
 
@@ -80,7 +81,7 @@ class GyroCompensator:
     time_constant: float = 60.0
     min_coverage: float = 0.1
 
-    def features(self, log) -> pd.DataFrame:
+    def features(self, log: pd.DataFrame) -> pd.DataFrame:
         """The estimator's inputs.
 
         Parameters
@@ -94,7 +95,7 @@ class GyroCompensator:
         """
         return features(log, self.inputs, self.time_constant)
 
-    def indicated(self, log) -> np.ndarray:
+    def indicated(self, log: pd.DataFrame) -> np.ndarray:
         """The rate that the gyro indicates without compensation.
 
         Parameters
@@ -108,7 +109,7 @@ class GyroCompensator:
         """
         return log["output"].to_numpy() / self.scale_factor
 
-    def apply(self, log) -> pd.DataFrame:
+    def apply(self, log: pd.DataFrame) -> pd.DataFrame:
         """Compensate a log, and flag the rows in which that cannot be trusted.
 
         Parameters
@@ -148,7 +149,7 @@ class GyroCompensator:
             index=log.index,
         )
 
-    def compensate(self, indicated, predicted) -> np.ndarray:
+    def compensate(self, indicated: np.ndarray, predicted: np.ndarray) -> np.ndarray:
         """The compensated rate from what the estimator predicts.
 
         Parameters
@@ -165,7 +166,7 @@ class GyroCompensator:
         """
         return indicated - predicted if self.predicts == "error" else predicted
 
-    def write_json(self, path) -> None:
+    def write_json(self, path: str | PathLike[str]) -> None:
         """Write it as text that runs nothing when it is read.
 
         Parameters
@@ -199,7 +200,7 @@ class GyroCompensator:
         Path(path).write_text(text, encoding="utf-8", newline="\n")
 
     @classmethod
-    def read_json(cls, path) -> Self:
+    def read_json(cls, path: str | PathLike[str]) -> Self:
         """Read one that :meth:`write_json` has written.
 
         Parameters

@@ -3,6 +3,7 @@
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn import get_config
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.pipeline import Pipeline
@@ -115,7 +116,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         router = MetadataRouter(owner=type(self).__name__)
         return router.add(base=base, residual=residual, method_mapping=to_both)
 
-    def fit(self, X, y, sample_weight=None) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Fit the base, then the residual model.
 
         Parameters
@@ -142,19 +143,19 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
         # Each part checks X for itself, here and in predict; only its columns are taken note of.
         validate_data(self, X, skip_check_array=True)
-        y = column_or_1d(y, dtype=float, warn=True)
+        target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
         base, residual = self._unfitted()
         weights = self._weights_by_part(base, residual, sample_weight)
-        learnt = np.zeros(y.size)
+        learnt = np.zeros(target.size)
         for _ in range(self.n_rounds):
-            self.base_ = clone(base).fit(X, y - learnt, **weights.base)
-            left = y - self.base_.predict(X)
+            self.base_ = clone(base).fit(X, target - learnt, **weights.base)
+            left = target - self.base_.predict(X)
             _check_answered(left)
             self.residual_ = clone(residual).fit(X, left, **weights.residual)
             learnt = self.residual_.predict(X)
         return self
 
-    def predict(self, X) -> np.ndarray:
+    def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the target, as the sum of both parts.
 
         Parameters
@@ -169,7 +170,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return self.base_.predict(X) + self.residual_.predict(X)
 
     @available_if(_some_part_has("in_bounds"))
-    def in_bounds(self, X):
+    def in_bounds(self, X: ArrayLike):
         """Tell which rows lie in bounds of every part that has such; through Pipelines too.
 
         Parameters
@@ -184,7 +185,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return np.logical_and.reduce(self._answers("in_bounds", X))
 
     @available_if(_some_part_has("coverage"))
-    def coverage(self, X):
+    def coverage(self, X: ArrayLike):
         """Tell how well the training data cover each row: the least that a part says.
 
         Parameters

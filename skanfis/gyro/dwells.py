@@ -1,7 +1,10 @@
 """Logs that are not tidy: a table on its way between two rates, a chamber that lingers."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from pandas.api.types import is_numeric_dtype
 
 from ._columns import check_column, check_labels
@@ -13,7 +16,9 @@ __all__ = ["clip_dwells", "find_dwells", "resample_in_temperature"]
 _TOLERANCE = 1e-3
 
 
-def find_dwells(rate, *, run=None, tolerance=None) -> np.ndarray:
+def find_dwells(
+    rate: ArrayLike, *, run: ArrayLike | None = None, tolerance: float | None = None
+) -> np.ndarray:
     """Number the dwells of a rate table: stretches of rows at one rate.
 
     Parameters
@@ -63,7 +68,14 @@ def find_dwells(rate, *, run=None, tolerance=None) -> np.ndarray:
 
 
 def clip_dwells(
-    log, lead, trail=0.0, *, rate="rate", time="time", run=None, tolerance=None
+    log: pd.DataFrame,
+    lead: float,
+    trail: float = 0.0,
+    *,
+    rate: str = "rate",
+    time: str = "time",
+    run: str | None = None,
+    tolerance: float | None = None,
 ) -> pd.DataFrame:
     """Leave out the beginning and the end of every dwell, and the table's way between them.
 
@@ -121,7 +133,13 @@ def clip_dwells(
     return log[kept]
 
 
-def resample_in_temperature(log, step, *, temperature="temperature", by=()) -> pd.DataFrame:
+def resample_in_temperature(
+    log: pd.DataFrame,
+    step: float,
+    *,
+    temperature: str = "temperature",
+    by: str | Sequence[str] = (),
+) -> pd.DataFrame:
     """Average the rows that lie within one step of the temperature.
 
     A chamber lingers at its soaks, and most rows of a log are there: a fit would care for little

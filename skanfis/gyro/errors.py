@@ -22,7 +22,7 @@ class LogError(ValueError):
     column 'rate', row 7: is missing.
     """
 
-    def __init__(self, reason, column=None, row=None) -> None:
+    def __init__(self, reason: str, column: str | None = None, row: int | None = None) -> None:
         super().__init__(reason, column, row)
         self.reason = reason
         self.column = column

@@ -20,10 +20,11 @@ nothing. In C, with the state {rate, previous} of one run, on every sample after
 where h is constant, the gain 1 - exp(-h / tau) is a constant too.
 """
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
@@ -42,7 +43,7 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     Subclasses have the parameters ``time`` and ``run``, the columns that are no quantities.
     """
 
-    def fit(self, X, y=None) -> Self:
+    def fit(self, X: ArrayLike, y: Any = None) -> Self:
         """Take note of the columns, and check them; nothing is learnt.
 
         Parameters
@@ -69,7 +70,7 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self._rows_by_run(names, columns)  # what transform refuses, fit refuses
         return self
 
-    def transform(self, X) -> np.ndarray:
+    def transform(self, X: ArrayLike) -> np.ndarray:
         """Compute the feature.
 
         Parameters
@@ -139,12 +140,12 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 class _ThermalFilter(_RunFeature):
     """A low-pass of every column that is neither time nor run."""
 
-    def __init__(self, time_constant, *, time, run) -> None:
+    def __init__(self, time_constant: Any, *, time: Any, run: Any) -> None:
         self.time_constant = time_constant
         self.time = time
         self.run = run
 
-    def get_feature_names_out(self, input_features=None) -> np.ndarray:
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
         """Names of the new columns.
 
         Parameters
@@ -355,7 +356,7 @@ class TimeSincePowerOn(_RunFeature):
         self.time = time
         self.run = run
 
-    def get_feature_names_out(self, input_features=None) -> np.ndarray:
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
         """Name of the new column.
 
         Parameters

@@ -8,9 +8,11 @@ StratifiedGroupKFold of scikit-learn take them as they are.
 """
 
 import warnings
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from sklearn.model_selection import check_cv
 from sklearn.utils import check_scalar
 
@@ -41,7 +43,7 @@ _FEW_ROWS = 0.1
 _SHARE_BY_CHANCE = 0.1
 
 
-def find_rate_levels(rate, *, tolerance=None) -> np.ndarray:
+def find_rate_levels(rate: ArrayLike, *, tolerance: float | None = None) -> np.ndarray:
     """Find the levels of a rate table in its log.
 
     The rates are sorted; a gap wider than the tolerance separates two levels. Where there are far
@@ -89,7 +91,13 @@ def find_rate_levels(rate, *, tolerance=None) -> np.ndarray:
     return pd.Series(rate).groupby(labels).median().to_numpy()
 
 
-def group_by_rate_level(rate, *, n_groups=None, signed=False, tolerance=None) -> np.ndarray:
+def group_by_rate_level(
+    rate: ArrayLike,
+    *,
+    n_groups: int | None = None,
+    signed: bool = False,
+    tolerance: float | None = None,
+) -> np.ndarray:
     """Groups that hold a level of the rate table together.
 
     Parameters
@@ -145,7 +153,7 @@ def group_by_rate_level(rate, *, n_groups=None, signed=False, tolerance=None) ->
     return labels % n_groups
 
 
-def group_by_run(time, *, max_gap=None) -> np.ndarray:
+def group_by_run(time: ArrayLike, *, max_gap: float | None = None) -> np.ndarray:
     """Groups of rows from one power-on to the next, in a log that does not number them.
 
     Parameters
@@ -179,7 +187,7 @@ def group_by_run(time, *, max_gap=None) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(begins)])
 
 
-def combine_groups(*labels) -> np.ndarray:
+def combine_groups(*labels: ArrayLike) -> np.ndarray:
     """Groups of the rows that agree in several labels, such as device and run.
 
     Parameters
@@ -217,7 +225,15 @@ def combine_groups(*labels) -> np.ndarray:
     return table.groupby(list(table), observed=True).ngroup().to_numpy()
 
 
-def check_split(cv, rate, *, y=None, groups=None, run=None, tolerance=None) -> pd.DataFrame:
+def check_split(
+    cv: Any,
+    rate: ArrayLike,
+    *,
+    y: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
+    run: ArrayLike | None = None,
+    tolerance: float | None = None,
+) -> pd.DataFrame:
     """Check that a split does not test on what it was trained on, and warn if it does.
 
     Parameters

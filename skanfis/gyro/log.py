@@ -6,8 +6,10 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 """
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,7 +30,14 @@ _PIECES_TOLD = 10
 
 
 def read_log(
-    paths, *, columns=None, units=None, require=None, separator=None, decimal=None, encoding=None
+    paths: Any,
+    *,
+    columns: dict[str, Any] | None = None,
+    units: dict[str, Any] | None = None,
+    require: Sequence[str] | None = None,
+    separator: str | None = None,
+    decimal: str | None = None,
+    encoding: str | None = None,
 ) -> pd.DataFrame:
     r"""Read one log from one or several files.
 

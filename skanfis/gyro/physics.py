@@ -22,6 +22,7 @@ from typing import Self
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.polynomial import polyval
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
@@ -181,7 +182,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = True
         return tags
 
-    def fit(self, X, y, sample_weight=None) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
         """Fit the law.
 
         Parameters
@@ -204,11 +205,12 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             coefficients, or if output or rate never change.
         """
         check_parameters(self)
-        X, y = validate_data(self, X, y, dtype=float, y_numeric=True)
-        weights = check_weights(sample_weight, len(y))
+        inputs, rate = validate_data(self, X, y, dtype=float, y_numeric=True)
+        weights = check_weights(sample_weight, len(rate))
         self.columns_ = self._find_columns()
-        used, y, weights = X[weights > 0][:, self.columns_], y[weights > 0], weights[weights > 0]
-        log = standardise(used, y.astype(float), weights)
+        counts = weights > 0
+        used = inputs[counts][:, self.columns_]
+        log = standardise(used, rate[counts].astype(float), weights[counts])
         shape = Shape(self._degrees(used), used.shape[1] == 3, self.fit_offset)
         check_log_fits(log, shape)
         fitted = fit_law(log, shape)
@@ -220,7 +222,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         self.minimum_, self.maximum_ = used.min(axis=0), used.max(axis=0)
         return self
 
-    def predict(self, X) -> np.ndarray:
+    def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the rate.
 
         Parameters
@@ -260,7 +262,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         difference = self._difference(used)
         return phase / polyval(difference, self.sagnac_factor_) - polyval(difference, self.bias_)
 
-    def phase(self, X) -> np.ndarray:
+    def phase(self, X: ArrayLike) -> np.ndarray:
         """Sagnac phase of each row, bias included.
 
         Parameters
@@ -276,7 +278,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         defined = np.abs(sine) <= 1.0
         return np.where(defined, np.arcsin(np.where(defined, sine, 0.0)), np.nan)
 
-    def in_bounds(self, X) -> np.ndarray:
+    def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in the range of the training data and within ``max_phase``.
 
         Parameters

@@ -1,7 +1,10 @@
 """One table of all figures of merit, per group, before and after, with bootstrap intervals."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
 from . import metrics
@@ -16,24 +19,24 @@ _NAN = float("nan")
 
 
 def gyro_report(
-    rate,
-    before,
-    after=None,
+    rate: ArrayLike,
+    before: ArrayLike,
+    after: ArrayLike | None = None,
     *,
-    temperature=None,
-    temperature_rate=None,
-    time=None,
-    run=None,
-    groups=None,
-    inside=None,
-    full_scale=None,
-    nominal_scale_factor=1.0,
-    averaging_times=(10.0, 100.0),
-    allan=False,
-    confidence_level=0.95,
-    n_resamples=200,
-    rate_unit=None,
-    random_state=None,
+    temperature: ArrayLike | None = None,
+    temperature_rate: ArrayLike | None = None,
+    time: ArrayLike | None = None,
+    run: ArrayLike | None = None,
+    groups: ArrayLike | None = None,
+    inside: ArrayLike | None = None,
+    full_scale: float | None = None,
+    nominal_scale_factor: float = 1.0,
+    averaging_times: Any = (10.0, 100.0),
+    allan: bool = False,
+    confidence_level: float = 0.95,
+    n_resamples: int = 200,
+    rate_unit: str | None = None,
+    random_state: int | np.random.RandomState | None = None,
 ) -> pd.DataFrame:
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
 
@@ -149,13 +152,13 @@ def gyro_report(
         for figure in figures_of_merit(full_scale, nominal_scale_factor, averaging_times, allan)
         if given.issuperset(figure.needs)
     ]
-    random_state = check_random_state(random_state)
+    generator = check_random_state(random_state)
     lines, resampled = [], {}
     for group, rows in _parts(labels["groups"], refused.size):
         part = _part(rows, columns, labels)
         counts, part = _without_refused(part, refused[rows])
         units, resampled[group] = units_to_resample(part)
-        draws = random_state.randint(2**31 - 1)
+        draws = generator.randint(2**31 - 1)
         bootstrap = Bootstrap(part, units, resampled[group], n_resamples, confidence_level, draws)
         lines += [[group, *line] for line in counts + bootstrap.lines(figures)]
     report = pd.DataFrame(lines, columns=["group", "figure", "unit", *VALUES, "note"])

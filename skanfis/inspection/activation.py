@@ -1,8 +1,10 @@
 """Which rules the data speak for, and which cells of the rule base are empty."""
 
-from typing import Self
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..export import fold, fold_with_rows
 from ..export.rules import knows_data
@@ -62,7 +64,15 @@ class RuleActivationDisplay:
     """
 
     def __init__(
-        self, *, weights, rows, rules, labels_down, labels_across, inputs_down, inputs_across
+        self,
+        *,
+        weights: np.ndarray,
+        rows: np.ndarray,
+        rules: np.ndarray,
+        labels_down: Sequence[str],
+        labels_across: Sequence[str],
+        inputs_down: Sequence[str],
+        inputs_across: Sequence[str],
     ) -> None:
         self.weights = weights
         self.rows = rows
@@ -73,7 +83,9 @@ class RuleActivationDisplay:
         self.inputs_across = inputs_across
 
     @classmethod
-    def from_estimator(cls, estimator, X=None, *, colormap="Blues", ax=None) -> Self:
+    def from_estimator(
+        cls, estimator: Any, X: ArrayLike | None = None, *, colormap: str = "Blues", ax: Any = None
+    ) -> Self:
         """Draw the activation of the rules of a fitted estimator.
 
         Parameters
@@ -109,7 +121,7 @@ class RuleActivationDisplay:
             rows = np.bincount(strengths.argmax(axis=1), minlength=model.n_rules)
         return cls(**_layout(model, weights, rows)).plot(colormap=colormap, ax=ax)
 
-    def plot(self, *, colormap="Blues", ax=None) -> Self:
+    def plot(self, *, colormap: str = "Blues", ax: Any = None) -> Self:
         """Draw the map.
 
         Parameters

@@ -1,7 +1,8 @@
 """What each rule contributes to the prediction along one input."""
 
+from collections.abc import Sequence
 from numbers import Real
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -80,16 +81,16 @@ class RuleContributionDisplay:
     def __init__(
         self,
         *,
-        grid,
-        contributions,
-        baseline,
-        coverage,
-        rule_terms,
-        premise_inputs,
-        input_name,
-        output_name,
-        held,
-        band=None,
+        grid: np.ndarray,
+        contributions: np.ndarray,
+        baseline: float,
+        coverage: np.ndarray,
+        rule_terms: Sequence[str],
+        premise_inputs: Sequence[str],
+        input_name: str,
+        output_name: str,
+        held: dict[str, Any],
+        band: np.ndarray | None = None,
     ) -> None:
         self.grid = grid
         self.contributions = contributions
@@ -105,17 +106,17 @@ class RuleContributionDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        feature=0,
+        estimator: Any,
+        feature: int | str = 0,
         *,
-        held=None,
-        output=0,
-        baseline="mean",
-        n_deviations=0,
-        n_points=201,
-        max_rules=6,
-        colormap="viridis",
-        ax=None,
+        held: dict[str, Any] | None = None,
+        output: int | str = 0,
+        baseline: Any = "mean",
+        n_deviations: float = 0,
+        n_points: int = 201,
+        max_rules: int = 6,
+        colormap: str = "viridis",
+        ax: Any = None,
     ) -> Self:
         """Draw the contributions of the rules of a fitted estimator.
 
@@ -184,7 +185,7 @@ class RuleContributionDisplay:
         )
         return display.plot(max_rules=max_rules, colormap=colormap, ax=ax)
 
-    def plot(self, *, max_rules=6, colormap="viridis", ax=None) -> Self:
+    def plot(self, *, max_rules: int = 6, colormap: str = "viridis", ax: Any = None) -> Self:
         """Draw the contributions.
 
         Parameters

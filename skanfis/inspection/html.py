@@ -1,6 +1,7 @@
 """The rules at a glance, as HTML for notebooks: one piece, no script, nothing loaded."""
 
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ _WIDTH, _HEIGHT = 130, 34
 _POINTS = 61
 
 
-def rules_html(estimator, *, max_rules=10, precision=4) -> str:
+def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> str:
     """Write the rules as HTML, the weightiest first, with pictures of the terms.
 
     Parameters

@@ -1,6 +1,6 @@
 """The error during training."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -50,14 +50,23 @@ class LossCurveDisplay:
     True
     """
 
-    def __init__(self, *, loss, validation_loss=None, name=None, status=None) -> None:
+    def __init__(
+        self,
+        *,
+        loss: np.ndarray,
+        validation_loss: np.ndarray | None = None,
+        name: str | None = None,
+        status: str | None = None,
+    ) -> None:
         self.loss = loss
         self.validation_loss = validation_loss
         self.name = name
         self.status = status
 
     @classmethod
-    def from_estimator(cls, estimator, *, name=None, ax=None, **line_kw) -> Self:
+    def from_estimator(
+        cls, estimator: Any, *, name: str | None = None, ax: Any = None, **line_kw: Any
+    ) -> Self:
         """Draw the training error of a fitted estimator.
 
         Parameters
@@ -88,7 +97,7 @@ class LossCurveDisplay:
         )
         return display.plot(ax=ax, **line_kw)
 
-    def plot(self, *, ax=None, **line_kw) -> Self:
+    def plot(self, *, ax: Any = None, **line_kw: Any) -> Self:
         """Draw the curve.
 
         Parameters

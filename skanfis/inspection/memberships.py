@@ -1,8 +1,10 @@
 """Membership functions before and after training, over the data."""
 
-from typing import NamedTuple, Self
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from ..export import fold, fold_with_rows
@@ -64,21 +66,21 @@ class MembershipDisplay:
     ('low', 'medium', 'high')
     """
 
-    def __init__(self, *, inputs) -> None:
+    def __init__(self, *, inputs: Any) -> None:
         self.inputs = inputs
 
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X=None,
+        estimator: Any,
+        X: ArrayLike | None = None,
         *,
-        features=None,
-        n_points=201,
-        bins=30,
-        show_before=True,
-        colormap="viridis",
-        ax=None,
+        features: Sequence[int] | str | None = None,
+        n_points: int = 201,
+        bins: int = 30,
+        show_before: bool = True,
+        colormap: str = "viridis",
+        ax: Any = None,
     ) -> Self:
         """Draw the memberships of a fitted estimator.
 
@@ -121,7 +123,7 @@ class MembershipDisplay:
         display = cls(inputs=[_terms_on(model, j, n_points, rows, bins) for j in chosen])
         return display.plot(ax=ax, show_before=show_before, colormap=colormap)
 
-    def plot(self, *, show_before=True, colormap="viridis", ax=None) -> Self:
+    def plot(self, *, show_before: bool = True, colormap: str = "viridis", ax: Any = None) -> Self:
         """Draw the memberships.
 
         Parameters

@@ -1,8 +1,9 @@
 """Whether the rules of a fitted estimator can be read one by one: in figures, and as a picture."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_count, check_finite, positive_weights
@@ -27,7 +28,13 @@ _BLUE, _RED = "#0072b2", "#c1272d"
 _HALF_BAND, _ROOM_FOR_INPUT = 0.36, 1.1
 
 
-def readability(estimator, X, y=None, *, sample_weight=None) -> Readability:
+def readability(
+    estimator: Any,
+    X: ArrayLike,
+    y: ArrayLike | None = None,
+    *,
+    sample_weight: ArrayLike | None = None,
+) -> Readability:
     r"""Measure whether the rules can be read one by one, and say what speaks against it.
 
     The model is the mean of its rules by their strengths, :math:`\hat y = \sum_r w_r f_r`. Nothing
@@ -179,7 +186,15 @@ class ReadabilityDisplay:
     ((4, 201), (121,))
     """
 
-    def __init__(self, *, readability, memberships, predictions, alone, output) -> None:
+    def __init__(
+        self,
+        *,
+        readability: Any,
+        memberships: np.ndarray,
+        predictions: np.ndarray,
+        alone: np.ndarray,
+        output: int,
+    ) -> None:
         self.readability = readability
         self.memberships = memberships
         self.predictions = predictions
@@ -189,16 +204,16 @@ class ReadabilityDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
-        y=None,
+        estimator: Any,
+        X: ArrayLike,
+        y: ArrayLike | None = None,
         *,
-        sample_weight=None,
-        output=0,
-        n_points=201,
-        max_rows=2000,
-        colormap="Blues",
-        ax=None,
+        sample_weight: ArrayLike | None = None,
+        output: int | str = 0,
+        n_points: int = 201,
+        max_rows: int = 2000,
+        colormap: str = "Blues",
+        ax: Any = None,
     ) -> Self:
         """Draw how the rules of a fitted estimator can be read.
 
@@ -243,7 +258,7 @@ class ReadabilityDisplay:
         )
         return display.plot(colormap=colormap, ax=ax)
 
-    def plot(self, *, colormap="Blues", ax=None) -> Self:
+    def plot(self, *, colormap: str = "Blues", ax: Any = None) -> Self:
         """Draw the picture.
 
         Parameters

@@ -1,8 +1,10 @@
 """The prediction over two inputs, the rest held."""
 
-from typing import Self
+from collections.abc import Sequence
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._validation import check_choice, check_count
 from ..export import fold, fold_with_rows
@@ -65,7 +67,16 @@ class ResponseSurfaceDisplay:
     """
 
     def __init__(
-        self, *, xx0, xx1, response, coverage, input_names, output_name, held, points=None
+        self,
+        *,
+        xx0: np.ndarray,
+        xx1: np.ndarray,
+        response: np.ndarray,
+        coverage: np.ndarray,
+        input_names: Sequence[str],
+        output_name: str,
+        held: dict[str, Any],
+        points: np.ndarray | None = None,
     ) -> None:
         self.xx0 = xx0
         self.xx1 = xx1
@@ -79,16 +90,16 @@ class ResponseSurfaceDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X=None,
+        estimator: Any,
+        X: ArrayLike | None = None,
         *,
-        features=(0, 1),
-        held=None,
-        output=0,
-        grid_resolution=60,
-        plot_method="contourf",
-        colormap="viridis",
-        ax=None,
+        features: Any = (0, 1),
+        held: dict[str, Any] | None = None,
+        output: int | str = 0,
+        grid_resolution: int = 60,
+        plot_method: str = "contourf",
+        colormap: str = "viridis",
+        ax: Any = None,
     ) -> Self:
         """Draw the prediction of a fitted estimator over the range of two inputs.
 
@@ -149,7 +160,9 @@ class ResponseSurfaceDisplay:
         )
         return display.plot(plot_method=plot_method, colormap=colormap, ax=ax)
 
-    def plot(self, *, plot_method="contourf", colormap="viridis", ax=None) -> Self:
+    def plot(
+        self, *, plot_method: str = "contourf", colormap: str = "viridis", ax: Any = None
+    ) -> Self:
         """Draw the surface.
 
         Parameters

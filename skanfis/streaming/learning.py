@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.utils.metaestimators import available_if
 
 from .._sklearn import fit_context
@@ -49,7 +50,14 @@ class LearnsFromChunksMixin:
 
     @available_if(can_learn_from_chunks)
     @fit_context(prefer_skip_nested_validation=False)
-    def partial_fit(self, X, y, sample_weight=None, *, forgetting: float = 1.0) -> Self:
+    def partial_fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        *,
+        forgetting: float = 1.0,
+    ) -> Self:
         r"""Learn from a chunk of rows, going on from those before; premises stay.
 
         The first call is ``fit`` on its rows, which finds the structure and the premises; or, with
@@ -183,7 +191,7 @@ class LearnsFromChunksMixin:
         for name in ("_stream", "_stream_settings", "n_samples_seen_"):
             self.__dict__.pop(name, None)
 
-    def merge(self, *others) -> Self:
+    def merge(self, *others: Any) -> Self:
         """Add up what models trained apart by ``partial_fit`` have seen.
 
         Parameters

@@ -1,6 +1,8 @@
 """A trained model as one C function over constant tables."""
 
 from dataclasses import dataclass
+from os import PathLike
+from typing import Any
 
 from .._numbers import Numbers, as_held
 from ..folding import fold
@@ -50,17 +52,17 @@ class CCode:
 
 
 def export_c(
-    estimator,
-    path=None,
+    estimator: Any,
+    path: str | PathLike[str] | None = None,
     *,
-    name=None,
-    dtype="double",
-    std="c99",
-    min_coverage=0.1,
-    saturate=None,
-    forgetting=None,
-    deviation=False,
-    coverage=None,
+    name: str | None = None,
+    dtype: str = "double",
+    std: str = "c99",
+    min_coverage: float | None = 0.1,
+    saturate: Any = None,
+    forgetting: float | None = None,
+    deviation: bool = False,
+    coverage: float | None = None,
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 

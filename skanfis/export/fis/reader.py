@@ -1,9 +1,11 @@
 """From a .fis file to a frozen model: strictly, and nothing but data."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from math import prod
+from os import PathLike
 
 import numpy as np
 
@@ -21,7 +23,7 @@ _MOST_TERMS = 10_000
 _MOST_RULES = 100_000
 
 
-def read_fis(path, *, input_names=None) -> TSKModel:
+def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = None) -> TSKModel:
     r"""Read a Sugeno system from a .fis file of MATLAB, Octave or fuzzylite.
 
     The file is data: it is parsed strictly, and no part of it is ever run. What it may hold:

@@ -2,7 +2,9 @@
 
 import re
 import unicodedata
+from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +36,7 @@ _WORDS = {
 _N_POINTS = 1000
 
 
-def export_fis(estimator) -> str:
+def export_fis(estimator: Any) -> str:
     r"""Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average. Its membership functions are
@@ -128,7 +130,7 @@ def export_fis(estimator) -> str:
     return text
 
 
-def write_fis(estimator, path) -> None:
+def write_fis(estimator: Any, path: str | PathLike[str]) -> None:
     """Write a trained model to a .fis file, as :func:`export_fis` gives it.
 
     Parameters

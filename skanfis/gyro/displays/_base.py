@@ -1,10 +1,11 @@
 """What the Displays of a compensation have in common: where their numbers come from."""
 
 from collections.abc import Callable
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._style import PER_UNIT
 
@@ -30,7 +31,15 @@ class CompensationDisplay:
 
     @classmethod
     def from_estimator(
-        cls, estimator, X, rate, *, output="output", predicts="error", ax=None, **options
+        cls,
+        estimator: Any,
+        X: Any,
+        rate: ArrayLike,
+        *,
+        output: str | ArrayLike = "output",
+        predicts: str = "error",
+        ax: Any = None,
+        **options: Any,
     ) -> Self:
         """Compute from a fitted estimator, and draw.
 
@@ -79,7 +88,7 @@ def compensated_rate(estimator, X, indicated, predicts):
     return np.asarray(indicated, dtype=float) - predicted if predicts == "error" else predicted
 
 
-def check_rows(**columns):
+def check_rows(**columns) -> list[np.ndarray]:
     """The columns as arrays of equal length; ValueError names the one that differs."""
     arrays = {name: np.asarray(values) for name, values in columns.items()}
     n_rows = next(iter(arrays.values())).size
@@ -90,7 +99,7 @@ def check_rows(**columns):
                 f"{name} has shape {values.shape}; it must have one value per row, as many as "
                 f"{first} ({n_rows})."
             )
-    return arrays.values()
+    return list(arrays.values())
 
 
 def check_unit(unit):

@@ -1,10 +1,11 @@
 """AllanDisplay: the Allan deviation of the error, before and after compensation."""
 
 import textwrap
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ..allan import allan_coefficients, allan_deviation
 from ._base import CompensationDisplay, check_unit
@@ -66,13 +67,21 @@ class AllanDisplay(CompensationDisplay):
 
     _PER_ROW = ("run",)
 
-    def __init__(self, *, before, after) -> None:
+    def __init__(self, *, before: Any, after: Any) -> None:
         self.before = before
         self.after = after
 
     @classmethod
     def from_predictions(
-        cls, rate, before, after, *, sampling_interval, run=None, unit="deg/h", ax=None
+        cls,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
+        *,
+        sampling_interval: float,
+        run: ArrayLike | None = None,
+        unit: str = "deg/h",
+        ax: Any = None,
     ) -> Self:
         """Compute from rates, and draw.
 
@@ -102,7 +111,7 @@ class AllanDisplay(CompensationDisplay):
         ]
         return cls(before=curves[0], after=curves[1]).plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/h") -> Self:
+    def plot(self, ax: Any = None, *, unit: str = "deg/h") -> Self:
         """Draw.
 
         Parameters

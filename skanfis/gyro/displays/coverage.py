@@ -1,6 +1,6 @@
 """CoverageDisplay: where the compensator knows what it says, and where it only goes on."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -68,7 +68,18 @@ class CoverageDisplay:
     """
 
     def __init__(
-        self, *, x, y, coverage, inside, rows, x_edges, y_edges, counts, min_coverage, names
+        self,
+        *,
+        x: np.ndarray,
+        y: np.ndarray,
+        coverage: np.ndarray,
+        inside: np.ndarray,
+        rows: np.ndarray,
+        x_edges: Any,
+        y_edges: Any,
+        counts: np.ndarray,
+        min_coverage: float,
+        names: Any,
     ) -> None:
         self.x = x
         self.y = y
@@ -84,18 +95,18 @@ class CoverageDisplay:
     @classmethod
     def from_estimator(
         cls,
-        estimator,
-        X,
+        estimator: Any,
+        X: Any,
         *,
-        x="temperature",
-        y="output",
-        others=None,
-        units=None,
-        n_points=96,
-        n_cells=24,
-        min_coverage=0.1,
-        margin=0.15,
-        ax=None,
+        x: str = "temperature",
+        y: str = "output",
+        others: dict[str, Any] | None = None,
+        units: dict[str, Any] | None = None,
+        n_points: int = 96,
+        n_cells: int = 24,
+        min_coverage: float = 0.1,
+        margin: float = 0.15,
+        ax: Any = None,
     ) -> Self:
         """Compute from a fitted estimator, and draw.
 
@@ -164,7 +175,7 @@ class CoverageDisplay:
         )
         return display.plot(ax=ax)
 
-    def plot(self, ax=None) -> Self:
+    def plot(self, ax: Any = None) -> Self:
         """Draw.
 
         Parameters

@@ -1,9 +1,10 @@
 """ErrorDisplay: the error against time, temperature or anything else, before and after."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._base import CompensationDisplay, binned, check_rows, check_unit
 from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
@@ -67,14 +68,14 @@ class ErrorDisplay(CompensationDisplay):
     def __init__(
         self,
         *,
-        position,
-        before,
-        after,
-        edges,
-        range_before,
-        range_after,
-        rms,
-        position_label="time [s]",
+        position: np.ndarray,
+        before: np.ndarray,
+        after: np.ndarray,
+        edges: np.ndarray,
+        range_before: np.ndarray,
+        range_after: np.ndarray,
+        rms: Any,
+        position_label: str = "time [s]",
     ) -> None:
         self.position = position
         self.before = before
@@ -88,14 +89,14 @@ class ErrorDisplay(CompensationDisplay):
     @classmethod
     def from_predictions(
         cls,
-        rate,
-        before,
-        after,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
         *,
-        position,
-        position_label="time [s]",
-        unit="deg/s",
-        ax=None,
+        position: ArrayLike,
+        position_label: str = "time [s]",
+        unit: str = "deg/s",
+        ax: Any = None,
     ) -> Self:
         """Compute from rates, and draw.
 
@@ -136,7 +137,7 @@ class ErrorDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/s") -> Self:
+    def plot(self, ax: Any = None, *, unit: str = "deg/s") -> Self:
         """Draw.
 
         Parameters

@@ -1,9 +1,10 @@
 """GroupResidualDisplay: the residual of every group that was held out."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ...inspection.labels import as_label
 from ._base import CompensationDisplay, check_rows, check_unit
@@ -50,13 +51,22 @@ class GroupResidualDisplay(CompensationDisplay):
 
     _PER_ROW = ("groups",)
 
-    def __init__(self, *, groups, before, after) -> None:
+    def __init__(self, *, groups: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
         self.groups = groups
         self.before = before
         self.after = after
 
     @classmethod
-    def from_predictions(cls, rate, before, after, *, groups, unit="deg/s", ax=None) -> Self:
+    def from_predictions(
+        cls,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
+        *,
+        groups: ArrayLike,
+        unit: str = "deg/s",
+        ax: Any = None,
+    ) -> Self:
         """Compute from rates, and draw.
 
         Parameters
@@ -87,7 +97,7 @@ class GroupResidualDisplay(CompensationDisplay):
         display = cls(groups=labels[order], before=results[0][order], after=results[1][order])
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/s") -> Self:
+    def plot(self, ax: Any = None, *, unit: str = "deg/s") -> Self:
         """Draw.
 
         Parameters

@@ -1,9 +1,10 @@
 """HysteresisDisplay: bias against temperature, warming and cooling apart."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._base import CompensationDisplay, binned, check_rows, check_unit
 from ._style import COOLING, PER_UNIT, SYMBOL, WARMING, dress, figures, make_axes
@@ -62,7 +63,7 @@ class HysteresisDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature", "temperature_rate")
 
-    def __init__(self, *, temperature, before, after) -> None:
+    def __init__(self, *, temperature: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
         self.temperature = temperature
         self.before = before
         self.after = after
@@ -70,15 +71,15 @@ class HysteresisDisplay(CompensationDisplay):
     @classmethod
     def from_predictions(
         cls,
-        rate,
-        before,
-        after,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
         *,
-        temperature,
-        temperature_rate,
-        least_rate_of_change=0.05,
-        unit="deg/h",
-        ax=None,
+        temperature: ArrayLike,
+        temperature_rate: ArrayLike,
+        least_rate_of_change: float = 0.05,
+        unit: str = "deg/h",
+        ax: Any = None,
     ) -> Self:
         """Compute from rates, and draw.
 
@@ -132,7 +133,7 @@ class HysteresisDisplay(CompensationDisplay):
         """Largest distance between the branches after compensation [deg/h]."""
         return _gap(self.after)
 
-    def plot(self, ax=None, *, unit="deg/h") -> Self:
+    def plot(self, ax: Any = None, *, unit: str = "deg/h") -> Self:
         """Draw.
 
         Parameters

@@ -1,9 +1,10 @@
 """ScaleFactorErrorDisplay: what is left of the scale factor's error, by rate and temperature."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._base import CompensationDisplay, binned, check_rows
 from ._style import dress, figures, make_axes
@@ -61,7 +62,14 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature",)
 
-    def __init__(self, *, rate, before, after, temperature_edges) -> None:
+    def __init__(
+        self,
+        *,
+        rate: np.ndarray,
+        before: np.ndarray,
+        after: np.ndarray,
+        temperature_edges: np.ndarray,
+    ) -> None:
         self.rate = rate
         self.before = before
         self.after = after
@@ -69,7 +77,14 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
 
     @classmethod
     def from_predictions(
-        cls, rate, before, after, *, temperature, n_temperatures=3, ax=None
+        cls,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
+        *,
+        temperature: ArrayLike,
+        n_temperatures: int = 3,
+        ax: Any = None,
     ) -> Self:
         """Compute from rates, and draw.
 
@@ -117,7 +132,7 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax)
 
-    def plot(self, ax=None) -> Self:
+    def plot(self, ax: Any = None) -> Self:
         """Draw.
 
         Parameters

@@ -1,9 +1,10 @@
 """ResidualSurfaceDisplay: where over temperature and rate error is left, and where data are."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._base import CompensationDisplay, binned, cells_table, check_rows, check_unit
 from ._style import (
@@ -61,7 +62,14 @@ class ResidualSurfaceDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature",)
 
-    def __init__(self, *, temperature_edges, rate_edges, residual, counts) -> None:
+    def __init__(
+        self,
+        *,
+        temperature_edges: np.ndarray,
+        rate_edges: np.ndarray,
+        residual: np.ndarray,
+        counts: np.ndarray,
+    ) -> None:
         self.temperature_edges = temperature_edges
         self.rate_edges = rate_edges
         self.residual = residual
@@ -69,7 +77,15 @@ class ResidualSurfaceDisplay(CompensationDisplay):
 
     @classmethod
     def from_predictions(
-        cls, rate, before, after, *, temperature, n_bins=(24, 24), unit="deg/s", ax=None
+        cls,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
+        *,
+        temperature: ArrayLike,
+        n_bins: Any = (24, 24),
+        unit: str = "deg/s",
+        ax: Any = None,
     ) -> Self:
         """Compute from rates, and draw.
 
@@ -114,7 +130,7 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax=None, *, unit="deg/s") -> Self:
+    def plot(self, ax: Any = None, *, unit: str = "deg/s") -> Self:
         """Draw.
 
         Parameters

@@ -7,7 +7,7 @@ from .._columns import check_column
 __all__ = ["centred", "least_squares", "line", "rate_and_output", "rms"]
 
 
-def rate_and_output(rate, output):
+def rate_and_output(rate, output) -> tuple[np.ndarray, np.ndarray]:
     rate = check_column(rate, "rate")
     return rate, check_column(output, "output", rate.size)
 
@@ -34,7 +34,7 @@ def least_squares(design, target, without):
     return solution / size
 
 
-def centred(values, name, n_rows):
+def centred(values, name, n_rows) -> np.ndarray:
     values = check_column(values, name, n_rows)
     # Not values - mean where they are all equal: that leaves rounding errors, not zero.
     return values - (values[0] if np.ptp(values) == 0 else values.mean())

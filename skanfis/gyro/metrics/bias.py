@@ -1,6 +1,7 @@
 """Figures of the bias, in deg/h, from the error at the input in deg/s."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._columns import check_column
 from ._lines import centred, least_squares, line, rate_and_output
@@ -24,7 +25,7 @@ _HYSTERESIS_BINS = 20
 _ROWS_PER_MEAN = 5
 
 
-def input_error(rate, output) -> np.ndarray:
+def input_error(rate: ArrayLike, output: ArrayLike) -> np.ndarray:
     """Error in units of the input: the output over its scale factor, less the true rate.
 
     This takes the scale factor out of the bias figures. At one rate (at rest) there is no line to
@@ -59,7 +60,7 @@ def input_error(rate, output) -> np.ndarray:
     return output / line(rate, output)[0] - rate
 
 
-def bias(error) -> float:
+def bias(error: ArrayLike) -> float:
     """Bias: mean error.
 
     Parameters
@@ -86,7 +87,7 @@ def bias(error) -> float:
     return float(_SECONDS_PER_HOUR * np.mean(check_column(error, "error")))
 
 
-def bias_repeatability(error, run) -> float:
+def bias_repeatability(error: ArrayLike, run: ArrayLike) -> float:
     """Bias repeatability: standard deviation of the mean errors of several power-ups.
 
     Parameters
@@ -115,7 +116,9 @@ def bias_repeatability(error, run) -> float:
     return spread_of_bias(error_by_run(error, run))
 
 
-def bias_temperature_sensitivity(error, temperature, *, temperature_rate=None) -> float:
+def bias_temperature_sensitivity(
+    error: ArrayLike, temperature: ArrayLike, *, temperature_rate: ArrayLike | None = None
+) -> float:
     """Bias temperature sensitivity: slope of the error in temperature, D_T.
 
     Parameters
@@ -147,7 +150,9 @@ def bias_temperature_sensitivity(error, temperature, *, temperature_rate=None) -
     return _bias_slopes(error, temperature, temperature_rate)[0]
 
 
-def bias_ramp_sensitivity(error, temperature_rate, *, temperature=None) -> float:
+def bias_ramp_sensitivity(
+    error: ArrayLike, temperature_rate: ArrayLike, *, temperature: ArrayLike | None = None
+) -> float:
     """Bias temperature-ramp sensitivity: slope of the error in the thermal rate, D_Tdot.
 
     Parameters
@@ -180,7 +185,7 @@ def bias_ramp_sensitivity(error, temperature_rate, *, temperature=None) -> float
     return _bias_slopes(error, temperature, temperature_rate)[1]
 
 
-def hysteresis(error, temperature, temperature_rate) -> float:
+def hysteresis(error: ArrayLike, temperature: ArrayLike, temperature_rate: ArrayLike) -> float:
     """Hysteresis: largest gap between warming and cooling at equal temperature.
 
     The range that both share is cut into 20 bins, and in each the mean errors of at least five rows

@@ -1,6 +1,7 @@
 """What is left of the error, in deg/s."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._columns import check_column
 from ._lines import rms
@@ -8,7 +9,7 @@ from ._lines import rms
 __all__ = ["reduction_factor", "residual_peak", "residual_peak_to_peak", "residual_rms"]
 
 
-def residual_rms(error) -> float:
+def residual_rms(error: ArrayLike) -> float:
     """Root mean square of what is left of the error.
 
     Parameters
@@ -35,7 +36,7 @@ def residual_rms(error) -> float:
     return float(rms(check_column(error, "error")))
 
 
-def residual_peak(error) -> float:
+def residual_peak(error: ArrayLike) -> float:
     """Largest size of what is left of the error.
 
     Parameters
@@ -62,7 +63,7 @@ def residual_peak(error) -> float:
     return float(np.abs(check_column(error, "error")).max())
 
 
-def residual_peak_to_peak(error) -> float:
+def residual_peak_to_peak(error: ArrayLike) -> float:
     """Distance from the smallest to the largest of what is left of the error.
 
     Parameters
@@ -89,7 +90,7 @@ def residual_peak_to_peak(error) -> float:
     return float(np.ptp(check_column(error, "error")))
 
 
-def reduction_factor(before, after) -> float:
+def reduction_factor(before: ArrayLike, after: ArrayLike) -> float:
     """Reduction factor: RMS of the error before compensation over that after it.
 
     Parameters

@@ -1,6 +1,7 @@
 """Figures of the scale factor, in ppm, from the true rate and an output in any unit."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ._lines import centred, least_squares, line, rate_and_output, rms
 from ._runs import rows_by_run
@@ -19,7 +20,7 @@ __all__ = [
 _PPM = 1e6
 
 
-def scale_factor(rate, output) -> float:
+def scale_factor(rate: ArrayLike, output: ArrayLike) -> float:
     """Scale factor: slope of the least-squares line of the output against the true rate.
 
     Parameters
@@ -49,7 +50,7 @@ def scale_factor(rate, output) -> float:
     return float(line(rate, output)[0])
 
 
-def scale_factor_error(rate, output, *, nominal=1.0) -> float:
+def scale_factor_error(rate: ArrayLike, output: ArrayLike, *, nominal: float = 1.0) -> float:
     """Scale factor error: relative deviation of the scale factor from its nominal value.
 
     Parameters
@@ -82,7 +83,9 @@ def scale_factor_error(rate, output, *, nominal=1.0) -> float:
     return float(_PPM * (scale_factor(rate, output) / nominal - 1.0))
 
 
-def scale_factor_nonlinearity(rate, output, *, statistic="max", full_scale=None) -> float:
+def scale_factor_nonlinearity(
+    rate: ArrayLike, output: ArrayLike, *, statistic: str = "max", full_scale: float | None = None
+) -> float:
     """Scale factor nonlinearity: deviation of the output from its least-squares line.
 
     The output's noise is in it: give means over dwells where the rows are noisy.
@@ -127,7 +130,7 @@ def scale_factor_nonlinearity(rate, output, *, statistic="max", full_scale=None)
     return float(_PPM * size / (abs(slope) * full_scale))
 
 
-def scale_factor_asymmetry(rate, output) -> float:
+def scale_factor_asymmetry(rate: ArrayLike, output: ArrayLike) -> float:
     """Scale factor asymmetry: difference of the scale factors for rates of either sign.
 
     Each side is fitted by a line of its own, rows at rest on both; the difference, positive less
@@ -165,7 +168,7 @@ def scale_factor_asymmetry(rate, output) -> float:
     return float(_PPM * (slopes[0] - slopes[1]) / np.mean(slopes))
 
 
-def scale_factor_repeatability(rate, output, run) -> float:
+def scale_factor_repeatability(rate: ArrayLike, output: ArrayLike, run: ArrayLike) -> float:
     """Scale factor repeatability: standard deviation of the scale factors of several runs.
 
     Parameters
@@ -196,7 +199,9 @@ def scale_factor_repeatability(rate, output, run) -> float:
     return relative_spread(scale_factor_by_run(rate, output, run))
 
 
-def scale_factor_temperature_sensitivity(rate, output, temperature) -> float:
+def scale_factor_temperature_sensitivity(
+    rate: ArrayLike, output: ArrayLike, temperature: ArrayLike
+) -> float:
     """Scale factor temperature sensitivity: slope of the scale factor in temperature.
 
     By least squares, output = (S + S_T dT) rate + c + c_T dT with dT the temperature less its mean;

@@ -1,6 +1,7 @@
 """Bias stability: how far means over some seconds scatter within the runs, in deg/h."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._columns import check_column
 from ._runs import rows_by_run
@@ -10,7 +11,9 @@ __all__ = ["bias_stability", "pooled_deviation", "squares_by_run"]
 _SECONDS_PER_HOUR = 3600.0
 
 
-def bias_stability(error, time, *, averaging_time=10.0, run=None) -> float:
+def bias_stability(
+    error: ArrayLike, time: ArrayLike, *, averaging_time: float = 10.0, run: ArrayLike | None = None
+) -> float:
     """Bias stability: standard deviation of means over 10 s, or any other time, within the runs.
 
     This is Chinese practice (GJB 2426), and not the minimum of the Allan deviation, to which it has
