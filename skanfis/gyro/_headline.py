@@ -1,6 +1,6 @@
 """Which compensation to use, in words that report and command share."""
 
-from ._simpler import NOTHING
+from ._simpler import LAW_AND_LINE, NOTHING
 from .displays._style import PER_UNIT, SYMBOL, figures
 
 __all__ = ["ARTICLES", "headline", "held_out_groups"]
@@ -10,6 +10,7 @@ ARTICLES = {
     "constant": "a constant",
     "straight line": "a straight line",
     "arcsine law": "the arcsine law",
+    LAW_AND_LINE: "the arcsine law and a line",
     "cubic polynomial": "a cubic polynomial",
 }
 

@@ -10,7 +10,13 @@ from ..options import LinearExtrapolation
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
-__all__ = ["make_constant", "make_estimator", "make_law", "make_polynomial"]
+__all__ = [
+    "make_constant",
+    "make_estimator",
+    "make_law",
+    "make_law_and_line",
+    "make_polynomial",
+]
 
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
 _ROUNDS = 3
@@ -45,6 +51,12 @@ def make_law(inputs, degree, outside):
         out_of_bounds=outside,
         warn_out_of_bounds=False,
     )
+
+
+def make_law_and_line(inputs):
+    """The law and a straight line in all inputs, in turns, as a single rule beside it is fitted."""
+    law = make_law(inputs, 1, "linear")
+    return ResidualRegressor(law, make_polynomial(1), n_rounds=_ROUNDS)
 
 
 def make_constant():

@@ -10,11 +10,12 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 
 from ..exceptions import ConstantInputWarning
-from ._models import make_constant, make_law, make_polynomial
+from ._models import make_constant, make_law, make_law_and_line, make_polynomial
 
-__all__ = ["NOTHING", "Simpler", "simpler_compensations"]
+__all__ = ["LAW_AND_LINE", "NOTHING", "Simpler", "simpler_compensations"]
 
 NOTHING = "no compensation"
+LAW_AND_LINE = "arcsine law and a line"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,7 @@ def _kinds(inputs):
     yield _Kind("straight line", partial(make_polynomial, 1))
     if "output" in inputs:
         yield _Kind("arcsine law", partial(make_law, inputs, 1, "linear"), "rate")
+        yield _Kind(LAW_AND_LINE, partial(make_law_and_line, inputs), "rate")
     yield _Kind("cubic polynomial", partial(make_polynomial, 3))
 
 

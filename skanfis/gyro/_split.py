@@ -46,7 +46,7 @@ def choose_split(log, kind="auto", *, uses_output=True):
     levels = _levels(log) if uses_output else None
     legs = _legs(log)
     if kind == "auto":
-        kind, reason = _choose(numbers, levels, legs)
+        kind, reason = _choose(numbers, levels, legs, "time" in log)
     else:
         reason = "as asked for"
     parts = kind.split("+")
@@ -86,7 +86,7 @@ def _by_leg(log, kind, legs, reason):
     return Split(kind, folds, name_legs(legs, log["temperature"].to_numpy()), sentence)
 
 
-def _choose(numbers, levels, legs):
+def _choose(numbers, levels, legs, has_time):
     """The kind of split that a log calls for, and why."""
     whole = next((name for name, groups in numbers.items() if _is_enough(name, groups)), None)
     few = _is_enough("level", levels) and np.unique(levels).size <= _MOST_LEVELS
@@ -96,7 +96,7 @@ def _choose(numbers, levels, legs):
         for kind in ("leg", "piece"):
             if _is_enough(kind, legs):
                 return kind, "too few runs to hold out"
-        raise LogError(_nothing_to_hold_out(numbers, levels))
+        raise LogError(_nothing_to_hold_out(numbers, levels, has_time))
     if few and _share_levels(numbers[whole], levels):
         return f"{whole}+level", f"the {whole}s share rate levels, which could be memorised"
     return whole, f"rows of one {whole} are alike"
@@ -120,17 +120,23 @@ def _check(part, groups):
         )
 
 
-def _nothing_to_hold_out(numbers, levels):
+def _nothing_to_hold_out(numbers, levels, has_time):
     found = [
         f"{np.unique(groups).size} {name}(s)"
         for name, groups in numbers.items()
         if groups is not None
     ]
     found.append(f"{0 if levels is None else np.unique(levels).size} rate levels")
+    clock = ""
+    if not has_time:
+        clock = (
+            " No column of the time was found, whose gaps would tell runs apart: name it with "
+            "--columns time=NAME."
+        )
     return (
         f"the compensator could not be checked: the log has {', '.join(found)}. At least 3 runs "
         "(a column run, or one file each), 5 rate levels, or a temperature that rises and falls "
-        "are needed, to be held out in turn."
+        f"are needed, to be held out in turn.{clock}"
     )
 
 

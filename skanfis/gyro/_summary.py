@@ -4,11 +4,16 @@ import numpy as np
 
 from ._headline import headline
 from ._reading import readability_of
+from ._simpler import LAW_AND_LINE
 
 __all__ = ["errors_and_verdict"]
 
 # What makes the files of a simpler compensation: a single rule is a straight line.
-_OPTIONS = {"straight line": "--terms {ones}", "arcsine law": "--physics --terms {ones}"}
+_OPTIONS = {
+    "straight line": "--terms {ones}",
+    "arcsine law": "--physics --terms {ones}",
+    LAW_AND_LINE: "--physics --terms {ones}",
+}
 
 
 def errors_and_verdict(calibration):

@@ -1,5 +1,7 @@
 """From a log to a verdict: planted truths, held out by hand, and structures chosen within folds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,6 +10,7 @@ from sklearn.model_selection import GroupKFold
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._choice import choose, choose_in_folds
 from skanfis.gyro._headline import headline
+from skanfis.gyro._sections.instead import formula_of
 from skanfis.gyro._split import Split
 from skanfis.gyro._summary import errors_and_verdict
 
@@ -67,6 +70,34 @@ def test_the_planted_truth_is_recommended(truth, tmp_path):
     assert title.startswith("Use ")
     assert title.endswith(f"{truth} instead of the fuzzy rules")
     assert "more than the scatter over the 8 held-out runs" in sentence
+
+
+def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended():
+    log = log_of(law)
+    log["time"] = np.tile(np.arange(N_ROWS) * 60.0, N_RUNS)
+    log["output"] += 2e-6 * log["time"]
+    split = Split("run", folds_of(log), log["run"].astype(str).to_numpy(dtype=object), "held out")
+    recipe = Recipe(("time", "temperature", "output"), terms=(1, 1, 1))
+    calibration = calibrate(log, split, recipe, lambda text: None)
+    verdict = calibration.verdict
+    assert verdict.recommended == "arcsine law and a line", verdict
+    # Law and line are fitted in turns: what is left is a little more than the noise.
+    assert verdict.rms["arcsine law and a line"] < 0.5 * verdict.rms["arcsine law"]
+    assert verdict.rms["arcsine law and a line"] < 3.0 * NOISE
+    # The single rule of --physics --terms 1,1,1 is that line.
+    alone = calibrate(log, split, replace(recipe, physics=True), lambda text: None)
+    assert alone.verdict.rms["this model"] == pytest.approx(
+        verdict.rms["arcsine law and a line"], rel=0.01
+    )
+    law_text, line = formula_of(calibration, "arcsine law and a line").split("added the line:\n")
+    assert law_text.startswith("rate [deg/s] = arcsin(")
+    names = calibration.X.to_dict("series")
+    for step in line.replace("\n    ", " ").replace("^", "**").split("\n"):
+        variable, _, value = step.partition(" = ")
+        names[variable] = eval(value, {}, names)
+    simple = next(each for each in calibration.simpler if each.name == "arcsine law and a line")
+    added = simple.model.predict(calibration.X) - simple.model.base_.predict(calibration.X)
+    np.testing.assert_allclose(names["line"], added, atol=1e-8)
 
 
 def test_before_after_and_what_is_simpler_are_of_the_same_rows():

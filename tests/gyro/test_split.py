@@ -70,6 +70,7 @@ def test_asked_for():
         ("run", r"cannot hold out by run: the log has 2 run\(s\), and at least 3"),
         ("level", "cannot hold out by level: the log has no rate levels"),
         ("auto", r"could not be checked: the log has 2 run\(s\), 0 rate levels"),
+        ("auto", r"No column of the time was found, .* --columns time=NAME"),
     ],
 )
 def test_what_cannot_be_held_out_is_refused(kind, message):

@@ -1,7 +1,7 @@
 """The simpler compensation, where that is the one to use: what to compute, to the last digit."""
 
 from .._headline import ARTICLES
-from .._simpler import NOTHING
+from .._simpler import LAW_AND_LINE, NOTHING
 from .words import law_table
 
 __all__ = ["formula_of", "instead"]
@@ -13,6 +13,8 @@ _COMMANDS = {
     "rule is a straight line.",
     "arcsine law": "The command writes its files, C code included, with --physics --terms {ones}: "
     "to the law it adds a single rule, which is a straight line.",
+    LAW_AND_LINE: "The command writes its files, C code included, with --physics --terms {ones}: a "
+    "single rule is a straight line.",
 }
 
 
@@ -41,15 +43,19 @@ def formula_of(calibration, name):
     """The formula of a simpler compensation, as lines of text."""
     simple = next(each for each in calibration.simpler if each.name == name)
     recipe, compensator = calibration.recipe, calibration.compensator
+    if name == LAW_AND_LINE:
+        line = _polynomial("line", simple.model.residual_, recipe.inputs)
+        law = law_table(simple.model.base_, recipe)
+        return "\n".join([law, "", "To this rate is added the line:", *line])
     if simple.predicts == "rate":
         return law_table(simple.model, recipe)
     lines = [f"rate = output / {compensator.scale_factor:{_DIGITS}} - error"]
     if name == "constant":
         return "\n".join([*lines, f"error = {float(simple.model.constant_.item()):{_DIGITS}}"])
-    return "\n".join([*lines, *_polynomial(simple.model, recipe.inputs)])
+    return "\n".join([*lines, *_polynomial("error", simple.model, recipe.inputs)])
 
 
-def _polynomial(pipeline, inputs):
+def _polynomial(what, pipeline, inputs):
     """In standardised inputs, which keep the digits that count in a cubic."""
     scaler, powers, line = (step for _, step in pipeline.steps)
     names = [f"z{j + 1}" for j in range(len(inputs))]
@@ -70,4 +76,4 @@ def _polynomial(pipeline, inputs):
     parts = [
         f"    {value:+{_DIGITS}} * {term}" for value, term in zip(line.coef_, terms, strict=True)
     ]
-    return [*scales, f"error = {float(line.intercept_):{_DIGITS}}", *parts]
+    return [*scales, f"{what} = {float(line.intercept_):{_DIGITS}}", *parts]
