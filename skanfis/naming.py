@@ -18,6 +18,7 @@ LINGUISTIC = {
     6: ("NL", "NM", "NS", "PS", "PM", "PL"),
     7: ("NL", "NM", "NS", "ZE", "PS", "PM", "PL"),
 }
+# More than these tell no two doubles apart.
 _MOST_DIGITS = 17
 
 

@@ -23,6 +23,7 @@ __all__ = ["MANY_ROWS", "SAMPLE_ROWS", "is_many", "with_sample"]
 # sample of m rows, q parameters cost a part q / m of the error's square: for 18 of them and 20,000
 # rows a thousandth, before all rows have their say.
 MANY_ROWS, SAMPLE_ROWS = 100_000, 20_000
+# Read at once; a block of this stays in the cache.
 _READ_ROWS = 4096
 # So many turns of the wheel per unit of the fingerprint; times a power of two nothing is rounded.
 _TURNS = 8192.0

@@ -17,6 +17,7 @@ LARGEST_NUMBER = 1e50
 # Of lengths and factors, which something is divided by.
 SMALLEST_NUMBER = 1e-50
 
+# Of a value in a message.
 _SHOWN = 60
 
 

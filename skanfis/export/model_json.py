@@ -50,6 +50,7 @@ from .limits import read_bytes
 
 __all__ = ["export_json", "read_json", "write_json"]
 
+# A model of 27 rules takes 10 kB: there is room for thousands, and none to fill the memory.
 _MOST_BYTES = 2**24
 
 

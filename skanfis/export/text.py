@@ -21,6 +21,7 @@ from .rules import (
 
 __all__ = ["consequent_text", "export_text", "range_text", "rows_text", "term_text"]
 
+# More than these give back no other double.
 _MOST_DIGITS = 17
 
 

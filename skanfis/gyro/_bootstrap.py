@@ -12,6 +12,7 @@ VALUES = ["before", "before_low", "before_high", "after", "after_low", "after_hi
 
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
+# Few enough to be long against what drifts within one, enough for a spread.
 _N_BLOCKS = 30
 # Row figures of a resample cost time in proportion to its rows, and their spread comes from the
 # runs or blocks: evenly thinned rows show it as well.

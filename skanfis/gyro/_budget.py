@@ -24,6 +24,7 @@ from scipy.stats import chi2
 
 __all__ = ["Budget", "budget_of", "noise_within", "scatter_between"]
 
+# The level of every interval in the report.
 _CONFIDENCE = 0.95
 # Evenly chosen rows, for the noise and the model.
 _MOST_ROWS = 100_000

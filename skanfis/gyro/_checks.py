@@ -29,6 +29,7 @@ _PLAUSIBLE = {
 }
 _LONGEST_RUN = 31 * 86_400.0  # s
 _FASTEST_CHANGE = 100.0  # degC/min over a whole run: no chamber does that
+# Fewer tell neither a line in every input nor what is left of it; of a run, no way it goes.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
 # At rest, the earth's rate included.

@@ -12,6 +12,7 @@ __all__ = ["check_different", "find_logs"]
 
 # Of a folder: tables first; what may as well be a note only where there is no table.
 _SUFFIXES = ((".csv", ".tsv", ".parquet", ".pq"), (".txt", ".dat", ".log"))
+# Bytes read at once for a hash.
 _BLOCK = 2**20
 
 

@@ -16,7 +16,9 @@ _MOST = 3
 # Times the deviation of the next row: none of a bell-shaped noise comes near, nor of Student's with
 # three degrees of freedom in a thousand logs.
 _ALONE = 5.0
+# Their median is the row's surroundings, and stands one other glitch among them.
 _N_NEIGHBOURS = 8
+# The rows farthest off: neighbours are sought of these alone, whatever the log's length.
 _MOST_CANDIDATES = 2_000
 # Rows among which the neighbours of candidates are looked for; more tell nothing new.
 _MOST_NEIGHBOURS = 200_000

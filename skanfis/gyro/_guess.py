@@ -56,9 +56,11 @@ _QUANTITIES = {
     "rate": ("rate",),
 }
 _STRANGER = 0.5  # what a word that says nothing takes off
+# No log is above it throughout in degrees, and every log is in kelvin.
 _COLDEST_IN_KELVIN = 150.0
 # Numbers that large count from 1970, in these units.
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+# The output follows the rate with a correlation near one, for all its errors.
 _FOLLOWS = 0.9
 _LARGEST_RATE = 1000  # of whole numbers, beyond which they are taken for counts
 

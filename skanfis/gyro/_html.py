@@ -9,7 +9,9 @@ from ._style_sheet import STYLE
 
 __all__ = ["Page"]
 
+# Sharp in print.
 _DOTS_PER_INCH = 160
+# Tables up to this are kept on one page in print.
 _MOST_ROWS_ON_A_PAGE = 25
 # Of columns that are not numbers.
 _KINDS = {

@@ -35,7 +35,9 @@ __all__ = [
 # two rates give one output.
 _SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
 _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
+# A dozen coefficients at most: more rows only make many starts slow. The fit to all rows follows.
 _ROWS_FOR_START = 2000
+# Of a long log, the law is fitted to so many rows first: what is left takes an evaluation or two.
 _ROWS_FOR_TRIAL = 10_000
 MAX_EVALUATIONS = 200
 _NEARBY = 1e-5  # how far a finished fit may still move, in standardised units

@@ -13,6 +13,7 @@ _RANGE = ("minimum", "maximum")
 _PARAMETERS = ("max_phase", "out_of_bounds")
 _KEYS = ("columns", *_POLYNOMIALS, *_NUMBERS, *_RANGE, *_PARAMETERS)
 _ROLES = ("output", "temperature", "temperature_rate")
+# Of the fifth degree in temperature, the highest that the estimator takes.
 _MOST_COEFFICIENTS = 6
 # What phase and rate are divided by.
 _NEVER_ZERO = ("amplitude", "sagnac_factor")

@@ -11,6 +11,7 @@ from .errors import LogError
 __all__ = ["COLUMNS", "Layout", "Request", "settle"]
 
 COLUMNS = (*QUANTITIES, *LABELS)
+# What columns are is told by their first rows: enough for a run's beginning, little to read.
 _SAMPLE_ROWS = 5_000
 
 

@@ -9,6 +9,7 @@ _TURN = 0.2
 _SMALLEST_TURN = 3.0  # degC
 # A turning point is looked for among so many means of each run.
 _MOST_POINTS = 5_000
+# As many folds as whole runs are held out in.
 _PIECES = 5
 
 

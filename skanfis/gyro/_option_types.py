@@ -24,8 +24,11 @@ __all__ = [
 
 # A grid that could neither be told nor learnt: the search takes 36.
 MOST_RULES = 500
+# Counts beyond are slips of the finger; floats count up to here exactly.
 _MANY = 10**15
+# More threads than any machine has cores for.
 _MOST_JOBS = 1024
+# It becomes part of file names.
 _LONGEST_AXIS = 20
 
 

@@ -24,7 +24,9 @@ from .displays import (
 __all__ = ["PICTURES", "Picture", "draw_coverage", "draw_memberships"]
 
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
+# Points beyond cover one another.
 _MOST_ROWS_SHOWN = 20_000
+# The picture of groups shows the worst, as many as can be read.
 _MOST_LINES = 30
 
 

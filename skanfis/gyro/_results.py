@@ -24,7 +24,9 @@ COUNTS = ("rows", "rows_refused", "rows_outside")
 
 _PER_MINUTE = 60.0
 _SMALL = 0.05  # deg/s
+# A line of the table for each: beyond, nobody reads it.
 _MOST_GROUPS = 40
+# Allan's variance asks for even steps: a part of the step that a logger's clock may jitter by.
 _UNEVEN = 0.01
 _CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls
 

@@ -8,10 +8,13 @@ __all__ = ["lost_rows", "name_runs", "split_runs"]
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
+# Shorter pieces are no runs, but a logger that stutters.
 _FEWEST_ROWS = 20
 # Part of a run at whose beginning a clock is again that has been set anew.
 _BEGINNING = 0.1
+# Part of the step by which even steps may differ.
 _REGULAR = 0.1
+# From here on a row is nearer to being missing than to being late.
 _LOST = 1.5
 
 

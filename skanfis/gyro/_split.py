@@ -15,12 +15,15 @@ KINDS = ("auto", "device", "run", "level", "device+level", "run+level", "leg", "
 
 # With two legs each way, one can be held out while another tells its direction.
 _FEWEST = {"device": 3, "run": 3, "level": 5, "leg": 4, "piece": 2}
+# As in scikit-learn's cross-validation: each fold trains on four fifths.
 _N_FOLDS = 5
 # Of the levels, where runs are held out too: every fold then trains on two thirds of them.
 _N_LEVEL_FOLDS_BESIDE = 3
 # More levels than a few per term of any model cannot be memorised.
 _MOST_LEVELS = 100
+# Of the levels, beyond which runs are taken to share them.
 _SHARED = 0.1
+# A level is a dwell of a few rows, not a rate that came up once.
 _ROWS_PER_LEVEL = 3
 
 

@@ -19,6 +19,7 @@ __all__ = ["LogFile"]
 
 # Of a piece, which is all that is held beside the log itself.
 _ROWS = 200_000
+# The form of a clock is told by its first rows.
 _CLOCK_ROWS = 200
 
 

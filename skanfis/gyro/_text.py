@@ -13,9 +13,13 @@ from .errors import LogError
 
 __all__ = ["TextLog"]
 
+# The largest limit that the module csv takes on every system.
 _LONGEST_FIELD = 2**31 - 1
+# Of a file, by which encoding, separator and header are told.
 _HEAD_BYTES = 2**16
+# Lines above the header that a logger may write, and a few rows to tell the columns by.
 _HEAD_RECORDS = 60
+# Patterns look at no more of a cell: no number is longer.
 _LONGEST_NUMBER = 60
 _SEPARATORS = "\t;|,"
 _MARKS = (

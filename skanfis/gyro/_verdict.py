@@ -22,6 +22,7 @@ from scipy.stats import t as student
 
 __all__ = ["Gain", "Verdict", "judge"]
 
+# The reasons stand at the head of the module.
 _CONFIDENCE = 0.95
 _LEAST_GAIN = 1.02
 # Errors smaller than this part of the uncompensated one are rounding, and equal.

@@ -23,7 +23,9 @@ __all__ = ["AllanCoefficients", "allan_coefficients", "allan_deviation"]
 
 _SECONDS_PER_HOUR = 3600.0
 _FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
+# A slope read off two points has no check.
 _POINTS_PER_SLOPE = 3
+# Neighbouring processes differ by a half in slope: a third of that tells them apart.
 _SLOPE_TOLERANCE = 0.15
 # A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
 ROWS_PER_TIME = 10

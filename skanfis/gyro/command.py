@@ -44,6 +44,7 @@ _FILES = {
     "rules": "rules.txt",
 }
 _C_FILES = ("compensator.h", "compensator.c")
+# Of several logs a summary names so many, and counts the rest.
 _MOST_NAMED = 3
 _PER_MINUTE = 60.0
 

@@ -27,7 +27,9 @@ INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
 _KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
+# As of a model alone: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
+# It is shown in tables and on axes.
 _LONGEST_UNIT = 40
 # Rows whose inputs, predictions and coverage are held at a time.
 _BLOCK_ROWS = 65_536

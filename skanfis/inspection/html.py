@@ -22,7 +22,9 @@ __all__ = ["rules_html"]
 
 # Hues of terms from the lowest to the highest, from blue to red; they show on white and on black.
 _HUES = (220, 10)
+# Dots: a picture stands beside the others of a row on a notebook's page.
 _WIDTH, _HEIGHT = 130, 34
+# A corner every other dot: curves look smooth.
 _POINTS = 61
 
 

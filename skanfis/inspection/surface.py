@@ -14,6 +14,7 @@ from .labels import as_label
 __all__ = ["ResponseSurfaceDisplay"]
 
 _PLOT_METHODS = ("contourf", "pcolormesh")
+# Contours that can still be told apart by colour.
 _LEVELS = 15
 
 

@@ -23,6 +23,7 @@ import numpy as np
 
 __all__ = ["GaussianProfile", "LinearProfile", "Profile", "SplineProfile"]
 
+# Part of a Gaussian that is mixed in, so that no logarithm is infinite beyond the foot.
 _FLOOR = 1e-10
 
 

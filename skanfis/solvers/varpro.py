@@ -38,6 +38,7 @@ __all__ = ["VariableProjection", "trust_region_step", "varpro"]
 # Displacements are in spacings and logarithms: steps beyond about a third of a spacing skip from
 # one arrangement of the terms to another, and the bad minima are met that way.
 _FIRST_RADIUS = 0.3
+# However well the steps before have done: a whole spacing.
 _LARGEST_RADIUS = 1.0
 # Below this the decrease that a step promises is lost in the rounding of the cost.
 _SMALLEST_RADIUS = 1e-9

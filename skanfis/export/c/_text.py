@@ -27,7 +27,9 @@ _KEYWORDS = """
 """
 # C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.
 LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
+# A name in a comment stays on its line.
 _LONGEST_COMMENT = 60
+# Decimal digits that give back the very same float or double.
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
 
 

@@ -17,6 +17,8 @@ from .syntax import sections_of, shown, text_of
 
 __all__ = ["parse_fis", "read_fis"]
 
+# What is larger is refused before it is read, and so are counts that no rule base comes near:
+# each is a loop over sections.
 _MOST_BYTES = 2**22
 _MOST_VARIABLES = 1000
 _MOST_TERMS = 10_000

@@ -19,7 +19,9 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?
 _MEMBERSHIP = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^\]]*)\]")
 _RULE = re.compile(r"([^,]*),([^,(]*)\(([^()]*)\)\s*:(.*)")
 _BETWEEN = re.compile(r"\s*,\s*|\s+")
+# Of a line in a message.
 _SHOWN = 60
+# No number takes as many characters, and a longer text takes long to parse.
 _LONGEST_NUMBER = 100
 # Of sections in a file, and of entries or rules in a section: no sound file has more.
 _MOST = 100_000

@@ -24,6 +24,7 @@ SYMBOL = {"deg/s": "°/s", "deg/h": "°/h"}
 PER_UNIT = {"deg/s": 1.0, "deg/h": 3600.0}
 
 _LEAST_ROOM = 0.14  # between two marks, as a part of the axis
+# From a hundred to a million, figures are written as whole numbers; else to three digits.
 _WHOLE, _LONGEST = 100.0, 1e6
 
 

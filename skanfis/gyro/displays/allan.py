@@ -14,6 +14,7 @@ from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, 
 __all__ = ["AllanDisplay"]
 
 _FEWEST_TIMES = 3  # for reading a slope off the curve
+# Part by which a line of slope -1/2 may miss the first point of the curve.
 _NEARLY = 0.3
 _PER_ROOT_HOUR = 60.0  # deg/h at 1 s per deg/sqrt(h)
 _PER_HOUR = 3600.0

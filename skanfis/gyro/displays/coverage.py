@@ -12,6 +12,7 @@ from ._style import NO_DATA, dress, make_axes
 
 __all__ = ["CoverageDisplay"]
 
+# Points beyond cover one another.
 _N_POINTS = 2_000
 _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some, full
 _SYMBOLS = {"degC": "°C", "deg/s": "°/s", "degC/min": "°C/min"}

@@ -11,7 +11,9 @@ from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
 
 __all__ = ["ErrorDisplay"]
 
+# Bands about two dots wide in the picture.
 _N_BINS = 300
+# Points beyond cover one another.
 _N_POINTS = 3_000
 
 

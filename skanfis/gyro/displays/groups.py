@@ -12,6 +12,7 @@ from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, 
 
 __all__ = ["GroupResidualDisplay"]
 
+# The worst groups: more lines cannot be read.
 _MOST_LINES = 30
 
 

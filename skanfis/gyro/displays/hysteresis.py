@@ -11,8 +11,10 @@ from ._style import COOLING, PER_UNIT, SYMBOL, WARMING, dress, figures, make_axe
 
 __all__ = ["HysteresisDisplay"]
 
+# Enough to show a loop, and few enough that every bin has rows.
 _N_BINS = 25
 _FEWEST_ROWS = 3  # of a bin, below which its mean is not drawn
+# Odd ones: what an error of the scale factor adds changes its sign with the rate.
 _POWERS = (1, 3, 5, 7)
 _PER_HOUR = 3600.0
 

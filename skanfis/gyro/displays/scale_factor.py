@@ -12,6 +12,7 @@ from ._style import dress, figures, make_axes
 __all__ = ["ScaleFactorErrorDisplay"]
 
 _PPM = 1e6
+# Odd, so that a bin has the rest in its middle.
 _N_RATES = 41
 # Nearer to rest, a bias divided by the rate would fill the picture.
 _SMALLEST_SHARE = 0.05
