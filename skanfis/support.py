@@ -20,9 +20,11 @@ from functools import partial
 import numpy as np
 
 from .antecedent import Antecedent
+from .consequent import basis
+from .gram import pairs
 from .rows import Rows, fingerprint
 
-__all__ = ["FIRES", "RuleSupport", "inverse_factor"]
+__all__ = ["FIRES", "RuleFiring", "RuleSupport", "inverse_factor"]
 
 # Rows of one block, however few values it needs; and the bytes that these may take.
 _MOST_ROWS, _FEWEST_ROWS = 4096, 64
@@ -70,24 +72,25 @@ class RuleSupport:
     radius: np.ndarray
 
     @classmethod
-    def of(cls, rows: Rows, antecedent: Antecedent, n_coefficients: int):
-        """The support of every rule, in the rows' standardised units, in two passes over them.
+    def of(cls, rows: Rows, antecedent: Antecedent, n_coefficients: int, firing=None):
+        """The support of every rule, in the rows' standardised units, in a pass over them.
 
-        Memory does not grow with the rows: of each rule, at most ``n_coefficients`` fingerprints of
-        inputs are held.
+        ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
+        ``n_coefficients``; where it is not given, it takes a pass of its own. Memory does not grow
+        with the rows: of each rule, at most ``n_coefficients`` fingerprints of inputs are held.
         """
-        mass, first, second, distinct = rows.reduce(
-            partial(_first_pass, antecedent=antecedent, enough=n_coefficients), _merge
-        )
-        known = np.flatnonzero(distinct.counts)
-        center, factor = np.zeros_like(first), np.zeros_like(second)
-        center[known] = first[known] / mass[known, None]
-        factor[known] = inverse_factor(second[known] / mass[known, None, None], center[known])
+        firing = RuleFiring.of(rows, antecedent, n_coefficients) if firing is None else firing
+        n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
+        known = np.flatnonzero(firing.n_distinct)
+        center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))
+        mass = firing.second[known, 0, 0]
+        center[known] = firing.second[known, 0, 1:] / mass[:, None]
+        squares = firing.second[known, 1:, 1:] / mass[:, None, None]
+        factor[known] = inverse_factor(squares, center[known])
         radius = rows.reduce(
-            partial(_radii, antecedent=antecedent, known=known, center=center, factor=factor),
-            np.maximum,
+            partial(_radii, antecedent=antecedent, center=center, factor=factor), np.maximum
         )
-        return cls(distinct.counts / n_coefficients, center, factor, radius)
+        return cls(firing.n_distinct / n_coefficients, center, factor, radius)
 
     def change_units(self, offset, scale):
         """Return the same support for inputs given as offset + scale * z, per input."""
@@ -119,46 +122,104 @@ class RuleSupport:
         return found
 
 
+@dataclass(frozen=True, eq=False)
+class RuleFiring:
+    """How rules fire on a set of rows, in one pass over them.
+
+    Attributes
+    ----------
+    overlap : ndarray of shape (n_rules, n_rules)
+        Sums of s w_r w_q, s the rows' weights.
+    second : ndarray of shape (n_rules, 1 + n_inputs, 1 + n_inputs)
+        Sums of s w_r [1, z] [1, z]'.
+    strongest : ndarray of shape (n_rules,)
+        Weight of the rows on which each rule is the strongest.
+    peak : ndarray of shape (n_rules,)
+        Largest strength on any row.
+    n_distinct : ndarray of int of shape (n_rules,)
+        Distinct inputs on which each rule is the strongest, up to a limit.
+    """
+
+    overlap: np.ndarray
+    second: np.ndarray
+    strongest: np.ndarray
+    peak: np.ndarray
+    n_distinct: np.ndarray
+
+    @classmethod
+    def of(cls, rows: Rows, antecedent: Antecedent, enough: int):
+        """Of rows; distinct inputs are counted up to ``enough`` of each rule."""
+        overlap, products, strongest, peak, distinct = rows.reduce(
+            partial(_first_pass, antecedent=antecedent, enough=enough), _merge
+        )
+        return cls(overlap, _symmetric(products), strongest, peak, distinct.counts)
+
+
+def _symmetric(products):
+    """Sums of :func:`~skanfis.gram.pairs` of n functions as matrices, (n_rules, n, n)."""
+    n = int(np.sqrt(2 * products.shape[1]))
+    upper = np.triu_indices(n)
+    found = np.zeros((products.shape[0], n, n))
+    found[:, *upper] = products
+    found[:, upper[1], upper[0]] = products
+    return found
+
+
 def _first_pass(rows, antecedent, enough):
-    """Mass, sums of inputs and of their products by rule, and the distinct inputs."""
-    n_rules, n_inputs = antecedent.n_rules, rows.X.shape[1]
-    mass, first = np.zeros(n_rules), np.zeros((n_rules, n_inputs))
-    second = np.zeros((n_rules, n_inputs, n_inputs))
+    """What :class:`RuleFiring` holds, of the symmetric products each but once."""
+    n_rules, n_basis = antecedent.n_rules, 1 + rows.X.shape[1]
+    overlap, strongest, peak = np.zeros((n_rules, n_rules)), np.zeros(n_rules), np.zeros(n_rules)
+    products = np.zeros((n_rules, n_basis * (n_basis + 1) // 2))
     distinct = _DistinctInputs(n_rules, enough)
     for part in _blocks(rows, antecedent):
         Z, _, weight = rows.read(part)
         strengths = antecedent.strengths(Z)
-        distinct.add(Z, strengths.argmax(axis=0))
-        if weight is not None:
-            strengths *= weight
-        mass += strengths.sum(axis=1)
-        first += strengths @ Z.T
-        for of_rule, total in zip(strengths, second, strict=True):
-            total += (of_rule * Z) @ Z.T
-    return mass, first, second, distinct
+        best = strengths.argmax(axis=0)
+        distinct.add(Z, best)
+        strongest += np.bincount(best, weights=weight, minlength=n_rules)
+        np.maximum(peak, strengths.max(axis=1), out=peak)
+        weighted = strengths if weight is None else strengths * weight
+        overlap += weighted @ strengths.T
+        basis_rows = basis(Z)
+        products += weighted @ pairs(basis_rows, basis_rows).T
+    return overlap, products, strongest, peak, distinct
 
 
 def _merge(one, other):
     sums = [a + b for a, b in zip(one[:3], other[:3], strict=True)]
-    return *sums, one[3].joined(other[3])
+    return *sums, np.maximum(one[3], other[3]), one[4].joined(other[4])
 
 
-def _radii(rows, antecedent, known, center, factor):
-    """The largest distance at which each rule fires."""
-    radius = np.zeros(antecedent.n_rules)
+def _radii(rows, antecedent, center, factor):
+    """The largest distance at which each rule fires.
+
+    The farthest row of a block is found by quadratic forms in [1, z], one product for all rules,
+    and measured by the factor itself: what the product rounds away is not lost.
+    """
+    n_rules, n_inputs = center.shape
+    affine = np.concatenate([-factor @ center[:, :, None], factor], axis=2)
+    upper = np.triu_indices(1 + n_inputs)
+    forms = (affine.transpose(0, 2, 1) @ affine)[:, *upper]
+    forms[:, upper[0] != upper[1]] *= 2.0
+    radius, every = np.zeros(n_rules), np.arange(n_rules)
     for part in _blocks(rows, antecedent):
         Z, _, _ = rows.read(part)
         strengths = antecedent.strengths(Z)
         fires = strengths >= FIRES * strengths.max(axis=0)
-        for r in known[fires[known].any(axis=1)]:
-            away = factor[r] @ (Z[:, fires[r]] - center[r][:, None])
-            radius[r] = max(radius[r], np.sqrt(np.max(np.sum(away**2, axis=0))))
+        basis_rows = basis(Z)
+        squares = forms @ pairs(basis_rows, basis_rows)
+        squares *= fires
+        farthest = squares.argmax(axis=1)
+        away = np.einsum("rij,jr->ri", factor, Z[:, farthest] - center.T)
+        distance = np.linalg.norm(away, axis=1)
+        np.maximum(radius, distance, out=radius, where=fires[every, farthest])
     return radius
 
 
 def _blocks(rows, antecedent):
     """Slices of rows whose memberships and strengths take a bounded number of bytes."""
-    n_values = 3 * antecedent.n_rules + 3 * antecedent.n_terms + 4 * rows.X.shape[1]
+    n_basis = 1 + rows.X.shape[1]
+    n_values = 3 * (antecedent.n_rules + antecedent.n_terms) + n_basis * (n_basis + 9) // 2
     n_rows = int(np.clip(_BLOCK_BYTES // (8 * n_values), _FEWEST_ROWS, _MOST_ROWS))
     return [part for chunk in rows.chunks(n_rows) for part in chunk]
 

@@ -37,10 +37,10 @@ from ..structure import (
     imported_antecedent,
     report_constant,
 )
-from ..support import RuleSupport
+from ..support import RuleFiring, RuleSupport
 from .data import TrainingData
 from .progress import Callbacks, Printer, watch_all
-from .pruning import RuleStatistics, redundant_rules, rule_statistics
+from .pruning import redundant_rules, rule_statistics
 from .restarts import displaced_starts, leave_one_out_error
 from .robust import (
     MANY_ROWS,
@@ -129,8 +129,8 @@ def fit_rules(
         run, row_weights = fit.robust_run(fit.huber.epsilon)
         weights = data.spread_over_rows(row_weights, fit.trained_on)
     fit.warn_unless_converged(run)
-    statistics = rule_statistics(fit.rows, run.evaluation.antecedent)
-    model, result, kept = fit.frozen(run.start, run.evaluation, statistics), run.result, None
+    firing = fit.firing(run.evaluation)
+    model, result, kept = fit.frozen(run.start, run.evaluation, firing), run.result, None
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
     model = replace(model, posterior=fit.posterior(run, robust))
     if data.wishes is not None:
@@ -139,7 +139,7 @@ def fit_rules(
         model,
         result,
         run.start,
-        redundant_rules(statistics),
+        redundant_rules(rule_statistics(fit.rows, firing)),
         weights,
         run.validation_losses,
         kept,
@@ -341,15 +341,23 @@ class _Fit:
             ConvergenceWarning,
         )
 
+    @property
+    def n_coefficients(self):
+        """Of a rule: one, and a slope for every input that its consequent takes and that varies."""
+        return 1 + int(np.sum(~self.rows.inputs.is_constant[self.request.consequent_inputs]))
+
+    def firing(self, evaluation: Evaluation) -> RuleFiring:
+        """How the rules fire on the rows, in a pass over them."""
+        return RuleFiring.of(self.rows, evaluation.antecedent, self.n_coefficients)
+
     def frozen(
-        self, start: Start, evaluation: Evaluation, statistics: RuleStatistics | None = None
+        self, start: Start, evaluation: Evaluation, firing: RuleFiring | None = None
     ) -> TSKModel:
-        """The model in the user's units; ``statistics`` of its rules, if they are at hand."""
+        """The model in the user's units; ``firing`` is how its rules fire, if that is at hand."""
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
-        statistics = rule_statistics(rows, trained) if statistics is None else statistics
-        slopes = self.request.consequent_inputs
-        n_coefficients = 1 + int(np.sum(~rows.inputs.is_constant[slopes]))
+        firing = self.firing(evaluation) if firing is None else firing
+        support = RuleSupport.of(rows, trained, self.n_coefficients, firing)
         policy, limit = policy_of(self.estimator.out_of_bounds)
         return TSKModel(
             antecedent=trained.change_units(offset, scale),
@@ -360,11 +368,11 @@ class _Fit:
             minimum=rows.inputs.minimum,
             maximum=rows.inputs.maximum,
             rule_weights=evaluation.masses,
-            rule_rows=rows.n_rows * statistics.strongest,
+            rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
             input_names=self.data.input_names,
             out_of_bounds=policy,
             max_extrapolation=limit,
-            support=RuleSupport.of(rows, trained, n_coefficients).change_units(offset, scale),
+            support=support.change_units(offset, scale),
             term_names=start.term_names,
             output_names=self.data.output_names,
             target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
@@ -428,7 +436,8 @@ def _as_given(estimator, data, model) -> Fitted:
     answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
     residual = (data.y - answering.predict(data.X)) / rows.targets.scale
     loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
-    redundant = redundant_rules(rule_statistics(rows, imported_antecedent(model, rows)))
+    firing = RuleFiring.of(rows, imported_antecedent(model, rows), 0)
+    redundant = redundant_rules(rule_statistics(rows, firing))
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
     return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
 

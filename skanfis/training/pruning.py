@@ -11,14 +11,13 @@ the stronger one stays.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TermGroup
 from ..model import TSKModel
 from ..rows import Rows
-from ..support import RuleSupport
+from ..support import RuleFiring, RuleSupport
 
 __all__ = [
     "RuleStatistics",
@@ -28,8 +27,6 @@ __all__ = [
     "without_rules",
 ]
 
-# Rows of one block: strengths of some dozen rules stay in the processor's cache.
-_READ_ROWS = 4096
 # A strength that is nowhere above this: what the rule says moves no prediction by more than a
 # hundredth of its difference from the others.
 _NEVER = 0.01
@@ -47,27 +44,10 @@ class RuleStatistics:
     peak: np.ndarray  # largest strength of each rule on any row
 
 
-def rule_statistics(rows: Rows, antecedent: Antecedent) -> RuleStatistics:
-    """Statistics of every rule, in one pass over the rows."""
-    overlap, strongest, peak = rows.reduce(partial(_count, antecedent=antecedent), _merge)
-    return RuleStatistics(overlap / rows.total_weight, strongest / rows.total_weight, peak)
-
-
-def _merge(one, other):
-    return one[0] + other[0], one[1] + other[1], np.maximum(one[2], other[2])
-
-
-def _count(rows, antecedent):
-    n_rules = antecedent.n_rules
-    overlap, strongest, peak = np.zeros((n_rules, n_rules)), np.zeros(n_rules), np.zeros(n_rules)
-    for chunk in rows.chunks(_READ_ROWS):
-        for part in chunk:
-            Z, _, weight = rows.read(part)
-            strengths = antecedent.strengths(Z)
-            overlap += (strengths if weight is None else strengths * weight) @ strengths.T
-            strongest += np.bincount(strengths.argmax(axis=0), weights=weight, minlength=n_rules)
-            np.maximum(peak, strengths.max(axis=1), out=peak)
-    return overlap, strongest, peak
+def rule_statistics(rows: Rows, firing: RuleFiring) -> RuleStatistics:
+    """Statistics of every rule, out of how rules have fired on these rows."""
+    weight = rows.total_weight
+    return RuleStatistics(firing.overlap / weight, firing.strongest / weight, firing.peak)
 
 
 def redundant_rules(statistics: RuleStatistics):

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
+from skanfis.support import RuleFiring
 from skanfis.training.pruning import redundant_rules, rule_statistics, without_rules
 
 from .. import oracles
@@ -18,6 +19,10 @@ def scattered(centers, width=0.5):
     return ScatteredAntecedent.build(Gaussian, np.arange(centers.shape[1]), theta)
 
 
+def statistics(rows, antecedent):
+    return rule_statistics(rows, RuleFiring.of(rows, antecedent, 0))
+
+
 @pytest.mark.parametrize("weighted", [False, True])
 def test_statistics_are_those_of_the_dense_strengths(weighted):
     g = np.random.default_rng(0)
@@ -25,7 +30,7 @@ def test_statistics_are_those_of_the_dense_strengths(weighted):
     antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
     dense = oracles.DenseProblem(rows, antecedent, 1, 1.0)
     w = oracles.strengths(antecedent, antecedent.parameters, dense.Z)
-    found = rule_statistics(rows, antecedent)
+    found = statistics(rows, antecedent)
     assert_allclose(found.overlap, (w * dense.weight) @ w.T, rtol=1e-10)
     assert_allclose(found.peak, w.max(axis=1), rtol=1e-10)
     expected = [dense.weight[w.argmax(axis=0) == r].sum() for r in range(6)]
@@ -35,7 +40,7 @@ def test_statistics_are_those_of_the_dense_strengths(weighted):
 def test_rules_far_away_and_rules_alike_are_found():
     rows = oracles.bumpy_rows(np.random.default_rng(0), 300, 2)
     antecedent = scattered([[-1, 0], [1, 0], [1, 0], [40, 40]])
-    found = redundant_rules(rule_statistics(rows, antecedent))
+    found = redundant_rules(statistics(rows, antecedent))
     assert [entry["rule"] for entry in found] == [2, 3]
     assert [entry["reason"] for entry in found] == ["repeats rule 1", "never fires"]
     assert found[1]["weight"] < 1e-6
@@ -45,7 +50,7 @@ def test_rules_far_away_and_rules_alike_are_found():
 def test_sound_rules_are_left_alone():
     rows = oracles.bumpy_rows(np.random.default_rng(0), 300, 2)
     grid = oracles.random_grid(np.random.default_rng(0), [Gaussian] * 2, [3, 3])
-    assert redundant_rules(rule_statistics(rows, grid)) == []
+    assert redundant_rules(statistics(rows, grid)) == []
 
 
 @pytest.mark.parametrize("kind", ["grid", "scattered", "table"])
