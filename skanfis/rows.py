@@ -81,24 +81,26 @@ def column_statistics(values, sample_weight=None):
     """
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
     with np.errstate(over="ignore", invalid="ignore"):
-        origin, total, first = _first_pass(values, sample_weight, 0, minimum, maximum)
+        origin, total, first = _first_pass(values, sample_weight, np.zeros(1, dtype=int), minimum, maximum)
         exponents = np.frexp(np.maximum(np.abs(minimum), np.abs(maximum)))[1]
     shift = np.where(np.abs(exponents) > _FAR, -exponents, 0)
     if shift.any():
         origin, total, first = _first_pass(values, sample_weight, shift, minimum, maximum)
     low, high = np.ldexp(minimum, shift), np.ldexp(maximum, shift)
-    mean = origin + first / total
+    mean = (origin + first / total)[:, None]
     constant = minimum == maximum
     # Deviations count in parts of the range: their squares neither overflow nor vanish.
     span = np.where(constant, 1.0, high - low)
     second = np.zeros(values.shape[1])
     for part in _slices(values.shape[0], _READ_ROWS):
-        block = _shifted(values[part], shift)
-        weight = _weights_of(sample_weight, part, block.shape[0])
-        second += weight @ ((block - mean) / span) ** 2
+        block = _shifted(_columns(values, part), shift)
+        block -= mean
+        block /= span[:, None]
+        np.square(block, out=block)
+        second += _sum(block, sample_weight, part)
     scale = np.ldexp(span * np.sqrt(second / total), -shift)
     return Scale(
-        np.where(constant, minimum, np.ldexp(mean, -shift)),
+        np.where(constant, minimum, np.ldexp(mean[:, 0], -shift)),
         np.where(scale == 0.0, 1.0, scale),
         minimum,
         maximum,
@@ -111,21 +113,30 @@ def _first_pass(values, sample_weight, shift, minimum, maximum):
     All but the range, which is written to ``minimum`` and ``maximum``, is in shifted units.
     """
     # Differences, so that columns far from the origin lose no digits.
-    origin = _shifted(values[0], shift)
+    origin = _shifted(_columns(values, slice(1)), shift)
     total, first = 0.0, np.zeros(values.shape[1])
     for part in _slices(values.shape[0], _READ_ROWS):
-        block = np.asarray(values[part], dtype=float)
-        np.minimum(minimum, block.min(axis=0), out=minimum)
-        np.maximum(maximum, block.max(axis=0), out=maximum)
-        weight = _weights_of(sample_weight, part, block.shape[0])
-        total += weight.sum()
-        first += weight @ (_shifted(block, shift) - origin)
-    return origin, total, first
+        block = _columns(values, part)
+        np.minimum(minimum, block.min(axis=1), out=minimum)
+        np.maximum(maximum, block.max(axis=1), out=maximum)
+        total += float(block.shape[1] if sample_weight is None else sample_weight[part].sum())
+        block = _shifted(block, shift)
+        block -= origin
+        first += _sum(block, sample_weight, part)
+    return origin[:, 0], total, first
+
+
+def _columns(values, part):
+    """Some rows as columns of their own, which sums run along."""
+    return np.array(values[part].T, dtype=float, order="C")
 
 
 def _shifted(block, shift):
-    block = np.asarray(block, dtype=float)
-    return np.ldexp(block, shift) if np.any(shift) else block
+    return np.ldexp(block, shift[:, None]) if np.any(shift) else block
+
+
+def _sum(block, sample_weight, part):
+    return block.sum(axis=1) if sample_weight is None else block @ sample_weight[part]
 
 
 def check_scales(inputs, targets, input_names, output_names):
@@ -157,10 +168,6 @@ def check_scales(inputs, targets, input_names, output_names):
                     f"{input_names[j]!r} of X by {inputs.scale[j]:.3g}: floats hold no slope of "
                     "one by the other. Give one of them in another unit."
                 )
-
-
-def _weights_of(sample_weight, part, n_rows):
-    return np.ones(n_rows) if sample_weight is None else sample_weight[part]
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,9 @@ __all__ = ["Fitted", "SolverRun", "fit_rules"]
 # Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
 # what is left to do is done on all rows.
 _THOROUGH = 0.1
+# The way there begins on a part of the sample, an iteration of which costs as much less; but no
+# fewer rows than so many per consequent.
+_PART_OF_SAMPLE, _ROWS_EACH = 4, 20
 # Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
 # them, and what has not after these goes to and fro.
 _MOST_TURNS = 20
@@ -232,10 +235,7 @@ class _Fit:
         settings = {"max_iter": estimator.max_iter, "stiffness": start.penalty.stiffness}
         if rows.sample is not None:
             if isinstance(self.solver, VariableProjection):
-                # Unwatched: what is left to do on all rows is a step or two.
-                thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
-                found = thorough.solve(problem, premise, start=displacement, **settings)
-                displacement = premise.displacement(found.evaluation.antecedent.parameters)
+                displacement = self.on_sample(rows.sample, problem, premise, displacement, settings)
             problem = problem.on_all(rows)
         result = self.solver.solve(
             problem,
@@ -248,6 +248,30 @@ class _Fit:
             return SolverRun(start, problem, premise, result)
         result = validation.restored(result)
         return SolverRun(start, problem, premise, result, tuple(validation.losses))
+
+    def on_sample(self, sample, problem, premise, displacement, settings):
+        """Where the premises come to rest on a sample, by way of a part of it.
+
+        Unwatched: what is left to do on all rows is a step or two.
+        """
+        thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
+        few = max(sample.n_rows // _PART_OF_SAMPLE, _ROWS_EACH * problem.n_columns)
+        stages = [(thorough, problem)]
+        if 2 * few <= sample.n_rows:
+            # The first rows of a sample are a sample.
+            part = SeparableProblem(
+                sample.part(slice(few)),
+                problem.antecedent,
+                problem.order,
+                problem.penalty,
+                self.map_ordered,
+                self.request.consequent_inputs,
+            )
+            stages.insert(0, (thorough, part))
+        for solver, one in stages:
+            found = solver.solve(one, premise, start=displacement, **settings)
+            displacement = premise.displacement(found.evaluation.antecedent.parameters)
+        return displacement
 
     def problem(self, rows: Rows, start: Start) -> SeparableProblem:
         """The least-squares problem at a start."""
