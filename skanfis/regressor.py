@@ -11,6 +11,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
 from ._callers import is_silent, pipelines_above
+from ._memory import keeps_freed_memory
 from ._notebook import RulesReprMixin
 from ._sklearn import (
     CallbackSupportMixin,
@@ -421,7 +422,7 @@ class ANFISRegressor(
                 metadata = None if sample_weight is None else {"sample_weight": sample_weight}
                 callbacks = Callbacks(self, context, {"X": X, "y": y, "metadata": metadata})
                 callbacks.begin()
-            with one_blas_thread():
+            with one_blas_thread(), keeps_freed_memory():
                 fitted = fit_rules(self, data, request, callbacks)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
@@ -640,7 +641,8 @@ class ANFISRegressor(
         return self.predict(X, return_std=True)[1]
 
     def _readability(self, data):
-        return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+        with keeps_freed_memory():
+            return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
 
     def _fitted_model(self) -> TSKModel:
         check_is_fitted(self)

@@ -44,6 +44,7 @@ TABLE = {
     "_callers": ([], LEARNING),
     "_validation": (["_sklearn", "_callers"], LEARNING),
     "_threads": ([], LEARNING),
+    "_memory": ([], []),
     "options": (["_sklearn", "policies"], LEARNING),
     "solvers": ([*KERNEL, "_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
@@ -61,6 +62,7 @@ TABLE = {
     "streaming": (
         [
             *KERNEL,
+            "_memory",
             "_sklearn",
             "_validation",
             "options",
@@ -77,6 +79,7 @@ TABLE = {
             *KERNEL,
             "_sklearn",
             "_threads",
+            "_memory",
             "_callers",
             "_validation",
             "_notebook",
@@ -114,7 +117,7 @@ TABLE = {
         [*NUMERIC, "sklearn", "pandas", "onnx", "skl2onnx"],
     ),
     "dask": (
-        [*KERNEL, "_validation", "constraints", "options", "readable", "regressor"],
+        [*KERNEL, "_memory", "_validation", "constraints", "options", "readable", "regressor"],
         [*NUMERIC, "sklearn", "pandas", "dask"],
     ),
     "_notebook": (["inspection"], []),
@@ -144,6 +147,7 @@ SHARED = {
     "_validation": "checks and warnings in one voice, by parameters and columns that it knows",
     "_callers": "reads the frames of the calls above, which no user should rely on",
     "_threads": "counts the fits that hold BLAS to one thread, which works only if all do",
+    "_memory": "sets limits of the process's malloc, and counts who needs them set",
     "_notebook": "overrides private methods of scikit-learn's representation",
 }
 

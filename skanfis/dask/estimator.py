@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
+from .._memory import keeps_freed_memory
 from ..constraints.wishes import Wishes
 from ..options import policy_of
 from ..readable import Readability, TargetScale, rule_sums
@@ -304,7 +305,8 @@ def _add(one, other):
 def _apply(block, model, method, columns, name):
     """A method of the model on a block, as a frame where the block is one."""
     if len(block):
-        values = getattr(model, method)(block)
+        with keeps_freed_memory():
+            values = getattr(model, method)(block)
     else:
         values = np.empty((0, len(columns)) if columns else 0)
     return _as_frame(values, columns, name, block.index) if hasattr(block, "index") else values

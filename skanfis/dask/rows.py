@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from .._memory import keeps_freed_memory
 from ..constraints.wishes import Wishes
 from ..rows import Rows, Scale, check_scales
 from .blocks import Blocks, Described, describe, joined
@@ -38,7 +39,8 @@ def _apply(number, X, y, sample_weight, groups, common):
     blocks, of_loaded = common
     loaded = blocks.load(number, X, y, sample_weight, groups)
     try:
-        return of_loaded(loaded)
+        with keeps_freed_memory():
+            return of_loaded(loaded)
     except ValueError as error:
         raise ValueError(f"Partition {number}: {error}") from error
 

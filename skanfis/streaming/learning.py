@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.metaestimators import available_if
 
+from .._memory import keeps_freed_memory
 from .._sklearn import fit_context
 from ..model import TSKModel
 from ..options import policy_of
@@ -115,7 +116,8 @@ class LearnsFromChunksMixin:
         """
         before = self.__dict__.copy()
         try:
-            self._take_in(X, y, sample_weight, forgetting)
+            with keeps_freed_memory():
+                self._take_in(X, y, sample_weight, forgetting)
         except BaseException:
             self.__dict__ = before
             raise
