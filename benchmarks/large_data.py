@@ -1,11 +1,15 @@
 """Many rows: a million in one process; on a cluster of two processes, Parquet larger than memory.
 
 Times of one process are its processor time; passes on the cluster are wall time, which on a machine
-with other work says little, and the workers' processor time beside it.
+with other work says little, and the workers' processor time beside it. The files take
+34 bytes a row of the folder for temporary files.
 """
 
+import os
 import pickle
+import sys
 import tempfile
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time
@@ -30,6 +34,7 @@ _NOISE = 0.1
 _FILE_ROWS = 500_000
 _MEMORY = "1GB"
 _NAMES = ["x0", "x1", "x2"]
+_FIGURE = Path(__file__).parents[1] / "docs" / "images" / "large_data.png"
 
 
 def surface(X):
@@ -81,17 +86,57 @@ def pass_in_fit():
 
 
 def write_files(folder, n_rows):
-    """Parquet, a file per partition."""
+    """Parquet, a file per partition, each of a seed of its own; the files in order."""
     import pandas as pd
 
+    files = []
     for number, start in enumerate(range(0, n_rows, _FILE_ROWS)):
-        X, y = noisy_rows(min(_FILE_ROWS, n_rows - start), seed=number)
-        table = pd.DataFrame(X, columns=_NAMES).assign(y=y)
-        table.to_parquet(Path(folder) / f"{number:05d}.parquet")
+        files.append(Path(folder) / f"{number:05d}.parquet")
+        if not files[-1].exists():
+            X, y = noisy_rows(min(_FILE_ROWS, n_rows - start), seed=number)
+            pd.DataFrame(X, columns=_NAMES).assign(y=y).to_parquet(files[-1])
+    return files
 
 
-def on_cluster(folder, n_workers):
-    """Passes of a fit (name, seconds, bytes there and back), times, peaks in MB, and the error."""
+@dataclass(frozen=True)
+class Pass:
+    """One pass over the rows: seconds by the clock and of the workers' processors, bytes."""
+
+    name: str
+    wall: float
+    cpu: float
+    to_workers: int
+    to_client: int
+
+
+@dataclass(frozen=True)
+class OnCluster:
+    """A fit on a cluster."""
+
+    n_rows: int
+    n_workers: int
+    passes: list[Pass]
+    wall: float
+    cpu: float
+    client_cpu: float
+    worker_peak: float  # MB
+    client_peak: float
+    off: float
+    load: float  # of the machine, processes that run or wait, on average
+
+    @property
+    def pass_cpu(self):
+        """Processor seconds of the workers in passes, per million rows."""
+        return sum(one.cpu for one in self.passes) / self.n_rows * 1e6
+
+    @property
+    def pass_wall(self):
+        """Seconds by the clock in passes, per million rows."""
+        return sum(one.wall for one in self.passes) / self.n_rows * 1e6
+
+
+def on_cluster(files, n_workers):
+    """A fit to files by so many worker processes."""
     import dask.dataframe as dd
     from distributed import Client, LocalCluster
 
@@ -100,12 +145,15 @@ def on_cluster(folder, n_workers):
     passes, whole = [], rows.reduce_blocks
 
     def recorded(blocks, of_loaded, merge):
-        start = perf_counter()
+        start, spent = perf_counter(), worker_time()
         result = whole(blocks, of_loaded, merge)
+        wall, cpu = perf_counter() - start, worker_time() - spent
         there = n_workers * len(pickle.dumps((blocks.without_pieces(), of_loaded)))
-        back = len(pickle.dumps(result))
-        passes.append([_name(of_loaded), perf_counter() - start, there, back])
+        passes.append(Pass(_name(of_loaded), wall, cpu, there, len(pickle.dumps(result))))
         return result
+
+    def worker_time():
+        return sum(client.run(process_time).values())
 
     options = {"threads_per_worker": 1, "memory_limit": _MEMORY, "dashboard_address": ":0"}
     with (
@@ -113,20 +161,27 @@ def on_cluster(folder, n_workers):
         Client(cluster) as client,
         patch.object(rows, "reduce_blocks", recorded),
     ):
-        client.run(_import_all)
-        before = sum(client.run(process_time).values())
-        table = dd.read_parquet(folder)
-        start = perf_counter()
+        # What is imported once is not counted.
+        client.run(_read_one, files[0])
+        table = dd.read_parquet(files)
+        start, spent, own = perf_counter(), worker_time(), process_time()
         model = DaskANFISRegressor(n_mfs=_N_MFS).fit(table[_NAMES], table["y"])
-        seconds = perf_counter() - start
-        cpu = sum(client.run(process_time).values()) - before
+        wall, cpu, own = perf_counter() - start, worker_time() - spent, process_time() - own
         workers = max(client.run(partial(status, "VmHWM")).values()) * 1024 / 1e6
-    client_peak = status("VmHWM") * 1024 / 1e6
-    return passes, seconds, cpu, workers, client_peak, off_the_truth(model)
+        load = os.getloadavg()[1]
+    peak = status("VmHWM") * 1024 / 1e6
+    n_rows = int(model.readability_.measures.weight)
+    off = off_the_truth(model)
+    return OnCluster(n_rows, n_workers, passes, wall, cpu, own, workers, peak, off, load)
 
 
-def _import_all():
+def _read_one(path):
+    import dask.dataframe  # noqa: F401
+    import pandas as pd
+
     import skanfis.dask  # noqa: F401
+
+    pd.read_parquet(path)
 
 
 def _name(of_loaded):
@@ -137,39 +192,81 @@ def _name(of_loaded):
     what = {
         "describe": "describe: scales, checks",
         "_draw": "sample",
-        "_count": "how rules fire",
-        "_first_pass": "support: where the data of each rule lie",
+        "_first_pass": "how rules fire, where their data lie",
         "_radii": "support: radii",
         "rule_sums": "readability",
     }
     return type(one_pass).__name__ if one_pass is not None else what.get(name, name)
 
 
-def cluster(n_rows):
-    """Tables: one fit pass by pass, and fits of growing numbers of rows."""
-    summary, detail = [], None
-    sizes = [n for n in (n_rows // 100, n_rows // 10, n_rows) if n > sampling.MANY_ROWS]
-    with tempfile.TemporaryDirectory() as folder:
-        for n in sizes:
-            own = Path(folder) / str(n)
-            own.mkdir()
-            write_files(own, n)
-            for n_workers in (1, 2) if n == n_rows or n <= 10_000_000 else (2,):
-                passes, *figures = alone(on_cluster, str(own), n_workers)
-                summary.append(
-                    [f"{n:,}", n_workers, *figures[:2], figures[1] / n * 1e6, *figures[2:]]
-                )
-                detail = passes
-    head = ["rows", "workers", "wall [s]", "workers' CPU [s]", "CPU per million rows [s]"]
+def cluster(n_rows, folder, figure):
+    """Tables and a picture: fits of growing numbers of rows, and the largest pass by pass."""
+    sizes = (n_rows // 100, n_rows // 10, n_rows * 3 // 10, n_rows)
+    files = write_files(folder, n_rows)
+    fits = []
+    for n in (n for n in sizes if n > sampling.MANY_ROWS):
+        for n_workers in (1, 2):
+            # By one worker alone, the largest take too long.
+            if n_workers == 2 or n <= 10_000_000:
+                own = list(map(str, files[: -(-n // _FILE_ROWS)]))
+                fits.append(alone(on_cluster, own, n_workers))
+                print(_summary(fits[-1]), file=sys.stderr, flush=True)
+    draw(fits, figure)
+    head = ["rows", "workers", "wall [s]", "load", "workers' CPU [s]", "client's CPU [s]"]
+    head += ["CPU of passes, per million rows [s]", "wall of passes, per million rows [s]"]
     head += ["worker's peak [MB]", "client's peak [MB]", "off the truth (noise 0.1)"]
+    per_million = 1e6 / fits[-1].n_rows
+    by_pass = [
+        [one.name, one.wall, one.cpu, one.cpu * per_million, one.to_workers, one.to_client]
+        for one in fits[-1].passes
+    ]
+    spent = ["wall [s]", "workers' CPU [s]", "per million rows [s]"]
     return [
-        Table(f"A fit on a cluster: Parquet, workers of {_MEMORY}, 27 rules", head, summary),
         Table(
-            f"Its passes over {n_rows:,} rows, two workers",
-            ["pass", "wall [s]", "sent to workers [bytes]", "sent to client [bytes]"],
-            detail,
+            f"A fit on a cluster: Parquet, workers of {_MEMORY}, 27 rules",
+            head,
+            [_summary(one) for one in fits],
+        ),
+        Table(
+            f"Its passes over {fits[-1].n_rows:,} rows, two workers",
+            ["pass", *spent, "sent to workers [bytes]", "sent to client [bytes]"],
+            by_pass,
         ),
     ]
+
+
+def _summary(fit):
+    """A line of the table."""
+    line = [f"{fit.n_rows:,}", fit.n_workers, fit.wall, fit.load, fit.cpu, fit.client_cpu]
+    line += [fit.pass_cpu, fit.pass_wall]
+    return [*line, fit.worker_peak, fit.client_peak, fit.off]
+
+
+def draw(fits, path):
+    """Cost against rows, to a file."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    ax = figure.subplots()
+    for n_workers, marker, color in ((1, "s", "0.55"), (2, "o", "C0")):
+        own = [fit for fit in fits if fit.n_workers == n_workers]
+        x, y = [fit.n_rows for fit in own], [fit.cpu for fit in own]
+        label = f"{n_workers} worker{'s' if n_workers > 1 else ''}"
+        ax.loglog(x, y, marker, color=color, label=label, mfc="none" if n_workers == 1 else None)
+    largest = fits[-1]
+    ends = np.array([min(fit.n_rows for fit in fits) / 2.0, largest.n_rows * 2.0])
+    ax.loglog(
+        ends,
+        ends * largest.pass_cpu / 1e6,
+        "-",
+        color="0.8",
+        zorder=0,
+        label=f"{largest.pass_cpu:.1f} s per million rows",
+    )
+    ax.set(xlabel="rows", ylabel="processor time of all workers [s]")
+    ax.set_title("A fit of 27 rules on three inputs: cost against rows")
+    ax.legend()
+    figure.savefig(path, dpi=110)
 
 
 def run(options):
@@ -201,4 +298,7 @@ def run(options):
             "Pass inside a fit", ["pass", "in products"], [list(item) for item in ratios.items()]
         ),
     ]
-    return Results(rows, tables + (cluster(options.rows) if options.rows else []))
+    if options.rows:
+        with tempfile.TemporaryDirectory() as folder:
+            tables += cluster(options.rows, folder, _FIGURE)
+    return Results(rows, tables)

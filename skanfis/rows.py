@@ -81,7 +81,9 @@ def column_statistics(values, sample_weight=None):
     """
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
     with np.errstate(over="ignore", invalid="ignore"):
-        origin, total, first = _first_pass(values, sample_weight, np.zeros(1, dtype=int), minimum, maximum)
+        origin, total, first = _first_pass(
+            values, sample_weight, np.zeros(1, dtype=int), minimum, maximum
+        )
         exponents = np.frexp(np.maximum(np.abs(minimum), np.abs(maximum)))[1]
     shift = np.where(np.abs(exponents) > _FAR, -exponents, 0)
     if shift.any():

@@ -276,7 +276,9 @@ class DaskANFISRegressor(ANFISRegressor):
         target = TargetScale(
             rows.total_weight, scale.offset, scale.scale, scale.minimum, scale.maximum
         )
-        sums = rows.reduce(partial(rule_sums, model=model, target=target), _joined)
+        # Nothing is asked of the posterior, which is most of a model's bytes.
+        sent = replace(model, posterior=None)
+        sums = rows.reduce(partial(rule_sums, model=sent, target=target), _joined)
         return Readability(model, sums.measures())
 
 
