@@ -36,6 +36,7 @@ from .asked import (
 from .information import Information
 from .merging import check_same_premises, stream_of
 from .stream import Stream
+from .window import check_window, latest_rows
 
 __all__ = ["LearnsFromChunksMixin"]
 
@@ -58,6 +59,7 @@ class LearnsFromChunksMixin:
         sample_weight: ArrayLike | None = None,
         *,
         forgetting: float = 1.0,
+        window: int | None = None,
     ) -> Self:
         r"""Learn from a chunk of rows, going on from those before; premises stay.
 
@@ -78,6 +80,12 @@ class LearnsFromChunksMixin:
             Above 0 and at most 1: with every row that has weight, the weights of all rows before it
             are multiplied by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count.
             The box, coverage, and what has ever been seen do not forget.
+        window : int, default=None
+            2 or more: only the last so many rows with weight count, of this call and those before;
+            they are kept, in the model and its pickle. The model, its box and coverage are then
+            those of ``fit`` with ``solver="lse"`` on these rows, at the same premises. To be given
+            from the first call on, and not beside ``forgetting``. None keeps sums alone, and
+            forgets no row.
 
         Returns
         -------
@@ -87,7 +95,8 @@ class LearnsFromChunksMixin:
         ------
         ValueError
             If the data are empty or not finite, or have other columns than those before; if
-            ``forgetting`` is out of its range; if the first call has a single row but must find the
+            ``forgetting`` or ``window`` is out of its range, both are given, or ``window`` only
+            after rows were taken in without it; if the first call has a single row but must find the
             structure; if what that depends on has been changed since the first call.
         AttributeError
             If ``loss``, ``early_stopping`` or constraints ask for what needs all rows again.
@@ -117,15 +126,16 @@ class LearnsFromChunksMixin:
         before = self.__dict__.copy()
         try:
             with keeps_freed_memory():
-                self._take_in(X, y, sample_weight, forgetting)
+                self._take_in(X, y, sample_weight, forgetting, window)
         except BaseException:
             self.__dict__ = before
             raise
         return self
 
-    def _take_in(self, X, y, sample_weight, forgetting):
+    def _take_in(self, X, y, sample_weight, forgetting, window):
         """Add a chunk, or make the first one."""
         forgetting = check_forgetting(forgetting)
+        check_window(window, forgetting)
         check_settings(self)
         base, stream = getattr(self, "model_", None), getattr(self, "_stream", None)
         single_output = getattr(self, "_single_output", None)
@@ -134,19 +144,25 @@ class LearnsFromChunksMixin:
         if base is not None:
             self._single_output = single_output
             check_outputs(base, data.y.shape[1], data.output_names)
+        before, rows = getattr(self, "_window", None), (data.X, data.y, weight)
+        kept = latest_rows(before, stream is not None, *rows, window)
         if stream is None:
-            stream = self._first_chunk(X, y, data, weight)
+            stream = self._first_chunk(X, y, data, weight, kept)
         else:
             if data.X.shape[0] == 0:
                 return
-            chunk = stream.chunk(data.X, data.y, weight)
-            stream = stream.faded(forgetting ** data.X.shape[0]).plus(chunk)
+            if kept is None:
+                chunk = stream.chunk(*rows)
+                stream = stream.faded(forgetting ** data.X.shape[0]).plus(chunk)
+            else:
+                stream = stream.anew(*kept.rows)
             self._learn_from(stream)
-            self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
-        self._stream, self.n_samples_seen_ = stream, stream.n_rows
+            self.readability_ = readability_of_rows(self.model_, *rows)
+        self._stream, self._window = stream, kept
+        self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + data.X.shape[0]
 
-    def _first_chunk(self, X, y, data, weight):
-        """The stream of a first chunk, whose model is learnt."""
+    def _first_chunk(self, X, y, data, weight, kept):
+        """The stream of a first chunk, or of the rows of it that are kept; its model is learnt."""
         check_first_chunk(self, data.X.shape[0])
         request = structure_request(self, data.input_names)
         after_fit = hasattr(self, "model_")
@@ -162,7 +178,8 @@ class LearnsFromChunksMixin:
             check_finds_structure(data.X.shape[0])
             self.fit(X, y, data.spread_weights(weight))
             base = self.model_
-        stream = Stream.of(base, request.consequent_inputs, data.X, data.y, weight)
+        rows = (data.X, data.y, weight) if kept is None else kept.rows
+        stream = Stream.of(base, request.consequent_inputs, *rows)
         self._stream_settings = structure_settings(self)
         if holds:
             self.stiffness_, self.structures_ = 0.0, []
@@ -172,6 +189,8 @@ class LearnsFromChunksMixin:
             self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
         else:
             stream = stream.starting_from(self.agreement_, self.alpha_, self.slope_alpha_)
+            if stream.n_rows < data.X.shape[0]:
+                self._learn_from(stream)
         return stream
 
     def _learn_from(self, stream):
@@ -190,7 +209,7 @@ class LearnsFromChunksMixin:
 
     def _forget_chunks(self):
         """Nothing is left of rows that came in chunks."""
-        for name in ("_stream", "_stream_settings", "n_samples_seen_"):
+        for name in ("_stream", "_stream_settings", "_window", "n_samples_seen_"):
             self.__dict__.pop(name, None)
 
     def merge(self, *others: Any) -> Self:
@@ -207,6 +226,7 @@ class LearnsFromChunksMixin:
         merged : ANFISRegressor
             With the parameters of this one, as after ``partial_fit`` with all rows. The models stay
             as they are. ``readability_`` it has after its next ``partial_fit``: it is of rows.
+            Of models with a window the rows in it are added, and do not leave any more.
 
         Raises
         ------
@@ -235,7 +255,8 @@ class LearnsFromChunksMixin:
         merged = copy(self)
         merged.__dict__.pop("readability_", None)
         merged._learn_from(stream)
-        merged._stream, merged.n_samples_seen_ = stream, stream.n_rows
+        merged._stream, merged._window = stream, None
+        merged.n_samples_seen_ = sum(model.n_samples_seen_ for model in models)
         return merged
 
     @property

@@ -127,6 +127,11 @@ class Stream:
         own = self.moments.consequent_inputs
         return Stream.of(self.base, own, X, y, sample_weight, self.farthest)
 
+    def anew(self, X, y, sample_weight=None):
+        """The stream of other rows in place of these, whose weights are sought from as before."""
+        fresh = Stream.of(self.base, self.moments.consequent_inputs, X, y, sample_weight)
+        return replace(fresh, first=self.first, first_rows=self.first_rows, is_free=self.is_free)
+
     def faded(self, factor):
         """The same rows with all weights times a factor."""
         if factor == 1.0:

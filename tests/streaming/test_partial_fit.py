@@ -113,6 +113,75 @@ def test_forgetting_is_a_fit_with_fading_weights(premises):
     assert model.noise_std_ > 0.0
 
 
+@pytest.mark.parametrize("kind", ["given", "weighted", "auto"])
+def test_window_is_a_fit_of_its_rows(premises, kind):
+    X, y = surface()
+    # What leaves is far larger than what stays, and of other scales: nothing of it may be left.
+    X[:120, 0] *= 3.0
+    y[:120] *= 1e9
+    settings = {"partition": premises, "solver": "lse"}
+    if kind != "auto":
+        settings |= {"agreement": 0.01, "alpha": 0.01}
+    weight = np.linspace(1.0, 2.0, 300) if kind == "weighted" else None
+    latest = None if weight is None else weight[-170:]
+    whole = ANFISRegressor(**settings).fit(X[-170:], y[-170:], latest)
+    for sizes in ([300], [1] * 20 + [280], [100, 30, 150, 20]):
+        model = in_chunks(ANFISRegressor(**settings), X, y, sizes, weight, window=170)
+        assert difference(model, whole, X[-170:]) < EXACT
+        for name in ("minimum", "maximum", "spread", "rule_rows", "output_limits"):
+            found, expected = getattr(model.model_, name), getattr(whole.model_, name)
+            assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
+        found, expected = model.model_.support.radius, whole.model_.support.radius
+        assert np.all(found >= 0.9 * expected)
+        assert np.all(found <= expected * (1.0 + 1e-9))
+        assert model.n_samples_seen_ == 300
+
+
+def test_window_may_change_and_its_memory_does_not_grow(premises):
+    X, y = surface()
+    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
+    model, sizes = ANFISRegressor(**settings), []
+    for start in range(0, 300, 50):
+        model.partial_fit(X[start : start + 50], y[start : start + 50], window=80)
+        sizes.append(len(pickle.dumps(model)))
+    assert max(sizes[2:]) < 1.1 * sizes[1]
+    model = pickle.loads(pickle.dumps(model)).partial_fit(X[:10], y[:10], window=60)
+    rows = np.r_[250:300, :10]
+    assert difference(model, ANFISRegressor(**settings).fit(X[rows], y[rows]), X[rows]) < EXACT
+    # Without a window nothing leaves any more; the rows in it go along to a merge.
+    other = ANFISRegressor(**settings).partial_fit(X[30:60], y[30:60])
+    rows = np.r_[rows, 10:60]
+    expected = ANFISRegressor(**settings).fit(X[rows], y[rows])
+    merged = model.partial_fit(X[10:30], y[10:30]).merge(other)
+    assert difference(merged, expected, X[rows]) < EXACT
+    with pytest.raises(ValueError, match="sums that no row can leave"):
+        merged.partial_fit(X, y, window=60)
+
+
+def test_window_after_a_first_call_that_is_a_fit():
+    X, y = surface()
+    model = ANFISRegressor(n_mfs=2).partial_fit(X, y, window=100)
+    settings = {"agreement": model.agreement_, "alpha": model.alpha_}
+    held = ANFISRegressor(partition=model, solver="lse", **settings)
+    # The slope's weight is found beside these.
+    assert difference(model, held.fit(X[200:], y[200:]), X[200:]) < 0.02
+    assert model.model_.minimum == pytest.approx(X[200:].min(axis=0))
+    assert model.n_samples_seen_ == 300
+
+
+@pytest.mark.parametrize("window", [1, 0, -5, 10.0, True, "10"])
+def test_window_out_of_range(premises, window):
+    X, y = surface()
+    with pytest.raises(ValueError, match="window=.* must be a whole number of 2 or more"):
+        ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y, window=window)
+
+
+def test_window_beside_forgetting_is_refused(premises):
+    X, y = surface()
+    with pytest.raises(ValueError, match="two ways to let old rows go"):
+        ANFISRegressor(partition=premises).partial_fit(X, y, window=50, forgetting=0.9)
+
+
 def test_drift_of_inputs_costs_no_digits(premises):
     """The first chunk lies a million of its own deviations from the rest."""
     X, y = surface()
