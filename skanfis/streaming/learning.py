@@ -96,8 +96,8 @@ class LearnsFromChunksMixin:
         ValueError
             If the data are empty or not finite, or have other columns than those before; if
             ``forgetting`` or ``window`` is out of its range, both are given, or ``window`` only
-            after rows were taken in without it; if the first call has a single row but must find the
-            structure; if what that depends on has been changed since the first call.
+            after rows were taken in without it; if the first call has a single row but must find
+            the structure; if what that depends on has been changed since the first call.
         AttributeError
             If ``loss``, ``early_stopping`` or constraints ask for what needs all rows again.
 

@@ -1,7 +1,7 @@
 """The latest rows, kept as they are: sums that old rows leave are taken anew of those that stay.
 
-To subtract what leaves from the sums would lose digits, all of them where rows that were large leave
-small ones behind; and blocks of sums that are dropped whole would tie the window to how rows were
+To subtract what leaves from the sums would lose digits, all of them where large rows leave small
+ones behind; and blocks of sums that are dropped whole would tie the window to how rows were
 divided into calls. A pass over the rows of the window does neither, in memory that does not grow.
 """
 
@@ -35,10 +35,8 @@ class Window:
             weight = np.concatenate(
                 [_ones(self.sample_weight, self.X)[old], _ones(sample_weight, X)[new]]
             )
-        joined = (
-            np.concatenate([mine[old], more[new]]) for mine, more in ((self.X, X), (self.y, y))
-        )
-        return Window(*joined, weight)
+        inputs = np.concatenate([self.X[old], X[new]])
+        return Window(inputs, np.concatenate([self.y[old], y[new]]), weight)
 
 
 def _ones(sample_weight, X):

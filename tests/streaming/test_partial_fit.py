@@ -172,7 +172,7 @@ def test_window_after_a_first_call_that_is_a_fit():
 @pytest.mark.parametrize("window", [1, 0, -5, 10.0, True, "10"])
 def test_window_out_of_range(premises, window):
     X, y = surface()
-    with pytest.raises(ValueError, match="window=.* must be a whole number of 2 or more"):
+    with pytest.raises(ValueError, match=r"window=.* must be a whole number of 2 or more"):
         ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y, window=window)
 
 
