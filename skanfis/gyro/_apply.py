@@ -4,13 +4,14 @@ from pathlib import Path
 
 import joblib
 import numpy as np
+import pandas as pd
 
 from ..export.c.status import STATUS
-from ._checks import check_log
 from ._console import UsageError, refuse_existing, say
 from ._files import check_different, find_logs
-from ._logs import read_for
+from ._logs import request_of
 from ._staging import Staging
+from ._stream import LogStream, rows_before
 from ._units import SIGNALS
 from .compensator import GyroCompensator
 from .errors import LogError
@@ -29,41 +30,107 @@ def apply(options, tell):
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
+    if options.average is not None:
+        needed.add("time")
     check_different(paths)
     summary = _Summary(target)
     with Staging(target.parent) as staging:
         with open(staging.path / target.name, "w", encoding="utf-8", newline="") as file:
             for number, path in enumerate(paths, start=1):
-                # One file at a time: memory does not grow with their number.
-                log = _read(path, options, sorted(needed), compensator, tell)
-                if len(paths) > 1 and "run" not in log:
-                    log["run"] = Path(path).stem
+                stream = _open(path, options, sorted(needed), compensator, tell)
                 tell(f"compensating {path} ({number} of {len(paths)})")
-                compensated = compensator.apply(log)
-                summary.add(log, compensated)
-                labels = [name for name in ("device", "run", "time") if name in log]
-                table = log[labels].join(compensated)
-                # Twelve digits are beyond any gyro, and short beside the seventeen of a double.
-                table.to_csv(file, index=False, header=number == 1, float_format="%.12g")
+                carried = _Carried(compensator)
+                for log in stream.pieces():
+                    if len(paths) > 1 and "run" not in log:
+                        log["run"] = Path(path).stem
+                    compensated = carried.apply(log)
+                    labels = [name for name in ("device", "run", "time") if name in log]
+                    table = log[labels].join(compensated)
+                    # Twelve digits are beyond any gyro, and short beside the 17 of a double.
+                    is_first = summary.n_rows == 0
+                    table.to_csv(file, index=False, header=is_first, float_format="%.12g")
+                    summary.add(log, compensated)
         tell(f"writing {target}")
         staging.publish()
     say(summary.lines())
     tell("done")
 
 
-def _read(path, options, needed, compensator, tell):
-    reading = read_for(options, [path], needed, tell)
-    unit, due = reading.units["output"], compensator.output_unit
+def _open(path, options, needed, compensator, tell):
+    """The log of one file, checked: read once, piece by piece, and to be read again."""
+    try:
+        request = request_of(options, needed)
+        stream = LogStream(path, request, options.max_gap, options.device)
+    except LogError:
+        raise
+    except ValueError as error:
+        # Signs that do not go together.
+        raise UsageError(str(error)) from error
+    unit, due = stream.units["output"], compensator.output_unit
     if (unit if unit in SIGNALS else "deg/s") != due:
         raise UsageError(
             f"the model was calibrated for an output in {due}; this is in {unit} "
             f"(--units output={due})."
         )
-    try:
-        check_log(reading.log, units=reading.units, inputs=())
-    except LogError as error:
-        raise reading.located(error) from error
-    return reading.log
+    for note in stream.scan(tell):
+        tell(f"note: {note}")
+    tell(f"{stream.n_rows:,} rows")
+    return stream
+
+
+class _Carried:
+    """A compensator over the pieces of a log, whose runs go on from one piece to the next.
+
+    A run that goes on begins with two rows made up: the second is its last one, and between them
+    the temperature rises by what leaves the low-pass at the rate that it had there.
+    """
+
+    def __init__(self, compensator):
+        self._compensator = compensator
+        self._state: dict = {}  # by run: first time, last time, temperature and its rate there
+
+    def apply(self, log):
+        """Compensate the next rows."""
+        compensator = self._compensator
+        if not {"time", "temperature_rate"} & set(compensator.inputs):
+            return compensator.apply(log)
+        runs = log["run"].astype(object) if "run" in log else pd.Series(None, log.index, object)
+        known = [run for run in runs.unique() if run in self._state]
+        before = [row for run in known for row in self._before(run, "run" in log)]
+        columns = [part for part in ("time", "temperature", "output", "run") if part in log]
+        own = log[columns].assign(run=runs) if "run" in log else log[columns]
+        X = compensator.features(rows_before(before, own))
+        X = X.iloc[len(before) :].set_axis(log.index)
+        lag = compensator.time_constant
+        if "time" in X:
+            began = {run: self._state[run][1] - lag - self._state[run][0] for run in known}
+            X["time"] += runs.map(began).fillna(0.0).astype(float)
+        self._remember(log, runs, X)
+        return compensator._compensated(X, compensator.indicated(log))
+
+    def _before(self, run, has_run):
+        _, time, temperature, rate = self._state[run]
+        lag = self._compensator.time_constant
+        earlier = temperature + rate * lag / np.expm1(-1.0)
+        rows = [
+            {"time": time - lag, "temperature": earlier, "output": 0.0},
+            {"time": time, "temperature": temperature, "output": 0.0},
+        ]
+        return [row | {"run": run} for row in rows] if has_run else rows
+
+    def _remember(self, log, runs, X):
+        ends = ~runs.duplicated(keep="last").to_numpy()
+        begins = ~runs.duplicated().to_numpy()
+        for run, time in zip(runs[begins], log["time"][begins], strict=True):
+            self._state.setdefault(run, (time, None, None, None))
+        for place in np.flatnonzero(ends):
+            run = runs.iloc[place]
+            self._state[run] = (
+                self._state[run][0],
+                log["time"].iloc[place],
+                log["temperature"].iloc[place] if "temperature" in log else 0.0,
+                X["temperature_rate"].iloc[place] if "temperature_rate" in X else 0.0,
+            )
 
 
 def load(path, tell):
@@ -96,7 +163,7 @@ class _Summary:
 
     def __init__(self, target):
         self._target = target
-        self._n_rows = self._n_flagged = 0
+        self.n_rows = self._n_flagged = 0
         self._by_status = dict.fromkeys(STATUS, 0)
         # Squares before and after, and how many, of the rows where all is well and of others.
         self._squares = {False: np.zeros(3), True: np.zeros(3)}
@@ -104,7 +171,7 @@ class _Summary:
     def add(self, log, compensated):
         """Count the rows of one file."""
         status = compensated["status"].to_numpy()
-        self._n_rows += len(log)
+        self.n_rows += len(log)
         self._n_flagged += int(np.count_nonzero(status))
         for name, bit in STATUS.items():
             self._by_status[name] += int(np.count_nonzero(status & bit))
@@ -121,7 +188,7 @@ class _Summary:
 
     def lines(self):
         """The summary."""
-        yield f"written        {self._target}: {self._n_rows:,} rows, {self._n_flagged:,} flagged"
+        yield f"written        {self._target}: {self.n_rows:,} rows, {self._n_flagged:,} flagged"
         for name, bit in STATUS.items():
             if self._by_status[name]:
                 count = self._by_status[name]

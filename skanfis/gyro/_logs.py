@@ -13,7 +13,7 @@ from .compensator import INPUTS
 from .errors import LogError
 from .log import checked_request, read
 
-__all__ = ["Task", "find_tasks", "read_for", "read_task"]
+__all__ = ["Task", "find_tasks", "read_for", "read_task", "request_of"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def find_tasks(options, paths):
     if options.axes is not None and len(told) < len(options.axes):
         raise UsageError("--axes: an axis is given twice.")
     try:
-        layout = LogFile.open(paths[0], _request(options, ())).layout
+        layout = LogFile.open(paths[0], request_of(options, ())).layout
     except LogError:
         raise
     except ValueError as error:
@@ -56,7 +56,7 @@ def find_tasks(options, paths):
     return tasks if len(tasks) > 1 or told else [Task()]
 
 
-def _request(options, require, columns=None):
+def request_of(options, require, columns=None):
     request = Request(
         columns=pairs(options.columns, "--columns") | (columns or {}),
         units=pairs(options.units, "--units"),
@@ -83,7 +83,7 @@ def read_for(options, paths, require, tell, columns=None):
         require = (*require, "time")
     try:
         reading = read(
-            paths, _request(options, require, columns), max_gap=options.max_gap, tell=tell
+            paths, request_of(options, require, columns), max_gap=options.max_gap, tell=tell
         )
     except LogError:
         raise

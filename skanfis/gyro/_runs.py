@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-__all__ = ["lost_rows", "name_runs", "split_runs"]
+__all__ = ["LostRows", "Splitter", "lost_rows", "name_runs", "split_runs"]
 
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
@@ -12,8 +12,8 @@ _STEPS = 50.0
 _FEWEST_ROWS = 20
 # Part of a run at whose beginning a clock is again that has been set anew.
 _BEGINNING = 0.1
-# Part of the step by which even steps may differ.
-_REGULAR = 0.1
+# A logger is even if so many of its steps are within a part of the usual one.
+_REGULAR, _EVEN = 0.1, 0.9
 # From here on a row is nearer to being missing than to being late.
 _LOST = 1.5
 
@@ -35,7 +35,7 @@ def split_runs(log, max_gap):
     if forward.size == 0:
         return None, ""
     usual = float(np.median(forward))
-    longest = max(_SHORTEST_GAP, _STEPS * usual) if max_gap == "auto" else max_gap
+    longest = _longest(max_gap, usual)
     gaps = steps > longest
     restarts = _restarts(time, steps, ~same)
     begins = ~same | gaps | restarts
@@ -47,18 +47,25 @@ def split_runs(log, max_gap):
         return None, ""
     number = np.empty(time.size, dtype=int)
     number[order] = np.cumsum(begins) - 1
+    return number, _why(int(begins.sum()), int(gaps.sum()), int(restarts.sum()), longest)
+
+
+def _longest(max_gap, usual):
+    """The longest step of the time within a run."""
+    return max(_SHORTEST_GAP, _STEPS * usual) if max_gap == "auto" else max_gap
+
+
+def _why(n_runs, n_gaps, n_restarts, longest):
     parts = []
-    if gaps.any():
-        parts.append(f"at {_times(gaps, 'gap')} of the time longer than {longest:.4g} s")
-    if restarts.any():
-        parts.append(f"where the time begins anew ({_times(restarts, 'time')})")
-    s = "s" if begins.sum() > 1 else ""
-    why = f"the log is split into {int(begins.sum())} run{s}, {' and '.join(parts)}"
-    return number, f"{why}; --max-gap says otherwise, inf for no such gap"
+    if n_gaps:
+        parts.append(f"at {_times(n_gaps, 'gap')} of the time longer than {longest:.4g} s")
+    if n_restarts:
+        parts.append(f"where the time begins anew ({_times(n_restarts, 'time')})")
+    why = f"the log is split into {_times(n_runs, 'run')}, {' and '.join(parts)}"
+    return f"{why}; --max-gap says otherwise, inf for no such gap"
 
 
-def _times(flags, noun):
-    n = int(flags.sum())
+def _times(n, noun):
     return f"{n} {noun}{'s' if n > 1 else ''}"
 
 
@@ -98,16 +105,17 @@ def lost_rows(log, n_known):
     if steps.size == 0:
         return ""
     usual = float(np.median(steps))
-    if np.mean(np.abs(steps - usual) < _REGULAR * usual) < 0.9:
+    if np.mean(np.abs(steps - usual) < _REGULAR * usual) < _EVEN:
         return ""  # not even
     long = steps[steps > _LOST * usual]
-    if long.size == 0:
-        return ""
-    lost = int(np.sum(np.round(long / usual) - 1))
-    if lost <= n_known:
+    return _lost(int(np.sum(np.round(long / usual) - 1)) - n_known, long.size, usual)
+
+
+def _lost(n_lost, n_places, usual):
+    if n_lost <= 0:
         return ""
     return (
-        f"about {lost - n_known:,} rows are missing: at {long.size:,} places the time steps by "
+        f"about {n_lost:,} rows are missing: at {n_places:,} places the time steps by "
         f"more than {_LOST:g} times its usual {usual:.4g} s"
     )
 
@@ -145,3 +153,95 @@ def _numbered(log, number):
     names = sorted(set(labels), key=int)
     codes = pd.Index(names).get_indexer(labels)[number]
     return pd.Categorical.from_codes(codes, categories=pd.Index(names))
+
+
+class Splitter:
+    """As :func:`split_runs`, of a log that comes in pieces.
+
+    The usual step of the time is that of the first piece.
+    """
+
+    def __init__(self, max_gap, longest=None):
+        self._max_gap, self._longest = max_gap, longest
+        # By sequence: when its run began, its last time, the number of its run.
+        self._open: dict = {}
+        self._lengths: dict = {}
+        self._n_gaps = self._n_restarts = 0
+
+    def again(self):
+        """For the same log from the beginning."""
+        return Splitter(self._max_gap, self._longest)
+
+    def numbers(self, sequence, time):
+        """Number of every row's run in its sequence, from 1; ``sequence`` are labels or None."""
+        codes, names = pd.factorize(np.zeros(time.size) if sequence is None else sequence)
+        numbers = np.empty(time.size, dtype=int)
+        for code, name in enumerate(names):
+            rows = np.flatnonzero(codes == code)
+            numbers[rows] = own = self._of_one(name, time[rows])
+            for number, count in zip(*np.unique(own, return_counts=True), strict=True):
+                self._lengths[name, number] = self._lengths.get((name, number), 0) + int(count)
+        return numbers
+
+    def _of_one(self, name, time):
+        begin, last, number = self._open.get(name, (time[0], time[0], 1))
+        steps = np.diff(time, prepend=last)
+        gaps = steps > self._limit(steps)
+        first = np.zeros(time.size + 2, dtype=bool)
+        first[0] = True
+        path = np.concatenate([[begin, last], time])
+        restarts = _restarts(path, np.concatenate([[0.0, 0.0], steps]), first)[2:]
+        numbers = number + np.cumsum(gaps | restarts)
+        if restarts.any():
+            begin = time[np.flatnonzero(restarts)[-1]]
+        self._open[name] = begin, time[-1], int(numbers[-1])
+        self._n_gaps += int(gaps.sum())
+        self._n_restarts += int(restarts.sum())
+        return numbers
+
+    def _limit(self, steps):
+        if self._longest is None:
+            forward = steps[steps > 0.0]
+            if forward.size == 0:
+                return np.inf
+            self._longest = _longest(self._max_gap, float(np.median(forward)))
+        return self._longest
+
+    @property
+    def is_split(self):
+        """Whether the time tells several runs."""
+        if self._n_gaps + self._n_restarts == 0:
+            return False
+        return self._max_gap != "auto" or np.median(list(self._lengths.values())) >= _FEWEST_ROWS
+
+    @property
+    def why(self):
+        """What told them apart, in words."""
+        return _why(len(self._lengths), self._n_gaps, self._n_restarts, self._longest)
+
+
+class LostRows:
+    """As :func:`lost_rows`, of a log that comes in pieces; its usual step is the first piece's."""
+
+    def __init__(self):
+        self._usual = 0.0
+        self._n_steps = self._n_even = self._n_long = self._n_lost = 0
+
+    def add(self, time, last=None):
+        """Times of one run, and the last one before them."""
+        steps = np.diff(time, prepend=time[0] if last is None else last)
+        steps = steps[steps > 0.0]
+        if steps.size == 0:
+            return
+        self._usual = self._usual or float(np.median(steps))
+        long = steps[steps > _LOST * self._usual]
+        self._n_steps += steps.size
+        self._n_even += int(np.sum(np.abs(steps - self._usual) < _REGULAR * self._usual))
+        self._n_long += long.size
+        self._n_lost += int(np.sum(np.round(long / self._usual) - 1))
+
+    def sentence(self, n_known):
+        """How many rows are missing, in words; empty where none."""
+        if self._n_steps + 1 < _FEWEST_ROWS or self._n_even < _EVEN * self._n_steps:
+            return ""
+        return _lost(self._n_lost - n_known, self._n_long, self._usual)

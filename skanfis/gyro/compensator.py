@@ -127,7 +127,10 @@ class GyroCompensator:
             range of the training data, 4 where the coverage is below ``min_coverage``, 8 where
             the policy gives no rate, and the compensated rate is NaN. Zero says that all is well.
         """
-        X, indicated = self.features(log), self.indicated(log)
+        return self._compensated(self.features(log), self.indicated(log))
+
+    def _compensated(self, X, indicated):
+        """What :meth:`apply` gives, of the estimator's inputs."""
         blocks = [
             self._apply_block(X.iloc[start : start + _BLOCK_ROWS])
             for start in range(0, len(X), _BLOCK_ROWS)
@@ -148,7 +151,7 @@ class GyroCompensator:
                 "coverage": coverage,
                 "status": status.astype(np.uint8),
             },
-            index=log.index,
+            index=X.index,
         )
 
     def compensate(self, indicated: np.ndarray, predicted: np.ndarray) -> np.ndarray:
