@@ -45,6 +45,7 @@ TABLE = {
     "_validation": (["_sklearn", "_callers"], LEARNING),
     "_threads": ([], LEARNING),
     "_memory": ([], []),
+    "_dispatch": (["_sklearn"], [*NUMERIC, "sklearn"]),
     "options": (["_sklearn", "policies"], LEARNING),
     "solvers": ([*KERNEL, "_sklearn"], LEARNING),
     "cluster": (["_sklearn", "_validation"], LEARNING),
@@ -80,6 +81,7 @@ TABLE = {
             "_sklearn",
             "_threads",
             "_memory",
+            "_dispatch",
             "_callers",
             "_validation",
             "_notebook",
@@ -147,6 +149,7 @@ SHARED = {
     "_validation": "checks and warnings in one voice, by parameters and columns that it knows",
     "_callers": "reads the frames of the calls above, which no user should rely on",
     "_threads": "counts the fits that hold BLAS to one thread, which works only if all do",
+    "_dispatch": "looks up what scikit-learn is set to, and reads arrays of other libraries",
     "_memory": "sets limits of the process's malloc, and counts who needs them set",
     "_notebook": "overrides private methods of scikit-learn's representation",
 }

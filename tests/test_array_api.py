@@ -1,4 +1,4 @@
-"""Arrays of other libraries go in as NumPy's, whatever scikit-learn's dispatch is set to."""
+"""Arrays of other libraries go in as NumPy's; with dispatch, predictions stay what they are."""
 
 import os
 import subprocess
@@ -15,15 +15,45 @@ from skanfis import ANFISRegressor
 strict = pytest.importorskip("array_api_strict")
 
 WITH_DISPATCH = """
-import array_api_strict, numpy, sklearn
+import array_api_strict as xp, numpy as np, pytest, sklearn, warnings
+from numpy.testing import assert_allclose
+from sklearn.preprocessing import StandardScaler
+from sklearn.pipeline import make_pipeline
 from skanfis import ANFISRegressor
-X = numpy.random.default_rng(0).uniform(-1.0, 1.0, (200, 2))
+from skanfis.exceptions import OutOfBoundsWarning
+
+X = np.random.default_rng(0).uniform(-1.0, 1.0, (200, 2))
 y = X[:, 0] * X[:, 1]
+host = ANFISRegressor(n_mfs=2).fit(X, y)
+far = xp.asarray(2.0 * X)
 with sklearn.config_context(array_api_dispatch=True):
-    model = ANFISRegressor(n_mfs=2).fit(*map(array_api_strict.asarray, (X, y)))
-    found = model.predict(array_api_strict.asarray(X))
-assert type(found) is numpy.ndarray
-assert (found == ANFISRegressor(n_mfs=2).fit(X, y).predict(X)).all()
+    model = ANFISRegressor(n_mfs=2).fit(xp.asarray(X), xp.asarray(y))
+    assert (model.consequents_ == host.consequents_).all()
+    assert type(model.predict(X)) is np.ndarray
+    assert (model.predict(X) == host.predict(X)).all()
+    for dtype, atol in ((xp.float64, 1e-13), (xp.float32, 1e-6)):
+        # No warning, which would be an error: rows stay in the box.
+        there = xp.asarray(X if dtype == xp.float64 else 0.999 * X, dtype=dtype)
+        found = model.predict(there)
+        assert found.dtype == dtype and found.device == far.device
+        assert_allclose(np.asarray(found), host.predict(np.asarray(there)), rtol=0.0, atol=atol)
+    both = model.predict(xp.asarray(X), return_std=True)
+    for one, other in zip(both, host.predict(X, return_std=True)):
+        assert_allclose(np.asarray(one), other)
+    with pytest.warns(OutOfBoundsWarning, match="'x0' in .* of 200 rows"):
+        found = model.predict(far)
+    with pytest.warns(OutOfBoundsWarning):
+        assert_allclose(np.asarray(found), host.predict(2.0 * X), rtol=0.0, atol=1e-13)
+    with pytest.raises(ValueError, match="outside the training data: 'x0'"):
+        model.set_params(out_of_bounds="raise").predict(far)
+    assert model.predict(xp.asarray(X)).shape == (200,)
+    with pytest.raises(ValueError, match="NaN in column 'x1', first at row 1"):
+        model.predict(xp.asarray([[0.0, 0.0], [0.0, float("nan")]]))
+    with pytest.raises(ValueError, match="3 features"):
+        model.predict(xp.zeros((4, 3)))
+    scaled = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)).fit(X, y)
+    assert_allclose(np.asarray(scaled[-1].predict(xp.asarray(scaled[0].transform(X)))),
+                    scaled.predict(X), rtol=0.0, atol=1e-12)
 """
 
 
@@ -40,13 +70,14 @@ def test_strict_arrays_are_the_same_as_numpys():
 
 
 @pytest.mark.slow
-def test_dispatch_changes_nothing():
+def test_with_dispatch_predictions_are_computed_in_the_arrays_library():
     if parse_version(sklearn.__version__) < parse_version("1.7"):
         # scikit-learn brings its own from 1.7 on.
         pytest.importorskip("array_api_compat")
     # SciPy reads its own switch when it is imported.
     environment = {**os.environ, "SCIPY_ARRAY_API": "1"}
-    subprocess.run([sys.executable, "-c", WITH_DISPATCH], env=environment, check=True)
+    command = [sys.executable, "-W", "error::UserWarning", "-c", WITH_DISPATCH]
+    subprocess.run(command, env=environment, check=True)
 
 
 def test_arrays_on_another_device_say_so():

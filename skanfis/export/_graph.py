@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["Graph"]
+__all__ = ["Graph", "Value"]
 
 
 class Graph:

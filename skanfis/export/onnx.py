@@ -16,7 +16,7 @@ from ._constants import FLOOR, SMALLEST_LOG_SQUARE
 from ._graph import Graph
 from ._numbers import Numbers
 
-__all__ = ["register_onnx_converter"]
+__all__ = ["Formula", "register_onnx_converter"]
 
 # Softmax along one axis and ReduceSum with axes as an input are of this version.
 _OLDEST_OPSET = 13
@@ -97,18 +97,19 @@ def _convert(scope, node, container):
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = Graph(scope, container, dtype)
     x = graph.node("Cast", graph.value(given.full_name), to=kind)
-    y = _Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
+    y = Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
     graph.node("Identity", y, output=node.outputs[0].full_name)
 
 
-class _Formula:
-    """The model's formula, written with values of a graph."""
+class Formula:
+    """The model's formula, written with values of a graph, or of what stands in for one."""
 
     def __init__(self, numbers, policy, graph):
         self.numbers, self.policy, self.graph = numbers, policy, graph
         self.rule_of_term = None if numbers.counts is not None else _indicator(numbers)
 
     def outputs(self, x):
+        """The outputs (n_rows, n_outputs) at inputs (n_rows, n_inputs)."""
         numbers = self.numbers
         inside = x.at_least(numbers.low).at_most(numbers.high)
         # Zero, unless an input is infinite or not a number: then NaN, also for a held input.

@@ -78,9 +78,11 @@ class LogStream:
 
     def pieces(self):
         """Its rows as logs, one after the other."""
-        is_split = self._splitter is not None and self._splitter.is_split
+        splitter = None
+        if self._splitter is not None and self._splitter.is_split:
+            splitter = self._splitter.again()
         file = LogFile.open(self.path, self._request)
-        for codes, keys, piece in self._keyed(file, self._splitter.again() if is_split else None):
+        for codes, keys, piece in self._keyed(file, splitter):
             log = pd.DataFrame({part: piece[part] for part in COLUMNS if part in piece})
             if self._names:
                 names = pd.Index([self._names[key] for key in keys])

@@ -33,6 +33,8 @@ from ._scalars import check_number
 
 __all__ = ["ThermalLag", "ThermalRate", "TimeSincePowerOn"]
 
+_BLOCK_ROWS = 65_536
+
 # By position in X, or by name.
 Column = int | str | None
 
@@ -416,10 +418,14 @@ def _filtered_rate(temperature, steps, gains, starts):
     slopes = np.diff(temperature, prepend=temperature[0]) / np.where(steps > 0, steps, np.inf)
     restarts = np.zeros(len(temperature), dtype=bool)
     restarts[starts] = True
-    rates, rate = [], 0.0
-    for slope, gain, restart in zip(
-        slopes.tolist(), gains.tolist(), restarts.tolist(), strict=True
-    ):
-        rate = 0.0 if restart else rate + gain * (slope - rate)
-        rates.append(rate)
-    return np.array(rates)
+    rates, rate = np.empty(len(temperature)), 0.0
+    for start in range(0, len(temperature), _BLOCK_ROWS):
+        # Numbers as Python's take four times the memory: some of them at a time.
+        part, found = slice(start, start + _BLOCK_ROWS), []
+        for slope, gain, restart in zip(
+            slopes[part].tolist(), gains[part].tolist(), restarts[part].tolist(), strict=True
+        ):
+            rate = 0.0 if restart else rate + gain * (slope - rate)
+            found.append(rate)
+        rates[part] = found
+    return rates

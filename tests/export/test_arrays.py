@@ -1,0 +1,35 @@
+"""The model's formula in the array API standard gives what the model gives."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from skanfis.export import arrays
+from skanfis.export.arrays import predict_in
+
+from .every_model import CASES, rows, size_of_sum
+
+xp = pytest.importorskip("array_api_strict")
+
+# Of the largest sum over rules: rounding, of some hundred operations.
+TOLERANCE = {np.float64: 1e-12, np.float32: 3e-5}
+
+
+@pytest.mark.parametrize("dtype", TOLERANCE)
+def test_every_model(dtype, monkeypatch):
+    monkeypatch.setattr(arrays, "_BLOCK_ROWS", 128)
+    X = rows(dtype, 300)
+    worst = {}
+    for case in CASES:
+        model = case.model
+        if model.out_of_bounds == "raise":
+            # Asked before, by whoever calls.
+            model = model.with_out_of_bounds("clip")
+        expected = model.predict(X.astype(float))
+        found = np.asarray(predict_in(xp, model, xp.asarray(X)))
+        assert found.dtype == dtype
+        assert_array_equal(np.isnan(found), np.isnan(expected))
+        difference = np.nanmax(np.abs(found - expected) / size_of_sum(model, X.astype(float)))
+        worst[case.label] = difference
+    late = {label: value for label, value in worst.items() if not value < TOLERANCE[dtype]}
+    assert not late
