@@ -12,6 +12,7 @@ from sklearn.cluster import KMeans
 from skanfis import ANFISRegressor
 from skanfis.bounds import bounds, gradient_bounds, monotonicity
 from skanfis.membership import MEMBERSHIPS
+from skanfis.options import LinearExtrapolation
 
 from .cases import geometric_mean
 from .gyro import make_surface
@@ -23,7 +24,7 @@ __all__ = ["run"]
 _ROWS = 250_000
 _BLOCK = 50_000
 _STARTS = 8
-_POLICIES = (("linear", 0.5), ("clip", 0.5), ("linear", 2.0))
+_POLICIES = ("linear", "clip", LinearExtrapolation(2.0))
 _SEEDS = range(10)
 # Truths that rise with the first input, on [-1, 1]^2.
 _TRUTHS = {
@@ -80,11 +81,10 @@ def _models(options):
     kinds = {"grid": {"n_mfs": [2, 3, 2]}, "scattered": {"partition": KMeans(5, random_state=0)}}
     combinations = product(MEMBERSHIPS, kinds.items(), (0, 1))
     for i, (mf, (kind, given), order) in enumerate(list(combinations)[:: options.every]):
-        policy, limit = _POLICIES[i % len(_POLICIES)]
-        model = ANFISRegressor(
-            mf=mf, order=order, max_iter=5, out_of_bounds=policy, max_extrapolation=limit, **given
-        )
-        yield f"{mf}, {kind}, order {order}, {policy} {limit}", model.fit(X, y).model_
+        policy = _POLICIES[i % len(_POLICIES)]
+        model = ANFISRegressor(mf=mf, order=order, max_iter=5, out_of_bounds=policy, **given)
+        frozen = model.fit(X, y).model_
+        yield f"{mf}, {kind}, order {order}, {frozen.policy}", frozen
 
 
 def _checked(options):
