@@ -15,6 +15,7 @@ ON_REQUEST = (
     "solvers",
     "partitions",
     "certain",
+    "deviation",
     "structure",
     "real_sets",
     "battery",

@@ -29,7 +29,7 @@ __all__ = ["DesignMoments", "pairs"]
 def pairs(rows, others):
     """Products rows_i * others_j for all j >= i, (n (n + 1) / 2, n_rows)."""
     n = rows.shape[0]
-    out = np.empty((n * (n + 1) // 2, rows.shape[1]))
+    out = np.empty((n * (n + 1) // 2, rows.shape[1]), rows.dtype)
     start = 0
     for i in range(n):
         stop = start + n - i

@@ -225,42 +225,44 @@ class TSKModel:
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
-        return self.predict_with_deviation(X)[1]
+        return self.predict_with_deviation(X, exact=True)[1]
 
-    def predict_with_deviation(self, X, inside=None) -> tuple[np.ndarray, np.ndarray]:
-        """Outputs and their standard deviations, each of shape (n_rows, n_outputs)."""
+    def predict_with_deviation(self, X, inside=None, exact=False) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
+
+        Deviations are right to five digits, or, if ``exact``, in double precision.
+        """
         posterior = self.posterior
         if posterior is None:
             raise ValueError(self._why_no_posterior())
         inside = self.in_bounds(X) if inside is None else inside
-        n_outputs, n_values = self.n_outputs, posterior.values_per_row(beyond=False)
+        n_outputs = self.n_outputs
 
         def within(Z):
-            outputs, deviations = posterior.inside(self, Z)
+            outputs, deviations = posterior.inside(self, Z, exact)
             if posterior.inputs.size < self.coefficients.shape[1] - 1:
                 outputs = self._outputs(Z)
             return np.vstack([self._hold(outputs), deviations])
 
         def beyond(Z):
             nearest = self._clip(Z)
-            way, slopes = Z - nearest, self._values_and_gradient(nearest)[1]
-            followed = self._held(way) if self.out_of_bounds == "linear" else 0.0
+            way = Z - nearest
+            values, slopes = self._values_and_gradient(nearest)
+            followed = self._held(way) if self.out_of_bounds == "linear" else np.zeros_like(way)
+            outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
             unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
-            return posterior.beyond(self, nearest, way, unfollowed)
+            return np.vstack([outputs, posterior.beyond(self, nearest, way, unfollowed, exact)])
 
         if inside.all():
-            found = self._by_block(X, within, 2 * n_outputs, n_values)
+            found = self._by_block(X, within, 2 * n_outputs)
             return found[:, :n_outputs], found[:, n_outputs:]
         self._refuse(X, inside)
-        outputs, deviations = np.full((2, X.shape[0], n_outputs), np.nan)
-        outputs[~inside] = self.predict(X[~inside])
+        found = np.full((X.shape[0], 2 * n_outputs), np.nan)
         if inside.any():
-            found = self._by_block(X[inside], within, 2 * n_outputs, n_values)
-            outputs[inside], deviations[inside] = found[:, :n_outputs], found[:, n_outputs:]
+            found[inside] = self._by_block(X[inside], within, 2 * n_outputs)
         if self.out_of_bounds != "nan":
-            n_values = posterior.values_per_row(beyond=True) + self._n_slopes
-            deviations[~inside] = self._by_block(X[~inside], beyond, n_outputs, n_values)
-        return outputs, deviations
+            found[~inside] = self._by_block(X[~inside], beyond, 2 * n_outputs, self._n_slopes)
+        return found[:, :n_outputs], found[:, n_outputs:]
 
     def gradient(self, X) -> np.ndarray:
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).

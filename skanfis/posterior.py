@@ -39,8 +39,8 @@ from scipy.linalg import blas
 from scipy.special import ndtr
 
 from .antecedent import Antecedent
-from .consequent import NormalFactor, basis, rule_outputs
-from .gram import DesignMoments
+from .consequent import NormalFactor
+from .deviation import DerivativeRows, DeviationTables, inner_products
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
@@ -50,11 +50,12 @@ __all__ = ["MOST_PARAMETERS", "Posterior"]
 MOST_PARAMETERS = 2000
 # Where rows leave no freedom, the noise is that of so many.
 _LEAST_FREEDOM = 1.0
-# Derivatives along a way out of the box, by differences of this many standard deviations. They are
-# taken inside: terms may have a corner on the edge. These weights of the values at one, two and
-# three steps inside are exact for parabolas.
-_STEP = 1e-4
-_WEIGHTS = (2.5, -4.0, 1.5)
+# Derivatives along a way out of the box, by differences over this part of a standard deviation.
+# They are taken inside: terms may have a corner on the edge.
+_STEP = 2.0**-14
+# Single precision takes half the time. It is used where it gives this part of a deviation, at so
+# many points of the range; of a deviation nobody knows as much.
+_DIGITS, _N_COMPARED = 1e-5, 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,117 +171,83 @@ class Posterior:
             self, noise=self.noise * np.abs(scale), cross=self.cross * scale[:, None, None]
         )
 
-    def inside(self, model, Z):
+    def inside(self, model, Z, exact=False):
         """Outputs and their deviations, each (n_outputs, n_rows), at rows Z (n_inputs, n_rows).
 
         u is not formed: u' u is the sum of moments of ``gram``, of which there are fewer. Outputs
-        are those of the consequents' own inputs.
+        are those of the consequents' own inputs. ``exact`` is in double precision throughout.
         """
-        strengths, shares, basis_rows, outputs, changes = self._derivatives(model, Z)
-        moments, table, slopes = self._tables(model)
-        basis_rows[1:] /= model.spread[self.inputs, None]
-        square = moments.quadratic(table, shares, basis_rows)
-        unit = self._unit
-        found = (self.noise[:, None] / unit) ** 2 * (1.0 + np.maximum(square, 0.0))
-        for k, change in enumerate(changes):
-            by_basis = (slopes[k] @ strengths).reshape(basis_rows.shape[0], -1, Z.shape[1])
-            half = self.premises @ change
-            # The first basis function is one.
-            half -= by_basis[0]
-            half -= np.einsum("iqn,in->qn", by_basis[1:], basis_rows[1:])
-            half /= unit[k]
-            found[k] += np.einsum("qn,qn->n", half, half)
-        return outputs, np.sqrt(found) * unit
+        return self._within(model, Z, self._tables(model, exact))
 
-    def beyond(self, model, Z, way, unfollowed):
+    def _within(self, model, Z, tables):
+        row = self._row(model, Z).astype(tables.dtype)
+        square = tables.moments.quadratic(tables.of_consequents, row.shares, row.basis)
+        np.maximum(square, 0.0, out=square)
+        square += 1.0
+        unit = tables.unit
+        found = (self.noise[:, None] / unit) ** 2 * square
+        if self.premises.shape[0]:
+            sides = np.empty((tables.joint.shape[2], Z.shape[1]), tables.dtype)
+            row.design(sides[self.premises.shape[1] :])
+            for k, joint in enumerate(tables.joint):
+                sides[: self.premises.shape[1]] = row.changes(k, unit)
+                half = joint @ sides
+                found[k] += np.einsum("qn,qn->n", half, half)
+        return row.outputs, np.sqrt(found) * unit
+
+    def beyond(self, model, Z, way, unfollowed, exact=False):
         """Deviation of every output, (n_outputs, n_rows), of rows out of the box.
 
         Z is the nearest point in it, ``way`` the way from there, (n_inputs, n_rows), and
         ``unfollowed`` (n_outputs, n_rows) what the prediction leaves out of the tangent.
+
+        With h at one step inside and e what it changes by from two steps to one, h + e is the half
+        at the edge, e times steps the slope. Both are linear in the rows of the design and of d:
+        they are subtracted first, and F, T and B_k applied to h and e alone.
         """
-        halves = self._halves(model, Z)
         length = np.sqrt(np.sum((way / model.spread[:, None]) ** 2, axis=0))
         step = way * (_STEP / np.maximum(length, np.finfo(float).tiny))
-        inside = [self._halves(model, Z - (k + 1) * step) for k in range(len(_WEIGHTS))]
-        slopes = []
-        for parts in zip(*inside, strict=True):
-            slope = sum(w * part for w, part in zip(_WEIGHTS, parts, strict=True))
-            slopes.append(slope * (length / _STEP))
-        growth = 2.0 * np.maximum(self._products(halves, slopes), 0.0)
-        growth += self._products(slopes, slopes)
-        unit = self._unit
-        found = (self.noise[:, None] / unit) ** 2 + self._products(halves, halves) + growth
-        return np.sqrt(found + (unfollowed / unit) ** 2) * unit
+        once, twice = (self._row(model, Z - k * step) for k in (1, 2))
+        tables, n_premises = self._tables(model, exact), self.premises.shape[1]
+        unit = tables.unit
+        sides = np.empty((2, tables.joint.shape[2], Z.shape[1]), tables.dtype)
+        designs, changes = sides[:, n_premises:], sides[:, :n_premises]
+        once.astype(tables.dtype).design(designs[0])
+        once.write_change_from(twice, designs[1])
+        # Half the work of a full product.
+        product = blas.get_blas_funcs("trmm", dtype=tables.dtype)
+        u = [product(1.0, tables.factor.T, one.T, side=1, lower=0).T for one in designs]
+        found = (self.noise[:, None] / unit) ** 2 * np.stack(inner_products(*u))[:, None]
+        if self.premises.shape[0]:
+            for k, joint in enumerate(tables.joint):
+                first, second = (one.changes(k, unit) for one in (once, twice))
+                changes[0], changes[1] = first, first - second
+                found[:, k] += inner_products(*(joint @ one for one in sides))
+        near, both, change = found
+        steps = length / _STEP
+        square = (self.noise[:, None] / unit) ** 2 + near + 2.0 * both + change
+        square += 2.0 * np.maximum((both + change) * steps, 0.0) + change * steps**2
+        return np.sqrt(square + (unfollowed / unit) ** 2) * unit
 
-    def values_per_row(self, beyond):
-        """Numbers that a row takes while its variance is found, in range or ``beyond``.
-
-        In range far from all, and not u: larger blocks cost less than what the cache lacks.
-        """
-        n_columns, n_parameters = self.consequents.shape[0], self.premises.shape[1]
-        return 3 * n_parameters + (n_columns if beyond else 0)
-
-    def _tables(self, model):
-        """What ``inside`` needs of F and B_k, found once: moments, table of F' F, B_k F."""
+    def _tables(self, model, exact):
+        """What rows are multiplied with, found once; in single precision where that will do."""
         if not hasattr(self, "_cached"):
-            n_rules, n_basis = model.n_rules, 1 + self.inputs.size
-            # Of inputs in standard deviations: squares of others might be beyond all floats.
-            widths = np.concatenate([[1.0], model.spread[self.inputs]])
-            factor = self.consequents * np.tile(widths, n_rules)
-            moments = DesignMoments(model.antecedent.share_counts, n_basis)
-            slopes = (self.cross @ factor).reshape(*self.cross.shape[:2], n_rules, n_basis)
-            slopes = slopes.transpose(0, 3, 1, 2).reshape(self.noise.size, -1, n_rules)
-            found = moments, moments.of_matrix(factor.T @ factor), np.ascontiguousarray(slopes)
+            double = DeviationTables.of(self, model)
+            single = double.astype(np.float32)
+            found = double, single if self._agree(model, double, single) else double
             object.__setattr__(self, "_cached", found)
-        return self.__dict__["_cached"]
+        return self.__dict__["_cached"][0 if exact else 1]
 
-    @property
-    def _unit(self):
-        """A power of two near the noise of every output, (n_outputs, 1): squares stay finite."""
-        return np.ldexp(1.0, np.frexp(self.noise)[1])[:, None]
+    def _agree(self, model, *tables):
+        """Whether deviations are the same with either tables, to ``_DIGITS``, in the range."""
+        unit = np.random.default_rng(0).random((model.n_inputs, _N_COMPARED))
+        with np.errstate(all="ignore"):
+            Z = model.minimum[:, None] + unit * (model.maximum - model.minimum)[:, None]
+            one, other = (self._within(model, Z, table)[1] for table in tables)
+            return bool((np.abs(other - one) <= _DIGITS * one).all())
 
-    def _products(self, one, other):
-        """Inner products of every output and row in squares of its unit, (n_outputs, n_rows)."""
-        found = (self.noise[:, None] / self._unit) ** 2 * np.einsum("pn,pn->n", one[0], other[0])
-        return found + np.einsum("kqn,kqn->kn", one[1], other[1])
-
-    def _halves(self, model, Z):
-        """U (n_columns, n_rows), and v of every output (n_outputs, n_displacements, n_rows).
-
-        The latter in units of ``_unit``.
-        """
-        strengths, _, basis_rows, _, changes = self._derivatives(model, Z)
-        design = (strengths[:, None, :] * basis_rows).reshape(-1, Z.shape[1])
-        # Half the work of a full product, and in Fortran order no copies.
-        half = blas.dtrmm(1.0, self.consequents.T, design.T, side=1, lower=0, overwrite_b=1).T
-        found = np.empty((self.noise.size, self.premises.shape[0], Z.shape[1]))
-        for k, change in enumerate(changes):
-            found[k] = (self.premises @ change - self.cross[k] @ half) / self._unit[k]
-        return half, found
-
-    def _derivatives(self, model, Z):
-        """Strengths, shares, basis, outputs, and every output's derivatives by the premises."""
-        antecedent = model.antecedent
-        log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
-        strengths, shares = antecedent.normalise(log_mu)
-        basis_rows = basis(Z[self.inputs] - model.reference[self.inputs, None])
-        columns = np.concatenate([[0], 1 + self.inputs]) if model.order == 1 else [0]
-        outputs, every = [], []
-        for one in model.coefficients[:, columns].transpose(2, 0, 1):
-            by_rule, output = rule_outputs(one, strengths, basis_rows)
-            outputs.append(output)
-            if self.premises.shape[0] == 0:
-                continue
-            by_term = antecedent.term_sensitivity(by_rule, output, shares)
-            changes = np.empty((self.premises.shape[1], Z.shape[1]))
-            row = term = 0
-            for gradient in gradients:
-                out = changes[row : row + gradient.shape[0] * gradient.shape[1]]
-                own = by_term[term : term + gradient.shape[1]]
-                np.multiply(gradient, own, out=out.reshape(gradient.shape))
-                row, term = row + out.shape[0], term + own.shape[0]
-            every.append(changes)
-        return strengths, shares, basis_rows, np.stack(outputs), every
+    def _row(self, model, Z):
+        return DerivativeRows.of(model, Z, self.inputs, self.premises.shape[0] > 0)
 
 
 def _mean_squares(problem, evaluation, robust):

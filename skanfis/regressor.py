@@ -475,7 +475,8 @@ class ANFISRegressor(
             noise, the consequents and, by Laplace's method, the premises, in the target's units. It
             is that of the rows' common noise; it takes the structure and the weights of the penalty
             for known. Outside the training range it grows with the distance, whatever the policy;
-            where the prediction is NaN, so is it.
+            where the prediction is NaN, so is it. It is right to five digits;
+            ``model_.standard_deviation(X)`` gives it in double precision, in twice the time.
 
         Returns
         -------

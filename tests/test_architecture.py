@@ -26,6 +26,7 @@ KERNEL = [
     "premise",
     "naming",
     "support",
+    "deviation",
     "posterior",
     "policies",
     "model",

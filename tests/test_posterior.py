@@ -155,10 +155,12 @@ def test_bayesian_line_in_and_out_of_range():
     mean, found = model.predict(new, return_std=True)
     assert_allclose(model.noise_std_, noise, rtol=1e-10)
     # The mean square of the inputs is where a line is known best: from there it only grows.
-    assert_allclose(found, expected, rtol=1e-8)
-    line = mean
-    held, deviation = model.set_params(out_of_bounds="clip").predict(new, return_std=True)
-    assert_allclose(deviation, np.hypot(found, line - held), rtol=1e-8)
+    exact = model.model_.standard_deviation(new)[:, 0]
+    assert_allclose(exact, expected, rtol=1e-8)
+    assert_allclose(found, exact, rtol=1e-5)
+    held = model.model_.with_out_of_bounds("clip")
+    left = mean - held.predict(new)[:, 0]
+    assert_allclose(held.standard_deviation(new)[:, 0], np.hypot(exact, left), rtol=1e-8)
 
 
 @pytest.mark.parametrize("settings", [{"mf": "triangular"}, {"partition": KMEANS}, {"mf": "bell"}])
@@ -193,7 +195,7 @@ def test_tangent_has_the_deviation_that_a_step_inside_foretells():
     high, step = X[:, 0].max(), 1e-4
     at = np.column_stack([np.full(9, high), np.linspace(-480, 480, 9)])
     before, edge, after = (
-        model.predict(at + np.array([k * step, 0.0]), return_std=True)[1] ** 2 for k in (-1, 0, 1)
+        model.model_.standard_deviation(at + np.array([k * step, 0.0])) ** 2 for k in (-1, 0, 1)
     )
     assert_allclose(after - edge, np.maximum(edge - before, 0.0), rtol=2e-3, atol=1e-12)
 
@@ -305,10 +307,11 @@ def test_scalers_folded_in_and_json_keep_the_deviation():
     estimator = TransformedTargetRegressor(scaled, transformer=StandardScaler()).fit(X, y)
     inner, scaler = estimator.regressor_, estimator.transformer_
     new = X[:40] * [1.0, 1.3, 1.05]
-    mean, std = inner[-1].predict(inner[0].transform(new), return_std=True)
+    frozen = inner[-1].model_
+    mean, std = frozen.predict_with_deviation(inner[0].transform(new), exact=True)
     model = parse_json(export_json(estimator, posterior=True))
-    assert_allclose(model.predict(new)[:, 0], scaler.inverse_transform(mean[:, None])[:, 0])
-    assert_allclose(model.standard_deviation(new)[:, 0], std * scaler.scale_, rtol=1e-9)
+    assert_allclose(model.predict(new), scaler.inverse_transform(mean))
+    assert_allclose(model.standard_deviation(new), std * scaler.scale_, rtol=1e-9)
     with pytest.raises(ValueError, match="knows of no posterior"):
         parse_json(export_json(estimator)).standard_deviation(new)
     with pytest.raises(ValueError, match=r"posterior=True, but the model knows of none"):

@@ -6,9 +6,9 @@ term k, g its derivatives by the term's parameters, and tables of F, T and B F,
     u = F phi ,    v = T (g t) - (B F) phi ,    variance = noise^2 (1 + |u|^2) + |v|^2 ,
 
 all over the square of a power of two near the noise. Where the premises were not learnt there is no
-v. Out of the box u and v are taken at its nearest point and at three points further inside, whose
-differences give their slopes along the way out, as in Python; in single precision the steps are
-longer, because a difference has the fewer digits the shorter it is.
+v. Out of the box u and v are taken at two points a little inside, which give what they are at its
+edge and their slopes along the way out, as in Python. In single precision the steps are longer,
+because a difference has the fewer digits the shorter it is, and the points three, for parabolas.
 
 The derivatives of a membership by its parameters follow from its derivative by x, which the
 continuation "linear" needs too, and from the distances and constants of its family.
@@ -42,8 +42,9 @@ from ._text import index_type, literals
 __all__ = ["DeviationSource", "deviation_test", "with_deviation"]
 
 # Steps inside, in standard deviations of the inputs; and the weights of what is found there.
-_STEP = {np.dtype(np.float64): 1e-4, np.dtype(np.float32): 2.0**-7}
-_WEIGHTS = (2.5, -4.0, 1.5)
+_STEP = {np.dtype(np.float64): 2.0**-14, np.dtype(np.float32): 2.0**-7}
+_OF_SLOPE = {np.dtype(np.float64): (1.0, -1.0), np.dtype(np.float32): (2.5, -4.0, 1.5)}
+_AT_EDGE = {np.dtype(np.float64): (2.0, -1.0), np.dtype(np.float32): (3.0, -3.0, 1.0)}
 # As parts of a deviation: what rounding leaves of differences, or in range.
 _TOLERANCE = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 2e-2}
 
@@ -298,10 +299,14 @@ class DeviationSource(Source):
             lines.append(BEYOND.replace("$unfollowed", self.unfollowed()).strip("\n"))
         lines.append(SUM.replace("$growth", GROWTH if self.answers_beyond else "").strip("\n"))
         step = self.dialect.number(_STEP[numbers.dtype])
-        weights = ", ".join(self.dialect.number(weight) for weight in _WEIGHTS)
+        weights = {
+            name: ", ".join(self.dialect.number(weight) for weight in own[numbers.dtype])
+            for name, own in (("of_slope", _OF_SLOPE), ("at_edge", _AT_EDGE))
+        }
+        n_steps = len(_OF_SLOPE[numbers.dtype])
         check = FINITE_INPUT.replace("(y,", "(deviation,") + INPUTS
         text = "\n".join(lines).replace("$finite", check.strip("\n")) + "\n"
-        return self.write(text, step=step, weights=weights, **self.words)
+        return self.write(text, step=step, n_steps=n_steps, **weights, **self.words)
 
     def unfollowed(self):
         """What the prediction leaves out of the tangent, into ``off``."""

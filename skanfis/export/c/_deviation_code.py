@@ -130,7 +130,8 @@ BEYOND = """
         off[o] = 0.0R;
     }
     if (status != $NAME_IN_RANGE) {
-        static const $real weights[3] = { $weights };
+        static const $real of_slope[$n_steps] = { $of_slope };
+        static const $real at_edge[$n_steps] = { $at_edge };
         $real length = 0.0R, top = 0.0R, part;
         for (i = 0; i < $NAME_N_INPUTS; ++i) {
             e[i] = (x[i] - c[i]) * $name_inverse_spread[i];
@@ -142,15 +143,16 @@ BEYOND = """
         length = top * $SQRT(length);
         part = length > 0.0R ? $step / length : 0.0R;
         for (a = 0; a < $all; ++a) {
-            slope[a] = 0.0R;
+            slope[a] = half[a] = 0.0R;
         }
-        for (k = 0; k < 3; ++k) {
+        for (k = 0; k < $n_steps; ++k) {
             for (i = 0; i < $NAME_N_INPUTS; ++i) {
                 e[i] = c[i] - (($real)(k + 1)) * ((x[i] - c[i]) * part);
             }
             $name_halves(e, near);
             for (a = 0; a < $all; ++a) {
-                slope[a] += weights[k] * near[a];
+                slope[a] += of_slope[k] * near[a];
+                half[a] += at_edge[k] * near[a];
             }
         }
         for (a = 0; a < $all; ++a) {

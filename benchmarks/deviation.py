@@ -1,0 +1,51 @@
+"""Predicting with the standard deviation, against predicting without, side by side."""
+
+import numpy as np
+
+from skanfis import ANFISRegressor
+
+from .report import Measure, Results, Row
+from .timing import side_by_side
+
+__all__ = ["run"]
+
+# Rows to predict, and terms of every input.
+_CASES = (
+    (20_000, [3, 3, 3]),
+    (20_000, [4, 3, 3]),
+    (20_000, [1, 6, 6]),
+    (100_000, [2, 3, 4, 1, 1, 1, 1, 1]),
+)
+_ROUNDS = 15
+
+
+def run(options):
+    return Results([_measured(*case) for case in _CASES])
+
+
+def _measured(n_rows, n_mfs):
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (2000, len(n_mfs)))
+    y = np.sin(3.0 * X[:, 0]) * X[:, 1] + X[:, 2] ** 2 + 0.1 * rng.standard_normal(len(X))
+    model = ANFISRegressor(n_mfs=n_mfs, max_iter=5).fit(X, y)
+    new = np.clip(rng.uniform(-1.0, 1.0, (n_rows, len(n_mfs))), X.min(axis=0), X.max(axis=0))
+    beyond = new.copy()
+    beyond[:, 0] = 1.3
+    seconds = side_by_side(
+        {
+            "plain": lambda: model.predict(new),
+            "std": lambda: model.predict(new, return_std=True),
+            "plain beyond": lambda: model.predict(beyond),
+            "std beyond": lambda: model.predict(beyond, return_std=True),
+        },
+        _ROUNDS,
+    )
+    inside = seconds["std"] / seconds["plain"]
+    outside = seconds["std beyond"] / seconds["plain beyond"]
+    work = f"deviation of {n_rows:,} rows, {len(n_mfs)} inputs, {model.n_rules_} rules"
+    measures = [
+        Measure("in range, over plain", inside, "x", 4.0),
+        Measure("a row", seconds["std"] / n_rows * 1e6, "µs"),
+        Measure("out of range, over plain", outside, "x"),
+    ]
+    return Row(f"{work} ({' x '.join(str(n) for n in n_mfs if n > 1)})", measures)

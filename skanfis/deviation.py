@@ -1,0 +1,138 @@
+r"""Rows of the design and of the derivatives by the premises, and what they are multiplied with.
+
+What ``posterior`` finds the variance of a row with. Products are in single precision where that is
+enough: they take half the time. Derivatives along a way out of the box are differences over small
+steps, taken in double precision before anything is rounded.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .consequent import basis, rule_outputs
+from .gram import DesignMoments
+
+__all__ = ["DerivativeRows", "DeviationTables", "inner_products"]
+
+
+@dataclass(frozen=True, eq=False)
+class DeviationTables:
+    """F and B_k F for inputs in standard deviations: squares of others might be beyond floats.
+
+    ``factor`` is F, ``of_consequents`` the table of F' F for ``moments``; ``joint`` is T beside
+    -B_k F, (n_outputs, n_displacements, n_parameters + n_columns). ``unit`` is a power of two near
+    the noise of every output, (n_outputs, 1), in which squares stay finite.
+    """
+
+    moments: DesignMoments
+    of_consequents: np.ndarray
+    factor: np.ndarray
+    joint: np.ndarray
+    unit: np.ndarray
+
+    @property
+    def dtype(self):
+        """The precision of products."""
+        return self.factor.dtype
+
+    def astype(self, dtype):
+        """The same in another precision."""
+        with np.errstate(over="ignore", under="ignore"):
+            return replace(
+                self,
+                of_consequents=self.of_consequents.astype(dtype),
+                factor=self.factor.astype(dtype),
+                joint=self.joint.astype(dtype),
+            )
+
+    @classmethod
+    def of(cls, posterior, model):
+        """Tables of a model's posterior, in double precision."""
+        widths = np.concatenate([[1.0], model.spread[posterior.inputs]])
+        factor = posterior.consequents * np.tile(widths, model.n_rules)
+        moments = DesignMoments(model.antecedent.share_counts, widths.size)
+        unit = np.ldexp(1.0, np.frexp(posterior.noise)[1])[:, None]
+        joint = [
+            np.hstack([posterior.premises, -cross @ factor / one])
+            for cross, one in zip(posterior.cross, unit, strict=True)
+        ]
+        table = moments.of_matrix(factor.T @ factor)
+        return cls(moments, table, factor, np.stack(joint), unit)
+
+
+@dataclass(frozen=True, eq=False)
+class DerivativeRows:
+    """Rows of the design and of the derivatives by the premises, about to be written.
+
+    ``basis`` is of inputs in standard deviations from the reference.
+    """
+
+    strengths: np.ndarray
+    shares: np.ndarray
+    basis: np.ndarray
+    outputs: np.ndarray
+    by_term: list[np.ndarray]  # of every output; none where the premises were not learnt
+    gradients: list[np.ndarray]
+
+    @classmethod
+    def of(cls, model, Z, inputs, is_learnt):
+        """Rows at Z (n_inputs, n_rows); ``inputs`` are those that consequents are linear in."""
+        antecedent = model.antecedent
+        log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
+        strengths, shares = antecedent.normalise(log_mu)
+        basis_rows = basis(Z[inputs] - model.reference[inputs, None])
+        columns = np.concatenate([[0], 1 + inputs]) if model.order == 1 else [0]
+        outputs, by_term = [], []
+        for one in model.coefficients[:, columns].transpose(2, 0, 1):
+            by_rule, output = rule_outputs(one, strengths, basis_rows)
+            outputs.append(output)
+            if is_learnt:
+                by_term.append(antecedent.term_sensitivity(by_rule, output, shares))
+        basis_rows[1:] /= model.spread[inputs, None]
+        return cls(strengths, shares, basis_rows, np.stack(outputs), by_term, gradients)
+
+    def design(self, out):
+        """Strengths times the basis, rule by rule, into (n_columns, n_rows)."""
+        by_rule = out.reshape(-1, *self.basis.shape)
+        by_rule[:, 0] = self.strengths
+        np.multiply(self.strengths[:, None], self.basis[1:], out=by_rule[:, 1:])
+
+    def astype(self, dtype):
+        """The same in another precision, but for outputs and ``changes``."""
+        if dtype == np.float64:
+            return self
+        return replace(
+            self,
+            strengths=self.strengths.astype(dtype),
+            shares=self.shares.astype(dtype),
+            basis=self.basis.astype(dtype),
+        )
+
+    def write_change_from(self, other, out):
+        """What the design changes by from other rows, into (n_columns, n_rows) of any precision.
+
+        By the changes of strengths and basis: of two designs no digits would be left.
+        """
+        dtype, by_rule = out.dtype, out.reshape(-1, *self.basis.shape)
+        strengths = (self.strengths - other.strengths).astype(dtype, copy=False)
+        slopes = (self.basis[1:] - other.basis[1:]).astype(dtype, copy=False)
+        by_rule[:, 0] = strengths
+        np.multiply(strengths[:, None], self.basis[1:].astype(dtype), out=by_rule[:, 1:])
+        by_rule[:, 1:] += other.strengths.astype(dtype)[:, None] * slopes
+
+    def changes(self, k, unit):
+        """Derivatives of output k by the antecedent's parameters, (n_parameters, n_rows).
+
+        In units of ``unit``.
+        """
+        by_term, parts, term = self.by_term[k] / unit[k], [], 0
+        for gradient in self.gradients:
+            own = by_term[term : term + gradient.shape[1]]
+            parts.append((gradient * own).reshape(-1, own.shape[1]))
+            term += own.shape[0]
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def inner_products(one, other):
+    """Inner products of every row: of one with itself, with the other, of the other with itself."""
+    return [np.einsum("pn,pn->n", a, b) for a, b in ((one, one), (one, other), (other, other))]
