@@ -8,7 +8,15 @@ without groups, where s is the ceil((K + 1) c)-th smallest.
 
 import numpy as np
 
-__all__ = ["cross_bounds", "is_enough", "n_needed", "row_masses", "score_quantile"]
+__all__ = [
+    "cross_bounds",
+    "group_scores",
+    "is_enough",
+    "n_needed",
+    "one_row_per_group",
+    "row_masses",
+    "score_quantile",
+]
 
 # What rounding leaves of a sum of masses.
 _ROUNDING = 1e-9
@@ -52,6 +60,65 @@ def score_quantile(scores, masses, coverage):
     order = np.argsort(scores)
     place = np.searchsorted(np.cumsum(masses[order]), coverage - _ROUNDING)
     return scores[order[place]] if place < scores.size else np.inf
+
+
+def group_scores(scores, masses, groups, coverage):
+    """Of every group the smallest score that ``coverage`` of its rows do not exceed, and its mass.
+
+    A group so is one observation of what groups do: a score that a new group's does not exceed
+    covers that part of its rows, or more.
+    """
+    present = [number for number in np.unique(groups) if masses[groups == number].any()]
+    parts = [groups == number for number in present]
+    shares = [masses[part] / masses[part].sum() for part in parts]
+    found = [
+        score_quantile(scores[part], share, coverage)
+        for part, share in zip(parts, shares, strict=True)
+    ]
+    return np.array(found), np.array([masses[part].sum() for part in parts])
+
+
+def one_row_per_group(scores, masses, groups, coverage):
+    """The middle one of the quantiles that one row drawn from every group would give.
+
+    Of K rows, one from each group, and one of a new group, the ceil((K + 1) c)-th smallest score
+    covers the new one with probability c (Dunn, Wasserman and Ramdas 2023, subsampling once). Which
+    rows are drawn is chance; the median over all draws is not: it is the smallest score q such that
+
+        P(N(q) >= ceil((K + 1) c)) >= 1 / 2 ,
+
+    N the number of rows drawn of a score of q or less, a sum of K indicators with the groups' own
+    probabilities. Surely 2 c - 1, for a row beyond the median is beyond half of the quantiles.
+    """
+    scores = np.where(np.isnan(scores), np.inf, scores)
+    numbers, place = np.unique(groups, return_inverse=True)
+    kept = masses > 0.0
+    share = np.where(kept, masses, 0.0) / np.where(kept, np.bincount(place, masses)[place], 1.0)
+    present = np.unique(place[kept])
+    needed = int(np.ceil((present.size + 1) * coverage - _ROUNDING))
+    values = np.unique(scores[kept])
+
+    def is_reached(q):
+        below = np.bincount(place, share * (scores <= q), minlength=numbers.size)[present]
+        return _at_least(below, needed) >= 0.5 - _ROUNDING
+
+    low, high = -1, values.size - 1
+    if not is_reached(values[high]):
+        return np.inf
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if is_reached(values[middle]) else (middle, high)
+    return values[high]
+
+
+def _at_least(probabilities, needed):
+    """The probability that so many of independent events happen, or more."""
+    counts = np.zeros(probabilities.size + 1)
+    counts[0] = 1.0
+    for p in np.clip(probabilities, 0.0, 1.0):
+        counts[1:] = counts[1:] * (1.0 - p) + counts[:-1] * p
+        counts[0] *= 1.0 - p
+    return counts[needed:].sum()
 
 
 def cross_bounds(folds, predictions, deviations, coverage):

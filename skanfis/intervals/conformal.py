@@ -1,7 +1,5 @@
 """ConformalRegressor: intervals that cover as often as was asked, around any regressor."""
 
-import inspect
-import warnings
 from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any, ClassVar, Self
@@ -9,36 +7,29 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import ArrayLike
-from sklearn import get_config
-from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin, clone
-from sklearn.frozen import FrozenEstimator
-from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, ShuffleSplit, check_cv
-from sklearn.pipeline import Pipeline
-from sklearn.utils import check_array, indexable
-from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping, process_routing
-from sklearn.utils.validation import check_is_fitted, has_fit_parameter
+from sklearn.base import BaseEstimator, MetaEstimatorMixin, RegressorMixin
+from sklearn.utils import indexable
+from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping
+from sklearn.utils.validation import check_is_fitted
 
-from .._sklearn import (
-    HasMethods,
-    Interval,
-    StrOptions,
-    check_sample_weight,
-    fit_context,
-    safe_indexing,
-)
-from .._validation import check_finite, group_numbers, named_refusals, positive_weights
-from ..exceptions import OutOfBoundsWarning
+from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
-from ._quantiles import cross_bounds, is_enough, n_needed, row_masses, score_quantile
+from ._quantiles import (
+    cross_bounds,
+    group_scores,
+    is_enough,
+    n_needed,
+    one_row_per_group,
+    row_masses,
+    score_quantile,
+)
+from ._scores import Scorer
+from ._training import TrainingSet, checked_targets, fit_params, folds, one_part
 
 __all__ = ["ConformalRegressor"]
 
-# An exact fit has no deviation to divide by: of the target's range, what rounding leaves.
-_LEAST_DEVIATION = 1e-12
 # Rows whose bounds are found at one time.
 _MOST_ROWS = 16_384
-# Of a row that a model has to itself.
-_SMALLEST_FREEDOM = 1e-6
 
 
 class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
@@ -55,19 +46,21 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     ----------
     estimator : regressor, default=None
         What predicts; a Pipeline for example. None is ``ANFISRegressor()``.
-    method : {"cross", "split", "loo"}, default="cross"
-        Which rows give the scores. "split": rows held out, on which the model is never trained.
-        Covers at least as often as asked. "cross": every row, by a model of the folds without it,
-        and intervals by all of these models (CV+ [2]_; of as many folds as rows, jackknife+).
-        Covers as often as asked up to small differences, surely 2 coverage - 1. "loo": every row,
-        by what the model would be without it: exact in the consequents, to first order in the
-        premises, without a further fit. No guarantee, for the structure has seen every row; for a
-        fitted :class:`~skanfis.ANFISRegressor` alone, or at the end of a Pipeline.
+    method : {"folds", "cross", "split", "loo"}, default="folds"
+        Which rows give the scores. "folds": every row, by a model of the folds without it; the
+        intervals are about the model of all rows, as wide as its own deviation says. Near what is
+        asked for, without a guarantee. "cross": the same scores, and intervals by the models of
+        all folds (CV+ [2]_; of as many folds as rows, jackknife+): surely 2 coverage - 1, and more
+        than asked for where a model of fewer rows is much worse. "split": rows held out, on which
+        the model is never trained. Covers at least as often as asked. "loo": every row, by what
+        the model would be without it: exact in the consequents, to first order in the premises,
+        without a further fit. No guarantee, for the structure has seen every row: for many rows
+        alone, and for a fitted :class:`~skanfis.ANFISRegressor`, or a Pipeline that ends in one.
     scaled : bool, default=True
         Whether intervals are as wide as the model's own standard deviation says, row by row, by
         ``predict(X, return_std=True)``; else all have one width ("cross": nearly).
     cv : int, splitter or iterable of splits, default=10
-        Of "cross": the number of folds, at most; no more than rows, or groups. A splitter of
+        Of "folds" and "cross": how many folds, at most; no more than rows, or groups. A splitter of
         scikit-learn, or splits, must hold out every row once.
     calibration_fraction : float, default=0.25
         Of "split": part of the rows, or of the groups, held out. 1 takes all rows given, for a
@@ -75,14 +68,14 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     random_state : int, RandomState instance or None, default=None
         Seed of the folds and of the rows held out. None stands for one fixed seed.
     n_jobs : int, default=None
-        Processes for the fits of "cross".
+        Processes for the fits of the folds.
 
     Attributes
     ----------
     estimator_ : regressor
         What ``predict`` asks: trained on all rows, but for "split", which holds some out.
     estimators_ : list of regressor
-        The models of "cross", each without its fold; else empty.
+        The models of the folds, each without its own; else empty.
     scores_ : ndarray of shape (n_calibration,) or (n_calibration, n_outputs)
         Sorted. NaN where the model gave NaN, which counts as infinite.
     n_units_ : float
@@ -101,7 +94,13 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     -----
     With ``groups`` (runs, devices, days) whole groups are held out, every group counts as much as
     any other, and what is covered is a row of a *new* group [3]_, which with intervals by row it
-    would not be. A group is one unit, however many rows it has: 90 % takes 9 groups.
+    would not be. A group is one unit, however many rows it has: 90 % takes 9 groups. That is on
+    average over groups: most are covered whole, and a few hardly. What holds for nearly every new
+    group is asked for by ``confidence``.
+
+    The quantile over groups is the median of those that one row drawn from each group would give
+    [4]_; of "cross" that of all rows, with the mass of a whole group for the new one [3]_, which
+    covers up to 1 / (K + 1) more than asked.
 
     References
     ----------
@@ -111,6 +110,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
        the jackknife+", Annals of Statistics 49 (2021) 486-507.
     .. [3] Y. Lee, R. F. Barber and R. Willett, "Distribution-free inference with hierarchical
        data", arXiv:2306.06342 (2023).
+    .. [4] R. Dunn, L. Wasserman and A. Ramdas, "Distribution-free prediction sets for two-layer
+       hierarchical models", Journal of the American Statistical Association 118 (2023) 2491-2502.
 
     Examples
     --------
@@ -129,7 +130,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     _parameter_constraints: ClassVar[dict] = {
         "estimator": [HasMethods(["fit", "predict"]), None],
-        "method": [StrOptions({"cross", "split", "loo"})],
+        "method": [StrOptions({"folds", "cross", "split", "loo"})],
         "scaled": ["boolean"],
         "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"]), Iterable],
         "calibration_fraction": [Interval(Real, 0, 1, closed="right")],
@@ -141,7 +142,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self,
         estimator: Any = None,
         *,
-        method: str = "cross",
+        method: str = "folds",
         scaled: bool = True,
         cv: Any = 10,
         calibration_fraction: float = 0.25,
@@ -205,27 +206,32 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             groups; if the regressor has no standard deviation.
         """
         X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
-        targets, weight, numbers = self._checked(y, sample_weight, groups)
-        params = self._fit_params(sample_weight, groups)
-        data = _Data(X, y, targets, params)
-        self._single_output, self._is_by_group = targets.ndim == 1, numbers is not None
-        self._floor = _LEAST_DEVIATION * np.atleast_1d(np.ptp(targets, axis=0))
-        held_out = np.arange(len(targets))
+        targets, weight, numbers = checked_targets(type(self).__name__, y, sample_weight, groups)
+        if numbers is not None and self.method == "loo":
+            raise ValueError(
+                "method='loo' leaves out rows, not groups: a row's group would stay, and tell. Use "
+                "method='folds', 'cross' or 'split', or leave groups at None."
+            )
+        regressor = self._regressor()
+        data = TrainingSet(X, y, targets, fit_params(self, regressor, sample_weight, groups))
+        self._single_output, self._scorer = targets.ndim == 1, Scorer.of(targets, self.scaled)
         self.estimators_: list[Any] = []
         self._folds: list[np.ndarray] = []
+        held_out = np.arange(len(targets))
         if self.method == "split":
-            training, held_out = self._split(len(targets), numbers)
-            self.estimator_ = data.fitted(self._regressor(), training)
-            scores = self._scores(self.estimator_, data, held_out)
+            fraction, seed = float(self.calibration_fraction), self._seed()
+            training, held_out = one_part(regressor, len(targets), numbers, fraction, seed)
+            self.estimator_ = data.fitted(regressor, training)
+            scores = self._scorer.held_out(self.estimator_, data, held_out)
         else:
-            self.estimator_ = data.fitted(self._regressor(), None)
+            self.estimator_ = data.fitted(regressor)
             if self.method == "loo":
-                scores = self._leave_one_out(data, weight)
-        part = None if numbers is None else numbers[held_out]
+                scores = self._scorer.leave_one_out(self.estimator_, data, weight)
+        self._groups = None if numbers is None else numbers[held_out]
         own = None if weight is None else weight[held_out]
-        self._masses, self.n_units_ = row_masses(held_out.size, own, part)
-        if self.method == "cross":
-            scores = self._cross(data, numbers)
+        self._masses, self.n_units_ = row_masses(held_out.size, own, self._groups)
+        if self.method in ("folds", "cross"):
+            scores = self._scores_of_folds(data, numbers)
         self._scores_by_row = scores
         found = np.sort(scores, axis=0)
         self.scores_ = found[:, 0] if self._single_output else found
@@ -249,7 +255,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return self.estimator_.predict(X)
 
     def predict_interval(
-        self, X: ArrayLike, coverage: float = 0.9
+        self, X: ArrayLike, coverage: float = 0.9, confidence: float | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Predict intervals that cover the target as often as asked.
 
@@ -259,6 +265,10 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         coverage : float, default=0.9
             How often a new row's target is to lie in its interval, between 0 and 1; of several
             outputs, each by itself.
+        confidence : float, default=None
+            With groups: how probable it is to be that ``coverage`` of the rows of a new group, or
+            more, lie in their intervals, between 0 and 1. None promises the coverage on average
+            over new groups, of which some may be covered much less.
 
         Returns
         -------
@@ -269,24 +279,28 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If there are too few rows, or groups, for such a coverage: K give K / (K + 1) at most.
+            If there are too few rows, or groups, for such a coverage, or confidence: K give
+            K / (K + 1) at most; if a confidence is asked for without groups.
         """
         check_is_fitted(self)
-        coverage = self._checked_coverage(coverage)
-        centers, deviations = self._predicted(self.estimator_, X)
+        coverage, confidence = self._checked_levels(coverage, confidence)
+        centers, deviations = self._scorer.predicted(self.estimator_, X)
         if self.method == "cross":
-            lower, upper = self._cross_intervals(X, centers, coverage)
+            lower, upper = self._cross_intervals(X, centers, coverage, confidence)
         else:
-            width = deviations * self._quantiles(coverage)
+            width = deviations * self._quantiles(coverage, confidence)
             lower, upper = centers - width, centers + width
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
 
-    def half_width(self, coverage: float = 0.9) -> float | np.ndarray:
-        """How far intervals reach to either side of the prediction, by ``method`` "split" or "loo".
+    def half_width(
+        self, coverage: float = 0.9, confidence: float | None = None
+    ) -> float | np.ndarray:
+        """How far intervals reach to either side of the prediction; not of method "cross".
 
         Parameters
         ----------
         coverage : float, default=0.9
+        confidence : float, default=None
             As of :meth:`predict_interval`.
 
         Returns
@@ -305,217 +319,93 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if self.method == "cross":
             raise ValueError(
                 "method='cross' has no one half width: its intervals are by the models of all "
-                "folds. Use method='split' or 'loo'."
+                "folds. Use method='folds', 'split' or 'loo'."
             )
-        found = self._quantiles(self._checked_coverage(coverage))
+        found = self._quantiles(*self._checked_levels(coverage, confidence))
         return float(found[0]) if self._single_output else found
 
-    def _quantiles(self, coverage):
-        scores = self._scores_by_row.T
-        return np.array([score_quantile(one, self._masses, coverage) for one in scores])
+    def _quantiles(self, coverage, confidence):
+        found = []
+        for scores in self._scores_by_row.T:
+            if self._groups is None:
+                found.append(score_quantile(scores, self._masses, coverage))
+            elif confidence is None:
+                found.append(one_row_per_group(scores, self._masses, self._groups, coverage))
+            else:
+                own, masses = group_scores(scores, self._masses, self._groups, coverage)
+                found.append(score_quantile(own, masses, confidence))
+        return np.array(found)
 
     def _regressor(self):
         return ANFISRegressor() if self.estimator is None else self.estimator
 
-    def _checked(self, y, sample_weight, groups):
-        """Targets as an array, positive weights or None, numbers of groups or None."""
-        if y is None:
-            name = type(self).__name__
-            raise ValueError(f"{name} requires y to be passed, but the target y is None.")
-        with named_refusals(y=y):
-            targets = check_array(
-                y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"
-            )
-        names = [f"y{k}" for k in range(targets.reshape(len(targets), -1).shape[1])]
-        check_finite(targets.reshape(len(targets), -1), "y", names)
-        if sample_weight is not None:
-            sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
-            positive_weights(sample_weight, len(targets))
-        if groups is None:
-            return targets, sample_weight, None
-        if self.method == "loo":
-            raise ValueError(
-                "method='loo' leaves out rows, not groups: a row's group would stay, and tell. Use "
-                "method='cross' or 'split', or leave groups at None."
-            )
-        numbers = group_numbers(groups)
-        if numbers.max() == 0:
-            raise ValueError("groups has a single group; at least 2 are needed to hold one out.")
-        return targets, sample_weight, numbers
-
-    def _fit_params(self, sample_weight, groups):
-        given = {"sample_weight": sample_weight, "groups": groups}
-        given = {name: value for name, value in given.items() if value is not None}
-        if get_config()["enable_metadata_routing"]:
-            return dict(process_routing(self, "fit", **given).estimator.fit)
-        regressor = self._regressor()
-        if "sample_weight" in given and not has_fit_parameter(regressor, "sample_weight"):
-            raise ValueError(
-                f"sample_weight was given, but the fit of {type(regressor).__name__} does not take "
-                "it. For a Pipeline turn on sklearn.set_config(enable_metadata_routing=True), and "
-                "call set_fit_request(sample_weight=True) on the step that is to have it."
-            )
-        if "groups" in given and not has_fit_parameter(regressor, "groups"):
-            del given["groups"]
-        return given
-
     def _seed(self):
         return 0 if self.random_state is None else self.random_state
 
-    def _split(self, n_rows, groups):
-        fraction = float(self.calibration_fraction)
-        every = np.arange(n_rows)
-        if fraction == 1.0:
-            if not isinstance(self._regressor(), FrozenEstimator):
-                raise ValueError(
-                    "calibration_fraction=1 leaves no row to train on: give the fitted model as "
-                    "sklearn.frozen.FrozenEstimator(model), or a smaller fraction."
-                )
-            return every, every
-        kind = ShuffleSplit if groups is None else GroupShuffleSplit
-        splitter = kind(1, test_size=fraction, random_state=self._seed())
-        try:
-            training, held_out = next(splitter.split(every, groups=groups))
-        except ValueError as error:
-            raise ValueError(
-                f"method='split' with calibration_fraction={fraction:g} leaves nothing to train on "
-                f"of {n_rows} rows: use a smaller fraction, or method='cross'."
-            ) from error
-        return np.sort(training), np.sort(held_out)
-
-    def _cross(self, data, groups):
+    def _scores_of_folds(self, data, groups):
         """Scores of every row by the models of the folds without it."""
-        n_rows = len(data.targets)
-        if not isinstance(self.cv, Integral):
-            splitter = check_cv(self.cv)
-        elif groups is None:
-            splitter = KFold(min(int(self.cv), n_rows), shuffle=True, random_state=self._seed())
-        else:
-            splitter = GroupKFold(min(int(self.cv), int(groups.max()) + 1))
-        folds = list(splitter.split(np.empty((n_rows, 0)), data.targets, groups))
-        counts = np.bincount(np.concatenate([held_out for _, held_out in folds]), minlength=n_rows)
-        if not (counts == 1).all():
-            row = int(np.argmax(counts != 1))
-            raise ValueError(
-                f"cv={splitter!r} holds out row {row} {counts[row]} times; every row must be held "
-                "out once, as KFold, GroupKFold and LeaveOneGroupOut do."
-            )
+        found = folds(self.cv, data.targets, groups, self._seed())
         regressor = self._regressor()
         self.estimators_ = Parallel(n_jobs=self.n_jobs)(
-            delayed(data.fitted)(regressor, training) for training, _ in folds
+            delayed(data.fitted)(regressor, training) for training, _ in found
         )
-        scores = np.empty((n_rows, data.targets.reshape(n_rows, -1).shape[1]))
-        for estimator, (_, held_out) in zip(self.estimators_, folds, strict=True):
-            scores[held_out] = self._scores(estimator, data, held_out)
-        self._folds = [held_out for _, held_out in folds]
+        self._folds = [held_out for _, held_out in found]
+        scores = np.empty(data.targets.reshape(len(data.targets), -1).shape)
+        for estimator, held_out in zip(self.estimators_, self._folds, strict=True):
+            scores[held_out] = self._scorer.held_out(estimator, data, held_out)
         return scores
 
-    def _scores(self, estimator, data, rows):
-        centers, deviations = self._predicted(estimator, safe_indexing(data.X, rows), warn=False)
-        targets = data.targets[rows].reshape(centers.shape)
-        return np.abs(targets - centers) / deviations
-
-    def _leave_one_out(self, data, weight):
-        """Studentised residuals: |y - y_(-i)| over the deviation of y_(-i)."""
-        final = _final(self.estimator_)
-        noise = getattr(final, "noise_std_", None)
-        if noise is None:
-            raise ValueError(
-                f"method='loo' needs a fitted ANFISRegressor, alone or at the end of a Pipeline; "
-                f"{type(final).__name__} tells nothing of its noise (noise_std_). Use "
-                "method='cross' or 'split'."
-            )
-        centers, deviations = _with_deviation(self.estimator_, data.X)
-        targets = data.targets.reshape(len(data.targets), -1)
-        noise = np.maximum(np.atleast_1d(noise), self._floor)
-        leverage = (deviations.reshape(targets.shape) / noise) ** 2 - 1.0
-        if weight is not None:
-            leverage *= (weight / np.mean(weight[weight > 0.0]))[:, None]
-        freedom = np.clip(1.0 - leverage, _SMALLEST_FREEDOM, 1.0)
-        residual = np.abs(targets - centers.reshape(targets.shape))
-        return residual / (np.sqrt(freedom) * noise) if self.scaled else residual / freedom
-
-    def _predicted(self, estimator, X, warn=True):
-        """Predictions and deviations, (n_rows, n_outputs); deviations of one where not scaled."""
-        with warnings.catch_warnings():
-            if not warn:
-                # That a row held out lies beyond the others is what is to be measured.
-                warnings.simplefilter("ignore", OutOfBoundsWarning)
-            if not self.scaled:
-                centers = np.asarray(estimator.predict(X), dtype=float)
-                centers = centers.reshape(len(centers), -1)
-                return centers, np.ones(centers.shape)
-            centers, deviations = _with_deviation(estimator, X)
-        centers = centers.reshape(len(centers), -1)
-        floor = np.where(self._floor > 0.0, self._floor, np.finfo(float).tiny)
-        return centers, np.maximum(deviations.reshape(centers.shape), floor)
-
-    def _cross_intervals(self, X, centers, coverage):
-        found = [self._predicted(estimator, X, warn=False) for estimator in self.estimators_]
+    def _cross_intervals(self, X, centers, coverage, confidence):
+        found = [self._scorer.predicted(one, X, warn=False) for one in self.estimators_]
         lower, upper = np.empty(centers.shape), np.empty(centers.shape)
         for k in range(centers.shape[1]):
-            folds = [(self._scores_by_row[rows, k], self._masses[rows]) for rows in self._folds]
+            held_out = [(self._scores_by_row[rows, k], self._masses[rows]) for rows in self._folds]
+            if confidence is not None:
+                parts = zip(held_out, self._folds, strict=True)
+                held_out = [group_scores(*own, self._groups[rows], coverage) for own, rows in parts]
             for start in range(0, len(centers), _MOST_ROWS):
                 part = slice(start, start + _MOST_ROWS)
                 own = np.array([(one[part, k], other[part, k]) for one, other in found])
-                bounds = cross_bounds(folds, own[:, 0], own[:, 1], coverage)
+                level = coverage if confidence is None else confidence
+                bounds = cross_bounds(held_out, own[:, 0], own[:, 1], level)
                 lower[part, k], upper[part, k] = bounds
         return lower, upper
 
-    def _checked_coverage(self, coverage):
-        if not (isinstance(coverage, Real) and 0.0 < float(coverage) < 1.0):
-            raise ValueError(f"coverage={coverage!r} must be a number between 0 and 1.")
-        coverage = float(coverage)
-        needed = n_needed(coverage)
-        total = self.n_units_ / (self.n_units_ + 1.0)
-        if not is_enough(total, coverage):
-            what = "groups" if self._is_by_group else "rows"
-            held_out = " held out" if self.method == "split" else ""
-            more = ", or a larger calibration_fraction" if self.method == "split" else ""
+    def _checked_levels(self, coverage, confidence):
+        """Both levels, as far as the rows or groups at hand allow them."""
+        for name, level in (("coverage", coverage), ("confidence", confidence)):
+            if level is None and name == "confidence":
+                continue
+            if not (isinstance(level, Real) and 0.0 < float(level) < 1.0):
+                raise ValueError(f"{name}={level!r} must be a number between 0 and 1.")
+        if confidence is None:
+            self._check_enough("coverage", float(coverage))
+            return float(coverage), None
+        if self._groups is None:
             raise ValueError(
-                f"coverage={coverage:g} needs {needed} {what}{held_out} or more; there are "
-                f"{self.n_units_:.4g}, enough for coverage={np.floor(1e3 * total) / 1e3:g}. Ask "
-                f"for less, or give more {what}{more}."
+                "confidence is of whole groups, and fit was given none: give it groups, or leave "
+                "confidence at None."
             )
-        return coverage
+        if self.method == "cross" and not self._keeps_groups():
+            raise ValueError(
+                "confidence takes folds that hold out whole groups, and cv parts some: use a "
+                "number of folds, GroupKFold or LeaveOneGroupOut."
+            )
+        self._check_enough("confidence", float(confidence))
+        return float(coverage), float(confidence)
 
+    def _keeps_groups(self):
+        return sum(np.unique(self._groups[rows]).size for rows in self._folds) == self.n_units_
 
-class _Data:
-    """What a regressor is trained on, in the user's own tables."""
-
-    def __init__(self, X, y, targets, params):
-        self.X, self.y, self.targets, self.params = X, y, targets, params
-
-    def fitted(self, regressor, rows):
-        """A clone of the regressor, trained on some rows, or on all of None."""
-        estimator = clone(regressor)
-        if rows is None:
-            return estimator.fit(self.X, self.y, **self.params)
-        params = {name: safe_indexing(value, rows) for name, value in self.params.items()}
-        return estimator.fit(safe_indexing(self.X, rows), safe_indexing(self.y, rows), **params)
-
-
-def _final(estimator):
-    """What predicts: behind what freezes it, the last step of a Pipeline."""
-    if isinstance(estimator, FrozenEstimator):
-        return _final(estimator.estimator)
-    return _final(estimator.steps[-1][1]) if isinstance(estimator, Pipeline) else estimator
-
-
-def _with_deviation(estimator, X):
-    """Prediction and standard deviation, of a Pipeline by its last step."""
-    if isinstance(estimator, FrozenEstimator):
-        return _with_deviation(estimator.estimator, X)
-    if isinstance(estimator, Pipeline):
-        # By itself: with metadata routing a Pipeline would have to be told of return_std.
-        for _, step in estimator.steps[:-1]:
-            X = X if step is None or step == "passthrough" else step.transform(X)
-        return _with_deviation(estimator.steps[-1][1], X)
-    if "return_std" not in inspect.signature(estimator.predict).parameters:
+    def _check_enough(self, name, level):
+        total = self.n_units_ / (self.n_units_ + 1.0)
+        if is_enough(total, level):
+            return
+        what = "rows" if self._groups is None else "groups"
+        held_out = " held out" if self.method == "split" else ""
+        more = ", or a larger calibration_fraction" if self.method == "split" else ""
         raise ValueError(
-            "scaled=True needs predict(X, return_std=True), which "
-            f"{type(estimator).__name__} does not have: use scaled=False, for intervals of one "
-            "width."
+            f"{name}={level:g} needs {n_needed(level)} {what}{held_out} or more; there are "
+            f"{self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
+            f"for less, or give more {what}{more}."
         )
-    found = estimator.predict(X, return_std=True)
-    return tuple(np.asarray(one, dtype=float) for one in found)

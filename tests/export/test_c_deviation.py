@@ -157,7 +157,7 @@ def test_deviation_takes_a_posterior_and_an_interval_one_model():
         export_c(rules, name="m", deviation=True, forgetting=0.9)
     with pytest.raises(ValueError, match="takes a fitted ConformalRegressor; got ANFISRegressor"):
         export_c(rules, name="m", coverage=0.9)
-    cross = ConformalRegressor(rules, cv=2).fit(X, y)
+    cross = ConformalRegressor(rules, cv=2, method="cross").fit(X, y)
     with pytest.raises(ValueError, match="method='cross' has no one half width"):
         export_c(cross, name="m", coverage=0.9)
     plain = ConformalRegressor(rules, method="split", scaled=False).fit(X, y)

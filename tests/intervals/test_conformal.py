@@ -14,7 +14,14 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
 from skanfis.intervals import ConformalRegressor
-from skanfis.intervals._quantiles import cross_bounds, n_needed, row_masses, score_quantile
+from skanfis.intervals._quantiles import (
+    cross_bounds,
+    group_scores,
+    n_needed,
+    one_row_per_group,
+    row_masses,
+    score_quantile,
+)
 from skanfis.solvers import VariableProjection
 
 QUICK = {
@@ -53,18 +60,19 @@ def test_split_is_that_of_crepes():
         assert_allclose(np.column_stack(ours.predict_interval(new, coverage)), expected, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("method", "theirs"), [("cross", "plus"), ("folds", "base")])
 @pytest.mark.parametrize("n_splits", [5, 40])
-def test_cross_is_the_cv_plus_of_mapie(n_splits):
+def test_folds_and_cross_are_those_of_mapie(n_splits, method, theirs):
     from mapie.regression import CrossConformalRegressor
 
     rng = np.random.default_rng(1)
     X, y = bent(rng, 40)
     new = rng.uniform(-3, 3, size=(30, 1))
     cv = KFold(n_splits, shuffle=True, random_state=3)
-    settings = {"confidence_level": 0.8, "method": "plus", "cv": cv}
-    theirs = CrossConformalRegressor(LinearRegression(), **settings).fit_conformalize(X, y)
-    expected = theirs.predict_interval(new)[1][:, :, 0]
-    ours = ConformalRegressor(LinearRegression(), scaled=False, cv=cv).fit(X, y)
+    settings = {"confidence_level": 0.8, "method": theirs, "cv": cv}
+    mapie = CrossConformalRegressor(LinearRegression(), **settings).fit_conformalize(X, y)
+    expected = mapie.predict_interval(new)[1][:, :, 0]
+    ours = ConformalRegressor(LinearRegression(), method=method, scaled=False, cv=cv).fit(X, y)
     assert_allclose(np.column_stack(ours.predict_interval(new, 0.8)), expected, rtol=1e-9)
 
 
@@ -103,6 +111,49 @@ def test_units_count_and_not_the_size_of_weights():
     assert score_quantile(np.arange(8.0), row_masses(8)[0], 0.9) == np.inf
 
 
+def hierarchical(rng, n_groups, within):
+    """Scores of groups of a size each, which have a part of their own, and equal masses."""
+    groups = np.repeat(np.arange(n_groups), rng.integers(4, 9, size=n_groups))
+    own = np.sqrt(1.0 - within**2) * rng.normal(size=n_groups)[groups]
+    scores = np.abs(own + within * rng.normal(size=groups.size))
+    return scores, row_masses(groups.size, groups=groups)[0], groups
+
+
+def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each():
+    rng = np.random.default_rng(11)
+    scores, masses, groups = hierarchical(rng, 12, 0.6)
+    scores[3] = np.nan
+    draws = np.stack(
+        [rng.choice(np.nan_to_num(scores[groups == g], nan=np.inf), 40_001) for g in range(12)]
+    )
+    for coverage in (0.5, 0.75, 0.9):
+        needed = int(np.ceil(13 * coverage - 1e-9))
+        expected = np.median(np.sort(draws, axis=0)[needed - 1])
+        assert one_row_per_group(scores, masses, groups, coverage) == expected
+    # One row to a group: the plain quantile.
+    masses = row_masses(scores.size, groups=np.arange(scores.size))[0]
+    found = one_row_per_group(scores, masses, np.arange(scores.size), 0.9)
+    assert found == score_quantile(scores, row_masses(scores.size)[0], 0.9)
+
+
+@pytest.mark.parametrize("within", [0.1, 0.7, 1.0])
+def test_rows_and_groups_are_covered_as_often_as_theory_says(within):
+    """29 groups known, whatever they have in common; new groups of many rows."""
+    rng = np.random.default_rng(12)
+    rows, whole = [], []
+    for _ in range(150):
+        known = hierarchical(rng, 29, within)
+        own = np.sqrt(1.0 - within**2) * rng.normal(size=(40, 1))
+        new = np.abs(own + within * rng.normal(size=(40, 50)))
+        rows.append(np.mean(new <= one_row_per_group(*known, 0.9)))
+        limit = score_quantile(*group_scores(*known, 0.8), 0.9)
+        whole.append(np.mean(np.mean(new <= limit, axis=1) >= 0.8))
+    # 27 of 30; the median of the quantiles lies above their mean, by 0.01 where rows are alone.
+    assert 0.89 < np.mean(rows) < 0.925
+    # Groups known have fewer rows than new ones: a part of five or six rows is a larger part.
+    assert np.mean(whole) > 0.89
+
+
 def test_leave_one_out_is_that_of_refits():
     """One rule and no ridge are a line: its residual and deviation without each row, by refits."""
     rng = np.random.default_rng(4)
@@ -138,23 +189,28 @@ def test_split_covers_exactly_as_often_as_theory_says():
     assert abs(np.mean(found) - 0.9) < 0.012
 
 
-def test_by_group_covers_new_groups_where_by_row_does_not():
+@pytest.mark.parametrize("method", ["folds", "cross"])
+def test_by_group_covers_new_groups_where_by_row_does_not(method):
     """Every run has an offset of its own: rows of a known run say nothing of a new one."""
     rng = np.random.default_rng(6)
-    by_row, by_group = [], []
-    for _ in range(25):
+    by_row, by_group, by_run = [], [], []
+    for _ in range(12):
         run = np.repeat(np.arange(60), rng.integers(3, 12, size=60))
         y = rng.normal(size=60)[run] + 0.1 * rng.normal(size=run.size)
         X, known = np.zeros((run.size, 1)), run < 12
         # Each run's mean is learnt from its own rows, as a flexible model does.
         X[:, 0] = run
-        model = ConformalRegressor(NearestRun(), scaled=False, cv=20)
+        model = ConformalRegressor(NearestRun(), method=method, scaled=False, cv=20)
         by_row.append(covered(model.fit(X[known], y[known]).predict_interval(X[~known]), y[~known]))
         model.fit(X[known], y[known], groups=run[known])
         by_group.append(covered(model.predict_interval(X[~known]), y[~known]))
         assert model.n_units_ == 12
+        lower, upper = model.predict_interval(X[~known], 0.7, confidence=0.9)
+        inside = ((lower <= y[~known]) & (y[~known] <= upper)).astype(float)
+        by_run += list(np.bincount(run[~known] - 12, inside) / np.bincount(run[~known] - 12))
     assert np.mean(by_row) < 0.5
     assert 0.87 < np.mean(by_group) < 0.97
+    assert np.mean(np.array(by_run) >= 0.7) > 0.88
 
 
 class NearestRun(DummyRegressor):
@@ -172,7 +228,7 @@ class NearestRun(DummyRegressor):
         return self.means_[X[:, 0].astype(int)]
 
 
-@pytest.mark.parametrize("method", ["cross", "split", "loo"])
+@pytest.mark.parametrize("method", ["folds", "cross", "split", "loo"])
 def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method):
     rng = np.random.default_rng(7)
     X, y = bent(rng, 300)
@@ -188,7 +244,7 @@ def test_several_outputs_are_each_covered():
     rng = np.random.default_rng(8)
     X, y = bent(rng, 160)
     y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=160)])
-    for method in ("cross", "split"):
+    for method in ("folds", "cross", "split"):
         model = ConformalRegressor(ANFISRegressor(**QUICK), method=method, cv=3).fit(X[:80], y[:80])
         lower, upper = model.predict_interval(X[80:], 0.8)
         assert lower.shape == (80, 2)
@@ -238,6 +294,12 @@ def test_bad_input_is_refused_by_name():
     refused(
         r"needs 9 groups or more; there are 8", rules, fit=lambda X: {"groups": np.arange(24) // 3}
     )
+    refused(
+        r"coverage=0\.9 needs 9 groups or more",
+        rules,
+        method="cross",
+        fit=lambda X: {"groups": np.arange(24) // 3},
+    )
     refused("single group", rules, fit=lambda X: {"groups": np.zeros(24)})
     refused(
         "leaves out rows, not groups", rules, method="loo", fit=lambda X: {"groups": np.arange(24)}
@@ -262,9 +324,20 @@ def test_bad_input_is_refused_by_name():
         model.predict_interval(X, 90)
     with pytest.raises(ValueError, match="Input X contains NaN"):
         model.predict_interval([[np.nan]])
+    with pytest.raises(ValueError, match="confidence is of whole groups, and fit was given none"):
+        model.predict_interval(X, confidence=0.9)
+    model.set_params(cv=list(KFold(5).split(X)), method="cross")
+    model.fit(X, y, groups=np.arange(24) // 2)
+    with pytest.raises(ValueError, match="confidence takes folds that hold out whole groups"):
+        model.predict_interval(X, 0.5, confidence=0.9)
+    model.set_params(cv=4, method="folds").fit(X, y, groups=np.arange(24) // 2)
+    with pytest.raises(ValueError, match=r"confidence=0\.95 needs 19 groups or more; there are 12"):
+        model.predict_interval(X, 0.99, confidence=0.95)
+    with pytest.raises(ValueError, match=r"confidence=2 must be a number between 0 and 1"):
+        model.half_width(0.9, confidence=2)
 
 
-CHECKED = ConformalRegressor(ANFISRegressor(n_mfs=1, alpha=0.1), cv=2, method="cross")
+CHECKED = ConformalRegressor(ANFISRegressor(n_mfs=1, alpha=0.1), cv=2)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")

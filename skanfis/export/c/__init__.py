@@ -110,7 +110,7 @@ def export_c(
         Between 0 and 1: adds ``int NAME_interval(const double x[], double lower[], double
         upper[])``, the ends of :meth:`~skanfis.intervals.ConformalRegressor.predict_interval` at
         this coverage, and the deviation. ``estimator`` is then a fitted ConformalRegressor with
-        ``scaled=True`` and ``method="split"`` or ``"loo"``, whose intervals are those of one model.
+        ``scaled=True`` and not ``method="cross"``, whose intervals are those of several models.
 
     Returns
     -------
