@@ -227,7 +227,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             self.estimator_ = data.fitted(regressor)
             if self.method == "loo":
                 scores = self._scorer.leave_one_out(self.estimator_, data, weight)
-        self._groups = None if numbers is None else numbers[held_out]
+        self._groups: Any = None if numbers is None else numbers[held_out]
         own = None if weight is None else weight[held_out]
         self._masses, self.n_units_ = row_masses(held_out.size, own, self._groups)
         if self.method in ("folds", "cross"):
@@ -395,7 +395,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return float(coverage), float(confidence)
 
     def _keeps_groups(self):
-        return sum(np.unique(self._groups[rows]).size for rows in self._folds) == self.n_units_
+        parts = [np.unique(self._groups[rows]) for rows in self._folds]
+        return np.unique(np.concatenate(parts)).size == sum(map(len, parts))
 
     def _check_enough(self, name, level):
         total = self.n_units_ / (self.n_units_ + 1.0)
