@@ -5,6 +5,9 @@ they are carried out at once, in the functions of the array API standard. NumPy 
 way, in place and in fewer calls: see ``model``.
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from ._graph import Value
@@ -87,7 +90,7 @@ def _softmax(xp, x, axis):
 
 # Their second input are whole numbers.
 _WITH_NUMBERS = ("Gather", "Reshape", "ReduceSum")
-_OPERATIONS = {
+_OPERATIONS: dict[str, Callable[..., Any]] = {
     "Add": lambda xp, x, y: x + y,
     "Sub": lambda xp, x, y: x - y,
     "Mul": lambda xp, x, y: x * y,
