@@ -2,6 +2,7 @@
 
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
+from .idle import has_idle_term
 from .imported import check_inputs, imported_antecedent
 from .request import StructureRequest, report_constant
 from .sample import SampleSize, effective_weight, representative_rows
@@ -20,6 +21,7 @@ __all__ = [
     "clustered_antecedent",
     "effective_weight",
     "grid_antecedent",
+    "has_idle_term",
     "imported_antecedent",
     "report_constant",
     "representative_rows",

@@ -6,7 +6,7 @@ whose final prediction error is the smallest, which counts the parameters that t
 (``Tuned.expected_error``); those are trained that promise most by it before any premise moves. The
 evidence itself would be the other criterion: it ranks penalties well, but one prior for the large
 and the small departures of all rules makes it too sparing with rules (docs/mathematics.rst has both
-on the same data).
+on the same data). A candidate with a term that is hardly true on any row is out of the running.
 
 The search is greedy and small. Grids grow from the linear model, one term at a time, on the input
 where it pays most, from where the terms of the others are already; inputs that need no terms get
@@ -41,6 +41,7 @@ from .candidate import Candidate
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .held_out import held_out_loss
+from .idle import has_idle_term
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
 from .tuning import FIRST_PENALTY, FIRST_STEPS, MOST_ROWS, Tuned, scaled, settled, tune
@@ -283,8 +284,10 @@ class StructureSearch:
             return np.inf
         if self.folds:
             return self._held_out_score(candidate)
-        # As the evidence, in units of twice the logarithm of a probability.
         tuned = self._tuned(candidate)
+        if has_idle_term(self.sample, tuned.evaluation.antecedent):
+            return np.inf
+        # As the evidence, in units of twice the logarithm of a probability.
         with np.errstate(divide="ignore"):
             return self.n_sample * tuned.posterior.n_outputs * np.log(tuned.expected_error)
 

@@ -34,6 +34,7 @@ from ..structure import (
     Start,
     StructureRequest,
     effective_weight,
+    has_idle_term,
     imported_antecedent,
     report_constant,
 )
@@ -60,6 +61,8 @@ _THOROUGH = 0.1
 # The way there begins on a part of the sample, an iteration of which costs as much less; but no
 # fewer rows than so many per consequent.
 _PART_OF_SAMPLE, _ROWS_EACH = 4, 20
+# Tenfold stiffer premises, while a term is hardly true on any row.
+_MOST_STIFFER = 6
 # Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
 # them, and what has not after these goes to and fro.
 _MOST_TURNS = 20
@@ -127,7 +130,7 @@ def fit_rules(
     report_constant(fit.rows, data.input_names)
     weights = None
     if fit.huber is None:
-        run = fit.best_run(fit.rows, fit.start(fit.rows))
+        run = fit.readable_run(fit.rows, fit.start(fit.rows))
     else:
         run, row_weights = fit.robust_run(fit.huber.epsilon)
         weights = data.spread_over_rows(row_weights, fit.trained_on)
@@ -185,6 +188,25 @@ class _Fit:
         if self.printer is not None:
             self.printer.tell_start(start)
         return start
+
+    def readable_run(self, rows: Rows, start: Start) -> SolverRun:
+        """The best run from a start that leaves no term where hardly a row is.
+
+        Rows that the search has not seen may draw a term into a gap between them, out of which no
+        gradient leads. The premises are then held ten times as much, from the start again, unless
+        it was asked for how much they are held.
+        """
+        seen = rows.sample or rows
+        run = self.best_run(rows, start)
+        if "stiffness" in self.request.weights or has_idle_term(seen, start.antecedent):
+            return run
+        for _ in range(_MOST_STIFFER):
+            if not has_idle_term(seen, run.evaluation.antecedent):
+                break
+            stiffer = replace(start.penalty, stiffness=10.0 * start.penalty.stiffness)
+            start = replace(start, penalty=stiffer)
+            run = self.best_run(rows, start)
+        return run
 
     def best_run(self, rows: Rows, start: Start) -> SolverRun:
         """The run from a start, or the best from several: of the least leave-one-out error.
@@ -313,7 +335,7 @@ class _Fit:
             start = self.start(without_outliers(rows, weights))
             if run is not None and turn > 1 and _is_of_one_size(start, run.start):
                 break
-            run = self.best_run(reweighted(rows, weights), start)
+            run = self.readable_run(reweighted(rows, weights), start)
             run, weights = self.settled(rows, run, weights, epsilon)
         assert run is not None
         return run, weights

@@ -20,6 +20,27 @@ def data(n_rows=120, n_inputs=2):
     return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
 
 
+def test_no_term_ends_in_a_gap_that_the_search_has_not_seen():
+    """One row far from 2,500 others draws a term away from them, unless the premises are held."""
+    rng = np.random.default_rng(3)
+    x = np.r_[rng.gamma(4.0, 0.25, 2500), rng.uniform(5.0, 30.0)]
+    y = np.abs(x - 2.2).clip(0.0, 2.0) + 0.3 * np.sin(4.0 * x) * (x < 3.0)
+    y += 0.02 * rng.normal(size=x.size)
+
+    def least_truth(stiffness="auto"):
+        solver = VariableProjection(stiffness=stiffness)
+        model = ANFISRegressor(n_mfs=3, solver=solver).fit(x[:, None], y)
+        nearest = [np.abs((x - t["center"]) / t["width"]).min() for t in model.memberships_]
+        return np.exp(-0.5 * max(nearest) ** 2), model.stiffness_
+
+    held, stiffness = least_truth()
+    assert held >= 0.5
+    # What is asked for is obeyed, whatever it does to the terms.
+    drawn, obeyed = least_truth(0.1 * stiffness)
+    assert drawn < 0.5
+    assert obeyed == 0.1 * stiffness
+
+
 # --------------------------------------------------------------------------------------- clusterers
 
 

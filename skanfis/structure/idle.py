@@ -1,0 +1,24 @@
+"""Terms that are hardly true on any row: names for nothing that was seen."""
+
+import numpy as np
+
+from ..antecedent import Antecedent
+from ..rows import Rows
+
+__all__ = ["LEAST_TRUTH", "has_idle_term"]
+
+# A term is to be truer than not on some row.
+LEAST_TRUTH = 0.5
+_READ_ROWS = 4096
+
+
+def has_idle_term(rows: Rows, antecedent: Antecedent) -> bool:
+    """Whether some term's membership is below one half on every row."""
+    greatest = np.full(antecedent.n_terms, -np.inf)
+    for chunk in rows.chunks(_READ_ROWS):
+        for part in chunk:
+            Z, _, _ = rows.read(part)
+            np.maximum(greatest, antecedent.log_memberships(Z).max(axis=1), out=greatest)
+            if (greatest >= np.log(LEAST_TRUTH)).all():
+                return False
+    return True
