@@ -5,11 +5,12 @@
 3. ``structure`` gives a start: the rules, the weights of the penalty, where the premises stand.
 4. A solver runs from there, or from several starts, of which the best is kept (``restarts``).
 5. With Huber's loss the rows are weighted anew by what that left, and 3 and 4 repeated.
-6. The model is frozen in the user's units, and rules that do nothing are listed (``pruning``).
+6. The model is frozen in the user's units (``freezing``), and rules that do nothing are listed
+   (``pruning``).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,29 +21,28 @@ from sklearn.exceptions import ConvergenceWarning
 from .._threads import map_in_threads
 from .._validation import warn_user
 from ..constraints.exchange import constrained
-from ..model import TargetRange, TSKModel
-from ..objective import Evaluation, SeparableProblem
-from ..options import EarlyStopping, Huber, policy_of
-from ..penalty import Penalty
+from ..model import TSKModel
+from ..objective import SeparableProblem
+from ..options import EarlyStopping, Huber
 from ..posterior import Posterior
 from ..premise import Premise
 from ..rows import Rows
 from ..sampling import is_many, with_sample
-from ..solvers import SOLVERS, LeastSquares, Solver, SolverResult, VariableProjection
+from ..solvers import SOLVERS, LeastSquares, Solver, VariableProjection
 from ..structure import (
     SampleSize,
     Start,
     StructureRequest,
     effective_weight,
     has_idle_term,
-    imported_antecedent,
     report_constant,
 )
-from ..support import RuleFiring, RuleSupport
 from .data import TrainingData
+from .freezing import ModelBuilder, as_given
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
 from .restarts import displaced_starts, leave_one_out_error
+from .result import Fitted, SolverRun
 from .robust import (
     MANY_ROWS,
     huber_weights,
@@ -53,7 +53,7 @@ from .robust import (
 )
 from .stopping import ValidationLoss, hold_out
 
-__all__ = ["Fitted", "SolverRun", "fit_rules"]
+__all__ = ["fit_rules"]
 
 # Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
 # what is left to do is done on all rows.
@@ -73,41 +73,6 @@ _SETTLED = 1e-3
 _MOST_STARTS = 5
 
 
-@dataclass(frozen=True, eq=False)
-class SolverRun:
-    """One run of the solver: where it began, what it worked on, where it ended."""
-
-    start: Start
-    problem: SeparableProblem
-    premise: Premise
-    result: SolverResult
-    validation_losses: tuple[float, ...] | None = None
-
-    @property
-    def evaluation(self) -> Evaluation:
-        """The problem at the best point."""
-        assert self.result.evaluation is not None
-        return self.result.evaluation
-
-    @property
-    def displacement(self) -> np.ndarray:
-        """Where the premises are, from their start."""
-        return self.premise.displacement(self.evaluation.antecedent.parameters)
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """What a fit leaves behind."""
-
-    model: TSKModel
-    result: SolverResult
-    start: Start
-    redundant_rules: list[dict]
-    robust_weights: np.ndarray | None = None
-    validation_losses: tuple[float, ...] | None = None
-    constraints: dict | None = None
-
-
 def fit_rules(
     estimator: Any,
     data: TrainingData,
@@ -125,7 +90,7 @@ def fit_rules(
         scikit-learn's.
     """
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
-        return _as_given(estimator, data, request.partition)
+        return as_given(estimator, data, request.partition)
     fit = _Fit(estimator, data, request, callbacks)
     report_constant(fit.rows, data.input_names)
     weights = None
@@ -135,8 +100,8 @@ def fit_rules(
         run, row_weights = fit.robust_run(fit.huber.epsilon)
         weights = data.spread_over_rows(row_weights, fit.trained_on)
     fit.warn_unless_converged(run)
-    firing = fit.firing(run.evaluation)
-    model, result, kept = fit.frozen(run.start, run.evaluation, firing), run.result, None
+    firing = fit.builder.firing(run.evaluation)
+    model, result, kept = fit.builder.model(run.start, run.evaluation, firing), run.result, None
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
     model = replace(model, posterior=fit.posterior(run, robust))
     if data.wishes is not None:
@@ -177,6 +142,11 @@ class _Fit:
         elif is_many(self.rows) and self.huber is None:
             self.rows = with_sample(self.rows)
         self.size = SampleSize.of(self.rows.sample or self.rows)
+
+    @property
+    def builder(self) -> ModelBuilder:
+        """What makes models of what is found on the rows as they are now."""
+        return ModelBuilder(self.data, self.rows, self.request, self.estimator.out_of_bounds)
 
     def start(self, rows: Rows) -> Start:
         """Where a run begins: rules, weights of the penalty, and the premises so far."""
@@ -363,7 +333,7 @@ class _Fit:
         callbacks = self.callbacks
 
         def watch(n_iter, evaluation):
-            return callbacks.task("iteration", lambda: self.frozen(start, evaluation))
+            return callbacks.task("iteration", lambda: self.builder.model(start, evaluation))
 
         return watch
 
@@ -373,7 +343,7 @@ class _Fit:
             self.printer.tell_run(run.result)
         if self.callbacks is None:
             return False
-        return self.callbacks.task("start", lambda: self.frozen(run.start, run.evaluation))
+        return self.callbacks.task("start", lambda: self.builder.model(run.start, run.evaluation))
 
     def warn_unless_converged(self, run):
         """Warn where the solver would have gone on."""
@@ -385,43 +355,6 @@ class _Fit:
             f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}: {result.message} The model "
             "is the best one found; increase max_iter or the solver's tol.",
             ConvergenceWarning,
-        )
-
-    @property
-    def n_coefficients(self):
-        """Of a rule: one, and a slope for every input that its consequent takes and that varies."""
-        return 1 + int(np.sum(~self.rows.inputs.is_constant[self.request.consequent_inputs]))
-
-    def firing(self, evaluation: Evaluation) -> RuleFiring:
-        """How the rules fire on the rows, in a pass over them."""
-        return RuleFiring.of(self.rows, evaluation.antecedent, self.n_coefficients)
-
-    def frozen(
-        self, start: Start, evaluation: Evaluation, firing: RuleFiring | None = None
-    ) -> TSKModel:
-        """The model in the user's units; ``firing`` is how its rules fire, if that is at hand."""
-        rows, trained = self.rows, evaluation.antecedent
-        offset, scale = rows.inputs.offset, rows.inputs.scale
-        firing = self.firing(evaluation) if firing is None else firing
-        support = RuleSupport.of(rows, trained, self.n_coefficients, firing)
-        policy, limit = policy_of(self.estimator.out_of_bounds)
-        return TSKModel(
-            antecedent=trained.change_units(offset, scale),
-            initial_antecedent=start.antecedent.change_units(offset, scale),
-            coefficients=self.in_user_units(evaluation.coefficients),
-            reference=offset,
-            spread=scale,
-            minimum=rows.inputs.minimum,
-            maximum=rows.inputs.maximum,
-            rule_weights=evaluation.masses,
-            rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
-            input_names=self.data.input_names,
-            out_of_bounds=policy,
-            max_extrapolation=limit,
-            support=support.change_units(offset, scale),
-            term_names=start.term_names,
-            output_names=self.data.output_names,
-            target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
         )
 
     def posterior(self, run, robust):
@@ -438,54 +371,13 @@ class _Fit:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         evaluation, report = constrained(
-            model, evaluation, run.problem, self.data.wishes, self.in_user_units
+            model, evaluation, run.problem, self.data.wishes, self.builder.in_user_units
         )
-        model = replace(model, coefficients=self.in_user_units(evaluation.coefficients))
+        model = replace(model, coefficients=self.builder.in_user_units(evaluation.coefficients))
         if not self.data.wishes.are_kept_within(model.output_limits):
             # What is asked for lies beyond what was seen: it goes before.
             model = replace(model, target=None)
         return model, replace(run.result, evaluation=evaluation), report
-
-    def in_user_units(self, coefficients):
-        """Consequents about the inputs' means, from those on [1, z] of standardised data."""
-        inputs, targets = self.rows.inputs, self.rows.targets
-        slopes = self.request.consequent_inputs
-        n_basis = 1 + slopes.size if self.estimator.order == 1 else 1
-        solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
-        solved[:, 0] += targets.offset
-        if self.estimator.order == 0:
-            return solved
-        found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
-        found[:, 0] = solved[:, 0]
-        found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
-        return found
-
-
-def _as_given(estimator, data, model) -> Fitted:
-    """The imported model itself, with its error on the data."""
-    if model.n_outputs != data.y.shape[1]:
-        raise ValueError(
-            f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}: with "
-            "max_iter=0 the model is taken as it is."
-        )
-    policy, limit = policy_of(estimator.out_of_bounds)
-    model = replace(
-        model,
-        initial_antecedent=model.antecedent,
-        input_names=data.input_names,
-        output_names=data.output_names,
-        out_of_bounds=policy,
-        max_extrapolation=limit,
-    )
-    rows = Rows.standardised(data.X, data.y, data.sample_weight)
-    # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
-    answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
-    residual = (data.y - answering.predict(data.X)) / rows.targets.scale
-    loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
-    firing = RuleFiring.of(rows, imported_antecedent(model, rows), 0)
-    redundant = redundant_rules(rule_statistics(rows, firing))
-    result = SolverResult(None, np.full(2, loss), 0, "as_given")
-    return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
 
 
 def _object_for(given, by_word):

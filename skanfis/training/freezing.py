@@ -1,0 +1,108 @@
+"""From where a run has ended to the frozen model, in the user's units."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..model import TargetRange, TSKModel
+from ..objective import Evaluation
+from ..options import policy_of
+from ..penalty import Penalty
+from ..rows import Rows
+from ..solvers import SolverResult
+from ..structure import Start, StructureRequest, imported_antecedent
+from ..support import RuleFiring, RuleSupport
+from .data import TrainingData
+from .pruning import redundant_rules, rule_statistics
+from .result import Fitted
+
+__all__ = ["ModelBuilder", "as_given"]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelBuilder:
+    """Makes models of what was found on ``rows``, which ``data`` has in the user's units."""
+
+    data: TrainingData
+    rows: Rows
+    request: StructureRequest
+    out_of_bounds: Any
+
+    @property
+    def n_coefficients(self):
+        """Of a rule: one, and a slope for every input that its consequent takes and that varies."""
+        return 1 + int(np.sum(~self.rows.inputs.is_constant[self.request.consequent_inputs]))
+
+    def firing(self, evaluation: Evaluation) -> RuleFiring:
+        """How the rules fire on the rows, in a pass over them."""
+        return RuleFiring.of(self.rows, evaluation.antecedent, self.n_coefficients)
+
+    def model(
+        self, start: Start, evaluation: Evaluation, firing: RuleFiring | None = None
+    ) -> TSKModel:
+        """The model in the user's units; ``firing`` is how its rules fire, if that is at hand."""
+        rows, trained = self.rows, evaluation.antecedent
+        offset, scale = rows.inputs.offset, rows.inputs.scale
+        firing = self.firing(evaluation) if firing is None else firing
+        support = RuleSupport.of(rows, trained, self.n_coefficients, firing)
+        policy, limit = policy_of(self.out_of_bounds)
+        return TSKModel(
+            antecedent=trained.change_units(offset, scale),
+            initial_antecedent=start.antecedent.change_units(offset, scale),
+            coefficients=self.in_user_units(evaluation.coefficients),
+            reference=offset,
+            spread=scale,
+            minimum=rows.inputs.minimum,
+            maximum=rows.inputs.maximum,
+            rule_weights=evaluation.masses,
+            rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
+            input_names=self.data.input_names,
+            out_of_bounds=policy,
+            max_extrapolation=limit,
+            support=support.change_units(offset, scale),
+            term_names=start.term_names,
+            output_names=self.data.output_names,
+            target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
+        )
+
+    def in_user_units(self, coefficients):
+        """Consequents about the inputs' means, from those on [1, z] of standardised data."""
+        inputs, targets = self.rows.inputs, self.rows.targets
+        slopes = self.request.consequent_inputs
+        n_basis = 1 + slopes.size if self.request.order == 1 else 1
+        solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
+        solved[:, 0] += targets.offset
+        if self.request.order == 0:
+            return solved
+        found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
+        found[:, 0] = solved[:, 0]
+        found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
+        return found
+
+
+def as_given(estimator, data, model) -> Fitted:
+    """The imported model itself, with its error on the data."""
+    if model.n_outputs != data.y.shape[1]:
+        raise ValueError(
+            f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}: with "
+            "max_iter=0 the model is taken as it is."
+        )
+    policy, limit = policy_of(estimator.out_of_bounds)
+    model = replace(
+        model,
+        initial_antecedent=model.antecedent,
+        input_names=data.input_names,
+        output_names=data.output_names,
+        out_of_bounds=policy,
+        max_extrapolation=limit,
+    )
+    rows = Rows.standardised(data.X, data.y, data.sample_weight)
+    # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
+    answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
+    residual = (data.y - answering.predict(data.X)) / rows.targets.scale
+    loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
+    firing = RuleFiring.of(rows, imported_antecedent(model, rows), 0)
+    redundant = redundant_rules(rule_statistics(rows, firing))
+    result = SolverResult(None, np.full(2, loss), 0, "as_given")
+    return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
