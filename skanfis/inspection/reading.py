@@ -304,6 +304,26 @@ class ReadabilityDisplay:
                 color="0.8",
                 linewidth=0.8,
             )
+        self._mark_terms(axes, places)
+        for name, y in places_of_inputs.items():
+            j = model.input_names.index(name)
+            low, high = range_text(model, j, 4)
+            axes.text(0.0, y, low, ha="left", va="center", fontsize="small", color="0.4")
+            axes.text(1.0, y, high, ha="right", va="center", fontsize="small", color="0.4")
+            axes.text(0.5, y, name, ha="center", va="center", fontweight="bold")
+        if not places:
+            axes.text(0.5, 0.5, "no terms", ha="center", color="0.4")
+        axes.set_yticks(places, terms["term"])
+        axes.set_xticks([])
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+        axes.set_xlim(0.0, 1.12)
+        axes.set_ylim(max(place, 1.0), 0.0)
+        axes.set_title("terms, and their greatest truth on the rows", fontsize="medium", loc="left")
+
+    def _mark_terms(self, axes, places):
+        """Each term's greatest truth beside its band, and where neighbours cross too high."""
+        terms = self.readability.terms
         for y, truth, height in zip(
             places, terms["greatest_truth"], terms["crossing"], strict=True
         ):
@@ -320,21 +340,6 @@ class ReadabilityDisplay:
                     color=_RED,
                     bbox={"color": "white", "pad": 0.5},
                 )
-        for name, y in places_of_inputs.items():
-            j = model.input_names.index(name)
-            low, high = range_text(model, j, 4)
-            axes.text(0.0, y, low, ha="left", va="center", fontsize="small", color="0.4")
-            axes.text(1.0, y, high, ha="right", va="center", fontsize="small", color="0.4")
-            axes.text(0.5, y, name, ha="center", va="center", fontweight="bold")
-        if not places:
-            axes.text(0.5, 0.5, "no terms", ha="center", color="0.4")
-        axes.set_yticks(places, terms["term"])
-        axes.set_xticks([])
-        axes.tick_params(length=0)
-        axes.spines[:].set_visible(False)
-        axes.set_xlim(0.0, 1.12)
-        axes.set_ylim(max(place, 1.0), 0.0)
-        axes.set_title("terms, and their greatest truth on the rows", fontsize="medium", loc="left")
 
     def _draw_rules(self, axes):
         found, k = self.readability.measures, self.output
