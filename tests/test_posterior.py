@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy import integrate, stats
 from sklearn.cluster import KMeans
 from sklearn.compose import TransformedTargetRegressor, make_column_transformer
 from sklearn.pipeline import make_pipeline
@@ -20,7 +21,7 @@ from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.options import LinearExtrapolation
 from skanfis.penalty import Penalty
-from skanfis.posterior import Posterior
+from skanfis.posterior import Posterior, _mean_squares
 from skanfis.premise import Premise
 from skanfis.solvers import GradientDescent, Hybrid, LeastSquares, VariableProjection
 
@@ -266,6 +267,26 @@ def test_noise_of_hubers_loss_is_that_of_the_sound_rows():
     plain = ANFISRegressor(**settings | {"loss": "squared_error"}).fit(X[8:], y[8:])
     assert_allclose(sound.noise_std_, plain.noise_std_, rtol=0.05)
     assert_allclose(spoilt.noise_std_, plain.noise_std_, rtol=0.1)
+
+
+@pytest.mark.parametrize("block_bytes", [1, 2**22])
+def test_noise_of_hubers_loss_is_his_second_proposal(monkeypatch, block_bytes):
+    monkeypatch.setattr("skanfis.objective._BLOCK_BYTES", block_bytes)
+    monkeypatch.setattr("skanfis.objective._FEWEST_ROWS", 64)
+    g, c = np.random.default_rng(12), 1.3
+    given = oracles.bumpy_rows(g, 250, 2, 2, weighted=True)
+    # As a fit leaves them: Huber's weights are in those of the rows.
+    left = g.uniform(0.2, 1.0, 250)
+    rows = replace(given, sample_weight=given.sample_weight * left)
+    antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+    problem = SeparableProblem(rows, antecedent, 1, PENALTY)
+    evaluation = problem.evaluate(antecedent.parameters)
+    dense = oracles.DenseProblem(rows, antecedent, 1, PENALTY)
+    r = dense.y - dense.design(antecedent.parameters) @ evaluation.coefficients
+    psi = left[:, None] * r
+    of_normal = 2.0 * integrate.quad(lambda t: min(t, c) ** 2 * stats.norm.pdf(t), 0.0, np.inf)[0]
+    expected = np.average(psi**2, axis=0, weights=given.sample_weight) / of_normal
+    assert_allclose(_mean_squares(problem, evaluation, (left, c)), expected, rtol=1e-7)
 
 
 def test_blocks_change_nothing(monkeypatch):
