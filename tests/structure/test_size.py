@@ -164,6 +164,13 @@ def test_limit_is_that_of_scikit_learn(rng):
         ANFISRegressor(n_mfs=2).fit(X, y)
 
 
+def test_a_grid_that_is_too_large_is_called_as_it_was_asked_for(rng):
+    X, y = rng.normal(size=(500, 3)), rng.normal(size=500)
+    asked = re.escape("n_mfs=[2, 3, 2] on 3 inputs makes a grid of 12 rules with 48")
+    with config_context(working_memory=0.05), pytest.raises(ValueError, match=asked):
+        ANFISRegressor(n_mfs=[2, 3, 2]).fit(X, y)
+
+
 def test_a_grid_counts_as_the_rules_that_it_makes():
     grid = GridSize([4, 1, 2], n_basis=4, n_outputs=3)
     table = RuleBaseSize(8, n_terms=6, n_basis=4, n_outputs=3)
