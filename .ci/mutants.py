@@ -27,8 +27,8 @@ from mutmut.mutation.file_mutation import mutate_file_contents
 ROOT = Path(__file__).resolve().parent.parent
 # Modules, and the tests that mirror them: these are run once for all of a group before any mutant.
 GROUPS = {
-    "membership/base membership/bell membership/flanked membership/gaussian membership/profiles "
-    "membership/sigmoid": (
+    "membership/__init__ membership/base membership/bell membership/flanked membership/gaussian "
+    "membership/profiles membership/sigmoid": (
         "membership/test_families.py membership/test_flanked.py membership/test_profiles.py "
         "membership/test_sigmoid.py"
     ),
@@ -46,7 +46,7 @@ GROUPS = {
     "structure/clusters structure/grid structure/sample structure/size": (
         "structure/test_clusters.py structure/test_grid.py structure/test_size.py"
     ),
-    "membership/__init__ structure/imported structure/request": (
+    "structure/imported structure/request": (
         "structure/test_request.py structure/test_size.py structure/test_imported.py"
     ),
     "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, membership_families
 
 from ..oracles import central_difference, complex_step, corners, textbook_membership
 
@@ -319,3 +319,25 @@ def test_parameters_of_another_family_are_refused():
         Gaussian.natural(one_too_many)
     with pytest.raises(ValueError, match="zip"):
         Gaussian.change_units(one_too_many, np.zeros(2), np.ones(2))
+
+
+def test_families_are_given_by_name_or_class_for_all_inputs_or_for_each():
+    names = ["time", "rate"]
+    assert membership_families("auto", names) == [Gaussian, Gaussian]
+    assert membership_families("bell", names) == [Bell, Bell]
+    assert membership_families(Bell, names) == [Bell, Bell]
+    assert membership_families(("bell", Gaussian), names) == [Bell, Gaussian]
+
+
+@pytest.mark.parametrize(
+    ("mf", "message"),
+    [
+        (["bell"], r"mf=\['bell'\] has 1 entries, but X has 2 columns \(time, rate\)"),
+        (["bell", "gbellmf"], "mf='gbellmf' is MATLAB's name for it: give mf='bell'"),
+        ("bells", "mf holds 'bells': it must be one of 'gaussian', 'bell', "),
+        ([Bell, int], "mf holds <class 'int'>: it must be one of"),
+    ],
+)
+def test_families_that_are_none_are_named(mf, message):
+    with pytest.raises(ValueError, match=message):
+        membership_families(mf, ["time", "rate"])
