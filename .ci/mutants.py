@@ -47,7 +47,8 @@ GROUPS = {
         "structure/test_clusters.py structure/test_grid.py structure/test_size.py"
     ),
     "structure/imported structure/request": (
-        "structure/test_request.py structure/test_size.py structure/test_imported.py"
+        "structure/test_request.py structure/test_size.py structure/test_imported.py "
+        "structure/test_search.py::test_family_is_that_of_the_truth_where_it_is_asked_for"
     ),
     "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (
         "structure/test_search.py structure/test_terms.py structure/test_held_out.py "
