@@ -52,7 +52,8 @@ GROUPS = {
     ),
     "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (
         "structure/test_search.py structure/test_terms.py structure/test_held_out.py "
-        "structure/test_tuning.py structure/test_candidate.py"
+        "structure/test_tuning.py structure/test_candidate.py "
+        "structure/test_request.py::test_radius_of_clusters_is_reported_and_is_that_of_the_clusterer"
     ),
 }
 MODULES = " ".join(GROUPS).split()

@@ -69,3 +69,13 @@ def test_a_kink_that_was_taken_for_noise_is_found_with_the_premises_first(monkey
     # Now nothing beats the way in that finds the weights first.
     monkeypatch.setattr(tuning, "WORTHWHILE", np.inf)
     assert start.expected_error < 0.3 * found().expected_error
+
+
+def test_where_terms_are_freed_for_exact_data_nothing_holds_the_rules_together(rng):
+    x = rng.uniform(-1.0, 1.0, (120, 1))
+    rows = Rows.standardised(x, np.sin(6.0 * x))
+    antecedent = grid_antecedent([Gaussian], [4], Spacing(rows), 0.6)
+    start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
+    assert start.is_free
+    # The least that rules would pay which are to be read: n_columns sigma^2 / n over two squared.
+    assert start.penalty.agreement < 0.1 * 8 * start.expected_error / 120 / 2.0**2
