@@ -79,3 +79,18 @@ def test_where_terms_are_freed_for_exact_data_nothing_holds_the_rules_together(r
     assert start.is_free
     # The least that rules would pay which are to be read: n_columns sigma^2 / n over two squared.
     assert start.penalty.agreement < 0.1 * 8 * start.expected_error / 120 / 2.0**2
+
+
+def test_turns_end_when_the_evidence_has_not_risen_twice(monkeypatch, two_rules):
+    # -2 log p by turn: it rises by more than a half in the third; the last is not reached.
+    told, seen = [10.0, 9.8, 5.0, 4.8, 4.9, 0.0], []
+
+    def score(self):
+        if not any(evaluation is self.evaluation for evaluation in seen):
+            seen.append(self.evaluation)
+        return told[[evaluation is self.evaluation for evaluation in seen].index(True)]
+
+    monkeypatch.setattr(tuning.Tuned, "score", property(score))
+    found = tuning.tune(*two_rules, FREE, 100.0)
+    assert len(seen) == 5
+    assert found.evaluation is seen[3]
