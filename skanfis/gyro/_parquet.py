@@ -33,7 +33,8 @@ class ParquetLog:
         with open(path, "rb"):
             pass  # what cannot be opened is told as of any other file
         try:
-            self._file = parquet.ParquetFile(path)
+            # Not buffered ahead: what was read would stay as long as the file is open.
+            self._file = parquet.ParquetFile(path, pre_buffer=False)
             self.header = list(self._file.schema_arrow.names)
         except (self._errors, OSError, ValueError) as error:
             raise self._damaged(error) from error
