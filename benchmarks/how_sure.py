@@ -4,9 +4,10 @@ Real sets (a third left out, at most 500 rows to train on), every twentieth func
 and cold starts of a dozen simulated gyros at rest, thirty to train on and thirty new ones of each:
 by so few runs the mean coverage of one gyro is uncertain by 4 %. Beside the deviation alone, taken
 for normal, and the intervals of ``ConformalRegressor``, a Gaussian process (of at most 400 rows)
-and gradient boosting of two quantiles, conformalised (Romano, Patterson and Candes 2019). Coverages
-are of rows that nothing has seen. Widths are beside one another at equal coverage: each method's
-intervals are stretched or shrunk about their centres until they cover 90 % of these rows.
+and gradient boosting of two quantiles, conformalised (Romano, Patterson and Candes 2019). Of "run",
+90 % of a new run's rows are to be covered with a probability of 90 %. Coverages are of rows that
+nothing has seen. Widths are beside one another at equal coverage: each method's intervals are
+stretched or shrunk about their centres until they cover 90 % of these rows.
 """
 
 from time import process_time

@@ -20,8 +20,9 @@ class DeviationTables:
     """F and B_k F for inputs in standard deviations: squares of others might be beyond floats.
 
     ``factor`` is F, ``of_consequents`` the table of F' F for ``moments``; ``joint`` is T beside
-    -B_k F, (n_outputs, n_displacements, n_parameters + n_columns). ``unit`` is a power of two near
-    the noise of every output, (n_outputs, 1), in which squares stay finite.
+    -B_k F, and under them Q_k times the whole half, whose squares are taken off: (n_outputs,
+    n_displacements + n_pinned, n_premises + n_columns). ``unit`` is a power of two near the noise
+    of every output, (n_outputs, 1), in which squares stay finite.
     """
 
     moments: DesignMoments
@@ -29,6 +30,20 @@ class DeviationTables:
     factor: np.ndarray
     joint: np.ndarray
     unit: np.ndarray
+    n_added: int
+
+    @property
+    def n_premises(self):
+        """Derivatives by premises that ``joint`` takes, none where these were not learnt."""
+        return self.joint.shape[2] - self.factor.shape[1]
+
+    def signed(self, one, other):
+        """Inner products of ``joint`` times rows: those added less those taken off, (n_rows,)."""
+        n = self.n_added
+        found = np.einsum("qn,qn->n", one[:n], other[:n])
+        if len(one) > n:
+            found -= np.einsum("qn,qn->n", one[n:], other[n:])
+        return found
 
     @property
     def dtype(self):
@@ -52,12 +67,17 @@ class DeviationTables:
         factor = posterior.consequents * np.tile(widths, model.n_rules)
         moments = DesignMoments(model.antecedent.share_counts, widths.size)
         unit = np.ldexp(1.0, np.frexp(posterior.noise)[1])[:, None]
-        joint = [
-            np.hstack([posterior.premises, -cross @ factor / one])
-            for cross, one in zip(posterior.cross, unit, strict=True)
-        ]
+        n_added, n_columns = posterior.premises.shape[0], factor.shape[0]
+        premises = posterior.premises if n_added else np.zeros((0, 0))
+        joint = []
+        for k, one in enumerate(unit):
+            own = np.hstack([premises, -posterior.cross[k] @ factor / one])
+            pinned = posterior.pinned[k, :, n_columns:] @ own
+            of_factor = posterior.pinned[k, :, :n_columns] @ factor
+            pinned[:, premises.shape[1] :] += of_factor * (posterior.noise[k] / one)
+            joint.append(np.vstack([own, pinned]))
         table = moments.of_matrix(factor.T @ factor)
-        return cls(moments, table, factor, np.stack(joint), unit)
+        return cls(moments, table, factor, np.stack(joint), unit, n_added)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +153,10 @@ class DerivativeRows:
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
 
-def inner_products(one, other):
-    """Inner products of every row: of one with itself, with the other, of the other with itself."""
-    return [np.einsum("pn,pn->n", a, b) for a, b in ((one, one), (one, other), (other, other))]
+def _inner(one, other):
+    return np.einsum("pn,pn->n", one, other)
+
+
+def inner_products(one, other, product=_inner):
+    """Of every row the products of one with itself, with the other, of the other with itself."""
+    return [product(a, b) for a, b in ((one, one), (one, other), (other, other))]

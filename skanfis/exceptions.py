@@ -2,6 +2,7 @@
 
 __all__ = [
     "ConstantInputWarning",
+    "ConstraintWarning",
     "ForgottenRowsWarning",
     "OutOfBoundsWarning",
     "ReadabilityWarning",
@@ -12,6 +13,10 @@ __all__ = [
 
 class ConstantInputWarning(UserWarning):
     """An input never changes in the training data, so that nothing can be learnt of it."""
+
+
+class ConstraintWarning(UserWarning):
+    """The data contradict what a fit was constrained to."""
 
 
 class ForgottenRowsWarning(UserWarning):

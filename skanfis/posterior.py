@@ -32,7 +32,7 @@ Of the tangent's variance, which is |h0 + h1|^2 with h0 from phi(c) and h1 from 
 product 2 h0 h1 counts where it is positive only: a deviation never falls on the way out.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from scipy.linalg import blas
@@ -53,6 +53,8 @@ _LEAST_FREEDOM = 1.0
 # Derivatives along a way out of the box, by differences over this part of a standard deviation.
 # They are taken inside: terms may have a corner on the edge.
 _STEP = 2.0**-14
+# Of what is known at points that lie close together, what says nothing new.
+_DEPENDENT = 1e-7
 # Single precision takes half the time. It is used where it gives this part of a deviation, at so
 # many points of the range; of a deviation nobody knows as much.
 _DIGITS, _N_COMPARED = 1e-5, 256
@@ -64,7 +66,7 @@ class Posterior:
 
     With phi = w_r [1, x - x0] the design of a row, d_k the derivatives of output k by the
     antecedent's parameters, u = F phi and v_k = T d_k - B_k u, the variance of output k is
-    noise_k^2 (1 + |u|^2) + |v_k|^2.
+    noise_k^2 + |h|^2 - |Q_k h|^2 with h = [noise_k u, v_k].
 
     Attributes
     ----------
@@ -78,6 +80,9 @@ class Posterior:
         T; of no rows where the premises were not learnt.
     cross : ndarray of shape (n_outputs, n_displacements, n_columns)
         B_k.
+    pinned : ndarray of shape (n_outputs, n_pinned, n_columns + n_displacements)
+        Q_k, orthonormal rows: what is known of each output for certain, by constraints that are
+        met with equality. Rows of zeros where outputs have different numbers of them.
     """
 
     noise: np.ndarray
@@ -85,6 +90,12 @@ class Posterior:
     consequents: np.ndarray
     premises: np.ndarray
     cross: np.ndarray
+    pinned: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0)))
+
+    def __post_init__(self):
+        if not self.pinned.size:
+            none = np.zeros((self.noise.size, 0, sum(self.cross.shape[1:])))
+            object.__setattr__(self, "pinned", none)
 
     def __getstate__(self):
         """What a file holds: of a triangle no zeros."""
@@ -96,6 +107,9 @@ class Posterior:
         full = np.zeros((n_columns, n_columns))
         full[np.tril_indices(n_columns)] = state["consequents"]
         self.__dict__.update(state | {"consequents": full})
+        if "pinned" not in state:
+            self.__dict__["pinned"] = np.zeros((0, 0, 0))
+            self.__post_init__()
 
     @classmethod
     def of(
@@ -167,9 +181,57 @@ class Posterior:
 
     def change_target_units(self, scale):
         """Return the same posterior for outputs given as offset + scale * y."""
+        pinned = self.pinned.copy()
+        pinned[:, :, self.cross.shape[2] :] *= np.sign(scale)[:, None, None]
         return replace(
-            self, noise=self.noise * np.abs(scale), cross=self.cross * scale[:, None, None]
+            self,
+            noise=self.noise * np.abs(scale),
+            cross=self.cross * scale[:, None, None],
+            pinned=pinned,
         )
+
+    def given(self, model, known):
+        """The same posterior, given that what an output does at some points is known.
+
+        Where a value, or a difference of two, is known for certain, what remains uncertain is
+        orthogonal to it: of the half h of every row the part along the halves of what is known is
+        taken off. Exact for a Gaussian posterior and equalities.
+
+        Parameters
+        ----------
+        model : TSKModel
+            Whose posterior this is, in the user's units.
+        known : list of (ndarray, ndarray or None)
+            Of every output points (n_points, n_inputs) in the range; values are known there, or, if
+            others of as many are given, the changes from those.
+        """
+        spans = []
+        for k, parts in enumerate(known):
+            halves = [np.zeros((sum(self.cross.shape[1:]), 0))]
+            for points, others in parts:
+                half = self._half(model, points, k)
+                if others is not None:
+                    half -= self._half(model, others, k)
+                halves.append(half)
+            spans.append(_orthonormal(np.hstack(halves)))
+        pinned = np.zeros((self.noise.size, max(map(len, spans)), len(spans[0].T)))
+        for own, rows in zip(pinned, spans, strict=True):
+            own[: len(rows)] = rows
+        return replace(self, pinned=pinned)
+
+    def _half(self, model, X, k):
+        """H of output k at points X (n_points, n_inputs), a column each, in units of its noise."""
+        Z = np.ascontiguousarray(X.T, dtype=float)
+        row, tables = self._row(model, Z), self._tables(model, exact=True)
+        design = np.empty((self.consequents.shape[0], Z.shape[1]))
+        row.design(design)
+        u = tables.factor @ design * (self.noise[k] / tables.unit[k])
+        if not self.premises.shape[0]:
+            return u
+        v = tables.joint[k, : self.premises.shape[0]] @ np.vstack(
+            [row.changes(k, tables.unit), design]
+        )
+        return np.vstack([u, v])
 
     def inside(self, model, Z, exact=False):
         """Outputs and their deviations, each (n_outputs, n_rows), at rows Z (n_inputs, n_rows).
@@ -186,13 +248,17 @@ class Posterior:
         square += 1.0
         unit = tables.unit
         found = (self.noise[:, None] / unit) ** 2 * square
-        if self.premises.shape[0]:
+        if tables.joint.shape[1]:
+            n_premises = tables.n_premises
             sides = np.empty((tables.joint.shape[2], Z.shape[1]), tables.dtype)
-            row.design(sides[self.premises.shape[1] :])
+            row.design(sides[n_premises:])
             for k, joint in enumerate(tables.joint):
-                sides[: self.premises.shape[1]] = row.changes(k, unit)
+                if n_premises:
+                    sides[:n_premises] = row.changes(k, unit)
                 half = joint @ sides
-                found[k] += np.einsum("qn,qn->n", half, half)
+                found[k] += tables.signed(half, half)
+        # Never below the noise, whatever rounding leaves of what is known.
+        np.maximum(found, (self.noise[:, None] / unit) ** 2, out=found)
         return row.outputs, np.sqrt(found) * unit
 
     def beyond(self, model, Z, way, unfollowed, exact=False):
@@ -208,8 +274,8 @@ class Posterior:
         length = np.sqrt(np.sum((way / model.spread[:, None]) ** 2, axis=0))
         step = way * (_STEP / np.maximum(length, np.finfo(float).tiny))
         once, twice = (self._row(model, Z - k * step) for k in (1, 2))
-        tables, n_premises = self._tables(model, exact), self.premises.shape[1]
-        unit = tables.unit
+        tables = self._tables(model, exact)
+        n_premises, unit = tables.n_premises, tables.unit
         sides = np.empty((2, tables.joint.shape[2], Z.shape[1]), tables.dtype)
         designs, changes = sides[:, n_premises:], sides[:, :n_premises]
         once.astype(tables.dtype).design(designs[0])
@@ -218,15 +284,18 @@ class Posterior:
         product = blas.get_blas_funcs("trmm", dtype=tables.dtype)
         u = [product(1.0, tables.factor.T, one.T, side=1, lower=0).T for one in designs]
         found = (self.noise[:, None] / unit) ** 2 * np.stack(inner_products(*u))[:, None]
-        if self.premises.shape[0]:
+        if tables.joint.shape[1]:
             for k, joint in enumerate(tables.joint):
-                first, second = (one.changes(k, unit) for one in (once, twice))
-                changes[0], changes[1] = first, first - second
-                found[:, k] += inner_products(*(joint @ one for one in sides))
+                if n_premises:
+                    first, second = (one.changes(k, unit) for one in (once, twice))
+                    changes[0], changes[1] = first, first - second
+                half, change = (joint @ one for one in sides)
+                found[:, k] += inner_products(half, change, tables.signed)
         near, both, change = found
         steps = length / _STEP
         square = (self.noise[:, None] / unit) ** 2 + near + 2.0 * both + change
         square += 2.0 * np.maximum((both + change) * steps, 0.0) + change * steps**2
+        np.maximum(square, (self.noise[:, None] / unit) ** 2, out=square)
         return np.sqrt(square + (unfollowed / unit) ** 2) * unit
 
     def _tables(self, model, exact):
@@ -248,6 +317,14 @@ class Posterior:
 
     def _row(self, model, Z):
         return DerivativeRows.of(model, Z, self.inputs, self.premises.shape[0] > 0)
+
+
+def _orthonormal(columns):
+    """Orthonormal rows that span some columns, (n, n_columns); what rounding leaves is dropped."""
+    lengths = np.sqrt(np.sum(columns**2, axis=0))
+    columns = columns[:, lengths > 0.0] / lengths[lengths > 0.0]
+    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return left[:, sizes > _DEPENDENT * sizes.max(initial=0.0)].T
 
 
 def _mean_squares(problem, evaluation, robust):

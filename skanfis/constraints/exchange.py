@@ -20,6 +20,7 @@ no data have asked for.
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import chdtri
 from scipy.stats import qmc
 from sklearn.exceptions import ConvergenceWarning
 
@@ -27,6 +28,7 @@ from .._validation import warn_user
 from ..bounds.enclosure import Enclosure
 from ..bounds.search import largest
 from ..bounds.terms import is_known
+from ..exceptions import ConstraintWarning
 from ..model import TSKModel
 from .held import Held
 from .program import InfeasibleError
@@ -39,6 +41,8 @@ _FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.03, 3.0
 _MOST_ROUNDS = 40
 _SAMPLE, _POINTS_A_ROUND = 2048, 40
 _MOST_BOXES = 30_000
+# That data which keep the constraints are said to contradict them.
+_CHANCE = 1e-3
 # Inputs up to which a sample has all corners of the range.
 _CORNERS = 8
 
@@ -62,6 +66,8 @@ def constrained(model: TSKModel, evaluation, problem, wishes, in_user_units):
     evaluation : Evaluation
         Its coefficients keep the wishes.
     report : dict
+    known : tuple
+        Of every output what is met with equality, as :class:`Posterior.given` takes it.
 
     Raises
     ------
@@ -96,6 +102,7 @@ class _Exchange:
             solved = self._on_sample(evaluation)
             self._warn()
         ended = self._ended(evaluation, solved)
+        self._warn_of_contradictions(evaluation, solved, ended)
         report = {
             "certified": is_proven,
             "margin": self.held.margin,
@@ -104,7 +111,7 @@ class _Exchange:
             "loss_before": float(evaluation.mean_squared_error),
             "loss_after": float(ended.mean_squared_error),
         }
-        return ended, report
+        return ended, report, solved.known
 
     @property
     def wishes(self):
@@ -189,6 +196,36 @@ class _Exchange:
             "skanfis.bounds.",
             ConvergenceWarning,
         )
+
+    def _warn_of_contradictions(self, evaluation, solved, ended):
+        """Warn where less than one fit in a thousand to such data would have to give up so much.
+
+        What is paid is half a Mahalanobis distance, over sigma^2 / n, in the posterior of the
+        consequents: of so many active points, its tail is no heavier than that of chi-squared.
+        """
+        n_rows, scale = self.problem.rows.total_weight, self.problem.rows.targets.scale
+        for k, name in enumerate(self.model.output_names):
+            guilty = [
+                (demand.name, active)
+                for demand, active in zip(self.held.demands, solved.active, strict=True)
+                if demand.output == k and active
+            ]
+            if self.model.posterior is None or not guilty:
+                continue
+            noise = max(self.model.posterior.noise[k] / scale[k], np.sqrt(np.finfo(float).eps))
+            distance = 2.0 * n_rows * solved.paid[k] / noise**2
+            count = sum(active for _, active in guilty) + len(self.wishes.points)
+            if distance <= chdtri(count, _CHANCE):
+                continue
+            names = " and ".join(name for name, _ in guilty)
+            before, after = evaluation.mean_squared_error, ended.mean_squared_error
+            warn_user(
+                f"The data contradict {names}: kept, it raises the mean squared error of training "
+                f"from {before:.3g} to {after:.3g} of the variance of {name!r}, far more than "
+                "noise would. Where the data go the other way, the model is flat. Leave the "
+                "constraint out, or look at the data; constraints_ has both losses.",
+                ConstraintWarning,
+            )
 
     def _ended(self, evaluation, solved):
         normal, local = evaluation.normal, solved.local

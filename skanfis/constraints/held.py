@@ -46,11 +46,17 @@ def demands(wishes: Wishes, model: TSKModel):
 class Solved:
     """Consequents that keep what is held, at some premises.
 
-    ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included.
+    ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
+    how much of it each output pays for what is held. ``known`` has for every output what is met
+    with equality: points in the user's units, and those that a slope begins at, or None. ``active``
+    is how many points of each demand are.
     """
 
     local: np.ndarray
     cost: float
+    paid: np.ndarray
+    known: tuple
+    active: np.ndarray
 
 
 class Held:
@@ -116,19 +122,37 @@ class Held:
         equal = self._in_local(self._at(columns, self.standardised(self.wishes.points)))
         values = (self.wishes.values - targets.offset) / targets.scale
         places = range(len(self.demands)) if chosen is None else chosen
+        known, active = [], np.zeros(len(self.demands), dtype=int)
         for k in range(problem.n_outputs):
             own = [p for p in places if self.demands[p].output == k]
             rows, least = self._rows(columns, own)
             try:
-                local[:, k] = nearest(
+                local[:, k], is_active = nearest(
                     normal.factor, normal.coefficients[:, k], equal, values[:, k], rows, least
                 )
             except InfeasibleError as failure:
                 failure.output = k
                 raise
+            known.append(self._known(own, is_active, active))
         change = local - normal.coefficients
-        added = 0.5 * float(np.sum(change * ((normal.gram + normal.penalty) @ change)))
-        return Solved(local, evaluation.cost + added)
+        paid = 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
+        return Solved(local, evaluation.cost + float(paid.sum()), paid, tuple(known), active)
+
+    def _known(self, places, is_active, active):
+        """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
+        inputs, found, start = self.problem.rows.inputs, [], 0
+        if len(self.wishes.points):
+            found.append((self.wishes.points, None))
+        for p in places:
+            chosen = is_active[start : start + len(self.after[p])]
+            start, active[p] = start + chosen.size, chosen.sum()
+            if not chosen.any():
+                continue
+            after, before = inputs.offset + inputs.scale * self.after[p][chosen], None
+            if self.demands[p].input is not None:
+                before = inputs.offset + inputs.scale * self.before[p][chosen]
+            found.append((after, before))
+        return found
 
     def _rows(self, columns, places):
         """Local rows of the demands of one output, and what they must be at least."""

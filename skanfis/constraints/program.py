@@ -38,10 +38,29 @@ class InfeasibleError(Exception):
 
 
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
-    """The local coefficients nearest to ``start`` with E u = e and G u >= h, (n_columns,).
+    """The local coefficients nearest to ``start`` with E u = e and G u >= h.
 
-    ``equal`` and ``at_least`` are (n, n_columns), ``equal_to`` and ``least`` (n,). Raises
-    :class:`InfeasibleError` where there are none.
+    Parameters
+    ----------
+    factor : NormalFactor
+        Of M.
+    start : ndarray of shape (n_columns,)
+        u0.
+    equal, at_least : ndarray of shape (n, n_columns)
+        E and G.
+    equal_to, least : ndarray of shape (n,)
+        e and h.
+
+    Returns
+    -------
+    coefficients : ndarray of shape (n_columns,)
+    is_active : ndarray of bool of shape (n,)
+        Which of G u >= h are met with equality, and hold the coefficients back.
+
+    Raises
+    ------
+    InfeasibleError
+        If there are none.
     """
     base, toward = np.empty((start.size, 0)), np.empty(0)
     if equal.size:
@@ -60,7 +79,7 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
         found = _least_distance(free[:, kept] / length[kept], short[kept] / length[kept])
         multipliers[kept] = found / length[kept]
     step = base @ toward + free @ multipliers
-    return start + factor.back_solve(step)
+    return start + factor.back_solve(step), multipliers > 0.0
 
 
 def _particular(columns, right_side):

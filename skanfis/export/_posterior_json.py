@@ -13,8 +13,9 @@
 "noise" has a number per output; "inputs" are those that the consequents are linear in;
 "consequents" is a triangle, row by row up to the diagonal, of as many rows as there are rules times
 1 + inputs; "premises" has a row per displacement and a column per parameter of a term; "cross", for
-every output, a row per displacement and a column per row of the triangle. ``posterior`` says what
-they are.
+every output, a row per displacement and a column per row of the triangle. Where constraints are met
+with equality there is "pinned" too, for every output rows of a column per row of the triangle and
+per displacement. ``posterior`` says what they are.
 """
 
 import numpy as np
@@ -29,18 +30,21 @@ _KEYS = ["noise", "inputs", "consequents", "premises", "cross"]
 
 def posterior_item(posterior: Posterior):
     """The object that describes a posterior."""
-    return {
+    item = {
         "noise": posterior.noise.tolist(),
         "inputs": posterior.inputs.tolist(),
         "consequents": [row[: i + 1] for i, row in enumerate(posterior.consequents.tolist())],
         "premises": posterior.premises.tolist(),
         "cross": posterior.cross.tolist(),
     }
+    if posterior.pinned.size:
+        item["pinned"] = posterior.pinned.tolist()
+    return item
 
 
 def read_posterior(item, antecedent, n_inputs, n_outputs, order):
     """The posterior that an object describes; ValueError where it is not one of such a model."""
-    if not isinstance(item, dict) or sorted(item) != sorted(_KEYS):
+    if not isinstance(item, dict) or sorted({**item, "pinned": None}) != sorted([*_KEYS, "pinned"]):
         raise ValueError(f'"posterior" is {shown(item)}, not an object of {", ".join(_KEYS)}.')
     where = "posterior.inputs"
     inputs = item["inputs"]
@@ -63,12 +67,18 @@ def read_posterior(item, antecedent, n_inputs, n_outputs, order):
     consequents = np.zeros((n_columns, n_columns))
     for i, row in enumerate(triangle):
         consequents[i, : i + 1] = _table(row, (i + 1,), f"posterior.consequents[{i}]")
+    pinned = item.get("pinned", [[]] * n_outputs)
+    first = pinned[0] if isinstance(pinned, list) and pinned else []
+    n_pinned = len(first) if isinstance(first, list) else 0
+    if n_pinned > n_columns + n_rows:
+        raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
     return Posterior(
         np.abs(_table(item["noise"], (n_outputs,), "posterior.noise")),
         np.array(inputs, dtype=int),
         consequents,
         _table(rows, (n_rows, n_parameters), "posterior.premises"),
         _table(item["cross"], (n_outputs, n_rows, n_columns), "posterior.cross"),
+        _table(pinned, (n_outputs, n_pinned, n_columns + n_rows), "posterior.pinned"),
     )
 
 

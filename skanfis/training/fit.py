@@ -370,13 +370,15 @@ class _Fit:
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
-        evaluation, report = constrained(
+        evaluation, report, known = constrained(
             model, evaluation, run.problem, self.data.wishes, self.builder.in_user_units
         )
         model = replace(model, coefficients=self.builder.in_user_units(evaluation.coefficients))
         if not self.data.wishes.are_kept_within(model.output_limits):
             # What is asked for lies beyond what was seen: it goes before.
             model = replace(model, target=None)
+        if model.posterior is not None:
+            model = replace(model, posterior=model.posterior.given(model, known))
         return model, replace(run.result, evaluation=evaluation), report
 
 

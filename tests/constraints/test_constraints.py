@@ -1,5 +1,7 @@
 """Constraints of the estimator: kept everywhere, proven, the least change, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,6 +15,9 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.bounds import bounds, monotonicity
 from skanfis.constraints import FixedPoint, OutputLimits
+from skanfis.exceptions import ConstraintWarning
+from skanfis.export import export_json
+from skanfis.export.json_reader import parse_json
 from skanfis.membership import Gaussian
 from skanfis.solvers import GradientDescent, VariableProjection
 
@@ -69,6 +74,30 @@ def test_predictions_rise_everywhere(params, rng):
     assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
 
 
+def test_what_is_held_is_certain_and_is_so_in_a_file(rng):
+    X, _, y = planted(rng)
+    held = {"monotonic_cst": [1, 0], "constraints": [FixedPoint([0.2, -0.4], 0.5)]}
+    model = ANFISRegressor(**QUICK, **held).fit(X, y)
+    unheld = replace(model.model_.posterior, pinned=np.zeros((0, 0, 0)))
+    new = rng.uniform(-1.3, 1.3, (200, 2))
+    free = replace(model.model_, posterior=unheld)
+    before, after = (one.standard_deviation(new) for one in (free, model.model_))
+    inside = free.in_bounds(new)
+    assert (after <= before * (1.0 + 1e-9))[inside].all()
+    assert (after < 0.99 * before)[inside].sum() > 20
+    found = model.predict([[0.2, -0.4]], return_std=True)[1]
+    assert_allclose(found, model.noise_std_, rtol=1e-5)
+    read = parse_json(export_json(model, posterior=True))
+    assert_allclose(read.standard_deviation(new), after, rtol=1e-9)
+
+
+def test_data_that_contradict_are_told(rng):
+    X, _, y = planted(rng)
+    # Noise that a fit follows is no contradiction: the other tests turn warnings into errors.
+    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
+        ANFISRegressor(**QUICK, monotonic_cst=[-1, 0]).fit(X, y)
+
+
 def test_noise_that_breaks_the_rule_is_not_followed():
     errors = []
     for seed in range(4):
@@ -96,6 +125,7 @@ def test_what_holds_already_is_left_alone(rng):
     assert_allclose(held.consequents_, free.consequents_, rtol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 def test_one_rule_is_bounded_least_squares(rng):
     """Without terms: a ridge of nearly nothing with the sign of each slope given."""
     X = rng.normal(size=(60, 3))
@@ -210,6 +240,7 @@ def test_what_cannot_be_is_refused(known, message, rng):
     assert not hasattr(estimator, "model_")
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 def test_what_the_rules_cannot_keep_is_named(rng):
     X, _, y = planted(rng)
     known = {"monotonic_cst": [0, -1], "constraints": [FixedPoint([0.0, x], x) for x in (0.0, 0.2)]}

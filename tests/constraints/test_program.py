@@ -22,7 +22,8 @@ def a_problem(rng, n_equal, n_rows):
 @pytest.mark.parametrize(("n_equal", "n_rows"), [(0, 0), (0, 5), (2, 0), (2, 5), (3, 40), (0, 100)])
 def test_it_is_the_minimum(n_equal, n_rows, rng):
     matrix, start, equal, equal_to, rows, least = a_problem(rng, n_equal, n_rows)
-    found = nearest(NormalFactor(matrix), start, equal, equal_to, rows, least)
+    found, is_active = nearest(NormalFactor(matrix), start, equal, equal_to, rows, least)
+    assert_allclose((rows @ found - least)[is_active], 0.0, atol=1e-8)
     assert_allclose(equal @ found, equal_to, atol=1e-9)
     assert (rows @ found >= least - 1e-9).all()
     # Karush, Kuhn and Tucker: the slope of the cost is a sum of those of what holds with equality,
@@ -37,7 +38,8 @@ def test_it_is_the_minimum(n_equal, n_rows, rng):
 def test_nothing_is_moved_where_nothing_is_violated(rng):
     matrix, start, equal, equal_to, rows, _ = a_problem(rng, 0, 5)
     least = rows @ start - 0.1
-    found = nearest(NormalFactor(matrix), start, equal, equal_to, rows, least)
+    found, is_active = nearest(NormalFactor(matrix), start, equal, equal_to, rows, least)
+    assert_allclose((rows @ found - least)[is_active], 0.0, atol=1e-8)
     assert_allclose(found, start, atol=1e-14)
 
 

@@ -10,6 +10,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
+from skanfis.constraints import FixedPoint
 from skanfis.export import export_c, fold
 from skanfis.intervals import ConformalRegressor
 from skanfis.options import LinearExtrapolation
@@ -81,6 +82,8 @@ OTHERS = {
     "plane": lambda: quick(n_mfs=1),
     "premises given": lambda: quick(solver="lse"),
     "a column without slopes": lambda: quick(consequent_features=[1]),
+    "a value known": lambda: quick(constraints=[FixedPoint([1e4, 0.5], [5.0, 0.0])]),
+    "rising": lambda: quick(solver="lse", monotonic_cst=[0, 1]),
     "behind a scaler": lambda: make_pipeline(StandardScaler(), quick(policy="clip")),
 }
 

@@ -28,6 +28,8 @@ from ._deviation_code import (
     INNER,
     INNER_WITHOUT,
     INTERVAL,
+    KNOWN,
+    KNOWN_OF_PREMISES,
     PREMISES,
     PRODUCTS,
     SUM,
@@ -109,6 +111,8 @@ class DeviationSource(Source):
             del tables["inverse_unit"]
         if found.q:
             tables |= {"premises": found.premises, "cross": found.cross}
+        if found.pinned.size:
+            tables["pinned"] = found.pinned
         tables = {name: fitting(values, numbers.dtype) for name, values in tables.items()}
         if self.answers_beyond and not self.judges_coverage:
             tables["inverse_spread"] = numbers.inverse_spread
@@ -150,12 +154,19 @@ class DeviationSource(Source):
             parts.append(self._along.tangent())
         if self.leaves_tangent:
             parts.append(self.leave())
-        inner = INNER if self.found.q else INNER_WITHOUT
-        parts += [self.halves(), self.write(inner, **self.words).lstrip(), self.deviation()]
+        inner = self.write(self.inner(), n_pinned=self.found.pinned.shape[1], **self.words)
+        parts += [self.halves(), inner.lstrip(), self.deviation()]
         if self.found.reach is not None:
             reach = fitting(self.found.reach, self.numbers.dtype)
             parts.append(self.write(INTERVAL, reach=literals(reach).strip()).lstrip())
         return "\n".join(parts)
+
+    def inner(self):
+        """The function of an inner product, less what is known of the output."""
+        is_learnt = bool(self.found.q)
+        known = KNOWN.strip("\n") + "\n" if self.found.pinned.size else ""
+        known = known.replace("$of_premises", KNOWN_OF_PREMISES if is_learnt else "")
+        return (INNER if is_learnt else INNER_WITHOUT).replace("$known", known)
 
     def tables(self):
         parts = [super().tables()]
@@ -383,6 +394,7 @@ def with_deviation(price, source):
     n, n_outputs, n_rules = found.n, numbers.n_outputs, numbers.n_rules
     n_parameters = found.terms.size if found.q else 0
     per_output = n + found.q * (n_parameters + n) + n_parameters + found.q
+    per_output += 2 * found.pinned.shape[1] * (n + found.q)
     values = n + (source.n_logarithms if source.has_shares else 0)
     values += 0 if source.is_grid else n_rules
     if found.q:

@@ -11,6 +11,8 @@ __all__ = [
     "INNER",
     "INNER_WITHOUT",
     "INTERVAL",
+    "KNOWN",
+    "KNOWN_OF_PREMISES",
     "PREMISES",
     "PRODUCTS",
     "SUM",
@@ -110,7 +112,8 @@ static $real $name_inner(const $real *h, const $real *k, int o)
     for (a = 0; a < $q; ++a) {
         of_premises += h[$n + o * $q + a] * k[$n + o * $q + a];
     }
-    return sum + of_premises;
+    sum += of_premises;
+$known    return sum;
 }
 """
 INNER_WITHOUT = """
@@ -122,8 +125,31 @@ static $real $name_inner(const $real *h, const $real *k, int o)
     for (a = 0; a < $n; ++a) {
         sum += h[a] * k[a];
     }
-    return sum * $name_noise[o] * $name_noise[o];
+    sum *= $name_noise[o] * $name_noise[o];
+$known    return sum;
 }
+"""
+KNOWN = """
+    {
+        int j;
+        for (j = 0; j < $n_pinned; ++j) {
+            const $real *p = $name_pinned[o][j];
+            $real one = 0.0R, other = 0.0R;
+            for (a = 0; a < $n; ++a) {
+                one += p[a] * h[a];
+                other += p[a] * k[a];
+            }
+$of_premises            sum -= one * other;
+        }
+        if (h == k && sum < 0.0R) {
+            sum = 0.0R;
+        }
+    }
+"""
+KNOWN_OF_PREMISES = """            for (a = 0; a < $q; ++a) {
+                one += p[$n + a] * h[$n + o * $q + a];
+                other += p[$n + a] * k[$n + o * $q + a];
+            }
 """
 BEYOND = """
     for (o = 0; o < $NAME_N_OUTPUTS; ++o) {

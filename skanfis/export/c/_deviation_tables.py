@@ -25,6 +25,7 @@ class Deviation:
     premises: np.ndarray
     cross: np.ndarray
     terms: np.ndarray
+    pinned: np.ndarray  # times [u, v]; what is known of the output and taken off
     reach: np.ndarray | None = None
     coverage: float | None = None
 
@@ -78,9 +79,17 @@ def deviation_of(model, numbers, reach=None, coverage=None):
         posterior.premises[:, np.concatenate([[], *order]).astype(int)],
         (posterior.cross @ factor) / unit[:, None, None],
         np.concatenate([[], *terms]).astype(int),
+        _pinned(posterior, unit),
         reach,
         coverage,
     )
+
+
+def _pinned(posterior, unit):
+    """Q_k times [noise u, v], by [u, v]."""
+    found = posterior.pinned.copy()
+    found[:, :, : posterior.consequents.shape[0]] *= (posterior.noise / unit)[:, None, None]
+    return found
 
 
 def fitting(values, dtype):
