@@ -141,21 +141,13 @@ def bounds(
     """
     model, box = _checked(model, box, tol, max_boxes)
     low, high = held_box(box, model)
-    cuts = np.stack([model.minimum, model.maximum], axis=1)
-    X = _first_points(low, high)
-    found = []
-    for k in range(model.n_outputs):
-        sides = [Enclosure(model, k, sign) for sign in (-1.0, 1.0)]
-        values = sides[1].predict(X)
-        spread = float(np.ptp(values))
-        ends = []
-        for side in sides:
-            own = side.sign * values
-            top = int(own.argmax())
-            tolerance = max(tol * spread, _resolution(side.values, X[top]))
-            start = X[top], float(own[top])
-            ends.append(largest(side.values, low, high, tolerance, max_boxes, cuts, start))
-        found.append(ends)
+
+    def sides(k):
+        below, above = (Enclosure(model, k, sign) for sign in (-1.0, 1.0))
+        values = above.predict(_first_points(low, high))
+        return [(below.values, -values), (above.values, values)], float(np.ptp(values))
+
+    found = _enclosed(model, low, high, sides, tol, max_boxes)
     return _gathered(found, box, model, model.output_names)
 
 
@@ -211,20 +203,14 @@ def gradient_bounds(
     model, box = _checked(model, box, tol, max_boxes)
     j = input_index(feature, model, "feature")
     low, high = held_box(box, model, _BEYOND)
-    cuts = np.stack([model.minimum, model.maximum], axis=1)
-    X = _first_points(low, high)
-    found = []
-    for k in range(model.n_outputs):
-        sides = [_slope_of(model, k, sign, j) for sign in (-1.0, 1.0)]
-        first = [side(X.T, X.T)[2] for side in sides]
-        largest_size = max(float(np.max(np.abs(values))) for values in first)
-        ends = []
-        for side, values in zip(sides, first, strict=True):
-            top = int(values.argmax())
-            tolerance = max(tol * largest_size, _resolution(side, X[top]))
-            start = X[top], float(values[top])
-            ends.append(largest(side, low, high, tolerance, max_boxes, cuts, start))
-        found.append(ends)
+
+    def sides(k):
+        X = _first_points(low, high).T
+        both = [_slope_of(model, k, sign, j) for sign in (-1.0, 1.0)]
+        values = [side(X, X)[2] for side in both]
+        return list(zip(both, values, strict=True)), float(np.max(np.abs(values)))
+
+    found = _enclosed(model, low, high, sides, tol, max_boxes)
     name = model.input_names[j]
     return _gathered(found, box, model, tuple(f"d {y} / d {name}" for y in model.output_names))
 
@@ -284,6 +270,26 @@ def monotonicity(
                 signs[k] = sign
                 break
     return signs
+
+
+def _enclosed(model, low, high, sides, tol, max_boxes):
+    """What is found of the lower and the upper side of every output, on a box.
+
+    ``sides`` gives of an output, for both sides, what bounds it on boxes and its values at the
+    first points; and the size that ``tol`` is a part of.
+    """
+    cuts, X = np.stack([model.minimum, model.maximum], axis=1), _first_points(low, high)
+    found = []
+    for k in range(model.n_outputs):
+        both, size = sides(k)
+        ends = []
+        for evaluate, values in both:
+            top = int(values.argmax())
+            tolerance = max(tol * size, _resolution(evaluate, X[top]))
+            start = X[top], float(values[top])
+            ends.append(largest(evaluate, low, high, tolerance, max_boxes, cuts, start))
+        found.append(ends)
+    return found
 
 
 def _slope_of(model, output, sign, j):
