@@ -300,5 +300,16 @@ def _add_output(group):
         metavar="STD",
         help="also write the model as C (compensator.h, compensator.c) by the standard c99 or c89",
     )
+    group.add_argument(
+        "--deviation",
+        action="store_true",
+        help="with --c: write the standard deviation too, compensator_deviation(x, deviation)",
+    )
+    group.add_argument(
+        "--saturate",
+        action="store_true",
+        help="with --c: hold what the rules give between the limits that the report has proven for "
+        "the box (--box)",
+    )
     group.add_argument("--force", action="store_true", help="replace files that exist")
     group.add_argument("--quiet", action="store_true", help="no progress on stderr")

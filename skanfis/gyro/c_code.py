@@ -5,23 +5,17 @@ file; the law is written here. What is asked of an exported function stays: cons
 heap, no state, the status word.
 """
 
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
 import numpy as np
-import pandas as pd
-from numpy.polynomial import Polynomial
-from scipy.stats import qmc
 
 from ..export.c import CCode
 from ..export.c.builder import (
+    DECLARATION,
     FINITE_INPUT,
     LONGEST_NAME,
-    ROWS,
-    STATUS,
-    TOLERANCE,
     Dialect,
     RulesPart,
     check_arguments,
@@ -33,13 +27,12 @@ from ..export.c.builder import (
     policy_line,
     rejection,
     self_test,
-    size_of_sum,
     write_files,
 )
 from ..policies import SILENT
-from ._frozen import FrozenRules, law_and_rules
+from ._c_composition import Composition, known_answers
+from ._frozen import law_and_rules
 from ._law_text import past_phase
-from .physics import OpenLoopArcsineRegressor
 
 __all__ = ["export_c_physics"]
 
@@ -114,6 +107,22 @@ $finite_input
     return status;
 }
 """
+_DEVIATION = """
+int $name_deviation(const $real x[$NAME_N_INPUTS], $real deviation[$NAME_N_OUTPUTS])
+{
+    $real z[$n_rules_inputs], rate[1];
+    int i;
+    const int status = $name_predict(x, rate) & ~$NAME_UNCOVERED;
+    if (status & $NAME_NO_OUTPUT) {
+        return $NAME_REJECT(deviation, status);
+    }
+    for (i = 0; i < $n_rules_inputs; ++i) {
+        z[i] = x[$name_rules_input[i]];
+    }
+    (void)$rules_deviation(z, deviation);
+    return status;
+}
+"""
 _BEYOND = {
     "clip": "phase = $max_phase;",
     "linear": "phase = $max_phase + (sine - $limit) * $slope;",
@@ -130,6 +139,8 @@ def export_c_physics(
     dtype: str = "double",
     std: str = "c99",
     min_coverage: float | None = 0.1,
+    saturate: Any = None,
+    deviation: bool = False,
 ) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 
@@ -157,6 +168,13 @@ def export_c_physics(
     min_coverage : float or None, default=0.1
         Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
         leaves that out.
+    saturate : Bounds or array-like of shape (1, 2), default=None
+        Limits between which what the rules add to the law is held: what
+        :func:`skanfis.bounds.bounds` has proven of them, or others. None holds nothing.
+    deviation : bool, default=False
+        Whether to write ``int NAME_deviation(const double x[], double deviation[])`` too: the
+        standard deviation of a new rate by the rules; the law, which is fitted before them, is
+        taken for known.
 
     Returns
     -------
@@ -203,110 +221,29 @@ def export_c_physics(
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
     dialect = Dialect(name, dtype, std)
-    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage)
+    if not isinstance(deviation, bool | np.bool_):
+        raise ValueError(f"deviation={deviation!r} must be True or False.")
+    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, saturate, bool(deviation))
     columns = np.union1d(law.columns_, rules.positions)
-    composition = _Composition(law, rules, columns, dialect.dtype)
+    composition = Composition(law, rules, columns, dialect.dtype)
+    of_law = _law(dialect, composition, policies)
+    answers, test = known_answers(composition, part), ""
+    if deviation:
+        test = part.deviation_test(dialect, answers[0][:, composition.rules_inputs])
     source = "".join(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
             part.text(),
             "\n",
-            _law(dialect, composition, policies),
-            self_test(_known_answers(composition, part), dialect),
+            of_law,
+            _write(dialect, _DEVIATION, composition) if deviation else "",
+            self_test(answers, dialect, test, "deviation_test"),
         ]
     )
     price = _cost(part.cost, composition)
-    code = CCode(name, _header(composition, dialect, price, part.min_coverage), source, price)
+    code = CCode(name, _header(composition, dialect, price, part, deviation), source, price)
     write_files(code, path)
     return code
-
-
-@dataclass(frozen=True, eq=False)
-class _Composition:
-    """Both parts, and what of the law is rounded to the type.
-
-    ``columns`` are the positions in X of the function's inputs.
-    """
-
-    law: Any
-    rules: FrozenRules
-    columns: np.ndarray
-    dtype: np.dtype
-
-    def rounded(self, values):
-        values = np.asarray(values, dtype=float)
-        largest = np.abs(values).max()
-        if not largest <= float(np.finfo(self.dtype).max):
-            raise ValueError(
-                f"Single precision cannot hold {largest:g}, a constant of the arcsine law. Scale "
-                "the output, or export in double precision."
-            )
-        return values.astype(self.dtype)
-
-    @property
-    def law_inputs(self):
-        return np.searchsorted(self.columns, self.law.columns_)
-
-    @property
-    def rules_inputs(self):
-        return np.searchsorted(self.columns, self.rules.positions)
-
-    @property
-    def low(self):
-        return self.rounded(self.law.minimum_)
-
-    @property
-    def high(self):
-        return self.rounded(self.law.maximum_)
-
-    @property
-    def reference(self):
-        return self.rounded(self.law.reference_temperature_)
-
-    def polynomial(self, coefficients):
-        """Coefficients about the reference as it is rounded, of no less than one number."""
-        shift = float(self.reference) - self.law.reference_temperature_
-        moved = np.zeros(coefficients.size)
-        found = Polynomial(coefficients)(Polynomial([shift, 1.0])).coef
-        moved[: found.size] = found
-        return self.rounded(moved)
-
-    @property
-    def polynomials(self):
-        return {
-            "amplitude": self.polynomial(self.law.amplitude_),
-            "sagnac": self.polynomial(self.law.sagnac_factor_),
-            "bias": self.polynomial(self.law.bias_),
-        }
-
-    @property
-    def box(self):
-        """Of every input, within which both parts know it."""
-        low, high = np.full(self.columns.size, -np.inf), np.full(self.columns.size, np.inf)
-        parts = [
-            (self.law_inputs, self.low, self.high),
-            (
-                self.rules_inputs,
-                self.rounded(self.rules.model.minimum),
-                self.rounded(self.rules.model.maximum),
-            ),
-        ]
-        for places, least, most in parts:
-            low[places] = np.maximum(low[places], least)
-            high[places] = np.minimum(high[places], most)
-        return low, high
-
-    @property
-    def names(self):
-        given = getattr(self.law, "feature_names_in_", None)
-        return [f"x{j}" if given is None else given[j] for j in self.columns]
-
-    def table(self, X):
-        """Rows as both parts take them, out of rows of the function's inputs."""
-        whole = np.zeros((len(X), self.law.n_features_in_))
-        whole[:, self.columns] = X
-        names = getattr(self.law, "feature_names_in_", None)
-        return whole if names is None else pd.DataFrame(whole, columns=names)
 
 
 def _write(dialect, template, composition, **words):
@@ -358,7 +295,7 @@ def _law(dialect, composition, policies):
     )
 
 
-def _header(composition, dialect, price, min_coverage):
+def _header(composition, dialect, price, part, deviation):
     law, model = composition.law, composition.rules.model
     lines = [
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
@@ -381,10 +318,16 @@ def _header(composition, dialect, price, min_coverage):
         policy_line(model, "Of the rules alone: outside their range"),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
-    if min_coverage is not None:
-        lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
+    if part.min_coverage is not None:
+        lines.append(f"A row is uncovered where its coverage is below {part.min_coverage:g}.")
+    if part.limits is not None:
+        low, high = part.limits[0]
+        lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
+    if deviation:
+        lines.append("The deviation is that of the rules: the law is taken for known.")
     title = "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
-    return header_of(title, lines, dialect, composition.columns.size, 1)
+    declarations = dialect.write(DECLARATION) if deviation else ""
+    return header_of(title, lines, dialect, composition.columns.size, 1, declarations)
 
 
 def _cost(of_rules, composition):
@@ -399,60 +342,3 @@ def _cost(of_rules, composition):
         table_bytes=of_rules.table_bytes + n_bytes,
         stack_bytes=of_rules.stack_bytes + itemsize * (composition.rules_inputs.size + 1),
     )
-
-
-def _known_answers(composition, part):
-    """Rows, rates, status and tolerance, as for rules alone; some rows lie far up the sine.
-
-    Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
-    """
-    law, rules = composition.law, composition.rules
-    rules, min_coverage = replace(rules, model=part.model), part.min_coverage
-    low, high = composition.box
-    points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
-    kind = np.arange(len(points)) % 4
-    reach = np.where(kind % 2, 1.0, 2.0)[:, None]
-    X = low + (high - low) * (0.5 + reach * (points - 0.5))
-    output = composition.law_inputs[0]
-    swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
-    X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
-    X = np.vstack([low, high, X]).astype(composition.dtype)
-    whole = composition.table(X.astype(float))
-    # NaN past the amplitude.
-    phase, coverage = np.abs(law.phase(whole)), rules.coverage(whole)
-    sure = ~(np.abs(phase - law.max_phase) < 1e-3)
-    if min_coverage is not None:
-        sure &= np.abs(coverage - min_coverage) > 1e-3 * min_coverage
-    chosen = np.flatnonzero(sure)[:ROWS]
-    X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= law.max_phase)[chosen]
-    whole = composition.table(X.astype(float))
-
-    def outside(inputs, least, most):
-        return ((X[:, inputs] < least) | (X[:, inputs] > most)).any(axis=1)
-
-    beside = outside(composition.rules_inputs, part.low, part.high)
-    out = beside | beyond | outside(composition.law_inputs, composition.low, composition.high)
-    silent = beyond & (law.out_of_bounds in SILENT)
-    silent |= beside & (rules.model.out_of_bounds in SILENT)
-    of_law = _answering(law).predict(whole)
-    model, rows = _answering(rules.model), np.asarray(whole)[:, rules.positions]
-    of_rules = model.predict(rows)
-    silent |= ~np.isfinite(of_law.astype(composition.dtype))
-    status = STATUS["OUT_OF_RANGE"] * out | STATUS["NO_OUTPUT"] * silent
-    if min_coverage is not None:
-        status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
-    y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
-    # What rounding of the sine is magnified by, too.
-    steepest = np.abs(of_law[~silent]).max(initial=0.0)
-    steepest = max(steepest, np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
-    size = size_of_sum(model, rows, of_rules) + steepest
-    tolerance = TOLERANCE[composition.dtype] * size
-    return X, y.astype(composition.dtype), status, tolerance.astype(composition.dtype)
-
-
-def _answering(part):
-    """A part that answers everywhere: by its own policy, or the nearest where that gives none."""
-    policy = "linear" if part.out_of_bounds == "linear" else "clip"
-    if isinstance(part, OpenLoopArcsineRegressor):
-        return copy(part).set_params(out_of_bounds=policy, warn_out_of_bounds=False)
-    return part.with_out_of_bounds(policy)

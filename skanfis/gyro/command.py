@@ -11,6 +11,7 @@ from ..export import export_c
 from ..inspection.labels import printable
 from ._apply import apply
 from ._calibration import Recipe, calibrate
+from ._certain import certain_of
 from ._console import (
     ExistsError,
     Progress,
@@ -78,6 +79,9 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
+    for name in ("deviation", "saturate"):
+        if getattr(options, name) and not options.c:
+            raise UsageError(f"--{name} is of the model in C: give --c c99 or --c c89 with it.")
     _refuse_twice([name for name, *_ in options.box], "--box: {} is given twice.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
@@ -200,7 +204,14 @@ def _write(calibration, options, paths, folder, axis=""):
         coverage = compensator.min_coverage or None
         path = folder / "compensator"
         export = export_c_physics if calibration.recipe.physics else export_c
-        export(compensator.estimator, path, std=options.c, min_coverage=coverage)
+        export(
+            compensator.estimator,
+            path,
+            std=options.c,
+            min_coverage=coverage,
+            deviation=options.deviation,
+            saturate=certain_of(calibration).found if options.saturate else None,
+        )
 
 
 def _title(logs):

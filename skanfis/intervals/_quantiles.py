@@ -6,9 +6,12 @@ infinity. A score s covers with probability c where the rows of score s or less 
 without groups, where s is the ceil((K + 1) c)-th smallest.
 """
 
+from numbers import Real
+
 import numpy as np
 
 __all__ = [
+    "check_level",
     "cross_bounds",
     "group_scores",
     "is_enough",
@@ -39,6 +42,12 @@ def row_masses(n_rows, sample_weight=None, groups=None):
     n_units = float(np.count_nonzero(totals))
     share = weight / np.where(totals > 0.0, totals, 1.0)[groups]
     return share / (n_units + 1.0), n_units
+
+
+def check_level(name, level):
+    """Raise ValueError unless a level is a number between 0 and 1."""
+    if not (isinstance(level, Real) and 0.0 < float(level) < 1.0):
+        raise ValueError(f"{name}={level!r} must be a number between 0 and 1.")
 
 
 def is_enough(mass, coverage):

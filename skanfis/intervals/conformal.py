@@ -15,6 +15,7 @@ from sklearn.utils.validation import check_is_fitted
 from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
 from ._quantiles import (
+    check_level,
     cross_bounds,
     group_scores,
     is_enough,
@@ -373,25 +374,20 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     def _checked_levels(self, coverage, confidence):
         """Both levels, as far as the rows or groups at hand allow them."""
-        for name, level in (("coverage", coverage), ("confidence", confidence)):
-            if level is None and name == "confidence":
-                continue
-            if not (isinstance(level, Real) and 0.0 < float(level) < 1.0):
-                raise ValueError(f"{name}={level!r} must be a number between 0 and 1.")
         if confidence is None:
-            self._check_enough("coverage", float(coverage))
+            self._check_enough("coverage", coverage)
             return float(coverage), None
+        check_level("coverage", coverage)
         if self._groups is None:
             raise ValueError(
-                "confidence is of whole groups, and fit was given none: give it groups, or leave "
-                "confidence at None."
+                "confidence is of whole groups, and fit was given none: give it groups, or None."
             )
         if self.method == "cross" and not self._keeps_groups():
             raise ValueError(
                 "confidence takes folds that hold out whole groups, and cv parts some: use a "
-                "number of folds, GroupKFold or LeaveOneGroupOut."
+                "number of folds or GroupKFold."
             )
-        self._check_enough("confidence", float(confidence))
+        self._check_enough("confidence", confidence)
         return float(coverage), float(confidence)
 
     def _keeps_groups(self):
@@ -399,6 +395,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return np.unique(np.concatenate(parts)).size == sum(map(len, parts))
 
     def _check_enough(self, name, level):
+        check_level(name, level)
         total = self.n_units_ / (self.n_units_ + 1.0)
         if is_enough(total, level):
             return

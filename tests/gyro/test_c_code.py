@@ -142,7 +142,9 @@ def as_given(model, rows, columns):
 def test_answers_as_predict(log, make, dtype, tolerance, std, tmp_path):
     real = np.float32 if dtype == "float" else np.float64
     model, X = make(log.assign(unused=1.0))
-    code = export_c_physics(model, name="gyro", dtype=dtype, std=std, min_coverage=MIN_COVERAGE)
+    # Its deviation is held against Python's by the self-test.
+    options = {"dtype": dtype, "std": std, "min_coverage": MIN_COVERAGE, "deviation": True}
+    code = export_c_physics(model, name="gyro", **options)
     rows = around(X).astype(real)
     used = [j for j, name in enumerate(X) if name != "unused"]
     taken = np.ascontiguousarray(rows[:, used])
@@ -167,6 +169,17 @@ def test_answers_as_predict(log, make, dtype, tolerance, std, tmp_path):
         assert np.isnan(silence).all()
     else:
         assert (silence == UNTOUCHED).all()
+
+
+@needs_compiler
+def test_what_rules_add_is_held(log, tmp_path):
+    model, X = whole(log)
+    limits = np.quantile(model.residual_.predict(X), [0.3, 0.7])
+    code = export_c_physics(model, name="gyro", saturate=limits[None])
+    rows = np.ascontiguousarray(X.to_numpy()[::50])
+    [(y, _)] = evaluate_all([code], rows, tmp_path, "c99", [1])
+    wanted = model.base_.predict(X[::50]) + np.clip(model.residual_.predict(X[::50]), *limits)
+    np.testing.assert_allclose(y[:, 0], wanted, rtol=1e-10, atol=1e-12)
 
 
 @needs_compiler

@@ -67,13 +67,16 @@ def calibrated(tmp_path_factory, log):
     )
     path = write_log(folder / "raw.csv", raw, raw.columns)
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
-    assert main([*arguments, "--c", "c99"]) == 0
+    assert main([*arguments, "--c", "c99", "--deviation", "--saturate"]) == 0
     return folder
 
 
 def test_writes_what_it_says(calibrated):
     found = sorted(path.name for path in (calibrated / "out").iterdir())
     assert found == sorted([*FILES, "compensator.c", "compensator.h"])
+    header = (calibrated / "out" / "compensator.h").read_text()
+    assert "int compensator_deviation(const double x[" in header
+    assert "saturated beyond limits" in header
 
 
 def test_the_compensator_knows_units_and_scale_factor(calibrated, log):
@@ -289,6 +292,7 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--columns", "speed=v"], "columns: there is no 'speed'"),
         (["--columns", "time=a", "time=b"], "time is given twice"),
         (["--units", "time=year"], "time has no unit 'year'"),
+        (["--saturate"], "--saturate is of the model in C: give --c"),
         (["--terms", "2,x"], "must be search, auto, or numbers"),
         (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
         (["--min-coverage", "2"], "must be a number from 0 to 1"),

@@ -6,8 +6,8 @@ from typing import Any
 
 from .._numbers import Numbers, as_held
 from ..folding import fold
-from ._cost import CCost, cost, with_learner
-from ._deviation import DeviationSource, deviation_test, with_deviation
+from ._cost import CCost, cost, with_deviation, with_learner
+from ._deviation import DeviationSource, deviation_test
 from ._deviation_tables import deviation_of
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
@@ -178,7 +178,7 @@ def export_c(
             numbers, dialect, model.out_of_bounds, min_coverage, found, limits=limits
         )
         price = with_deviation(cost(numbers, sure), sure)
-        test, call = deviation_test(as_held(model, numbers), sure, answers), "deviation_test"
+        test, call = deviation_test(as_held(model, numbers), dialect, answers[0]), "deviation_test"
         declarations, body = sure.declarations(), sure
     elif forgetting is None:
         body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)

@@ -7,7 +7,7 @@ import numpy as np
 from ._families import BODIES
 from ._text import index_type
 
-__all__ = ["INDEX_BYTES", "CCost", "cost", "with_learner"]
+__all__ = ["INDEX_BYTES", "CCost", "cost", "with_deviation", "with_learner"]
 
 # What C promises at least, and what there is nearly everywhere.
 _INT_BYTES = 4
@@ -129,6 +129,33 @@ def with_learner(price, source):
         learn_stack_bytes=(2 * n + n_outputs) * size,
         learner_bytes=(learner.packed.size + n * (1 + n_outputs)) * size + 2 * _INT_BYTES,
         table_bytes=price.table_bytes + sum(table.nbytes for table in tables),
+    )
+
+
+def with_deviation(price, source):
+    """The cost with that of a DeviationSource besides."""
+    found, numbers = source.found, source.numbers
+    n, n_outputs, n_rules = found.n, numbers.n_outputs, numbers.n_rules
+    n_parameters = found.terms.size if found.q else 0
+    per_output = n + found.q * (n_parameters + n) + n_parameters + found.q
+    per_output += 2 * found.pinned.shape[1] * (n + found.q)
+    values = n + (source.n_logarithms if source.has_shares else 0)
+    values += 0 if source.is_grid else n_rules
+    if found.q:
+        values += 2 * n_parameters + source.n_logarithms + n_outputs * (1 + n_rules)
+        values += numbers.n_inputs if source.has_slopes else 0
+    values += numbers.n_inputs + source.size
+    if source.answers_beyond:
+        values += 2 * source.size + numbers.n_inputs + n_outputs
+    tables = sum(table.nbytes for table in source.deviation_tables().values())
+    tables += sum(
+        table.size * INDEX_BYTES[index_type(table)] for table in source.index_tables().values()
+    )
+    return replace(
+        price,
+        deviation_multiply_adds=price.multiply_adds + n + n * (n + 1) // 2 + n_outputs * per_output,
+        deviation_stack_bytes=values * numbers.dtype.itemsize,
+        table_bytes=price.table_bytes + tables,
     )
 
 

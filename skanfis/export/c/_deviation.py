@@ -14,11 +14,8 @@ The derivatives of a membership by its parameters follow from its derivative by 
 continuation "linear" needs too, and from the distances and constants of its family.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from ._cost import INDEX_BYTES
 from ._deviation_code import (
     BEYOND,
     CHANGES_OF,
@@ -39,9 +36,9 @@ from ._deviation_tables import fitting
 from ._families import words_of
 from ._fragments import CENTRE, FINITE_INPUT, INPUTS
 from ._source import Source
-from ._text import index_type, literals
+from ._text import literals
 
-__all__ = ["DeviationSource", "deviation_test", "with_deviation"]
+__all__ = ["DeviationSource", "deviation_test"]
 
 # Steps inside, in standard deviations of the inputs; and the weights of what is found there.
 _STEP = {np.dtype(np.float64): 2.0**-14, np.dtype(np.float32): 2.0**-7}
@@ -54,8 +51,10 @@ _TOLERANCE = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 2e-2}
 class DeviationSource(Source):
     """A Source with the function of the deviation, and of the interval where it has a reach."""
 
-    def __init__(self, numbers, dialect, policy, min_coverage, found, *, limits=None):
-        super().__init__(numbers, dialect, policy, min_coverage, limits=limits)
+    def __init__(
+        self, numbers, dialect, policy, min_coverage, found, *, is_part=False, limits=None
+    ):
+        super().__init__(numbers, dialect, policy, min_coverage, is_part=is_part, limits=limits)
         self.found, self.given_policy = found, policy
         # The way out of the box along which the prediction's tangent is not followed.
         self._along = Source(numbers, dialect, policy, None)
@@ -285,7 +284,8 @@ class DeviationSource(Source):
         """The function that is called."""
         numbers = self.numbers
         lines = [
-            "int $name_deviation(const $real x[$NAME_N_INPUTS], $real deviation[$NAME_N_OUTPUTS])",
+            f"{self.linkage}int $name_deviation("
+            "const $real x[$NAME_N_INPUTS], $real deviation[$NAME_N_OUTPUTS])",
             "{",
             f"    $real c[{numbers.n_inputs}], half[{self.size}];",
         ]
@@ -373,43 +373,14 @@ class DeviationSource(Source):
         return self.write("\n".join([*lines, f"    $name_tangent({values});", "}"]) + "\n")
 
 
-def deviation_test(model, source, answers):
+def deviation_test(model, dialect, X):
     """The test of the deviations at the rows of the self-test; ``model`` as it is held."""
-    X = answers[0]
-    dtype = source.numbers.dtype
     policy = "linear" if model.out_of_bounds == "linear" else "clip"
     wanted = model.with_out_of_bounds(policy).standard_deviation(X.astype(float))
-    factor = " * $NAME_TEST_FACTOR" if source.dialect.real == "double" else ""
-    return source.write(
+    factor = " * $NAME_TEST_FACTOR" if dialect.real == "double" else ""
+    return dialect.write(
         TEST.replace("$factor", factor),
         n_test=len(X),
-        deviations=literals(wanted.astype(dtype)),
-        tolerance=source.dialect.number(_TOLERANCE[dtype]),
-    )
-
-
-def with_deviation(price, source):
-    """The cost with that of a DeviationSource besides."""
-    found, numbers = source.found, source.numbers
-    n, n_outputs, n_rules = found.n, numbers.n_outputs, numbers.n_rules
-    n_parameters = found.terms.size if found.q else 0
-    per_output = n + found.q * (n_parameters + n) + n_parameters + found.q
-    per_output += 2 * found.pinned.shape[1] * (n + found.q)
-    values = n + (source.n_logarithms if source.has_shares else 0)
-    values += 0 if source.is_grid else n_rules
-    if found.q:
-        values += 2 * n_parameters + source.n_logarithms + n_outputs * (1 + n_rules)
-        values += numbers.n_inputs if source.has_slopes else 0
-    values += numbers.n_inputs + source.size
-    if source.answers_beyond:
-        values += 2 * source.size + numbers.n_inputs + n_outputs
-    tables = sum(table.nbytes for table in source.deviation_tables().values())
-    tables += sum(
-        table.size * INDEX_BYTES[index_type(table)] for table in source.index_tables().values()
-    )
-    return replace(
-        price,
-        deviation_multiply_adds=price.multiply_adds + n + n * (n + 1) // 2 + n_outputs * per_output,
-        deviation_stack_bytes=values * numbers.dtype.itemsize,
-        table_bytes=price.table_bytes + tables,
+        deviations=literals(wanted.astype(dialect.dtype)),
+        tolerance=dialect.number(_TOLERANCE[dialect.dtype]),
     )

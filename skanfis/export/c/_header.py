@@ -160,5 +160,5 @@ def header_of(title, lines, dialect, n_inputs, n_outputs, declarations=""):
         n_inputs=n_inputs,
         n_outputs=n_outputs,
         declarations=declarations,
-        but=_OF_A_LEARNER if declarations else "",
+        but=_OF_A_LEARNER if "_learner" in declarations else "",
     )

@@ -5,17 +5,22 @@ the same header and self-test; :func:`skanfis.export.export_c` is made of the sa
 """
 
 from .._numbers import Numbers, as_held
-from ._cost import CCost, cost
+from ._cost import CCost, cost, with_deviation
+from ._deviation import DeviationSource, deviation_test
+from ._deviation_code import DECLARATION
+from ._deviation_tables import deviation_of
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._fragments import FINITE_INPUT, rejection
 from ._header import coverage_line, header_of, policy_line
+from ._saturation import read_limits
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ._source import Source
 from ._text import LONGEST_NAME, comment, index_type, literals
 from .status import STATUS
 
 __all__ = [
+    "DECLARATION",
     "FINITE_INPUT",
     "LONGEST_NAME",
     "ROWS",
@@ -54,6 +59,10 @@ class RulesPart:
     min_coverage : float or None
         Rows are uncovered where the coverage is below this. None leaves coverage out; it is left
         out too where the rules have never seen data.
+    saturate : Bounds or array-like of shape (n_outputs, 2), default=None
+        Limits between which the outputs of the rules are held.
+    deviation : bool, default=False
+        Whether there is ``int NAME_deviation(const REAL x[], REAL deviation[])`` too.
 
     Attributes
     ----------
@@ -64,6 +73,8 @@ class RulesPart:
     low, high : ndarray of shape (n_inputs,)
         The box of the training data, in the type of the file.
     min_coverage : float or None
+    limits : ndarray of shape (n_outputs, 2) or None
+        ``saturate`` in the type of the file.
     cost : CCost
         Of the rules alone.
 
@@ -84,16 +95,35 @@ class RulesPart:
     True
     """
 
-    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage: float | None) -> None:
+    def __init__(
+        self,
+        model,
+        dialect: Dialect,
+        suffix: str,
+        min_coverage: float | None,
+        saturate=None,
+        deviation: bool = False,
+    ) -> None:
         self.name = dialect.name + suffix
         self.min_coverage = None if model.support is None else min_coverage
         numbers = Numbers.of(model, dialect.dtype)
         own = Dialect(self.name, dialect.real, dialect.std)
-        self._source = Source(numbers, own, model.out_of_bounds, self.min_coverage, is_part=True)
+        self.limits = read_limits(saturate, numbers)
+        given = (numbers, own, model.out_of_bounds, self.min_coverage)
+        self._source = Source(*given, is_part=True, limits=self.limits)
         self.model = as_held(model, numbers)
         self.low, self.high = numbers.low, numbers.high
-        self.cost: CCost = cost(numbers, self._source)
+        if deviation:
+            found = deviation_of(model, numbers)
+            sure = DeviationSource(*given, found, is_part=True, limits=self.limits)
+            self._source, self.cost = sure, with_deviation(cost(numbers, sure), sure)
+        else:
+            self.cost = cost(numbers, self._source)
         self._outer = dialect.name.upper()
+
+    def deviation_test(self, dialect: Dialect, rows) -> str:
+        """The self-test of deviations of a file in a dialect, at ``rows`` of the rules."""
+        return deviation_test(self.model, dialect, rows)
 
     def text(self) -> str:
         """The C code, for after the lines that include other files."""
