@@ -89,6 +89,7 @@ OTHERS = {
 
 
 @needs_compiler
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 @pytest.mark.parametrize("std", ["c99", "c89"])
 def test_deviations_are_those_of_python(std, tmp_path):
     X, y = surface(n_outputs=2)
