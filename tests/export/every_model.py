@@ -4,7 +4,7 @@ Inputs are in everyday units, one of them far from the origin; rows are in the b
 """
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from skanfis.policies import OUT_OF_BOUNDS
 from ..oracles import random_grid, random_scattered
 from .rule_bases import OFFSET, SCALE, build, narrow_target
 
-N_ROWS = 10_000
+N_ROWS = 3000
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,11 @@ class Case:
     family: str
     partition: str
     model: TSKModel
+
+    def traits(self):
+        """What may meet in one model."""
+        model = self.model
+        return self.family, self.partition, model.order, model.n_outputs, model.out_of_bounds
 
 
 def table_of(rng, family):
@@ -52,9 +57,10 @@ def generate():
     """All combinations; the policies out of bounds go round among them."""
     policies = ("linear", "clip", "linear", "nan", "linear", "raise")
     limits = (np.inf, 0.5, 0.6, 0.5, 0.2, 0.5)
-    combinations = product(MEMBERSHIPS.items(), PARTITIONS.items(), (0, 1), (1, 3))
-    for i, ((name, family), (kind, make), order, n_outputs) in enumerate(combinations):
-        policy, limit = policies[i % len(policies)], limits[i % len(limits)]
+    every = product(MEMBERSHIPS.items(), PARTITIONS.items(), (0, 1), (1, 3))
+    for i, ((name, family), (kind, make), order, n_outputs) in enumerate(every):
+        turn = (i + i // 6) % 6
+        policy, limit = policies[turn], limits[turn]
         antecedent = make(np.random.default_rng(i), family)
         label = f"{name}, {kind}, order {order}, {n_outputs} outputs, {policy} {limit}"
         beyond = {"out_of_bounds": policy, "max_extrapolation": limit}
@@ -63,8 +69,28 @@ def generate():
         yield Case(label, name, kind, model)
 
 
+def meetings(cases):
+    """Every two traits that meet in one of the cases; of policies, those with order and outputs."""
+    every = [case.traits() for case in cases]
+    pairs = {(i, j, t[i], t[j]) for t in every for i, j in combinations(range(4), 2)}
+    return pairs | {(4, 4, t[4], t[j]) for t in every for j in range(2, 5)}
+
+
+def fewest(cases):
+    """One case for each family and partition, in which any two traits still meet."""
+    chosen, missing = [], meetings(cases)
+    for pair in product(MEMBERSHIPS, PARTITIONS):
+        of_pair = [case for case in cases if (case.family, case.partition) == pair]
+        chosen.append(max(of_pair, key=lambda case: len(meetings([case]) & missing)))
+        missing -= meetings(chosen[-1:])
+    return tuple(chosen)
+
+
 CASES = tuple(generate())
 assert {case.model.out_of_bounds for case in CASES} == set(OUT_OF_BOUNDS)
+# For what takes its time with every model.
+FEWEST = fewest(CASES)
+assert meetings(FEWEST) == meetings(CASES)
 
 
 def rows(dtype, n_rows=N_ROWS):

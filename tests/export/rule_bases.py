@@ -68,6 +68,12 @@ MODELS = {
     f"{kind}, order {order}, {n_outputs} outputs": build(antecedent, order, n_outputs)
     for (kind, antecedent), order, n_outputs in product(_antecedents().items(), (0, 1), (1, 2))
 }
+# Half of them: every kind meets both orders and both numbers of outputs, and these each other.
+EVERY_PAIR = {
+    name: model
+    for place, (name, model) in enumerate(MODELS.items())
+    if (place // 4 + model.order + model.n_outputs) % 2
+}
 
 
 def rows_of(model, reach, n_rows=40):

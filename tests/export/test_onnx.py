@@ -16,7 +16,7 @@ from skanfis import ANFISRegressor
 from skanfis.export import fold, register_onnx_converter
 from skanfis.options import LinearExtrapolation
 
-from .every_model import CASES, full_scale, print_differences, rows, size_of_sum
+from .every_model import FEWEST, full_scale, print_differences, rows, size_of_sum
 
 REASON = "{} IS NOT INSTALLED (pip install '.[onnx]'): THE ONNX CONVERTER IS NOT TESTED"
 skl2onnx = pytest.importorskip("skl2onnx", reason=REASON.format("skl2onnx"))
@@ -54,12 +54,14 @@ def answers(estimator, X, **options):
     return y
 
 
-@pytest.mark.slow
 @PRECISIONS
 def test_every_model_answers_as_predict(dtype, tolerance, capsys):
     X = rows(dtype)
     differences = []
-    cases = [case for case in CASES if case.model.out_of_bounds != "raise"]
+    # In single precision each family twice, each time on another partition.
+    every = 2 if dtype is np.float32 else 1
+    listed = [case for i, case in enumerate(FEWEST) if (i + i // 4) % every == 0]
+    cases = [case for case in listed if case.model.out_of_bounds != "raise"]
     for case in cases:
         found = answers(holding(case.model), X)
         wanted = case.model.predict(X.astype(float))
@@ -98,11 +100,11 @@ PIPELINES = {
 
 
 @PRECISIONS
-@pytest.mark.parametrize("n_outputs", [1, 2])
 @pytest.mark.parametrize("kind", PIPELINES)
-def test_pipeline_answers_as_predict(kind, n_outputs, dtype, tolerance):
+def test_pipeline_answers_as_predict(kind, dtype, tolerance):
     scaler, settings = PIPELINES[kind]
-    X, y = surface(n_outputs=n_outputs)
+    # One output and two by turns, in either precision the other way round.
+    X, y = surface(n_outputs=1 + (list(PIPELINES).index(kind) + (dtype is np.float32)) % 2)
     pipeline = make_pipeline(clone(scaler), ANFISRegressor(**settings))
     pipeline.fit(X, y)
     Z = (X.mean(axis=0) + 1.3 * (X - X.mean(axis=0))).astype(dtype)

@@ -1,5 +1,6 @@
 """A model in a file comes back the same: joblib, and skops for files from strangers."""
 
+from functools import lru_cache
 from importlib import import_module
 from io import BytesIO
 
@@ -32,32 +33,34 @@ ESTIMATORS = {
     "pipeline": make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)),
     **{mf: ANFISRegressor(n_mfs=2, mf=mf) for mf in MEMBERSHIPS},
 }
-EACH = pytest.mark.parametrize("estimator", ESTIMATORS.values(), ids=list(ESTIMATORS))
-X = np.random.default_rng(0).uniform(0.0, [10.0, 1.0], (120, 2))
+EACH = pytest.mark.parametrize("name", ESTIMATORS)
+X = np.random.default_rng(0).uniform(0.0, [10.0, 1.0], (60, 2))
 Y = np.column_stack([np.sin(X[:, 0]) + X[:, 1], X[:, 0] * X[:, 1]])
 
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 
 
-def fitted(estimator):
+@lru_cache(maxsize=None)
+def fitted(name):
+    estimator = ESTIMATORS[name]
     short = {name: 5 for name in estimator.get_params() if name.endswith("regressor__max_iter")}
     return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
 
 
 @EACH
-def test_joblib(estimator):
-    estimator = fitted(estimator)
+def test_joblib(name):
+    estimator = fitted(name)
     file = BytesIO()
     joblib.dump(estimator, file)
     assert_array_equal(joblib.load(file).predict(X), estimator.predict(X))
 
 
 @EACH
-def test_skops_with_the_listed_types(estimator):
+def test_skops_with_the_listed_types(name):
     io = pytest.importorskip(
         "skops.io", reason="skops IS NOT INSTALLED: its files are not checked (pip install skops)"
     )
-    estimator = fitted(estimator)
+    estimator = fitted(name)
     data = io.dumps(estimator)
     assert set(io.get_untrusted_types(data=data)) <= set(TRUSTED_TYPES)
     loaded = io.loads(data, trusted=TRUSTED_TYPES)

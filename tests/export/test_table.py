@@ -13,9 +13,9 @@ from sklearn.preprocessing import MinMaxScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.export import explain, memberships_table, rules_table
 
-from .rule_bases import MODELS, NAMES, narrow_target, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, NAMES, narrow_target, rows_of
 
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 A_TABLE = MODELS["rule table, order 1, 2 outputs"]
 
@@ -100,8 +100,9 @@ def test_a_pipeline_is_told_in_raw_units():
     assert_allclose(mean, rules_table(pipe, about="mean")["then y", "constant"], rtol=1e-9)
 
 
-@pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
-@pytest.mark.parametrize("min_strength", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("policy", "min_strength"), [("clip", 0.1), ("linear", 0.0), ("linear", 0.1), ("nan", 0.0)]
+)
 @ALL
 def test_contributions_add_up_to_the_prediction(model, policy, min_strength):
     model = model.with_out_of_bounds(policy, 0.5)

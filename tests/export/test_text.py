@@ -17,9 +17,9 @@ from skanfis.membership import Gaussian
 
 from .. import oracles
 from ..oracles import textbook_membership
-from .rule_bases import MODELS, NAMES, build, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, NAMES, build, rows_of
 
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 NUMBER = r"[-\d.e+]+"
 

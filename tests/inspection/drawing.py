@@ -2,12 +2,12 @@
 
 import pytest
 
-from ..export.rule_bases import MODELS, NAMES
+from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES
 
 __all__ = ["ALL", "A_GRID", "NAMES", "drawn", "plt"]
 
 plt = pytest.importorskip("matplotlib.pyplot")
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 
 

@@ -42,8 +42,9 @@ def test_a_label_is_drawn_as_it_is(name):
     plt.close(figure)
 
 
+# Those that cannot be drawn as they are: no picture has forgotten to ask for a label.
 @pytest.mark.filterwarnings("ignore:Glyph .* missing")
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", [r"$\frac{0$", "\udcff"])
 def test_every_picture_takes_every_name(name):
     model = replace(
         A_GRID,

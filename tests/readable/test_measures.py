@@ -10,9 +10,9 @@ from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.membership import Gaussian
 from skanfis.readable import Source, measure, measures
 
-from ..export.rule_bases import MODELS, build, rows_of
+from ..export.rule_bases import EVERY_PAIR, MODELS, build, rows_of
 
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 ONE = MODELS["one rule, order 1, 1 outputs"]
 A_TABLE = MODELS["rule table, order 1, 2 outputs"]
 

@@ -22,9 +22,9 @@ from skanfis.readable import (
     readability_of_rows,
 )
 
-from ..export.rule_bases import MODELS, rows_of
+from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 
 

@@ -11,7 +11,7 @@ from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.readable import crossings, distinct_terms, greatest_truth_in_box, own_terms
 
 from .. import oracles
-from ..export.rule_bases import MODELS, OFFSET, SCALE
+from ..export.rule_bases import EVERY_PAIR, OFFSET, SCALE
 
 DENSE = 200_001
 
@@ -113,7 +113,7 @@ def test_neighbours_of_two_families():
     assert_allclose(crossings(antecedent), expected, atol=1e-5)
 
 
-@pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+@pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 def test_greatest_truth_in_the_box_is_that_of_a_dense_grid(model):
     Z = model.minimum[:, None] + (model.maximum - model.minimum)[:, None] * np.linspace(0, 1, DENSE)
     expected = np.exp(model.antecedent.log_memberships(Z)).max(axis=1)

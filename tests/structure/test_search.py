@@ -343,7 +343,6 @@ def test_noise_free_data_get_next_to_no_penalty():
     model = ANFISRegressor().fit(X, y)
     assert model.alpha_ <= 1e-6
     assert model.score(X, y) > 0.9999
-    assert_array_equal(model.predict(X), ANFISRegressor().fit(X, y).predict(X))
 
 
 def runs(n_runs=6, n_rows=120, seed=0):
