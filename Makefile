@@ -21,24 +21,27 @@ DEMO := .venv
 DEV := .venv-dev
 FLOORS := .venv-floors
 MUTANTS := .venv-mutants
-DOCS := .venv-docs
+WHEEL := .venv-wheel
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
 export MPLBACKEND := Agg
 
 # $(call make-venv,FOLDER,PYTHON,RELATION): the pip of an older Python knows no dependency groups.
+# Bytecode is made of what is imported, when it is: all of it takes twice as long to install.
 define make-venv
 	@$(or $(2),false) -c '$(call check-python,$(3))' 2>/dev/null || { echo "This needs Python $(3) $(MINIMUM)" \
 		"with the modules venv and ensurepip; $(or $(2),no command found) is not that." \
 		"Name one with PYTHON=... (for the floors FLOORS_PYTHON=...)."; exit 1; }
 	$(2) -m venv --clear $(1)
-	$(1)/bin/python -m pip install --upgrade "pip>=25.1"
+	$(1)/bin/python -m pip install --no-compile "pip>=25.1"
 endef
+pip-install = $(1)/bin/python -m pip install --no-compile
 
 # One BLAS thread per test process: more would only compete for the same cores. No more processes
 # than four where their number is left open: each pays for its imports.
-pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4
+pytest = env OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(1)/bin/python -m pytest \
+	-n $(WORKERS) --maxprocesses 4 --dist worksteal
 
 .PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour mutants release clean
 
@@ -50,7 +53,7 @@ help:
 	@echo "make lint         style, format, types"
 	@echo "make format       put style and format right where a tool can"
 	@echo "make test-floors  all tests at the oldest dependencies that pyproject.toml allows"
-	@echo "make test-wheel   all but the slow tests against the built wheel, away from the source"
+	@echo "make test-wheel   the built wheel, away from the source: modules, files, every way out"
 	@echo "make wheel        sdist and wheel, in dist/"
 	@echo "make check-dist   what a package index and an installer would object to in these"
 	@echo "make docs         the documentation, in docs/_build/html"
@@ -61,28 +64,23 @@ help:
 
 $(DEMO)/.installed: pyproject.toml
 	$(call make-venv,$(DEMO),$(PYTHON),>=)
-	$(DEMO)/bin/python -m pip install --editable ".[plot]"
+	$(call pip-install,$(DEMO)) --editable ".[plot]"
 	@touch $@
 
 $(DEV)/.installed: pyproject.toml
 	$(call make-venv,$(DEV),$(PYTHON),>=)
-	$(DEV)/bin/python -m pip install --editable ".[plot,allan,onnx,dask]" --group dev
+	$(call pip-install,$(DEV)) --editable ".[docs]" --group dev
 	@touch $@
 
 $(FLOORS)/.installed: pyproject.toml .ci/floors.py
 	$(call make-venv,$(FLOORS),$(FLOORS_PYTHON),==)
 	$(FLOORS)/bin/python .ci/floors.py > $(FLOORS)/floors.txt
-	$(FLOORS)/bin/python -m pip install --editable ".[plot,allan,onnx,dask]" --group test --constraint $(FLOORS)/floors.txt
+	$(call pip-install,$(FLOORS)) --editable ".[plot,allan,onnx,dask]" --group test --constraint $(FLOORS)/floors.txt
 	@touch $@
 
 $(MUTANTS)/.installed: pyproject.toml
 	$(call make-venv,$(MUTANTS),$(PYTHON),>=)
-	$(MUTANTS)/bin/python -m pip install --editable "." --group mutants
-	@touch $@
-
-$(DOCS)/.installed: pyproject.toml
-	$(call make-venv,$(DOCS),$(PYTHON),>=)
-	$(DOCS)/bin/python -m pip install --editable ".[docs]"
+	$(call pip-install,$(MUTANTS)) --editable "." --group mutants
 	@touch $@
 
 demo: $(DEMO)/.installed
@@ -106,33 +104,36 @@ format: $(DEV)/.installed
 	$(DEV)/bin/ruff check --fix
 	$(DEV)/bin/ruff format
 
+# What README, the pages and the examples print is compared at the newest dependencies.
 test-floors: $(FLOORS)/.installed
 	@echo "The floors:" $$(cat $(FLOORS)/floors.txt)
-	$(call pytest,$(FLOORS))
+	$(call pytest,$(FLOORS)) -m "not page"
 
 wheel: $(DEV)/.installed
 	rm -rf dist
-	$(DEV)/bin/python -m build --outdir dist
+	$(DEV)/bin/python -m build --no-isolation --outdir dist
 
 check-dist: wheel
 	$(DEV)/bin/python -m twine check --strict dist/*
-	$(DEV)/bin/check-wheel-contents dist/*.whl
+	$(DEV)/bin/check-wheel-contents --package skanfis --package-omit "__pycache__,*.pyc" dist/*.whl
 
-# The tests read pyproject.toml for pytest's settings and docs/api.rst for the names it lists. What a
-# wheel may lack is files: the slow tests, long lists of models through the same code, add nothing.
-test-wheel: wheel
+# With nothing but what it asks for itself and pytest: what a wheel may lack is files, modules and
+# what they need; what they compute has been tested.
+$(WHEEL)/.installed: wheel
+	$(call make-venv,$(WHEEL),$(PYTHON),>=)
+	wheel=$$(echo dist/*.whl) && $(call pip-install,$(WHEEL)) "$$wheel[plot]" pytest
+	@touch $@
+
+test-wheel: $(WHEEL)/.installed
 	@set -e; away=$$(mktemp -d); trap 'rm -rf "$$away"' EXIT; trap 'exit 1' INT TERM; \
-	mkdir "$$away/docs"; cp -R tests pyproject.toml "$$away"; cp docs/api.rst "$$away/docs"; \
-	wheel=$$(ls "$$PWD"/dist/*.whl); \
-	$(DEV)/bin/python -m venv "$$away/venv"; cd "$$away"; \
-	venv/bin/python -m pip install --upgrade "pip>=25.1"; \
-	venv/bin/python -m pip install "$$wheel[plot,allan,onnx,dask]" --group test; \
-	venv/bin/python -c "import skanfis; print('Testing', skanfis.__file__)"; \
-	$(call pytest,venv) -m "not slow" tests --pyargs skanfis
+	mkdir "$$away/tests"; cp tests/conftest.py tests/leftovers.py tests/test_installed.py "$$away/tests"; \
+	cp pyproject.toml "$$away"; python="$$PWD/$(WHEEL)/bin/python"; cd "$$away"; \
+	$$python -c "import skanfis; print('Testing', skanfis.__file__); assert '$(WHEEL)' in skanfis.__file__"; \
+	$$python -m pytest tests
 
-docs: $(DOCS)/.installed
-	$(DOCS)/bin/python -m sphinx --fail-on-warning --keep-going docs docs/_build/html
-	$(DOCS)/bin/python .ci/check_links.py docs/_build/html
+docs: $(DEV)/.installed
+	$(DEV)/bin/python -m sphinx --fail-on-warning --keep-going docs docs/_build/html
+	$(DEV)/bin/python .ci/check_links.py docs/_build/html
 	@echo "Documentation: $(CURDIR)/docs/_build/html/index.html"
 
 # The address, date and version are written first, so that everything below is checked as it will be
@@ -151,7 +152,7 @@ benchmarks: $(DEV)/.installed
 	$(DEV)/bin/python -m benchmarks
 
 clean:
-	rm -rf $(DEMO) $(DEV) $(FLOORS) $(MUTANTS) $(DOCS) build dist figures
+	rm -rf $(DEMO) $(DEV) $(FLOORS) $(WHEEL) $(MUTANTS) build dist figures
 	rm -rf .mypy_cache .pytest_cache .ruff_cache
 	rm -rf docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst
 	find skanfis tests examples benchmarks docs -type d -name __pycache__ -exec rm -rf {} +

@@ -1,12 +1,35 @@
-"""What all tests share."""
+"""What all tests share, and that they leave nothing behind."""
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from .leftovers import left_behind, listing
+
 # It is read by mypy, and run by nobody.
 collect_ignore = ["typed_user.py"]
+
+ROOT = Path(__file__).resolve().parents[1]
+BEFORE = pytest.StashKey()
+
+
+def pytest_sessionstart(session):
+    # The one process that outlasts the others where there are several.
+    if not hasattr(session.config, "workerinput"):
+        session.config.stash[BEFORE] = listing(ROOT)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session):
+    before = session.config.stash.get(BEFORE, None)
+    if before is not None and (found := left_behind(before, listing(ROOT))):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        report = session.config.pluginmanager.get_plugin("terminalreporter")
+        if report is not None:
+            report.section("the tests changed the folder that they run in", red=True)
+            report.write("".join(f"{line}\n" for line in found))
 
 
 @pytest.fixture

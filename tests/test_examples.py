@@ -14,6 +14,8 @@ SCRIPT = Path(__file__).parents[1] / "examples" / "plot_gyro_compensation.py"
 if not SCRIPT.is_file():
     pytest.skip("the examples are not here", allow_module_level=True)
 
+pytestmark = pytest.mark.page
+
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):

@@ -51,18 +51,15 @@ DATA = {
 }
 KMEANS = KMeans(n_clusters=4, n_init=2, random_state=0)
 # The points of the sinc lie on a symmetric grid: there rounding would decide ties of a clustering.
+# Grids and clusters, lines and constants, with noise and without: each way that rounding could go.
+# More terms or other data of the same kind take longer and go the same way.
 CASES = {
     "gyro, 8 rules": ("gyro", {"n_mfs": 2}),
-    "gyro, 27 rules": ("gyro", {"n_mfs": 3, "alpha": 1e-8}),
     "gyro, bells": ("gyro", {"n_mfs": [3, 2, 1], "mf": "bell"}),
     "gyro, clusters": ("gyro", {"partition": KMEANS}),
-    "gyro, constant rules": ("gyro", {"n_mfs": 3, "order": 0}),
-    "sinc, 9 rules": ("sinc", {"n_mfs": 3}),
     "sinc, constant rules": ("sinc", {"n_mfs": 3, "order": 0, "mf": "bell"}),
     "three inputs, bells": ("three inputs", {"n_mfs": 2, "mf": "bell"}),
-    "mackey-glass, 16 rules": ("mackey-glass", {"n_mfs": 2}),
     "mackey-glass, clusters": ("mackey-glass", {"partition": KMEANS, "mf": "bell"}),
-    "friedman, 8 rules": ("friedman", {"n_mfs": [2, 2, 2, 1, 1, 1]}),
     "friedman, clusters": ("friedman", {"partition": KMEANS}),
 }
 
@@ -116,9 +113,8 @@ def alternating(n_inputs, exponent):
     return 10.0 ** (exponent * (-1.0) ** np.arange(n_inputs + 1))
 
 
-@pytest.mark.parametrize("exponent", [6, -6])
-def test_units_of_inputs_and_target(case, exponent):
-    *factors, factor = alternating(case.X.shape[1], exponent)
+def test_units_of_inputs_and_target(case):
+    *factors, factor = alternating(case.X.shape[1], 6)
     found = case.fit(case.X * factors, case.y * factor).predict(case.X * factors)
     case.assert_same(found / factor)
 
@@ -140,7 +136,7 @@ def test_unit_of_a_single_column(column, factor):
     case.assert_same(found / factors[3])
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"n_mfs": 3}, {"partition": "grid"}], ids=str)
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "grid"}], ids=str)
 def test_an_input_with_a_long_tail_may_run_backwards(settings):
     rng = np.random.default_rng(0)
     X = rng.lognormal(size=(300, 3))
@@ -300,7 +296,7 @@ def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
 # ---------------------------------------------------------------------- every part of the estimator
 
 
-@pytest.mark.parametrize("name", DATA)
+@pytest.mark.parametrize("name", ["gyro", "sinc", "friedman"])
 def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()
@@ -322,11 +318,12 @@ def test_structure_that_is_chosen_by_itself(name):
 @pytest.mark.parametrize(
     "settings",
     [
-        *({"n_mfs": 2, "mf": mf} for mf in sorted(set(MEMBERSHIPS) - {"triangular"})),
+        # By turns on a grid and on clusters, which do not ask for the family.
+        *({"n_mfs": 2, "mf": mf} for mf in sorted(MEMBERSHIPS)[::2]),
+        *({"partition": KMEANS, "mf": mf} for mf in sorted(MEMBERSHIPS)[1::2]),
         # Two triangles have linear shares, whose products with [1, x] span 1, x and x^2 only: the
         # Gram matrix is singular, and the least ridge leaves 4e-3 of rounding. This one does not.
         {"n_mfs": 2, "mf": "triangular", "alpha": 1e-10},
-        *({"partition": KMEANS, "mf": mf} for mf in sorted(MEMBERSHIPS)),
         *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
     ],
     ids=str,

@@ -14,6 +14,8 @@ WITH_PROMPTS = {"files": 5, "how_sure": 15, "reading_rules": 15, "training": 20}
 if not (DOCS / f"{PAGES[0]}.rst").is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
 
+pytestmark = pytest.mark.page
+
 BLOCK = re.compile(r"^\.\. code-block:: (python|text)\n\n((?:   .*\n|\n)+)", re.MULTILINE)
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 

@@ -10,6 +10,8 @@ README = ROOT / "README.md"
 if not README.is_file():
     pytest.skip("README.md is not here", allow_module_level=True)
 
+pytestmark = pytest.mark.page
+
 TEXT = README.read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
 

@@ -43,7 +43,7 @@ def test_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypa
     y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(N_ROWS)
     expected = ANFISRegressor(n_mfs=2).fit(X, y).model_.coefficients
     flag = tmp_path / "calls"
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
+    options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
     with LocalCluster(**options) as cluster, Client(cluster):
         blocks = da.from_array(X, chunks=(1000, 2)).blocks
         fragile = blocks[1].map_blocks(ends_once(str(flag), 3), dtype=float, meta=X[:0])

@@ -11,6 +11,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "large_data.rst"
 if not PAGE.is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
 
+pytestmark = pytest.mark.page
+
 
 def test_the_code_on_the_page_works():
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE

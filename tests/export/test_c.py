@@ -568,6 +568,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_c_export.py"
 
 
 @needs_compiler
+@pytest.mark.page
 @pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
 def test_example_runs(capsys):
     pytest.importorskip("matplotlib")

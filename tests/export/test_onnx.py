@@ -186,6 +186,7 @@ def test_opset_too_old_is_refused():
 EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_onnx.py"
 
 
+@pytest.mark.page
 @pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
 def test_example_runs(capsys):
     pytest.importorskip("matplotlib")

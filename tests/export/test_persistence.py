@@ -1,6 +1,6 @@
 """A model in a file comes back the same: joblib, and skops for files from strangers."""
 
-from functools import lru_cache
+from functools import cache
 from importlib import import_module
 from io import BytesIO
 
@@ -40,7 +40,7 @@ Y = np.column_stack([np.sin(X[:, 0]) + X[:, 1], X[:, 0] * X[:, 1]])
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 
 
-@lru_cache(maxsize=None)
+@cache
 def fitted(name):
     estimator = ESTIMATORS[name]
     short = {name: 5 for name in estimator.get_params() if name.endswith("regressor__max_iter")}

@@ -5,6 +5,7 @@ import io
 import re
 import subprocess
 import sys
+from functools import cache
 from html.parser import HTMLParser
 
 import numpy as np
@@ -170,10 +171,22 @@ def test_rules_and_what_to_compute_on_board(page, calibration):
     assert "rate = output / 1 - error(time, temperature, temperature_rate, output);" in text
 
 
+@cache
+def short_log():
+    return make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)
+
+
+@cache
+def timeless(physics):
+    """A calibration of a log that says nothing of time."""
+    options = {"outside": "linear"} if physics else {}
+    log = short_log().drop(columns="time")
+    return calibration_of(log, ("temperature", "output"), terms=(2, 2), physics=physics, **options)
+
+
 @pytest.mark.parametrize("physics", [False, True])
 def test_says_whether_the_rules_can_be_read(physics, no_drawing):
-    log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
-    calibration = calibration_of(log, ("temperature", "output"), terms=(2, 2), physics=physics)
+    calibration = timeless(physics)
     estimator = calibration.compensator.estimator
     # What the rules were taught, by hand.
     taught = calibration.before - calibration.rate
@@ -188,7 +201,7 @@ def test_says_whether_the_rules_can_be_read(physics, no_drawing):
 
 
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(no_drawing):
-    log = make_ofog(n_devices=1, n_runs=4, duration=600.0, rates=[0.0], random_state=0)
+    log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
     calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
     text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
     assert "°/h" in text
@@ -198,12 +211,11 @@ def test_a_gyro_at_rest_has_no_scale_factor_pictures(no_drawing):
 
 @pytest.mark.parametrize("has_time", [True, False])
 def test_physics_shows_its_law(has_time, no_drawing):
-    log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
-    inputs = ("temperature", "temperature_rate", "output")
-    if not has_time:
-        log, inputs = log.drop(columns="time"), ("temperature", "output")
-    terms = (1,) * len(inputs)
-    calibration = calibration_of(log, inputs, terms=terms, physics=True, outside="linear")
+    calibration = timeless(physics=True)
+    if has_time:
+        inputs = ("temperature", "temperature_rate", "output")
+        settings = {"terms": (1, 1, 1), "physics": True, "outside": "linear"}
+        calibration = calibration_of(short_log(), inputs, **settings)
     text = " ".join(Outline(report_page(calibration, "law.csv")).text)
     law = calibration.compensator.estimator.base_
     assert f"{law.sagnac_factor_[0]:.8g}" in text

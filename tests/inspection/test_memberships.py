@@ -7,10 +7,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.export import memberships_table
 from skanfis.inspection import MembershipDisplay
 
-from ..export.rule_bases import MODELS
+from ..export.rule_bases import EVERY_PAIR, MODELS
 from .drawing import drawn, plt
 
-WITH_TERMS = pytest.mark.parametrize("kind", [kind for kind in MODELS if "one rule" not in kind])
+WITH_TERMS = pytest.mark.parametrize("kind", [k for k in EVERY_PAIR if "one rule" not in k])
 
 
 @WITH_TERMS

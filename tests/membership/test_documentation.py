@@ -30,6 +30,7 @@ def test_every_family_is_on_the_page(family):
     assert all(parameter.name in text for parameter in family.parameters)
 
 
+@pytest.mark.page
 def test_the_gallery_draws_every_family(capsys):
     pyplot = pytest.importorskip("matplotlib.pyplot")
     pyplot.switch_backend("Agg")
