@@ -3,8 +3,6 @@
 import inspect
 from importlib import import_module
 
-import pytest
-
 import skanfis
 
 MODULES = [
@@ -24,12 +22,12 @@ MODULES = [
 
 
 def public():
-    yield pytest.param(skanfis.ANFISRegressor, id="ANFISRegressor")
+    yield skanfis.ANFISRegressor
     for module in MODULES:
         exported = import_module(f"skanfis.{module}")
         for name in exported.__all__:
             if callable(getattr(exported, name)):
-                yield pytest.param(getattr(exported, name), id=f"{module}.{name}")
+                yield getattr(exported, name)
 
 
 def own_functions(named):
@@ -44,11 +42,14 @@ def own_functions(named):
                 yield function
 
 
-@pytest.mark.parametrize("named", list(public()))
-def test_what_is_public_says_what_it_returns(named):
-    functions = own_functions(named) if inspect.isclass(named) else [named]
-    untyped = [f.__qualname__ for f in functions if "return" not in f.__annotations__]
-    assert untyped == []
+def test_what_is_public_says_what_it_returns():
+    functions = [
+        function
+        for named in public()
+        for function in (own_functions(named) if inspect.isclass(named) else [named])
+    ]
+    assert len(functions) > 100
+    assert [f.__qualname__ for f in functions if "return" not in f.__annotations__] == []
 
 
 # The method solve() of a solver takes what training gives it, and is none of the user's.
