@@ -30,7 +30,7 @@ from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import MAX_EXTRAPOLATION
 from skanfis.rows import Rows
-from skanfis.solvers import SOLVERS, VariableProjection
+from skanfis.solvers import VariableProjection
 
 from . import oracles
 
@@ -131,7 +131,7 @@ def test_planted_model_is_found_under_noise():
     ],
 )
 def test_surface_is_learnt_between_the_points(settings, most):
-    train, check = surface(1000), surface(500, seed=1)
+    train, check = surface(600), surface(500, seed=1)
     model = ANFISRegressor(**settings).fit(*train)
     # Of the target's deviation; a linear model leaves 0.4.
     assert np.sqrt(1 - model.score(*check)) < most
@@ -528,10 +528,10 @@ def test_another_fit_in_between_changes_nothing():
     same_bits(clone(model).fit(X, Y), first)
 
 
-@pytest.mark.parametrize("settings", [{}, {"partition": KMEANS}, {"order": 0, "mf": "bell"}])
+@pytest.mark.parametrize("settings", [{}, {"partition": KMEANS}])
 def test_nothing_depends_on_chance_or_changes_the_global_seed(settings):
     # Few rows: "auto" clusters them.
-    few, targets = X[:150], Y[:150]
+    few, targets = X[:100], Y[:100]
     np.random.seed(1)  # noqa: NPY002
     one = ANFISRegressor(random_state=None, solver=VariableProjection(tol=0.01), **settings).fit(
         few, targets
@@ -549,11 +549,12 @@ def test_nothing_depends_on_chance_or_changes_the_global_seed(settings):
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 @pytest.mark.parametrize(
     "settings",
+    # Every solver takes the same passes over the rows: one that asks for all of them, and Jang's.
     [
-        {"partition": KMEANS, "mf": "bell"},
-        *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
+        {"partition": KMEANS, "mf": "bell", "solver": VariableProjection(stiffness=1e-3)},
+        {"n_mfs": 2, "solver": "hybrid"},
     ],
-    ids=str,
+    ids=["clusters", "hybrid"],
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
@@ -570,7 +571,7 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     models = {}
     for n_jobs in (None, 1, 2, -1):
         threads.clear()
-        model = ANFISRegressor(n_jobs=n_jobs, max_iter=5, **settings)
+        model = ANFISRegressor(n_jobs=n_jobs, agreement=0.1, alpha=0.01, max_iter=3, **settings)
         models[n_jobs] = model.fit(X, Y, weight)
         # Else this test compares nothing.
         assert (len(threads) > 1) == (n_jobs == 2 or (n_jobs == -1 and joblib.cpu_count() > 1))
@@ -579,20 +580,20 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
 
 
 @pytest.mark.parametrize("settings", [{"n_mfs": 3}, {"partition": KMEANS, "mf": "bell"}])
-@pytest.mark.parametrize("through", ["pickle", "joblib", "compressed"])
-def test_loaded_model_is_the_same_to_the_last_bit(settings, through, tmp_path):
+def test_loaded_model_is_the_same_to_the_last_bit(settings, tmp_path):
     model = ANFISRegressor(solver=VariableProjection(tol=0.5), **settings).fit(X, Y)
     path = tmp_path / "model"
-    if through == "pickle":
-        path.write_bytes(pickle.dumps(model))
-        loaded = pickle.loads(path.read_bytes())
-    else:
-        joblib.dump(model, path, compress=3 * (through == "compressed"))
-        loaded = joblib.load(path)
-    same_bits(loaded, model)
-    assert loaded.get_params()["n_mfs"] == model.n_mfs
-    # Most of it is the posterior that standard deviations need.
-    assert path.stat().st_size < 90_000
+    for through in ("pickle", "joblib", "compressed"):
+        if through == "pickle":
+            path.write_bytes(pickle.dumps(model))
+            loaded = pickle.loads(path.read_bytes())
+        else:
+            joblib.dump(model, path, compress=3 * (through == "compressed"))
+            loaded = joblib.load(path)
+        same_bits(loaded, model)
+        assert loaded.get_params()["n_mfs"] == model.n_mfs
+        # Most of it is the posterior that standard deviations need.
+        assert path.stat().st_size < 90_000
     assert model.n_rules_ == (27 if "n_mfs" in settings else 4)
 
 
@@ -712,8 +713,8 @@ def test_parameters_are_got_and_set_as_given():
     "n_mfs", [2, np.int64(2), [2, 2, 2], (2, 2, 2), np.array([2, 2, 2]), pd.Series([2, 2, 2])]
 )
 def test_number_of_terms_in_any_form(n_mfs):
-    model = ANFISRegressor(n_mfs=n_mfs, solver=VariableProjection(tol=0.01)).fit(X, Y)
-    same_bits(model, ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.01)).fit(X, Y))
+    model = ANFISRegressor(n_mfs=n_mfs, solver="lse").fit(X, Y)
+    same_bits(model, ANFISRegressor(n_mfs=2, solver="lse").fit(X, Y))
     assert model.n_mfs is n_mfs
 
 
@@ -787,7 +788,6 @@ def test_grid_search_over_runs_left_out():
         make_pipeline(StandardScaler(), estimator),
         {"anfisregressor__n_mfs": [2, 3, [4, 2, 3]]},
         cv=LeaveOneGroupOut(),
-        n_jobs=2,
     )
     search.fit(data, target, groups=run)
     assert search.best_params_ == {"anfisregressor__n_mfs": [4, 2, 3]}

@@ -5,6 +5,7 @@ import runpy
 import shutil
 import subprocess
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -143,23 +144,30 @@ TRAINED = {
 }
 
 
-@needs_compiler
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-@pytest.mark.parametrize(("dtype", "tolerance"), [("double", 1e-12), ("float", 1e-5)])
-def test_trained_models_answer_as_predict(dtype, tolerance, tmp_path):
+@cache
+def trained():
+    """By kind; one output and two by turns, which are written the same way for every kind."""
     X, y = surface(n_outputs=2)
-    Z = around(X, np.float32 if dtype == "float" else float)
-    # One output and two by turns; how outputs are written is the same of every kind.
-    estimators = {
+    return {
         kind: make().fit(X, y[:, 0] if place % 2 else y)
         for place, (kind, make) in enumerate(TRAINED.items())
     }
+
+
+@needs_compiler
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.parametrize(
+    ("dtype", "tolerance", "flags"), [("double", 1e-12, SANITIZE), ("float", 1e-5, [])]
+)
+def test_trained_models_answer_as_predict(dtype, tolerance, flags, tmp_path):
+    estimators = trained()
+    Z = around(surface()[0], np.float32 if dtype == "float" else float)
     codes = [
         export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
         for place, estimator in enumerate(estimators.values())
     ]
     n_outputs = [2 - place % 2 for place in range(len(codes))]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", n_outputs)
+    answers = evaluate_all(codes, Z, tmp_path, "c99", n_outputs, flags)
     for (kind, estimator), (found, status) in zip(estimators.items(), answers, strict=True):
         wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
         scale = np.maximum(full_scale(wanted), size_of_sum(fold(estimator), Z))

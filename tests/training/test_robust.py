@@ -37,8 +37,7 @@ def linear_huber(X, y, epsilon, sample_weight=None):
     return LinearRegression().fit(X, y, sample_weight=own * weights), weights
 
 
-@pytest.mark.parametrize("weighted", [False, True])
-@pytest.mark.parametrize("epsilon", [1.0, 1.35, 3.0])
+@pytest.mark.parametrize(("epsilon", "weighted"), [(1.0, False), (1.35, True), (3.0, False)])
 def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
     monkeypatch.setattr(fit, "_SETTLED", 1e-12)
     monkeypatch.setattr(fit, "_MOST_TURNS", 500)
@@ -102,8 +101,7 @@ def test_rows_that_were_not_trained_on_have_no_weight():
     assert_array_equal(np.flatnonzero(np.isnan(dropped.robust_weights_)), [3])
 
 
-@pytest.mark.parametrize("settings", [{}, {"n_mfs": 4}])
-@pytest.mark.parametrize("size", [1e3, 1e6])
+@pytest.mark.parametrize(("settings", "size"), [({}, 1e6), ({"n_mfs": 4}, 1e3)])
 def test_outliers_do_not_decide_on_the_start(settings, size):
     g = np.random.default_rng(0)
     X = g.uniform(-1, 1, (300, 2))
