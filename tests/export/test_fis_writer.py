@@ -19,9 +19,9 @@ from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.policies import OUT_OF_BOUNDS
 
 from .. import oracles
-from .rule_bases import MODELS, build, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, build, rows_of
 
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 
 

@@ -18,9 +18,9 @@ from skanfis.policies import OUT_OF_BOUNDS
 
 from .. import oracles
 from .json_mutations import mutated_numbers, with_number
-from .rule_bases import MODELS, build, narrow_target, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 
-ALL = pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
 
 

@@ -174,6 +174,7 @@ def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
 
 @pytest.mark.usefixtures("no_report")
 def test_physics_and_policy(tmp_path, log, capsys):
+    log = log[log["run"] < 3]
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
     arguments = [path, "--physics", "--terms", "1,2,1,1", "--outside", "nan", "--quiet"]
     assert main([*arguments, "--output", str(out), "--c", "c99"]) == 0
@@ -203,7 +204,7 @@ def test_physics_and_policy(tmp_path, log, capsys):
 
 @pytest.mark.usefixtures("no_report")
 def test_at_rest(tmp_path, capsys):
-    log = simulated(n_runs=5, rates=[0.0], profile="ramps")
+    log = simulated(n_runs=3, rates=[0.0], profile="ramps")
     path = write_log(tmp_path / "log.csv", log, ["time", "temperature", "output", "run"])
     arguments = [path, "--at-rest", "--max-rules", "2", "--output", str(tmp_path / "out")]
     assert main([*arguments, "--quiet"]) == 0
