@@ -34,7 +34,7 @@ class DaskANFISRegressor(ANFISRegressor):
     Data that are NumPy arrays or pandas frames from the beginning are left to it altogether.
 
     The scheduler is that which dask uses: the ``dask.distributed`` client that was made last, or
-    else the threads of this process. Partitions are loaded anew for every pass, some nine
+    else the threads of this process. Partitions are loaded anew for every pass, some eight
     times, unless they have been persisted (``X.persist()``): data may be larger than the memory of
     all workers.
 
