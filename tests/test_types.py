@@ -42,25 +42,23 @@ def own_functions(named):
                 yield function
 
 
+def functions_of(named):
+    return list(own_functions(named)) if inspect.isclass(named) else [named]
+
+
 def test_what_is_public_says_what_it_returns():
-    functions = [
-        function
-        for named in public()
-        for function in (own_functions(named) if inspect.isclass(named) else [named])
-    ]
+    functions = [function for named in public() for function in functions_of(named)]
     assert len(functions) > 100
     assert [f.__qualname__ for f in functions if "return" not in f.__annotations__] == []
 
 
-# The method solve() of a solver takes what training gives it, and is none of the user's.
-@pytest.mark.parametrize(
-    "named", [one for one in public() if not one.values[0].__module__.startswith("skanfis.solvers")]
-)
-def test_what_is_public_says_what_it_takes(named):
-    functions = own_functions(named) if inspect.isclass(named) else [named]
+def test_what_is_public_says_what_it_takes():
+    # The method solve() of a solver takes what training gives it, and is none of the user's.
     untyped = [
         f"{function.__qualname__}: {name}"
-        for function in map(inspect.unwrap, functions)
+        for named in public()
+        if not named.__module__.startswith("skanfis.solvers")
+        for function in map(inspect.unwrap, functions_of(named))
         for name, parameter in inspect.signature(function).parameters.items()
         if parameter.annotation is parameter.empty and name not in ("self", "cls")
     ]
