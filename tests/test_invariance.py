@@ -331,7 +331,7 @@ def test_structure_that_is_chosen_by_itself(name):
 def test_every_family_and_solver(settings):
     X, y = gyro(200)
     weight = np.random.default_rng(2).integers(1, 5, len(y))
-    model = ANFISRegressor(max_iter=20, **settings)
+    model = ANFISRegressor(max_iter=8, **settings)
     plain = model.fit(X, y, weight).predict(X)
     order = np.random.default_rng(3).permutation(weight.sum())
     model.fit(np.repeat(X, weight, axis=0)[order], np.repeat(y, weight)[order])
