@@ -35,7 +35,7 @@ GROUPS = {
     "antecedent/base antecedent/grid antecedent/rule_table antecedent/scattered": (
         "antecedent/test_antecedent.py"
     ),
-    "rows": "test_rows.py test_extremes.py",
+    "data": "test_data.py test_extremes.py",
     "consequent gram passes penalty objective": (
         "test_consequent.py test_penalty.py test_objective.py solvers/test_gradient.py "
         "test_posterior.py training/test_many_rows.py"
@@ -50,9 +50,10 @@ GROUPS = {
         "structure/test_request.py structure/test_size.py structure/test_imported.py "
         "structure/test_search.py::test_family_is_that_of_the_truth_where_it_is_asked_for"
     ),
-    "structure/candidate structure/held_out structure/search structure/terms structure/tuning": (
+    "structure/candidate structure/held_out structure/idle structure/search structure/terms "
+    "structure/tuning": (
         "structure/test_search.py structure/test_terms.py structure/test_held_out.py "
-        "structure/test_tuning.py structure/test_candidate.py "
+        "structure/test_tuning.py structure/test_candidate.py structure/test_idle.py "
         "structure/test_request.py::test_radius_of_clusters_is_reported_and_is_that_of_the_clusterer"
     ),
 }

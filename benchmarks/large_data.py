@@ -18,7 +18,7 @@ from unittest.mock import patch
 import numpy as np
 
 from skanfis import ANFISRegressor, sampling
-from skanfis.rows import Rows
+from skanfis.data import StandardisedData
 
 from .fresh import alone
 from .memory import status
@@ -69,7 +69,7 @@ def million():
 def pass_in_fit():
     """Cost, consequents and gradient of all rows inside a fit, in bare products."""
     X, y = noisy_rows(_IN_FIT)
-    spent, whole = {}, Rows.sum
+    spent, whole = {}, StandardisedData.sum
 
     def timed(rows, one_pass, *args):
         start = process_time()
@@ -78,7 +78,7 @@ def pass_in_fit():
             spent.setdefault(type(one_pass).__name__, []).append(process_time() - start)
         return sums
 
-    with patch.object(Rows, "sum", timed):
+    with patch.object(StandardisedData, "sum", timed):
         for _ in range(3):
             ANFISRegressor(n_mfs=_N_MFS).fit(X, y)
     product = min(side_by_side(bare_products(make_problem())).values())

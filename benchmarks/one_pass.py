@@ -13,10 +13,10 @@ import numpy as np
 from scipy.linalg import blas
 
 from skanfis import objective
+from skanfis.data import StandardisedData
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.rows import Rows
 from skanfis.structure import Spacing, grid_antecedent
 
 from .fresh import alone
@@ -36,7 +36,7 @@ def make_problem():
     y = np.multiply(X[:, :1], 3.0)
     np.sin(y, out=y)
     y *= X[:, 1:2]
-    rows = Rows.standardised(X, y)
+    rows = StandardisedData.of(X, y)
     antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], Spacing(rows), overlap=0.6)
     return SeparableProblem(rows, antecedent, order=1, penalty=Penalty(alpha=1e-12))
 

@@ -43,10 +43,10 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
+from .data import StandardisedData
 from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass
 from .penalty import CommonLine, Penalty, disagreement_matrix
-from .rows import Rows
 
 __all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "SeparableProblem"]
 
@@ -113,7 +113,7 @@ class SeparableProblem:
 
     Parameters
     ----------
-    rows : Rows
+    rows : StandardisedData
     antecedent : Antecedent
         The rule base at the start, which freezes the consequents' local basis.
     order : {0, 1}
@@ -128,7 +128,7 @@ class SeparableProblem:
 
     def __init__(
         self,
-        rows: Rows,
+        rows: StandardisedData,
         antecedent: Antecedent,
         order: int,
         penalty: Penalty,

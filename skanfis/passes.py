@@ -2,7 +2,7 @@ r"""What one pass adds up over the rows, a block at a time: the sums behind ``ob
 
 A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights or
 None, that adds to its sums, arrays of the pass's ``shapes``. It holds the point at which it is
-taken and nothing of the rows: it can be sent to where the rows are (:meth:`skanfis.rows.Rows.sum`),
+taken and nothing of the rows: it can be sent to where the rows are (``StandardisedData.sum``),
 and only the sums come back. The formulas are in ``objective``.
 """
 

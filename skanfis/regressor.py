@@ -53,7 +53,7 @@ from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
 from .streaming.learning import LearnsFromChunksMixin
-from .training import Callbacks, TrainingData, fit_rules, model_without_rules
+from .training import Callbacks, ValidatedData, fit_rules, model_without_rules
 
 __all__ = ["ANFISRegressor"]
 
@@ -728,7 +728,7 @@ class ANFISRegressor(
             groups = None if groups is None else groups[keep]
         names = tuple(map(str, self._input_names()))
         wishes = Wishes.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
-        return TrainingData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
+        return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
 
     def _check_inputs(self, X):
         check_is_fitted(self)

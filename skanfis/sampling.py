@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from .rows import Rows, fingerprint
+from .data import StandardisedData, fingerprint
 
 __all__ = ["MANY_ROWS", "SAMPLE_ROWS", "is_many", "with_sample"]
 
@@ -84,7 +84,7 @@ def with_sample(rows, most=None):
             break
     X, y, weight, _, _ = drawn.columns
     weight = None if (weight == 1.0).all() else weight
-    sample = Rows(X, y, weight, rows.inputs, rows.targets, drawn.groups)
+    sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, drawn.groups)
     return replace(rows, sample=sample)
 
 

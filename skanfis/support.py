@@ -21,8 +21,8 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import basis
+from .data import StandardisedData, fingerprint
 from .gram import pairs
-from .rows import Rows, fingerprint
 
 __all__ = ["FIRES", "RuleFiring", "RuleSupport", "inverse_factor"]
 
@@ -72,7 +72,7 @@ class RuleSupport:
     radius: np.ndarray
 
     @classmethod
-    def of(cls, rows: Rows, antecedent: Antecedent, n_coefficients: int, firing=None):
+    def of(cls, rows: StandardisedData, antecedent: Antecedent, n_coefficients: int, firing=None):
         """The support of every rule, in the rows' standardised units, in a pass over them.
 
         ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
@@ -147,7 +147,7 @@ class RuleFiring:
     n_distinct: np.ndarray
 
     @classmethod
-    def of(cls, rows: Rows, antecedent: Antecedent, enough: int):
+    def of(cls, rows: StandardisedData, antecedent: Antecedent, enough: int):
         """Of rows; distinct inputs are counted up to ``enough`` of each rule."""
         overlap, products, strongest, peak, distinct = rows.reduce(
             partial(_first_pass, antecedent=antecedent, enough=enough), _merge

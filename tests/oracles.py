@@ -15,8 +15,8 @@ from skanfis.antecedent import (
     ScatteredAntecedent,
     TermGroup,
 )
+from skanfis.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
-from skanfis.rows import Rows
 from skanfis.support import RuleSupport
 
 # With a complex step there is no difference to lose digits in: any tiny step is exact to rounding.
@@ -265,7 +265,7 @@ def bumpy_rows(rng, n_rows=300, n_inputs=2, n_outputs=1, weighted=False):
         for k in range(n_outputs)
     ]
     y = np.stack(bumps, axis=1) + 0.1 * rng.normal(size=(n_rows, n_outputs))
-    return Rows.standardised(X, y, rng.uniform(0.2, 3.0, n_rows) if weighted else None)
+    return StandardisedData.of(X, y, rng.uniform(0.2, 3.0, n_rows) if weighted else None)
 
 
 def box(rows):

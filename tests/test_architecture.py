@@ -17,7 +17,7 @@ KERNEL = [
     "antecedent",
     "consequent",
     "gram",
-    "rows",
+    "data",
     "sampling",
     "passes",
     "penalty",
@@ -264,9 +264,9 @@ def test_every_module_keeps_to_its_layer():
 @pytest.mark.parametrize(
     ("module", "source"),
     [
-        ("skanfis.exceptions", "from . import rows"),
+        ("skanfis.exceptions", "from . import data"),
         ("skanfis.membership", "from .antecedent import Antecedent"),
-        ("skanfis.rows", "from . import objective"),
+        ("skanfis.data", "from . import objective"),
         ("skanfis.objective", "from skanfis.solvers.varpro import varpro"),
         ("skanfis.objective", "import skanfis.solvers"),
         ("skanfis.solvers.varpro", "from ..structure import grid"),

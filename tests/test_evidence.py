@@ -10,12 +10,12 @@ from scipy import integrate, optimize, special, stats
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.data import StandardisedData
 from skanfis.evidence import PRIOR_DISPLACEMENT, laplace, reestimated
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.rows import Rows
 
 from . import oracles
 
@@ -173,8 +173,8 @@ class TestAtGivenPremises:
         g = np.random.default_rng(5)
         X, times = oracles.bumpy_rows(g, 30, 2, n_outputs), g.integers(1, 5, 30)
         antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
-        weighted = Rows.standardised(X.X, X.y, times.astype(float))
-        repeated = Rows.standardised(np.repeat(X.X, times, axis=0), np.repeat(X.y, times, axis=0))
+        weighted = StandardisedData.of(X.X, X.y, times.astype(float))
+        repeated = StandardisedData.of(np.repeat(X.X, times, axis=0), np.repeat(X.y, times, axis=0))
         for penalty in PENALTIES:
             one, other = (posterior(r, antecedent, 1, penalty) for r in (weighted, repeated))
             assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-9)
@@ -197,7 +197,7 @@ class TestAtGivenPremises:
     def test_units_do_not_matter(self, factor):
         g = np.random.default_rng(2)
         rows, antecedent = oracles.bumpy_rows(g, 60, 2), oracles.random_grid(g, [Gaussian], [3])
-        moved = Rows.standardised(rows.X, 7.0 + factor * rows.y)
+        moved = StandardisedData.of(rows.X, 7.0 + factor * rows.y)
         one, other = (posterior(r, antecedent, 1, PENALTIES[0]) for r in (rows, moved))
         assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-8)
 
@@ -249,7 +249,7 @@ class TestLimits:
         g = np.random.default_rng(1)
         x = g.normal(size=(50, 1))
         for signal, wins in ((0.0, False), (1.0, True)):
-            rows = Rows.standardised(x, signal * x + g.normal(size=(50, 1)))
+            rows = StandardisedData.of(x, signal * x + g.normal(size=(50, 1)))
             constant = posterior(rows, ONE_RULE, 0, FIRST)
             flat = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e7))
             line = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e-2))
@@ -344,7 +344,7 @@ class TestReestimated:
         g = np.random.default_rng(0)
         X, slopes = g.normal(size=(2000, 100)), 0.1 * g.normal(size=100)
         y = X @ slopes + g.normal(size=2000)
-        rows, penalty = Rows.standardised(X, y[:, None]), FIRST
+        rows, penalty = StandardisedData.of(X, y[:, None]), FIRST
         problem = SeparableProblem(rows, ONE_RULE, 1, penalty)
         evaluation = problem.evaluate(np.empty(0))
         for _ in range(30):
@@ -367,7 +367,7 @@ class OneWidth:
         g = np.random.default_rng(0)
         X = g.uniform(-1.0, 1.0, (n_rows, 1))
         y = np.sin(3.0 * X) + 0.4 * X**2 + noise * g.normal(size=X.shape)
-        self.rows = Rows.standardised(X, y)
+        self.rows = StandardisedData.of(X, y)
         low, high = oracles.box(self.rows)
         self.antecedent = oracles.even_grid([Gaussian], [3], low, high, 0.6)
         self.premise = Premise.of(self.antecedent, low, high)
@@ -481,7 +481,7 @@ def surface(n_rows, noise, seed=0):
 
 def effective_parameters(model, X, y):
     """Trace of the hat matrix of the consequents where the fit ended."""
-    rows = Rows.standardised(X, y[:, None])
+    rows = StandardisedData.of(X, y[:, None])
     antecedent = model.model_.antecedent.change_units(
         -rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale
     )

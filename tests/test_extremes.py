@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.rows import column_statistics
+from skanfis.data import column_statistics
 from skanfis.solvers import VariableProjection
 
 LOW, HIGH = -1000, 1000

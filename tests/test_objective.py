@@ -12,12 +12,13 @@ from joblib import Parallel, delayed
 from numpy.testing import assert_allclose, assert_array_equal
 from threadpoolctl import threadpool_limits
 
-from skanfis import objective, rows
+from skanfis import data as rows
+from skanfis import objective
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.rows import Rows
 
 from . import oracles
 
@@ -176,10 +177,10 @@ def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
     # Without residuals the second derivatives of the model drop out: H is the Hessian itself.
     antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])
     X = rng.normal(size=(200, 2))
-    plain = Rows.standardised(X, X)
+    plain = StandardisedData.of(X, X)
     Z = plain.inputs.apply(X.T, np.empty((2, 200)))
     phi = oracles.dense_design(antecedent, antecedent.parameters, Z, 1)
-    exact = Rows.standardised(X, phi @ rng.normal(size=(phi.shape[1], 1)))
+    exact = StandardisedData.of(X, phi @ rng.normal(size=(phi.shape[1], 1)))
     problem = SeparableProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
     at = antecedent.parameters
     evaluation = problem.evaluate(at)
@@ -293,7 +294,7 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     y = phi @ rng.normal(size=(12, 1))
     y = (y - y.mean()) / y.std()
     noise = 1e-9 * rng.normal(size=(400, 1))
-    data = Rows.standardised(X, y + noise)
+    data = StandardisedData.of(X, y + noise)
     problem = SeparableProblem(data, antecedent, 1, Penalty())
     blind = problem.evaluate(antecedent.parameters)
     seeing = problem.evaluate(antecedent.parameters, blind.coefficients)
@@ -309,8 +310,10 @@ def test_whole_weights_are_repeated_rows(name):
     build, order, n_outputs, _ = CASES[name]
     antecedent, data = build(g), oracles.bumpy_rows(g, 120, 2, n_outputs)
     times = g.integers(1, 5, 120)
-    weighted = Rows.standardised(data.X, data.y, times.astype(float))
-    repeated = Rows.standardised(np.repeat(data.X, times, axis=0), np.repeat(data.y, times, axis=0))
+    weighted = StandardisedData.of(data.X, data.y, times.astype(float))
+    repeated = StandardisedData.of(
+        np.repeat(data.X, times, axis=0), np.repeat(data.y, times, axis=0)
+    )
     one, other = (Case(antecedent, order, r).at_point() for r in (weighted, repeated))
     for found, expected in zip(arrays(*one), arrays(*other), strict=True):
         assert_all_close(found, expected, 1e-9)
@@ -324,8 +327,8 @@ def test_units_and_sizes_of_weights_do_not_matter(factor):
         oracles.bumpy_rows(g, 250, 2, 2),
     )
     weight = g.uniform(0.5, 2.0, 250)
-    plain = Rows.standardised(data.X, data.y, weight)
-    other = Rows.standardised(data.X * factor, data.y / factor, weight * factor)
+    plain = StandardisedData.of(data.X, data.y, weight)
+    other = StandardisedData.of(data.X * factor, data.y / factor, weight * factor)
     one, two = (Case(antecedent, 1, r).at_point() for r in (plain, other))
     for found, expected in zip(arrays(*one), arrays(*two), strict=True):
         assert_all_close(found, expected, 1e-9)
@@ -338,7 +341,7 @@ def test_outputs_add_up(rng):
     both = Case(antecedent, 1, data).at_point()
     singles = [
         Case(
-            antecedent, 1, Rows.standardised(data.X, data.y[:, [k]], data.sample_weight)
+            antecedent, 1, StandardisedData.of(data.X, data.y[:, [k]], data.sample_weight)
         ).at_point()
         for k in range(2)
     ]
@@ -361,7 +364,7 @@ def test_without_terms_the_cost_is_that_of_a_linear_model(rng):
 def test_constant_input_changes_nothing(rng):
     data = oracles.bumpy_rows(rng, 200, 2)
     antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
-    padded = Rows.standardised(np.column_stack([data.X, np.full(200, 7.0)]), data.y)
+    padded = StandardisedData.of(np.column_stack([data.X, np.full(200, 7.0)]), data.y)
     one, two = (SeparableProblem(r, antecedent, 1, FULL) for r in (data, padded))
     first, second = (p.evaluate(antecedent.parameters) for p in (one, two))
     assert_allclose(second.cost, first.cost, rtol=1e-12)

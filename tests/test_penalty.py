@@ -6,10 +6,10 @@ from numpy.testing import assert_allclose
 from sklearn.linear_model import LinearRegression, Ridge
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import CommonLine, Penalty, disagreement_matrix
-from skanfis.rows import Rows
 
 from . import oracles
 
@@ -249,7 +249,7 @@ class TestOneRule:
     @pytest.mark.parametrize("weighted", [False, True])
     def test_it_is_ridge_with_a_free_intercept(self, rng, alpha, weighted):
         data = oracles.bumpy_rows(rng, 120, 3, 2, weighted)
-        moved = Rows.standardised(data.X, data.y + 1e3, data.sample_weight)
+        moved = StandardisedData.of(data.X, data.y + 1e3, data.sample_weight)
         weight = np.ones(120) if data.sample_weight is None else data.sample_weight
         for rows in (data, moved):
             problem = SeparableProblem(
@@ -291,7 +291,9 @@ class TestInvariance:
     def test_units(self, kind, order):
         model = Model(kind, order)
         rows = model.rows
-        moved = Rows.standardised(1e6 * rows.X - 3e5, 1e-6 * rows.y + 2.0, 1e3 * rows.sample_weight)
+        moved = StandardisedData.of(
+            1e6 * rows.X - 3e5, 1e-6 * rows.y + 2.0, 1e3 * rows.sample_weight
+        )
         one, other = (self.prediction(model, r, model.antecedent) for r in (rows, moved))
         assert_allclose(one[0], other[0], rtol=1e-8)
         assert_allclose(one[1], other[1], atol=1e-7)
@@ -299,7 +301,7 @@ class TestInvariance:
     def test_mirrored_inputs_and_target(self, kind, order):
         model = Model(kind, order)
         rows = model.rows
-        turned = Rows.standardised(-rows.X, -rows.y, rows.sample_weight)
+        turned = StandardisedData.of(-rows.X, -rows.y, rows.sample_weight)
         mirrored = model.antecedent
         theta = []
         for group in mirrored.groups:
@@ -316,8 +318,8 @@ class TestInvariance:
         model = Model(kind, order)
         times = np.random.default_rng(1).integers(1, 5, 200)
         rows = model.rows
-        weighted = Rows.standardised(rows.X, rows.y, times.astype(float))
-        repeated = Rows.standardised(*(np.repeat(a, times, axis=0) for a in (rows.X, rows.y)))
+        weighted = StandardisedData.of(rows.X, rows.y, times.astype(float))
+        repeated = StandardisedData.of(*(np.repeat(a, times, axis=0) for a in (rows.X, rows.y)))
         one, other = (self.prediction(model, r, model.antecedent) for r in (weighted, repeated))
         assert_allclose(one[0], other[0], rtol=1e-10)
         assert_allclose(np.repeat(one[1], times, axis=0), other[1], atol=1e-9)

@@ -24,12 +24,13 @@ from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut, cross_val_sc
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor, objective, rows
+from skanfis import ANFISRegressor, objective
+from skanfis import data as rows
+from skanfis.data import StandardisedData
 from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import MAX_EXTRAPOLATION
-from skanfis.rows import Rows
 from skanfis.solvers import VariableProjection
 
 from . import oracles
@@ -560,13 +561,13 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
     monkeypatch.setattr(objective, "_FEWEST_ROWS", 16)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
-    threads, read = set(), Rows.read
+    threads, read = set(), StandardisedData.read
 
     def read_and_remember(self, part):
         threads.add(threading.get_ident())
         return read(self, part)
 
-    monkeypatch.setattr(Rows, "read", read_and_remember)
+    monkeypatch.setattr(StandardisedData, "read", read_and_remember)
     weight = np.random.default_rng(0).uniform(0.5, 2.0, len(X))
     models = {}
     for n_jobs in (None, 1, 2, -1):

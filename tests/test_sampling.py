@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.rows import Rows, fingerprint
+from skanfis.data import StandardisedData, fingerprint
 from skanfis.sampling import with_sample
 
 N_ROWS, N_WANTED = 9000, 400
@@ -14,7 +14,7 @@ N_ROWS, N_WANTED = 9000, 400
 def rows():
     g = np.random.default_rng(0)
     X = g.normal(size=(N_ROWS, 2)) * [1.0, 30.0] + [0.0, 1e4]
-    return Rows.standardised(X, X[:, :1] * X[:, 1:] + g.normal(size=(N_ROWS, 1)))
+    return StandardisedData.of(X, X[:, :1] * X[:, 1:] + g.normal(size=(N_ROWS, 1)))
 
 
 def table(rows):
@@ -33,7 +33,7 @@ def test_sample_is_the_rows_of_the_smallest_numbers(rows):
 def test_order_and_units_of_the_rows_do_not_matter(rows):
     found = table(with_sample(rows, N_WANTED).sample)
     mixed = np.random.default_rng(1).permutation(N_ROWS)
-    other = Rows.standardised(rows.X[mixed] * [1e3, 1e-6], rows.y[mixed])
+    other = StandardisedData.of(rows.X[mixed] * [1e3, 1e-6], rows.y[mixed])
     assert_allclose(
         table(with_sample(other, N_WANTED).sample)[:, :3] / [1e3, 1e-6, 1.0],
         found[:, :3],
@@ -46,7 +46,7 @@ def test_repeats_are_one_row_of_their_weight(rows, n_distinct):
     g = np.random.default_rng(2)
     which = np.concatenate([np.arange(n_distinct), g.integers(0, n_distinct, N_ROWS - n_distinct)])
     weight = g.uniform(0.5, 1.5, N_ROWS)
-    repeated = Rows.standardised(rows.X[which], rows.y[which], weight)
+    repeated = StandardisedData.of(rows.X[which], rows.y[which], weight)
     sample = with_sample(repeated, N_WANTED).sample
     assert sample.n_rows == min(N_WANTED, n_distinct)
     places = [np.flatnonzero((rows.X[:n_distinct] == x).all(axis=1))[0] for x in sample.X]

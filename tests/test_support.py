@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, support
+from skanfis.data import StandardisedData
 from skanfis.exceptions import ConstantInputWarning
-from skanfis.rows import Rows
 from skanfis.support import RuleSupport
 
 from . import oracles
@@ -62,7 +62,7 @@ ANTECEDENTS = {
 def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng, monkeypatch):
     X = table(rng)
     weight = rng.uniform(0.1, 3.0, len(X)) if weighted else None
-    rows = Rows.standardised(X, X[:, :1], weight)
+    rows = StandardisedData.of(X, X[:, :1], weight)
     antecedent = ANTECEDENTS[kind](rng)
     monkeypatch.setattr(support, "_BLOCK_BYTES", 1)  # 64 rows
     found = RuleSupport.of(rows, antecedent, n_coefficients)
@@ -81,9 +81,11 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
 def test_whole_weights_are_repeated_rows(rng):
     X, weight = table(rng), rng.integers(1, 5, 400)
     antecedent = ANTECEDENTS["grid"](rng)
-    weighted = RuleSupport.of(Rows.standardised(X, X[:, :1], weight.astype(float)), antecedent, 30)
+    weighted = RuleSupport.of(
+        StandardisedData.of(X, X[:, :1], weight.astype(float)), antecedent, 30
+    )
     again = np.repeat(X, weight, axis=0)
-    repeated = RuleSupport.of(Rows.standardised(again, again[:, :1]), antecedent, 30)
+    repeated = RuleSupport.of(StandardisedData.of(again, again[:, :1]), antecedent, 30)
     for part in fields(RuleSupport):
         one, other = getattr(weighted, part.name), getattr(repeated, part.name)
         assert_allclose(one, other, rtol=1e-8, atol=1e-8)

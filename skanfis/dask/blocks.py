@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .._validation import check_finite, positive_weights
-from ..rows import Rows, Scale, column_statistics
+from ..data import Scale, StandardisedData, column_statistics
 
 __all__ = ["Blocks", "Layout", "Loaded", "describe", "is_collection", "joined_scales"]
 
@@ -60,7 +60,7 @@ class Loaded:
 
     def rows(self, inputs, targets):
         """The same on given scales."""
-        return Rows(self.X, self.y, self.sample_weight, inputs, targets, self.groups)
+        return StandardisedData(self.X, self.y, self.sample_weight, inputs, targets, self.groups)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._memory import keeps_freed_memory
 from ..constraints.wishes import Wishes
-from ..rows import Rows, Scale, check_scales
+from ..data import Scale, StandardisedData, check_scales
 from .blocks import Blocks, Described, describe, joined
 
 __all__ = ["ClusterData", "ClusterRows", "reduce_blocks"]
@@ -85,14 +85,14 @@ def _gone(error):
 
 @dataclass(frozen=True, eq=False)
 class ClusterRows:
-    """As :class:`skanfis.rows.Rows`, wherever the blocks are; on a sample, rows are at hand."""
+    """As :class:`skanfis.data.Rows`, wherever the blocks are; on a sample, rows are at hand."""
 
     blocks: Blocks
     n_rows: int
     total_weight: float
     inputs: Scale
     targets: Scale
-    sample: Rows | None = None
+    sample: StandardisedData | None = None
 
     def reduce(self, of_rows, merge):
         """What ``of_rows`` makes of the rows of every block, merged two by two."""
@@ -119,7 +119,7 @@ def _add(one, other):
 
 @dataclass(frozen=True, eq=False)
 class ClusterData:
-    """Validated data on a cluster; see ``TrainingData``."""
+    """Validated data on a cluster; see ``ValidatedData``."""
 
     blocks: Blocks
     described: Described

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..rows import Rows
+from ..data import StandardisedData
 from ..support import FIRES, RuleSupport, inverse_factor
 from .scales import Change
 
@@ -92,7 +92,7 @@ class RuleFiring:
     rows: np.ndarray
 
     @classmethod
-    def of(cls, rows: Rows, antecedent: Antecedent, parts):
+    def of(cls, rows: StandardisedData, antecedent: Antecedent, parts):
         """Of rows in blocks, on their own scales."""
         n_rules, n_inputs = antecedent.n_rules, rows.X.shape[1]
         second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))

@@ -7,9 +7,9 @@ import numpy as np
 
 from ..antecedent import Antecedent
 from ..consequent import LocalBasis, NormalFactor, rule_masses
+from ..data import Scale
 from ..objective import Evaluation, NormalEquations
 from ..penalty import CommonLine, Penalty, disagreement_matrix
-from ..rows import Scale
 from .farthest import Farthest
 from .moments import Moments
 

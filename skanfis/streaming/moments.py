@@ -13,8 +13,8 @@ import numpy as np
 
 from ..antecedent import Antecedent
 from ..consequent import basis
+from ..data import Scale, StandardisedData
 from ..gram import DesignMoments
-from ..rows import Rows, Scale
 from .scales import Change, merged_scale
 
 __all__ = ["Moments", "blocks"]
@@ -23,7 +23,7 @@ _MOST_ROWS = 4096
 _BLOCK_BYTES = 2**22
 
 
-def blocks(rows: Rows, antecedent: Antecedent, n_more=0):
+def blocks(rows: StandardisedData, antecedent: Antecedent, n_more=0):
     """Slices of rows whose intermediate results take a bounded number of bytes."""
     n_values = 4 * (antecedent.n_rules + antecedent.n_terms + rows.X.shape[1]) + n_more
     length = int(np.clip(_BLOCK_BYTES // (8 * n_values), 64, _MOST_ROWS))
@@ -55,7 +55,7 @@ class Moments:
     consequent_inputs: np.ndarray
 
     @classmethod
-    def of(cls, rows: Rows, antecedent: Antecedent, consequent_inputs):
+    def of(cls, rows: StandardisedData, antecedent: Antecedent, consequent_inputs):
         """The sums over rows, on the rows' own scales; the antecedent is in the units of X."""
         n_basis, n_outputs = 1 + consequent_inputs.size, rows.y.shape[1]
         design = DesignMoments(antecedent.share_counts, n_basis)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rows import Scale
+from ..data import Scale
 
 __all__ = ["Change", "merged_scale"]
 

@@ -9,13 +9,13 @@ from typing import cast
 
 import numpy as np
 
+from ..data import StandardisedData, check_scales
 from ..evidence import laplace, least_weights
 from ..model import TargetRange, TSKModel
 from ..objective import SeparableProblem
 from ..penalty import Penalty
 from ..posterior import Posterior
 from ..premise import Premise
-from ..rows import Rows, check_scales
 from ..structure.tuning import FIRST_PENALTY, scaled, tune
 from ..training import RuleStatistics, redundant_rules
 from .farthest import Farthest
@@ -85,7 +85,7 @@ class Stream:
         ``farthest`` is where that of these rows starts from. Raises ValueError where columns are
         beyond what floats hold.
         """
-        rows = Rows.standardised(X, y, sample_weight)
+        rows = StandardisedData.of(X, y, sample_weight)
         _check(rows.inputs, rows.targets, base)
         antecedent, n_columns = base.antecedent, base.n_rules * (1 + consequent_inputs.size)
         parts = blocks(rows, antecedent)

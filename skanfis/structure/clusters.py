@@ -10,7 +10,7 @@ otherwise hardly overlap.
 import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
-from ..rows import Rows
+from ..data import StandardisedData
 from .sample import representative_rows
 
 __all__ = ["clustered_antecedent"]
@@ -24,7 +24,9 @@ _POINTS = 65
 _MOST_TURNS = 4
 
 
-def clustered_antecedent(families, rows: Rows, label, premise_inputs, share_terms=False):
+def clustered_antecedent(
+    families, rows: StandardisedData, label, premise_inputs, share_terms=False
+):
     """A rule for every cluster that ``label(table, weight)`` finds in [z, y].
 
     z are the ``premise_inputs`` alone, in whose terms the rules are; ``families`` has one entry per

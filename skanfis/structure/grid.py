@@ -13,7 +13,7 @@ on them. The outer terms stand at quantiles and not at the outermost row.
 import numpy as np
 
 from ..antecedent import GridAntecedent
-from ..rows import Rows
+from ..data import StandardisedData
 from .sample import representative_rows
 
 __all__ = ["Spacing", "grid_antecedent"]
@@ -30,10 +30,10 @@ class Spacing:
 
     Parameters
     ----------
-    rows : Rows
+    rows : StandardisedData
     """
 
-    def __init__(self, rows: Rows):
+    def __init__(self, rows: StandardisedData):
         table, weight, _ = representative_rows(rows, _MOST_ROWS)
         self._columns = [_levels(column, weight) for column in table[:, : rows.X.shape[1]].T]
 

@@ -3,14 +3,14 @@
 import numpy as np
 
 from ..consequent import basis, rule_outputs
-from ..rows import Rows
+from ..data import StandardisedData
 
 __all__ = ["held_out_loss"]
 
 _READ_ROWS = 4096
 
 
-def held_out_loss(rows: Rows, consequent_inputs, evaluation):
+def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
     """Mean squared error of rows that were not trained on, standardised, summed over outputs.
 
     Rows beyond the training rows' range count as predict holds them, at its edge.

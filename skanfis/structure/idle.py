@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..rows import Rows
+from ..data import StandardisedData
 
 __all__ = ["LEAST_TRUTH", "has_idle_term"]
 
@@ -12,7 +12,7 @@ LEAST_TRUTH = 0.5
 _READ_ROWS = 4096
 
 
-def has_idle_term(rows: Rows, antecedent: Antecedent) -> bool:
+def has_idle_term(rows: StandardisedData, antecedent: Antecedent) -> bool:
     """Whether some term's membership is below one half on every row."""
     greatest = np.full(antecedent.n_terms, -np.inf)
     for chunk in rows.chunks(_READ_ROWS):

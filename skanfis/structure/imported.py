@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent
+from ..data import StandardisedData
 from ..model import TSKModel
-from ..rows import Rows
 
 __all__ = ["check_inputs", "imported_antecedent"]
 
@@ -27,7 +27,7 @@ def check_inputs(model: TSKModel, names, what):
         )
 
 
-def imported_antecedent(model: TSKModel, rows: Rows) -> Antecedent:
+def imported_antecedent(model: TSKModel, rows: StandardisedData) -> Antecedent:
     """The rule base of a model in the rows' standardised units, ready to be moved."""
     scale = rows.inputs
     antecedent = model.antecedent.change_units(-scale.offset / scale.scale, 1.0 / scale.scale)

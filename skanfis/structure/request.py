@@ -11,11 +11,11 @@ from sklearn.utils.validation import has_fit_parameter
 
 from .._callers import names_in_pipeline
 from .._validation import warn_user
+from ..data import StandardisedData
 from ..evidence import FREE
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
-from ..rows import Rows
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .imported import imported_antecedent
@@ -79,7 +79,7 @@ class StructureRequest:
             and self.partition in SEARCHED
         )
 
-    def start(self, rows: Rows, size: SampleSize) -> Start:
+    def start(self, rows: StandardisedData, size: SampleSize) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
         if self.is_searched:
@@ -127,7 +127,7 @@ class StructureRequest:
             is_compared,
         )
 
-    def for_all(self, start: Start, sample: Rows, rows: Rows) -> Start:
+    def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""
         free = [key for key in FREE if key not in self.weights]
         ratio = effective_weight(sample) / rows.total_weight

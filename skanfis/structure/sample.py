@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rows import Rows, Scale, fingerprint
+from ..data import Scale, StandardisedData, fingerprint
 
 __all__ = ["ENOUGH_ROWS", "SampleSize", "representative_rows", "search_sample", "unit_scale"]
 
@@ -32,7 +32,7 @@ class SampleSize:
     weight: float
 
     @classmethod
-    def of(cls, rows: Rows, enough=ENOUGH_ROWS):
+    def of(cls, rows: StandardisedData, enough=ENOUGH_ROWS):
         """Count, up to ``enough`` distinct ones."""
         inputs, whole = np.empty(0), np.empty(0)
         for start in range(0, rows.n_rows, _READ_ROWS):
@@ -46,7 +46,7 @@ class SampleSize:
         )
 
 
-def effective_weight(rows: Rows):
+def effective_weight(rows: StandardisedData):
     """Rows by weight."""
     if rows.sample_weight is None:
         return float(rows.n_rows)
@@ -56,7 +56,7 @@ def effective_weight(rows: Rows):
     return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
 
 
-def _fingerprints(rows: Rows):
+def _fingerprints(rows: StandardisedData):
     """A number for every row of standardised inputs and target."""
     numbers = np.empty(rows.n_rows)
     for chunk in rows.chunks(_MOST_ROWS):
@@ -65,7 +65,7 @@ def _fingerprints(rows: Rows):
     return numbers
 
 
-def representative_rows(rows: Rows, most=_MOST_ROWS):
+def representative_rows(rows: StandardisedData, most=_MOST_ROWS):
     """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
@@ -99,10 +99,10 @@ def unit_scale(values):
     return Scale(np.zeros(n_columns), np.ones(n_columns), values.min(axis=0), values.max(axis=0))
 
 
-def search_sample(rows: Rows, most):
+def search_sample(rows: StandardisedData, most):
     """At most so many representative rows, already in the standardised units of all rows."""
     table, weight, indices = representative_rows(rows, most)
     n_inputs = rows.X.shape[1]
     X, y = table[:, :n_inputs], table[:, n_inputs:]
     groups = None if rows.groups is None else rows.groups[indices]
-    return Rows(X, y, weight, unit_scale(X), unit_scale(y), groups)
+    return StandardisedData(X, y, weight, unit_scale(X), unit_scale(y), groups)

@@ -32,11 +32,11 @@ from sklearn.model_selection import GroupKFold
 
 from ..antecedent import GridAntecedent
 from ..cluster import FuzzyCMeans, SubtractiveClustering
+from ..data import StandardisedData
 from ..evidence import FREE
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
-from ..rows import Rows
 from .candidate import Candidate
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
@@ -82,7 +82,7 @@ class StructureSearch:
 
     Parameters
     ----------
-    rows : Rows
+    rows : StandardisedData
         The rows that the final model will be trained on.
     families : sequence of type of Membership
         One per input.
@@ -107,7 +107,7 @@ class StructureSearch:
 
     def __init__(
         self,
-        rows: Rows,
+        rows: StandardisedData,
         families: Sequence[type[Membership]],
         order: int,
         premise_inputs: np.ndarray,

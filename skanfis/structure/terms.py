@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._threads import one_blas_thread
+from ..data import StandardisedData
 from ..membership import Gaussian
-from ..rows import Rows
 from .request import OVERLAP
 from .search import StructureSearch
 
@@ -65,7 +65,7 @@ def search_terms(
     found : TermsFound
     """
     # As groups, the rows' own numbers: they tell which of them came into a sample.
-    rows = Rows.standardised(X, y[:, None], groups=np.arange(y.size))
+    rows = StandardisedData.of(X, y[:, None], groups=np.arange(y.size))
     inputs = np.arange(X.shape[1])
 
     def split(kept):

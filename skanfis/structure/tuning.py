@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent import Antecedent
+from ..data import StandardisedData
 from ..evidence import FREE, PRIOR_DISPLACEMENT, Laplace, laplace, least_weights, reestimated
 from ..objective import Evaluation, SeparableProblem
 from ..penalty import Penalty
 from ..premise import Premise
-from ..rows import Rows
 from ..solvers.varpro import varpro
 from .sample import effective_weight, search_sample
 from .start import Start
@@ -214,7 +214,7 @@ def tune(
 
 def tuned_start(
     antecedent: Antecedent,
-    rows: Rows,
+    rows: StandardisedData,
     order,
     consequent_inputs,
     weights,

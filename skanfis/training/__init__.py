@@ -1,6 +1,6 @@
 """Training: one fit in a straight line (``fit``), and what it uses on the way."""
 
-from .data import TrainingData
+from .data import ValidatedData
 from .fit import fit_rules
 from .progress import Callbacks
 from .pruning import RuleStatistics, model_without_rules, redundant_rules
@@ -11,7 +11,7 @@ __all__ = [
     "Fitted",
     "RuleStatistics",
     "SolverRun",
-    "TrainingData",
+    "ValidatedData",
     "fit_rules",
     "model_without_rules",
     "redundant_rules",

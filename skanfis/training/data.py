@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..constraints.wishes import Wishes
-from ..rows import Rows, check_scales
+from ..data import StandardisedData, check_scales
 
-__all__ = ["TrainingData"]
+__all__ = ["ValidatedData"]
 
 
 @dataclass(frozen=True, eq=False)
-class TrainingData:
+class ValidatedData:
     """Validated data.
 
     Parameters
@@ -41,7 +41,7 @@ class TrainingData:
         """Some of the rows, on scales of their own."""
         weight = None if self.sample_weight is None else self.sample_weight[indices]
         groups = None if self.groups is None else self.groups[indices]
-        rows = Rows.standardised(self.X[indices], self.y[indices], weight, groups)
+        rows = StandardisedData.of(self.X[indices], self.y[indices], weight, groups)
         check_scales(rows.inputs, rows.targets, self.input_names, self.output_names)
         return rows
 

@@ -21,12 +21,12 @@ from sklearn.exceptions import ConvergenceWarning
 from .._threads import map_in_threads
 from .._validation import warn_user
 from ..constraints.exchange import constrained
+from ..data import StandardisedData
 from ..model import TSKModel
 from ..objective import SeparableProblem
 from ..options import EarlyStopping, Huber
 from ..posterior import Posterior
 from ..premise import Premise
-from ..rows import Rows
 from ..sampling import is_many, with_sample
 from ..solvers import SOLVERS, LeastSquares, Solver, VariableProjection
 from ..structure import (
@@ -37,7 +37,7 @@ from ..structure import (
     has_idle_term,
     report_constant,
 )
-from .data import TrainingData
+from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
@@ -75,7 +75,7 @@ _MOST_STARTS = 5
 
 def fit_rules(
     estimator: Any,
-    data: TrainingData,
+    data: ValidatedData,
     request: StructureRequest,
     callbacks: Callbacks | None = None,
 ) -> Fitted:
@@ -84,7 +84,7 @@ def fit_rules(
     Parameters
     ----------
     estimator : ANFISRegressor
-    data : TrainingData
+    data : ValidatedData
     request : StructureRequest
     callbacks : Callbacks, optional
         scikit-learn's.
@@ -148,7 +148,7 @@ class _Fit:
         """What makes models of what is found on the rows as they are now."""
         return ModelBuilder(self.data, self.rows, self.request, self.estimator.out_of_bounds)
 
-    def start(self, rows: Rows) -> Start:
+    def start(self, rows: StandardisedData) -> Start:
         """Where a run begins: rules, weights of the penalty, and the premises so far."""
         start = self.request.start(rows.sample or rows, self.size)
         if rows.sample is not None:
@@ -159,7 +159,7 @@ class _Fit:
             self.printer.tell_start(start)
         return start
 
-    def readable_run(self, rows: Rows, start: Start) -> SolverRun:
+    def readable_run(self, rows: StandardisedData, start: Start) -> SolverRun:
         """The best run from a start that leaves no term where hardly a row is.
 
         Rows that the search has not seen may draw a term into a gap between them, out of which no
@@ -178,7 +178,7 @@ class _Fit:
             run = self.best_run(rows, start)
         return run
 
-    def best_run(self, rows: Rows, start: Start) -> SolverRun:
+    def best_run(self, rows: StandardisedData, start: Start) -> SolverRun:
         """The run from a start, or the best from several: of the least leave-one-out error.
 
         Workers are threads: passes over the data release Python's lock.
@@ -207,7 +207,7 @@ class _Fit:
         run = self.run(rows, start, displacement, is_alone=False)
         return run, leave_one_out_error(run.problem, run.evaluation)
 
-    def run(self, rows: Rows, start: Start, displacement, is_alone=True) -> SolverRun:
+    def run(self, rows: StandardisedData, start: Start, displacement, is_alone=True) -> SolverRun:
         """One run of the solver, watched; the iterations of one among several are not told."""
         estimator = self.estimator
         problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)
@@ -265,7 +265,7 @@ class _Fit:
             displacement = premise.displacement(found.evaluation.antecedent.parameters)
         return displacement
 
-    def problem(self, rows: Rows, start: Start) -> SeparableProblem:
+    def problem(self, rows: StandardisedData, start: Start) -> SeparableProblem:
         """The least-squares problem at a start."""
         return SeparableProblem(
             rows,
@@ -390,7 +390,7 @@ def _object_for(given, by_word):
     return None if of_word is None else of_word()
 
 
-def _premise(rows: Rows, start: Start) -> Premise:
+def _premise(rows: StandardisedData, start: Start) -> Premise:
     """What moves at a start, within the box of the data."""
     low, high = rows.inputs.box
     return Premise.of(start.antecedent, low, high, start.is_free)

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from ..data import StandardisedData
 from ..model import TargetRange, TSKModel
 from ..objective import Evaluation
 from ..options import policy_of
 from ..penalty import Penalty
-from ..rows import Rows
 from ..solvers import SolverResult
 from ..structure import Start, StructureRequest, imported_antecedent
 from ..support import RuleFiring, RuleSupport
-from .data import TrainingData
+from .data import ValidatedData
 from .pruning import redundant_rules, rule_statistics
 from .result import Fitted
 
@@ -24,8 +24,8 @@ __all__ = ["ModelBuilder", "as_given"]
 class ModelBuilder:
     """Makes models of what was found on ``rows``, which ``data`` has in the user's units."""
 
-    data: TrainingData
-    rows: Rows
+    data: ValidatedData
+    rows: StandardisedData
     request: StructureRequest
     out_of_bounds: Any
 
@@ -97,7 +97,7 @@ def as_given(estimator, data, model) -> Fitted:
         out_of_bounds=policy,
         max_extrapolation=limit,
     )
-    rows = Rows.standardised(data.X, data.y, data.sample_weight)
+    rows = StandardisedData.of(data.X, data.y, data.sample_weight)
     # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
     answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
     residual = (data.y - answering.predict(data.X)) / rows.targets.scale

@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TermGroup
+from ..data import StandardisedData
 from ..model import TSKModel
-from ..rows import Rows
 from ..support import RuleFiring, RuleSupport
 
 __all__ = [
@@ -44,7 +44,7 @@ class RuleStatistics:
     peak: np.ndarray  # largest strength of each rule on any row
 
 
-def rule_statistics(rows: Rows, firing: RuleFiring) -> RuleStatistics:
+def rule_statistics(rows: StandardisedData, firing: RuleFiring) -> RuleStatistics:
     """Statistics of every rule, out of how rules have fired on these rows."""
     weight = rows.total_weight
     return RuleStatistics(firing.overlap / weight, firing.strongest / weight, firing.peak)

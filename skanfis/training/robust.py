@@ -26,7 +26,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
-from ..rows import column_statistics
+from ..data import column_statistics
 
 __all__ = ["MANY_ROWS", "huber_weights", "resistant", "reweighted", "some_rows", "without_outliers"]
 

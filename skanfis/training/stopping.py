@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from sklearn.model_selection import GroupShuffleSplit
 
-from ..rows import Rows, fingerprint
+from ..data import StandardisedData, fingerprint
 from ..structure.held_out import held_out_loss
 
 __all__ = ["ValidationLoss", "hold_out"]
@@ -14,7 +14,7 @@ __all__ = ["ValidationLoss", "hold_out"]
 _READ_ROWS = 4096
 
 
-def hold_out(rows: Rows, validation_fraction, seed):
+def hold_out(rows: StandardisedData, validation_fraction, seed):
     """Indices to train on and to hold out, each in order: whole groups of the rows.
 
     Where there are none, equal rows are a group: no row is on both sides, and a weight is as good
@@ -55,7 +55,7 @@ class ValidationLoss:
 
     Parameters
     ----------
-    rows : Rows
+    rows : StandardisedData
         The held-out rows, on the training rows' scales.
     consequent_inputs : ndarray of int
     n_iter_no_change : int
@@ -63,7 +63,7 @@ class ValidationLoss:
     tol : float
     """
 
-    def __init__(self, rows: Rows, consequent_inputs, n_iter_no_change, tol):
+    def __init__(self, rows: StandardisedData, consequent_inputs, n_iter_no_change, tol):
         self.rows, self.consequent_inputs = rows, consequent_inputs
         self.n_iter_no_change, self.tol = n_iter_no_change, tol
         self.losses: list[float] = []

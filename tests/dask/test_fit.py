@@ -17,8 +17,8 @@ import dask.dataframe as dd
 from skanfis import ANFISRegressor, sampling
 from skanfis.dask import DaskANFISRegressor, blocks, rows
 from skanfis.dask.blocks import joined_scales
+from skanfis.data import column_statistics
 from skanfis.export import export_json
-from skanfis.rows import column_statistics
 
 N_ROWS = 6000
 NAMES = ["temperature", "rate"]

@@ -5,12 +5,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
+from skanfis.data import StandardisedData
 from skanfis.datasets import make_jang_sinc
 from skanfis.membership import MEMBERSHIPS
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.rows import Rows
 
 from .. import oracles
 
@@ -47,7 +47,7 @@ def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     rng = np.random.default_rng(3)
     antecedent = oracles.random_grid(rng, [family] * 2, [3, 3])
     X = rng.uniform(-1.0, 1.0, (250, 2))
-    rows = Rows.standardised(X, np.sin(3.0 * X[:, :1]) * np.cos(2.0 * X[:, 1:]))
+    rows = StandardisedData.of(X, np.sin(3.0 * X[:, :1]) * np.cos(2.0 * X[:, 1:]))
     # Some term reaches every row by the textbook: the dense problem has no floor.
     Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
     mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 3, -1)

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skanfis import ANFISRegressor
+from skanfis.data import column_statistics
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.export import export_json, export_text
 from skanfis.export.json_reader import parse_json
-from skanfis.rows import column_statistics
 
 from .strategies import settings_of_fit, tables
 

@@ -7,10 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
+from skanfis.data import StandardisedData
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.rows import Rows
 from skanfis.solvers import SOLVERS, SolverResult
 from skanfis.solvers.result import MESSAGES
 
@@ -184,8 +184,8 @@ def test_max_iter_is_the_number_of_iterations(name, max_iter):
 def test_weights_are_repeated_rows(name, kind):
     rows, premise = noisy(kind)
     counts = np.random.default_rng(1).integers(1, 4, rows.n_rows)
-    weighted = Rows.standardised(rows.X, rows.y, counts.astype(float))
-    repeated = Rows.standardised(*(np.repeat(a, counts, axis=0) for a in (rows.X, rows.y)))
+    weighted = StandardisedData.of(rows.X, rows.y, counts.astype(float))
+    repeated = StandardisedData.of(*(np.repeat(a, counts, axis=0) for a in (rows.X, rows.y)))
     antecedent = start_of(kind, repeated)
     premise = Premise.of(antecedent, *oracles.box(repeated))
     one, other = (solve(name, some, premise, alpha=1e-6) for some in (weighted, repeated))
@@ -199,7 +199,7 @@ def test_weights_are_repeated_rows(name, kind):
 @every_solver
 def test_units_do_not_matter(name):
     rows, premise = noisy()
-    moved = Rows.standardised(3.0 - 1e4 * rows.X, 7.0 + 1e-5 * rows.y)
+    moved = StandardisedData.of(3.0 - 1e4 * rows.X, 7.0 + 1e-5 * rows.y)
     mirrored = Premise.of(start_of("grid", moved), *oracles.box(moved))
     one, other = (
         solve(name, *of, alpha=1e-6, max_iter=6) for of in ((rows, premise), (moved, mirrored))
@@ -246,7 +246,7 @@ def test_one_rule_has_nothing_to_iterate_on(name):
 @every_solver
 def test_constant_target(name):
     rows, premise = noisy()
-    flat = Rows.standardised(rows.X, np.full_like(rows.y, 3.0))
+    flat = StandardisedData.of(rows.X, np.full_like(rows.y, 3.0))
     result = solve(name, flat, premise)
     assert result.evaluation.mean_squared_error == 0.0
     assert result.status == ("no_premise" if name == "lse" else "gradient")
@@ -263,7 +263,7 @@ def test_two_runs_are_the_same_to_the_last_bit(name):
 
 @every_solver
 def test_workers_do_not_matter(name, monkeypatch):
-    monkeypatch.setattr("skanfis.rows._BLOCKS_PER_CHUNK", 1)
+    monkeypatch.setattr("skanfis.data._BLOCKS_PER_CHUNK", 1)
     monkeypatch.setattr("skanfis.objective._MOST_ROWS", 128)
     rows, premise = noisy()
     results = []

@@ -71,7 +71,7 @@ class TestJointGradient:
         expected = whole.problem.joint(whole.point, coefficients)
         monkeypatch.setattr("skanfis.objective._FEWEST_ROWS", 8)
         monkeypatch.setattr("skanfis.objective._BLOCK_BYTES", 1)
-        monkeypatch.setattr("skanfis.rows._BLOCKS_PER_CHUNK", 3)
+        monkeypatch.setattr("skanfis.data._BLOCKS_PER_CHUNK", 3)
         found = Case.named("grid of both").problem.joint(whole.point, coefficients)
         assert_allclose(found.premises, expected.premises, rtol=1e-10)
         assert_allclose(found.coefficients, expected.coefficients, rtol=1e-10, atol=1e-14)

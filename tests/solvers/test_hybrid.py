@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis.data import Scale, StandardisedData
 from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.rows import Rows, Scale
 from skanfis.solvers.hybrid import NaturalPremise, StepSize, hybrid
 
 from .. import oracles
@@ -92,7 +92,7 @@ def in_raw_units(X, y):
         n = values.shape[1]
         return Scale(np.zeros(n), np.ones(n), values.min(axis=0), values.max(axis=0))
 
-    return Rows(X, y[:, None], None, raw(X), raw(y[:, None]))
+    return StandardisedData(X, y[:, None], None, raw(X), raw(y[:, None]))
 
 
 def two_bells(rows, alpha=0.0):
@@ -109,7 +109,7 @@ class TestAgainstTheTranscription:
     @pytest.mark.parametrize("raw", [True, False])
     def test_three_input_problem(self, step_size, raw):
         X, y = make_jang_three_input()
-        rows = in_raw_units(X, y) if raw else Rows.standardised(X, y[:, None])
+        rows = in_raw_units(X, y) if raw else StandardisedData.of(X, y[:, None])
         seen = []
         result = hybrid(
             *two_bells(rows),
@@ -301,7 +301,7 @@ class TestEnd:
     def test_error_goal_is_of_one_output(self):
         # Two outputs that are one: the root mean square error is that of either.
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
-        twice = Rows.standardised(rows.X, np.hstack([rows.y, rows.y]))
+        twice = StandardisedData.of(rows.X, np.hstack([rows.y, rows.y]))
         one, two = (
             SeparableProblem(some, premise.antecedent, 1, Penalty(alpha=1e-8))
             for some in (rows, twice)

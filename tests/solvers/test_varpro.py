@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import optimize
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.rows import Rows
 from skanfis.solvers.result import MESSAGES
 from skanfis.solvers.varpro import trust_region_step, varpro
 
@@ -268,7 +268,7 @@ class TestOnKnownProblems:
 
 def spread_rows(kind, rng, n_rows=300):
     X = rng.uniform(-2.0, 2.0, (n_rows, 1 if kind == "one input" else 2))
-    return Rows.standardised(X, X[:, :1])
+    return StandardisedData.of(X, X[:, :1])
 
 
 def start_of(kind, rows):
@@ -297,7 +297,7 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     phi = oracles.dense_design(antecedent, truth, Z, 1)
     beta = g.normal(size=(phi.shape[1], n_outputs))
     y = phi @ beta + noise * g.normal(size=(len(phi), n_outputs))
-    return Rows.standardised(rows.X, y), premise, truth, beta
+    return StandardisedData.of(rows.X, y), premise, truth, beta
 
 
 def solve(rows, premise, alpha=1e-8, agreement=0.0, **settings):
@@ -477,7 +477,7 @@ class TestStatus:
 
     def test_gradient_vanishes_where_the_target_is_constant(self, rng):
         X = rng.normal(size=(50, 2))
-        rows = Rows.standardised(X, np.full((50, 1), 3.0))
+        rows = StandardisedData.of(X, np.full((50, 1), 3.0))
         premise = Premise.of(start_of("grid", rows), *oracles.box(rows))
         _, result = solve(rows, premise)
         self.check(result, "gradient")

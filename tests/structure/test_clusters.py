@@ -7,8 +7,8 @@ from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import RuleTableAntecedent
+from skanfis.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
-from skanfis.rows import Rows
 from skanfis.solvers import VariableProjection
 from skanfis.structure import SampleSize, clustered_antecedent, representative_rows
 from skanfis.structure.clusters import _HIGHEST_CROSSING
@@ -64,7 +64,7 @@ def highest_crossings(antecedent):
 class TestRules:
     def test_families_may_differ_from_input_to_input(self, rng):
         X, y, *_ = blobs(rng)
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         mixed = clustered_antecedent(
             [Gaussian, Bell], rows, by_k_means, np.arange(2), share_terms=True
         )
@@ -77,11 +77,11 @@ class TestRules:
     def test_clusters_are_sought_in_the_premise_inputs_alone(self, rng):
         X, y, *_ = blobs(rng)
         noise = 100.0 * rng.normal(size=(len(X), 1))
-        rows = Rows.standardised(np.hstack([noise, X]), y)
+        rows = StandardisedData.of(np.hstack([noise, X]), y)
         found = clustered_antecedent(
             [Gaussian] * 3, rows, by_k_means, np.array([1, 2]), share_terms=True
         )
-        expected = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
+        expected = rules_of(Gaussian, StandardisedData.of(X, y), by_k_means)
         assert {int(j) for group in found.groups for j in group.inputs} == {1, 2}
         for one, other in zip(rule_parameters(found, 2), rule_parameters(expected, 2), strict=True):
             assert_allclose(one, other)
@@ -90,7 +90,7 @@ class TestRules:
     @pytest.mark.parametrize("n_inputs", [1, 2])
     def test_centers_and_widths_are_weighted_moments_of_the_clusters(self, rng, weighted, n_inputs):
         X, y, labels, weight = blobs(rng, n_inputs=n_inputs)
-        rows = Rows.standardised(X, y, weight if weighted else None)
+        rows = StandardisedData.of(X, y, weight if weighted else None)
         theta = rule_parameters(rules_of(Gaussian, rows, by_k_means), n_inputs)
         z = (X - rows.inputs.offset) / rows.inputs.scale
         expected = []
@@ -109,7 +109,7 @@ class TestRules:
     @pytest.mark.parametrize("name", sorted(set(MEMBERSHIPS) - {"s_shaped", "z_shaped"}))
     def test_each_rule_rules_its_own_blob(self, rng, name):
         X, y, labels, _ = blobs(rng)
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         antecedent = rules_of(MEMBERSHIPS[name], rows, by_k_means)
         assert isinstance(antecedent, RuleTableAntecedent)
         strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
@@ -117,7 +117,7 @@ class TestRules:
         assert len(set(zip(strongest.tolist(), labels.tolist(), strict=True))) == 3
 
     def test_clusters_are_sought_in_inputs_and_target_together(self, rng):
-        rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 3)))
+        rows = StandardisedData.of(rng.normal(size=(50, 2)), rng.normal(size=(50, 3)))
         seen = []
 
         def label(table, weight):
@@ -131,7 +131,7 @@ class TestRules:
     def test_noise_belongs_to_no_rule(self, rng):
         # Without the far rows that are labelled -1, the rules are those of the rest.
         X, y, _, _ = blobs(rng)
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         noisy = rules_of(Gaussian, rows, lambda t, w: np.where(t[:, 0] > 0.5, -1, t[:, 1] > 0))
         assert noisy.n_rules == 2
         z, _, _ = rows.read(slice(None))
@@ -143,26 +143,26 @@ class TestRules:
 
     def test_labels_may_be_any_integers(self, rng):
         X, y, _, _ = blobs(rng)
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         plain = rules_of(Gaussian, rows, by_k_means)
         odd = rules_of(Gaussian, rows, lambda t, w: 7 * by_k_means(t, w) + 3)
         assert_array_equal(odd.parameters, plain.parameters)
 
     def test_one_cluster_is_a_linear_model(self, rng):
-        rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
+        rows = StandardisedData.of(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
         antecedent = rules_of(Gaussian, rows, lambda t, w: np.zeros(len(t), dtype=int))
         assert antecedent.n_rules == 1
         assert antecedent.parameters.size == 0
         assert_array_equal(antecedent.strengths(np.zeros((2, 5))), 1.0)
 
     def test_no_cluster_is_an_error_that_says_why(self, rng):
-        rows = Rows.standardised(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
+        rows = StandardisedData.of(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
         with pytest.raises(ValueError, match=r"partition found no cluster: .* noise.*standardised"):
             rules_of(Gaussian, rows, lambda t, w: np.full(len(t), -1))
 
     def test_cluster_on_one_spot_has_a_term_of_some_width(self, rng):
         X = np.vstack([np.full((30, 2), 5.0), rng.normal(size=(30, 2))])
-        rows = Rows.standardised(X, X[:, :1])
+        rows = StandardisedData.of(X, X[:, :1])
         antecedent = rules_of(Gaussian, rows, lambda t, w: (t[:, 0] < t[:, 0].max()).astype(int))
         assert_allclose(
             np.exp(rule_parameters(antecedent, 2)[1, 1]), 0.1 * np.sqrt(2.0), rtol=1e-12
@@ -170,8 +170,8 @@ class TestRules:
 
     def test_constant_input_gets_no_terms_and_widens_none(self, rng):
         X, y, _, _ = blobs(rng)
-        padded = Rows.standardised(np.insert(X, 1, 7.0, axis=1), y)
-        plain = rules_of(Gaussian, Rows.standardised(X, y), by_k_means)
+        padded = StandardisedData.of(np.insert(X, 1, 7.0, axis=1), y)
+        plain = rules_of(Gaussian, StandardisedData.of(X, y), by_k_means)
         other = rules_of(Gaussian, padded, by_k_means)
         assert {int(j) for group in other.groups for j in group.inputs} == {0, 2}
         assert_allclose(other.parameters, plain.parameters, rtol=1e-12, atol=1e-14)
@@ -181,7 +181,7 @@ class TestRules:
         corner = np.arange(400) % 4
         X = np.array([[0.0, 0.0], [9.0, 0.1], [0.1, 9.0], [9.1, 9.1]])[corner]
         X = X + rng.normal(size=X.shape)
-        rows = Rows.standardised(X, corner[:, None].astype(float))
+        rows = StandardisedData.of(X, corner[:, None].astype(float))
         antecedent = rules_of(
             Gaussian, rows, lambda t, w: np.unique(t[:, 2], return_inverse=True)[1]
         )
@@ -200,7 +200,7 @@ class TestRules:
     @pytest.mark.parametrize("n_clusters", [3, 8, 20])
     def test_no_two_terms_cross_too_high(self, rng, draw, n_clusters):
         X = getattr(rng, draw)(size=(400, 3))
-        rows = Rows.standardised(X, np.sin(X[:, :1]))
+        rows = StandardisedData.of(X, np.sin(X[:, :1]))
         for name in ("gaussian", "bell", "trapezoidal"):
             antecedent = rules_of(
                 MEMBERSHIPS[name],
@@ -213,12 +213,12 @@ class TestRules:
     def test_an_input_that_tells_no_clusters_apart_has_no_terms(self, rng):
         X, y, labels, _ = blobs(rng)
         alike = rng.normal(size=(len(X), 1))
-        rows = Rows.standardised(np.hstack([X, alike]), y)
+        rows = StandardisedData.of(np.hstack([X, alike]), y)
         order = np.lexsort(rows.table(slice(None)).T[::-1])
         antecedent = rules_of(Gaussian, rows, lambda t, w: labels[order])
         plain = rules_of(
             Gaussian,
-            Rows.standardised(X, y),
+            StandardisedData.of(X, y),
             lambda t, w: labels[np.lexsort(np.hstack([X, y]).T[::-1])],
         )
         assert {int(j) for group in antecedent.groups for j in group.inputs} == {0, 1}
@@ -234,7 +234,7 @@ class TestRules:
 
     def test_of_several_families_each_rule_has_terms_of_its_own(self, rng):
         X, y, *_ = blobs(rng)
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         mixed = clustered_antecedent([Gaussian, Bell], rows, by_k_means, np.arange(2))
         assert_array_equal(mixed.rule_terms, [[0, 3], [1, 4], [2, 5]])
         for j, family in enumerate([Gaussian, Bell]):
@@ -253,7 +253,7 @@ class TestRules:
             asked.append((table, weight))
             return np.zeros(len(table), dtype=int)
 
-        rows = Rows.standardised(X, y, times.astype(float))
+        rows = StandardisedData.of(X, y, times.astype(float))
         clustered_antecedent([Gaussian] * 2, rows, label, np.array([1]))
         (table, weight), (every, share, _) = asked[0], representative_rows(rows)
         assert_array_equal(table, every[:, [1, 2]])
@@ -262,7 +262,7 @@ class TestRules:
 
     def test_of_clusters_that_no_input_tells_apart_one_rule_without_terms_is_left(self, rng):
         X, y = rng.normal(size=(200, 1)), rng.normal(size=(200, 1))
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         found = rules_of(Gaussian, rows, lambda t, w: np.arange(len(t)) % 2)
         assert (found.n_rules, found.n_terms) == (1, 0)
 
@@ -276,7 +276,7 @@ def many(rng, n_rows=300):
 
 def standing_for(X, y, weight=None, most=10_000):
     """Table in the user's units, and weight as part of the whole."""
-    rows = Rows.standardised(X, y, None if weight is None else weight.astype(float))
+    rows = StandardisedData.of(X, y, None if weight is None else weight.astype(float))
     table, share, _ = representative_rows(rows, most)
     scales = np.concatenate([rows.inputs.scale, rows.targets.scale])
     return table * scales + np.concatenate(
@@ -324,7 +324,7 @@ class TestRepresentativeRows:
     def test_many_rows_are_thinned_evenly(self, rng):
         X = rng.normal(size=(5000, 2))
         y = X.sum(axis=1, keepdims=True)
-        rows = Rows.standardised(X, y)
+        rows = StandardisedData.of(X, y)
         table, weight, _ = representative_rows(rows, 500)
         assert len(table) <= 500
         assert weight.sum() == 500
@@ -337,7 +337,7 @@ class TestRepresentativeRows:
     def test_heavy_rows_stand_for_more(self, rng):
         X = rng.normal(size=(1000, 1))
         weight = np.where(X[:, 0] > 0.0, 9.0, 1.0)
-        rows = Rows.standardised(X, np.zeros((1000, 1)), weight)
+        rows = StandardisedData.of(X, np.zeros((1000, 1)), weight)
         table, share, _ = representative_rows(rows, 200)
         heavy = table[:, 0] > -rows.inputs.offset[0] / rows.inputs.scale[0]
         assert_allclose(
@@ -361,7 +361,7 @@ class TestSampleSize:
     def test_repeats_are_rows_and_weight_but_not_distinct(self, rng):
         X, y, times = many(rng)
         size = SampleSize.of(
-            Rows.standardised(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
+            StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
         )
         assert size.n_rows == size.weight == times.sum()
         assert size.n_distinct_rows == len(np.unique(np.hstack([X, y]), axis=0))
@@ -370,9 +370,9 @@ class TestSampleSize:
 
     def test_whole_weights_count_as_copies(self, rng):
         X, y, times = many(rng)
-        weighted = SampleSize.of(Rows.standardised(X, y, times.astype(float)))
+        weighted = SampleSize.of(StandardisedData.of(X, y, times.astype(float)))
         repeated = SampleSize.of(
-            Rows.standardised(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
+            StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
         )
         assert weighted.n_rows == len(X)
         assert weighted.weight == repeated.weight
@@ -383,32 +383,32 @@ class TestSampleSize:
     def test_weights_below_one_count_by_the_precision_they_leave(self, rng, unit):
         # Kish: of equal weights every row counts; of a half with next to none, half of them.
         X, y, _ = many(rng)
-        even = Rows.standardised(X, y, np.full(300, unit))
+        even = StandardisedData.of(X, y, np.full(300, unit))
         assert_allclose(effective_weight(even), 300.0, rtol=1e-12)
-        half = Rows.standardised(X, y, np.where(np.arange(300) < 150, unit, 1e-9 * unit))
+        half = StandardisedData.of(X, y, np.where(np.arange(300) < 150, unit, 1e-9 * unit))
         assert_allclose(effective_weight(half), 150.0, rtol=1e-6)
         share = rng.uniform(0.1, 1.0, 300)
-        uneven = Rows.standardised(X, y, unit * share)
+        uneven = StandardisedData.of(X, y, unit * share)
         assert_allclose(effective_weight(uneven), share.sum() ** 2 / (share**2).sum(), rtol=1e-12)
 
     def test_counting_stops_as_soon_as_there_are_enough(self, rng):
         X = np.vstack([rng.normal(size=(5000, 2)), np.zeros((5000, 2))])
-        rows = Rows.standardised(X, np.zeros((10_000, 1)))
+        rows = StandardisedData.of(X, np.zeros((10_000, 1)))
         assert SampleSize.of(rows, 100).n_distinct_inputs == 100
         assert SampleSize.of(rows, 10_000).n_distinct_inputs == 5001
 
     def test_rows_that_differ_in_the_last_digits_of_one_input_are_distinct(self, rng):
         X = np.tile(rng.normal(size=3), (40, 1))
         X[:, 1] += 1e-9 * np.arange(40)
-        size = SampleSize.of(Rows.standardised(X, np.zeros((40, 1))))
+        size = SampleSize.of(StandardisedData.of(X, np.zeros((40, 1))))
         assert size.n_distinct_inputs == 40
 
     @pytest.mark.parametrize("most", [10_000, 100])
     def test_a_search_sees_repeated_rows_as_weighted_ones(self, rng, most):
         X, y, times = many(rng)
-        weighted = search_sample(Rows.standardised(X, y, times.astype(float)), most)
+        weighted = search_sample(StandardisedData.of(X, y, times.astype(float)), most)
         repeated = search_sample(
-            Rows.standardised(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0)), most
+            StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0)), most
         )
         assert_allclose(repeated.X, weighted.X, atol=1e-12)
         assert_allclose(repeated.y, weighted.y, atol=1e-12)
@@ -419,7 +419,7 @@ class TestSampleSize:
 
     def test_a_search_knows_the_group_of_each_of_its_rows(self, rng):
         X, y = rng.normal(size=(500, 2)), rng.normal(size=(500, 1))
-        rows = Rows.standardised(X, y, groups=np.arange(500))
+        rows = StandardisedData.of(X, y, groups=np.arange(500))
         sample = search_sample(rows, 60)
         assert sample.n_rows == 60
         assert_array_equal(np.hstack([sample.X, sample.y]), rows.table(sample.groups))

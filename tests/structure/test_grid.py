@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis.data import StandardisedData
 from skanfis.membership import (
     MEMBERSHIPS,
     Bell,
@@ -11,7 +12,6 @@ from skanfis.membership import (
     SigmoidDifference,
     SigmoidProduct,
 )
-from skanfis.rows import Rows
 from skanfis.structure import Spacing, grid_antecedent
 from skanfis.structure.grid import _EDGE, _POWER
 
@@ -20,7 +20,7 @@ N_ROWS = 1001
 
 def rows_of(*columns, weight=None):
     X = np.column_stack(columns)
-    return Rows.standardised(X, np.arange(len(X), dtype=float)[:, None], weight)
+    return StandardisedData.of(X, np.arange(len(X), dtype=float)[:, None], weight)
 
 
 def evenly(n_inputs, n_rows=N_ROWS):
@@ -158,4 +158,4 @@ class TestSpacing:
 def rows_of_one(x, times=None):
     """One input, and a target that goes with it."""
     weight = None if times is None else times.astype(float)
-    return Rows.standardised(x[:, None], np.sin(x)[:, None], weight)
+    return StandardisedData.of(x[:, None], np.sin(x)[:, None], weight)

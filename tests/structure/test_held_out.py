@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skanfis.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.rows import Rows
 from skanfis.structure import held_out
 
 from .. import oracles
@@ -26,7 +26,7 @@ def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, conseque
     low, high = rows.inputs.minimum, rows.inputs.maximum
     X = low + (high - low) * g.uniform(-0.5, 1.5, (100, 2))
     weight = g.uniform(0.5, 2.0, 100) if weighted else None
-    rest = Rows(X, g.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
+    rest = StandardisedData(X, g.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
     at_edge = rest.inputs.apply(np.clip(X, low, high).T, np.empty((2, 100)))
     design = oracles.dense_design(antecedent, antecedent.parameters, at_edge, 1, used)
     target = (rest.y - rows.targets.offset) / rows.targets.scale

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from skanfis import ANFISRegressor
+from skanfis.data import StandardisedData
 from skanfis.membership import Gaussian
-from skanfis.rows import Rows
 from skanfis.structure import Spacing, grid_antecedent, has_idle_term
 
 
 @pytest.mark.parametrize(("truth", "is_idle"), [(0.501, False), (0.499, True)])
 def test_the_nearest_row_decides(truth, is_idle):
     x = np.linspace(0.0, 1.0, 50)[:, None]
-    whole = Rows.standardised(x, x)
+    whole = StandardisedData.of(x, x)
     antecedent = grid_antecedent([Gaussian], (2,), Spacing(whole), 0.6)
     (low, high), (_, log_width) = antecedent.groups[0].theta
     # No row nearer to the upper term than this.

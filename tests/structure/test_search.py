@@ -9,10 +9,10 @@ from sklearn.datasets import make_friedman1
 from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
+from skanfis.data import StandardisedData
 from skanfis.datasets import make_jang_three_input
 from skanfis.membership import TRIED_FAMILIES, Gaussian
 from skanfis.premise import Premise
-from skanfis.rows import Rows
 from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
 from skanfis.structure.candidate import Candidate
@@ -252,7 +252,7 @@ def test_screening_is_by_correlations_of_weighted_rows(rng):
     X, every = inputs(rng, 150, 18), np.arange(18)
     y = np.sin(3.0 * X[:, [0]]) + X[:, [5]] * X[:, [3]] + 0.3 * rng.standard_normal((150, 1))
     # Weights that go with the inputs: the mean of a share is far from its plain mean.
-    rows = Rows.standardised(X, y, np.ceil(np.exp(X.sum(axis=1))))
+    rows = StandardisedData.of(X, y, np.ceil(np.exp(X.sum(axis=1))))
     found = search.StructureSearch(rows, [Gaussian] * 18, 1, every, every, 0, {}, overlap=0.6)
     linear = Candidate((1,) * 18)
     z, s = found.sample.X, found.sample.sample_weight
@@ -274,7 +274,7 @@ def test_screening_is_by_correlations_of_weighted_rows(rng):
 def test_a_grid_starts_from_where_the_terms_of_its_parent_are(rng):
     X, used = inputs(rng, 200, 2), np.arange(2)
     y = np.sin(3.0 * X[:, [0]]) + np.cos(4.0 * X[:, [1]]) + 0.05 * rng.standard_normal((200, 1))
-    rows = Rows.standardised(X, y)
+    rows = StandardisedData.of(X, y)
     found = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
     found.parent = found._train(Candidate((3, 2)), found.sample)
     child = found._antecedent(Candidate((3, 3)), found.sample)
@@ -442,7 +442,7 @@ def test_score_counts_rows_by_weight_and_all_outputs(rng):
     X = inputs(rng, 120, 1)
     y = np.column_stack([np.sin(3.0 * X[:, 0]), X[:, 0]]) + 0.1 * rng.standard_normal((120, 2))
     times = rng.integers(1, 4, 120)
-    rows, used = Rows.standardised(X, y, times.astype(float)), np.arange(1)
+    rows, used = StandardisedData.of(X, y, times.astype(float)), np.arange(1)
     found = search.StructureSearch(rows, [Gaussian], 1, used, used, 0, {}, overlap=0.6)
     found.choose("grid")
     assert len(found.scores) > 1

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skanfis.data import StandardisedData
 from skanfis.evidence import FREE, PRIOR_DISPLACEMENT
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.premise import Premise
-from skanfis.rows import Rows
 from skanfis.structure import Spacing, grid_antecedent, tuning
 
 
@@ -16,7 +16,7 @@ from skanfis.structure import Spacing, grid_antecedent, tuning
 def two_rules(rng):
     """A problem of 100 rows, and its premise."""
     x = rng.uniform(-1.0, 1.0, (100, 1))
-    rows = Rows.standardised(x, np.sin(3.0 * x) + 0.1 * rng.normal(size=(100, 1)))
+    rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.1 * rng.normal(size=(100, 1)))
     antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
     problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
     return problem, Premise.of(antecedent, *rows.inputs.box)
@@ -58,7 +58,7 @@ def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
 
 def test_a_kink_that_was_taken_for_noise_is_found_with_the_premises_first(monkeypatch, rng):
     x = rng.uniform(-1.0, 1.0, (150, 1))
-    rows = Rows.standardised(x, np.abs(x) + 1e-3 * rng.normal(size=(150, 1)))
+    rows = StandardisedData.of(x, np.abs(x) + 1e-3 * rng.normal(size=(150, 1)))
     antecedent = grid_antecedent([Gaussian], [3], Spacing(rows), 0.6)
 
     def found():
@@ -73,7 +73,7 @@ def test_a_kink_that_was_taken_for_noise_is_found_with_the_premises_first(monkey
 
 def test_where_terms_are_freed_for_exact_data_nothing_holds_the_rules_together(rng):
     x = rng.uniform(-1.0, 1.0, (120, 1))
-    rows = Rows.standardised(x, np.sin(6.0 * x))
+    rows = StandardisedData.of(x, np.sin(6.0 * x))
     antecedent = grid_antecedent([Gaussian], [4], Spacing(rows), 0.6)
     start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
     assert start.is_free

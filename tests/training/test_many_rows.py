@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor, sampling
+from skanfis.data import StandardisedData
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
-from skanfis.rows import Rows
 from skanfis.sampling import with_sample
 from skanfis.solvers import VariableProjection
 
@@ -33,14 +33,14 @@ def few_are_many(monkeypatch):
 def full_passes(monkeypatch):
     """Passes over all rows, by name."""
     seen = []
-    whole = Rows.sum
+    whole = StandardisedData.sum
 
     def counted(self, one_pass, *args):
         if self.n_rows == N_ROWS:
             seen.append(type(one_pass).__name__)
         return whole(self, one_pass, *args)
 
-    monkeypatch.setattr(Rows, "sum", counted)
+    monkeypatch.setattr(StandardisedData, "sum", counted)
     return seen
 
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
+from skanfis.data import StandardisedData
 from skanfis.options import EarlyStopping
-from skanfis.rows import Rows
 from skanfis.solvers import SOLVERS, VariableProjection
 from skanfis.training.stopping import hold_out
 
@@ -27,7 +27,7 @@ def overfitting(n_rows=150, seed=0):
 
 def held_out_by_default(X, y):
     seed = int(np.random.default_rng(0).integers(2**31 - 1))
-    return hold_out(Rows.standardised(X, y.reshape(len(y), -1)), 0.1, seed)[1]
+    return hold_out(StandardisedData.of(X, y.reshape(len(y), -1)), 0.1, seed)[1]
 
 
 def test_best_parameters_are_restored():
@@ -68,7 +68,7 @@ def test_every_solver_can_be_stopped(solver):
 def test_whole_groups_are_held_out():
     g = np.random.default_rng(2)
     groups = np.repeat(np.arange(10), 20)
-    rows = Rows.standardised(g.normal(size=(200, 2)), g.normal(size=(200, 1)))
+    rows = StandardisedData.of(g.normal(size=(200, 2)), g.normal(size=(200, 1)))
     training, validation = hold_out(replace(rows, groups=groups), 0.3, 0)
     assert set(groups[training]).isdisjoint(groups[validation])
     assert np.unique(groups[validation]).size == 3
@@ -93,7 +93,7 @@ def test_held_out_rows_are_weighted_and_have_several_outputs():
     weight = np.random.default_rng(1).uniform(0.5, 2.0, 150)
     both = np.column_stack([y, X[:, 1]])
     model = ANFISRegressor(n_mfs=2, **SETTINGS).fit(X, both, sample_weight=weight)
-    every = Rows.standardised(X, both, weight)
+    every = StandardisedData.of(X, both, weight)
     _, held = hold_out(every, 0.1, int(np.random.default_rng(0).integers(2**31 - 1)))
     kept = np.setdiff1d(np.arange(150), held)
     mean = np.average(both[kept], axis=0, weights=weight[kept])
@@ -105,7 +105,7 @@ def test_held_out_rows_are_weighted_and_have_several_outputs():
 
 def test_random_state_chooses_the_rows():
     g = np.random.default_rng(0)
-    rows = Rows.standardised(g.normal(size=(100, 2)), g.normal(size=(100, 1)))
+    rows = StandardisedData.of(g.normal(size=(100, 2)), g.normal(size=(100, 1)))
     one, again, other = (hold_out(rows, 0.2, seed)[1] for seed in (0, 0, 1))
     assert one.size == 20
     assert_array_equal(one, again)
@@ -115,7 +115,7 @@ def test_random_state_chooses_the_rows():
 def test_equal_rows_are_on_one_side():
     g = np.random.default_rng(0)
     X = g.normal(size=(50, 2))[np.arange(200) % 50]
-    training, held = hold_out(Rows.standardised(X, g.normal(size=(200, 1))), 0.2, 0)
+    training, held = hold_out(StandardisedData.of(X, g.normal(size=(200, 1))), 0.2, 0)
     assert held.size == 40
     assert set(training % 50).isdisjoint(held % 50)
 

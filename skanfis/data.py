@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Rows", "Scale", "check_scales", "column_statistics", "fingerprint"]
+__all__ = ["Scale", "StandardisedData", "check_scales", "column_statistics", "fingerprint"]
 
 # Rows that are read at once where no cache-sized working set asks for fewer.
 _READ_ROWS = 4096
@@ -173,7 +173,7 @@ def check_scales(inputs, targets, input_names, output_names):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class StandardisedData:
     """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups.
 
     Of many rows there may be a ``sample`` on which to begin, see ``sampling``.
@@ -185,10 +185,10 @@ class Rows:
     inputs: Scale
     targets: Scale
     groups: np.ndarray | None = None  # the run, device, ... that each row belongs to
-    sample: "Rows | None" = None
+    sample: "StandardisedData | None" = None
 
     @classmethod
-    def standardised(cls, X, y, sample_weight=None, groups=None):
+    def of(cls, X, y, sample_weight=None, groups=None):
         """Rows with the scales found from the data; every weight must be positive."""
         return cls(
             X,
@@ -203,7 +203,9 @@ class Rows:
         """Some of the rows, on the same scales."""
         weight = None if self.sample_weight is None else self.sample_weight[indices]
         groups = None if self.groups is None else self.groups[indices]
-        return Rows(self.X[indices], self.y[indices], weight, self.inputs, self.targets, groups)
+        return StandardisedData(
+            self.X[indices], self.y[indices], weight, self.inputs, self.targets, groups
+        )
 
     @property
     def n_rows(self):

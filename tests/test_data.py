@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor, rows
-from skanfis.rows import Rows, column_statistics, fingerprint
+from skanfis import ANFISRegressor
+from skanfis import data as rows
+from skanfis.data import StandardisedData, column_statistics, fingerprint
 from skanfis.solvers import VariableProjection
 
 # Enough rows for several reads.
@@ -116,13 +117,13 @@ def test_sums_that_overflow_on_either_side_are_taken_again():
 
 def test_part_of_the_rows_keeps_scales_weights_and_groups(rng):
     values, weight = table(rng, 40), rng.uniform(0.5, 2.0, 40)
-    whole = Rows.standardised(values, values[:, :2] ** 2, weight, groups=np.arange(40) // 4)
+    whole = StandardisedData.of(values, values[:, :2] ** 2, weight, groups=np.arange(40) // 4)
     some = np.array([31, 2, 7, 7])
     part = whole.part(some)
     assert_array_equal(part.table(slice(None)), whole.table(some))
     assert_array_equal(part.sample_weight, weight[some])
     assert_array_equal(part.groups, some // 4)
-    plain = Rows.standardised(values, values).part(some)
+    plain = StandardisedData.of(values, values).part(some)
     assert plain.sample_weight is None
     assert plain.groups is None
 
@@ -137,7 +138,7 @@ def test_single_precision_is_summed_in_double(rng):
 
 def test_read_standardises_and_transposes(rng):
     X, y, weight = table(rng, 100), rng.normal(size=(100, 2)) * 5 + 3, rng.uniform(0.1, 2.0, 100)
-    data = Rows.standardised(X, y, weight)
+    data = StandardisedData.of(X, y, weight)
     part = slice(10, 40)
     Z, target, read_weight = data.read(part)
     z = (X[part] - data.inputs.offset) / data.inputs.scale
@@ -147,12 +148,12 @@ def test_read_standardises_and_transposes(rng):
     assert_array_equal(read_weight, weight[part])
     assert Z.flags.c_contiguous
     assert_array_equal(data.table(part), np.hstack([z, t]))
-    assert Rows.standardised(X, y).read(part)[2] is None
+    assert StandardisedData.of(X, y).read(part)[2] is None
 
 
 def test_standardised_data_have_mean_zero_and_deviation_one(rng):
     X, y, weight = table(rng, 1000), rng.normal(size=(1000, 1)), rng.uniform(0.1, 2.0, 1000)
-    Z, target, _ = Rows.standardised(X, y, weight).read(slice(None))
+    Z, target, _ = StandardisedData.of(X, y, weight).read(slice(None))
     for columns in (Z, target):
         # -1e7 + 1e6 z, and 1e-3 + 1e-6 z: z is read with twelve digits.
         assert_allclose(np.average(columns, axis=1, weights=weight), 0.0, atol=1e-11)
@@ -175,7 +176,7 @@ def test_data_are_only_read(rng, tmp_path):
     before = [array.copy() for array in (X, y, weight)]
     for array in (X, y, weight):
         array.flags.writeable = False
-    data = Rows.standardised(X, y, weight)
+    data = StandardisedData.of(X, y, weight)
     data.read(slice(None))
     data.table(slice(None))
     for array, copy in zip((X, y, weight), before, strict=True):
@@ -190,7 +191,7 @@ def test_memory_map_reads_as_the_array_itself(rng, tmp_path, dtype, layout):
     mapped = np.load(tmp_path / "X.npy", mmap_mode="r")
     assert isinstance(mapped, np.memmap)
     y = X[:, :1].astype(float)
-    from_map, from_array = Rows.standardised(mapped, y), Rows.standardised(X, y)
+    from_map, from_array = StandardisedData.of(mapped, y), StandardisedData.of(X, y)
     assert_array_equal(fields(from_map.inputs), fields(from_array.inputs))
     part = slice(100, 5000)
     Z = from_map.read(part)[0]
@@ -202,7 +203,7 @@ def test_memory_map_reads_as_the_array_itself(rng, tmp_path, dtype, layout):
 @pytest.mark.parametrize("n_rows", [1, 127, 128, 129, 5000])
 @pytest.mark.parametrize("block_rows", [1, 128, 10_000])
 def test_chunks_cover_every_row_once_in_order(n_rows, block_rows):
-    data = Rows.standardised(np.zeros((n_rows, 1)), np.zeros((n_rows, 1)))
+    data = StandardisedData.of(np.zeros((n_rows, 1)), np.zeros((n_rows, 1)))
     chunks = data.chunks(block_rows)
     parts = [part for chunk in chunks for part in chunk]
     assert_array_equal(np.concatenate([np.arange(n_rows)[p] for p in parts]), np.arange(n_rows))
@@ -212,5 +213,5 @@ def test_chunks_cover_every_row_once_in_order(n_rows, block_rows):
 
 def test_total_weight_is_the_sum_or_the_number_of_rows(rng):
     X, y, weight = table(rng, 50), rng.normal(size=(50, 1)), rng.uniform(size=50)
-    assert Rows.standardised(X, y).total_weight == 50.0
-    assert_allclose(Rows.standardised(X, y, weight).total_weight, weight.sum(), rtol=1e-14)
+    assert StandardisedData.of(X, y).total_weight == 50.0
+    assert_allclose(StandardisedData.of(X, y, weight).total_weight, weight.sum(), rtol=1e-14)
