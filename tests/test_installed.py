@@ -23,7 +23,7 @@ def model():
     g = np.random.default_rng(0)
     X = g.uniform(-1.0, 1.0, (100, 2))
     y = np.sin(3.0 * X[:, 0]) + X[:, 1]
-    return ANFISRegressor(n_mfs=[3, 1]).fit(X, y)
+    return ANFISRegressor(n_mfs=[3, 1], agreement=0.01).fit(X, y)
 
 
 def test_every_module_can_be_imported():
