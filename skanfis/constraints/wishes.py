@@ -25,8 +25,8 @@ class OutputLimits:
     >>> from skanfis.constraints import OutputLimits
     >>> x = np.linspace(0.0, 1.0, 50)[:, None]
     >>> y = np.sin(3.0 * x[:, 0])
-    >>> model = ANFISRegressor(n_mfs=3, constraints=[OutputLimits(upper=0.9)]).fit(x, y)
-    >>> bool(model.predict(x).max() <= 0.9)
+    >>> model = ANFISRegressor(n_mfs=3, constraints=[OutputLimits(upper=1.0)]).fit(x, y)
+    >>> bool(model.predict(x).max() <= 1.0)
     True
     """
 

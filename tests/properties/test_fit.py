@@ -4,6 +4,7 @@ import re
 import warnings
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -53,6 +54,8 @@ def test_a_fit_is_no_worse_than_the_mean(table, settings):
     assert error <= 1.01 * spread + 1e-18
 
 
+# What is drawn is not there to be read.
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ReadabilityWarning")
 @given(tables(), settings_of_fit, st.floats(1.0, 1e3))
 def test_a_model_answers_everywhere_and_comes_back(table, settings, reach):
     model = fitted(table, settings)
