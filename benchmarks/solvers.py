@@ -68,14 +68,14 @@ def tasks():
 def count_passes(function):
     """How often a function's trainings read all rows, and what it returned."""
     n_passes = 0
-    one_pass = SeparableProblem._sum_over_chunks
+    one_pass = SeparableProblem._sum
 
     def counted(*args):
         nonlocal n_passes
         n_passes += 1
         return one_pass(*args)
 
-    with patch.object(SeparableProblem, "_sum_over_chunks", counted):
+    with patch.object(SeparableProblem, "_sum", counted):
         returned = function()
     return n_passes, returned
 
