@@ -25,6 +25,10 @@ from scipy.linalg import blas
 
 __all__ = ["DesignMoments", "pairs"]
 
+# Columns up to which the places of moments are kept, 4 MB each; of more, they are soon worked out
+# beside a pass, and would hold memory after the fit.
+_MOST_KEPT = 1024
+
 
 def pairs(rows, others):
     """Products rows_i * others_j for all j >= i, (n (n + 1) / 2, n_rows)."""
@@ -135,4 +139,6 @@ class DesignMoments:
 
     def gram(self, sums):
         """Phi' S Phi out of the sums, (n_columns, n_columns)."""
-        return np.ascontiguousarray(sums).ravel()[_moment_of_pair(self._lengths)]
+        is_kept = prod(self._lengths) <= _MOST_KEPT
+        place = _moment_of_pair if is_kept else _moment_of_pair.__wrapped__
+        return np.ascontiguousarray(sums).ravel()[place(self._lengths)]
