@@ -98,7 +98,10 @@ TABLE = {
         LEARNING,
     ),
     "intervals": (["_sklearn", "_validation", "exceptions", "regressor"], LEARNING),
-    "readable": (["exceptions", "model", "_validation", "export"], [*NUMERIC, "pandas"]),
+    "readable": (
+        ["exceptions", "membership", "model", "_validation", "export"],
+        [*NUMERIC, "pandas"],
+    ),
     "inspection": (
         ["model", "naming", "_validation", "export", "readable"],
         [*PLOTTING, "pandas"],

@@ -1,12 +1,13 @@
 """Families of membership functions; ``base`` has the conventions that all of them follow."""
 
-from .base import Membership, Parameter
+from .base import LEAST_TRUTH, Membership, Parameter
 from .bell import Bell
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
 from .gaussian import Gaussian
 from .sigmoid import SigmoidDifference, SigmoidProduct
 
 __all__ = [
+    "LEAST_TRUTH",
     "MEMBERSHIPS",
     "NAMES_IN_MATLAB",
     "TRIED_FAMILIES",

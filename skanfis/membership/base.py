@@ -28,7 +28,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-__all__ = ["Membership", "Parameter"]
+__all__ = ["LEAST_TRUTH", "Membership", "Parameter"]
+
+# A term that is never truer than this is, on every row, more false than true: its name describes
+# no row.
+LEAST_TRUTH = 0.5
 
 # exp(-u^2 / 2) = 1/2 at this u.
 _HALF_HEIGHT = np.sqrt(2.0 * np.log(2.0))

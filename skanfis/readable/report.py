@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from ..membership import LEAST_TRUTH
 from ..model import TSKModel
 from .measures import Measures, Source, measure
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
@@ -25,9 +26,6 @@ __all__ = [
     "readability_of_rows",
 ]
 
-# A term that is never truer than this is, on every row, more false than true: its name describes
-# no row.
-LEAST_TRUTH = 0.5
 # Neighbours that cross above this are both all but true at one place: no reader can say which of
 # the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
 GREATEST_CROSSING = 0.9

@@ -4,11 +4,10 @@ import numpy as np
 
 from ..antecedent import Antecedent
 from ..data import StandardisedData
+from ..membership import LEAST_TRUTH
 
-__all__ = ["LEAST_TRUTH", "has_idle_term"]
+__all__ = ["has_idle_term"]
 
-# A term is to be truer than not on some row.
-LEAST_TRUTH = 0.5
 _READ_ROWS = 4096
 
 
