@@ -85,7 +85,7 @@ def _gone(error):
 
 @dataclass(frozen=True, eq=False)
 class ClusterRows:
-    """As :class:`skanfis.data.StandardisedData`, wherever the blocks are; on a sample, rows are at hand."""
+    """As ``StandardisedData``, wherever the blocks are; on a sample, rows are at hand."""
 
     blocks: Blocks
     n_rows: int

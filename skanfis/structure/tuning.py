@@ -109,6 +109,37 @@ class Tuned:
         return other < part * noise and loose.score < self.score - WORTHWHILE
 
 
+class _Weights:
+    """Steps of the penalty's weights up the evidence, at fixed premises."""
+
+    def __init__(self, problem: SeparableProblem, n_rows: float, is_free: bool):
+        self.problem, self.n_rows, self.is_free = problem, n_rows, is_free
+        self.n_rules = problem.antecedent.n_rules
+        self.n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
+        self.n_distinct = problem.rows.n_rows  # a search sample has no row twice
+
+    def improved(self, evaluation, x, penalty, steps, free, curvature=None) -> Laplace:
+        """The posterior after so many steps of the free weights."""
+        for _ in range(steps):
+            posterior = self._posterior(evaluation, x, penalty, curvature)
+            least = least_weights(posterior, self.n_rules, self.n_distinct)
+            penalty = reestimated(posterior, free, {} if self.is_free else least)
+        return self._posterior(evaluation, x, penalty, curvature)
+
+    def _posterior(self, evaluation, x, penalty, curvature):
+        return laplace(
+            evaluation.normal,
+            self.problem.common_line,
+            evaluation.mean_squared_error,
+            penalty,
+            self.n_rows,
+            self.n_rules,
+            x,
+            curvature,
+            self.n_outputs,
+        )
+
+
 def tune(
     problem: SeparableProblem,
     premise: Premise,
@@ -146,34 +177,11 @@ def tune(
     steps_a_turn = _STEPS
     if problem.n_columns > _MOST_COLUMNS:
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
-    n_rules, penalty = problem.antecedent.n_rules, problem.penalty
-    n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
-    n_distinct = problem.rows.n_rows  # a search sample has no row twice
-
-    def posterior_at(evaluation, penalty, curvature=None):
-        return laplace(
-            evaluation.normal,
-            problem.common_line,
-            evaluation.mean_squared_error,
-            penalty,
-            n_rows,
-            n_rules,
-            x,
-            curvature,
-            n_outputs,
-        )
-
-    def improved(evaluation, penalty, steps, free, curvature=None):
-        for _ in range(steps):
-            posterior = posterior_at(evaluation, penalty, curvature)
-            least = {} if is_free else least_weights(posterior, n_rules, n_distinct)
-            penalty = reestimated(posterior, free, least)
-        return posterior_at(evaluation, penalty, curvature)
-
+    weights, penalty = _Weights(problem, n_rows, is_free), problem.penalty
     if is_loose:
         penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
     evaluation = problem.evaluate(premise.parameters(x))
-    posterior = improved(evaluation, penalty, 0 if is_loose else first_steps, free)
+    posterior = weights.improved(evaluation, x, penalty, 0 if is_loose else first_steps, free)
     penalty = posterior.penalty
     if premise.size == 0 or turns == 0:
         return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
@@ -199,7 +207,7 @@ def tune(
         _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
         steps = FIRST_STEPS if is_first else steps_a_turn
-        posterior = improved(evaluation, penalty, steps, free, curvature)
+        posterior = weights.improved(evaluation, x, penalty, steps, free, curvature)
         penalty = posterior.penalty
         found = Tuned(weighted, evaluation, x, posterior)
         rises = best is None or found.score < best.score - _RISE
