@@ -26,6 +26,9 @@ WHEEL := .venv-wheel
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_QUIET := 1
 export MPLBACKEND := Agg
+# Some machines forbid Python to keep the bytecode that it makes. Then each of the many processes that
+# tests start makes that of every library again, for several seconds.
+unexport PYTHONDONTWRITEBYTECODE
 
 # $(call make-venv,FOLDER,PYTHON,RELATION): the pip of an older Python knows no dependency groups.
 # Bytecode is made of what is imported, when it is: all of it takes twice as long to install.
