@@ -10,15 +10,28 @@ import pytest
 from numpy.testing import assert_array_equal
 from sklearn.base import clone
 from sklearn.cluster import KMeans
+from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
+from skanfis.constraints import FixedPoint, OutputLimits
 from skanfis.export import TRUSTED_TYPES
 from skanfis.export.fis.reader import parse_fis
+from skanfis.gyro import (
+    OpenLoopArcsineRegressor,
+    ResidualRegressor,
+    ThermalLag,
+    ThermalRate,
+    TimeSincePowerOn,
+)
+from skanfis.intervals import ConformalRegressor
 from skanfis.membership import MEMBERSHIPS
+from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
+from skanfis.solvers import SOLVERS, Hybrid
 
+from ..quick import quick
 from .fis_files import BY_HAND
 
 ESTIMATORS = {
@@ -31,7 +44,17 @@ ESTIMATORS = {
     "clusterer": ANFISRegressor(partition=KMeans(3, random_state=0)),
     "model": ANFISRegressor(partition=parse_fis(BY_HAND)),
     "pipeline": make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)),
-    **{mf: ANFISRegressor(n_mfs=2, mf=mf) for mf in MEMBERSHIPS},
+    "words as objects": ANFISRegressor(
+        solver=Hybrid(),
+        loss=Huber(),
+        early_stopping=EarlyStopping(),
+        out_of_bounds=LinearExtrapolation(),
+    ),
+    **{name: quick(solver=solver()) for name, solver in SOLVERS.items()},
+    "constrained": quick(
+        constraints=[OutputLimits(-50.0, 50.0), FixedPoint([5.0, 0.5], [-0.4, 2.5])],
+    ),
+    **{mf: quick(mf=mf) for mf in MEMBERSHIPS},
 }
 EACH = pytest.mark.parametrize("name", ESTIMATORS)
 X = np.random.default_rng(0).uniform(0.0, [10.0, 1.0], (60, 2))
@@ -45,6 +68,37 @@ def fitted(name):
     estimator = ESTIMATORS[name]
     short = {name: 5 for name in estimator.get_params() if name.endswith("regressor__max_iter")}
     return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
+
+
+def learning():
+    """One that goes on learning, and keeps what it needs for that."""
+    return quick().partial_fit(X, Y)
+
+
+def sure():
+    """With intervals."""
+    return ConformalRegressor(quick()).fit(X, Y[:, 0])
+
+
+def compensator():
+    """Of a gyro: what its log does not say, a law, and rules for what the law leaves."""
+    g = np.random.default_rng(1)
+    log = np.column_stack([np.arange(60.0), 20.0 + np.arange(60.0) / 60.0, g.uniform(-1, 1, 60)])
+    parts = (TimeSincePowerOn(time=0), ThermalRate(30.0, time=0), ThermalLag(30.0, time=0))
+    features = [(type(part).__name__, part, [0, 1]) for part in parts]
+    law = OpenLoopArcsineRegressor(output=-1, temperature=1)
+    return make_pipeline(
+        ColumnTransformer([*features, ("log", "passthrough", [1, 2])]),
+        ResidualRegressor(law, quick(n_mfs=1)),
+    ).fit(log, log[:, 2] + 0.1 * log[:, 2] ** 3)
+
+
+@pytest.mark.parametrize("make", [learning, sure, compensator])
+def test_skops_of_what_is_more_than_rules(make):
+    io = pytest.importorskip("skops.io")
+    data = io.dumps(make())
+    assert set(io.get_untrusted_types(data=data)) <= set(TRUSTED_TYPES)
+    io.loads(data, trusted=TRUSTED_TYPES)
 
 
 @EACH
