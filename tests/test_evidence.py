@@ -413,7 +413,7 @@ class OneWidth:
             paid = 2.0 * dense.cost(parameters) + penalty.stiffness * x**2
             return 0.5 * (n * paid / variance + determinants + np.log(self.antecedent.n_rules))
 
-        x = np.linspace(-2.0, 2.0, 801)
+        x = np.linspace(-2.0, 2.0, 401)
         values = np.array([minus_log(one) for one in x])
         height = values.min()
         integral = integrate.simpson(np.exp(height - values), x=x)
@@ -430,7 +430,7 @@ class TestPremises:
 
     def test_a_displacement_is_integrated_over(self):
         case, errors, sizes = OneWidth(1500), [], []
-        for stiffness in (1e-4, 1e-2, 1.0):
+        for stiffness in (1e-4, 1.0):
             penalty = Penalty(agreement=0.05, alpha=0.01, slope=0.01, stiffness=stiffness)
             found = list(case.laplace(penalty))
             own = np.array([in_full(one) - self.prior_of_weight(one) for one in found])

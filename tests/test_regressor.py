@@ -37,8 +37,14 @@ from . import oracles
 
 NAMES = ["time", "temperature", "rate"]
 KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
-# Where two fits are compared to the last bit, a few iterations show as much as many.
-SHORT = {"n_mfs": 2, "solver": VariableProjection(tol=0.01)}
+# Where two fits are compared to the last bit, a few iterations show as much as many, and weights
+# that are given as much as those that are found: of these are the bits in test_reproducibility.py.
+SHORT = {
+    "n_mfs": 2,
+    "agreement": 0.1,
+    "alpha": 1e-6,
+    "solver": VariableProjection(tol=0.01, stiffness=1e-3),
+}
 
 
 def surface(n_rows=240, seed=0, noise=0.0):
@@ -237,7 +243,7 @@ def test_grid_starts_evenly_spaced_between_the_outer_quantiles_of_even_values(mf
     rng = np.random.default_rng(5)
     even_values = {name: rng.permutation(np.linspace(-7.0, 93.0, 501)) for name in NAMES}
     frame = pd.DataFrame(even_values)
-    model = ANFISRegressor(n_mfs=[4, 2, 3], mf=mf, solver=VariableProjection(tol=0.1)).fit(
+    model = ANFISRegressor(**SHORT | {"n_mfs": [4, 2, 3], "mf": mf}).fit(
         frame, np.sin(frame["rate"] / 20)
     )
     terms = pd.DataFrame(model.initial_memberships_)
@@ -308,7 +314,7 @@ def test_loss_curve_of_weights_that_are_found_ends_at_the_error():
 
 
 def test_terms_of_an_input_stay_in_order():
-    model = ANFISRegressor(n_mfs=4, alpha=1e-6).fit(*surface(1200, noise=0.01))
+    model = ANFISRegressor(n_mfs=4, alpha=1e-6).fit(*surface(600, noise=0.01))
     centers = np.reshape([term["center"] for term in model.memberships_], (3, 4))
     assert (np.diff(centers) > 0).all()
 
@@ -413,7 +419,7 @@ def test_coverage_decays_with_the_distance_from_the_data():
 @pytest.fixture(scope="module")
 def trained():
     """Trained where temperature is in [-40, 85] and rate in [-300, 300]."""
-    return ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.01)).fit(FRAME, Y)
+    return ANFISRegressor(**SHORT).fit(FRAME, Y)
 
 
 OUTSIDE = pd.DataFrame(
@@ -570,14 +576,13 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(StandardisedData, "read", read_and_remember)
     weight = np.random.default_rng(0).uniform(0.5, 2.0, len(X))
     models = {}
-    for n_jobs in (None, 1, 2, -1):
+    for n_jobs in (None, 2):
         threads.clear()
         model = ANFISRegressor(n_jobs=n_jobs, agreement=0.1, alpha=0.01, max_iter=3, **settings)
         models[n_jobs] = model.fit(X, Y, weight)
         # Else this test compares nothing.
-        assert (len(threads) > 1) == (n_jobs == 2 or (n_jobs == -1 and joblib.cpu_count() > 1))
-    for n_jobs in (1, 2, -1):
-        same_bits(models[n_jobs], models[None])
+        assert (len(threads) > 1) == (n_jobs == 2)
+    same_bits(models[2], models[None])
 
 
 @pytest.mark.parametrize("settings", [{"n_mfs": 3}, {"partition": KMEANS, "mf": "bell"}])
@@ -690,7 +695,7 @@ def test_array_in_place_of_the_frame_is_warned_of(trained):
 
 
 def test_one_row_at_a_time_is_as_good_as_all():
-    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(tol=0.5)).fit(*surface(1000))
+    model = ANFISRegressor(**SHORT | {"n_mfs": 3}).fit(*surface(1000))
     data = surface(200)[0]
     data = data[model.in_bounds(data)]
     together = model.predict(data)
@@ -726,7 +731,7 @@ def test_changed_parameters_count_from_the_next_fit_on():
     assert_array_equal(model.predict(X), before)
     same_bits(
         model.fit(X, Y),
-        ANFISRegressor(n_mfs=[3, 2, 1], solver=VariableProjection(tol=0.01)).fit(X, Y),
+        ANFISRegressor(**SHORT | {"n_mfs": [3, 2, 1]}).fit(X, Y),
     )
     assert model.n_rules_ == 6
 
@@ -780,18 +785,17 @@ def test_cross_val_score_scores_every_fold():
 def test_grid_search_over_runs_left_out():
     # Three terms are too few on the first input, and needless on the second.
     rng = np.random.default_rng(0)
-    data = rng.uniform(size=(400, 3))
-    target = np.sin(14.0 * data[:, 0]) + data[:, 1] + np.sin(3.0 * data[:, 2])
-    target += 0.1 * rng.normal(size=400)
-    run = np.arange(400) % 4
+    data = rng.uniform(size=(200, 2))
+    target = np.sin(14.0 * data[:, 0]) + data[:, 1] + 0.1 * rng.normal(size=200)
+    run = np.arange(200) % 4
     estimator = ANFISRegressor(alpha=1e-6, solver=VariableProjection(tol=0.01))
     search = GridSearchCV(
         make_pipeline(StandardScaler(), estimator),
-        {"anfisregressor__n_mfs": [2, 3, [4, 2, 3]]},
+        {"anfisregressor__n_mfs": [2, 3, [4, 1]]},
         cv=LeaveOneGroupOut(),
     )
     search.fit(data, target, groups=run)
-    assert search.best_params_ == {"anfisregressor__n_mfs": [4, 2, 3]}
+    assert search.best_params_ == {"anfisregressor__n_mfs": [4, 1]}
     again = clone(search.best_estimator_).fit(data, target)
     assert_array_equal(search.predict(data), again.predict(data))
     held_out = [

@@ -16,7 +16,6 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
-from skanfis import ANFISRegressor
 from skanfis.bounds import bounds
 from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c, fold
@@ -27,6 +26,7 @@ from skanfis.policies import OUT_OF_BOUNDS
 from skanfis.solvers import VariableProjection
 
 from ..oracles import random_grid
+from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from .every_model import CASES, FEWEST, full_scale, print_differences, rows, size_of_sum
 
@@ -117,29 +117,27 @@ def answers_of(code, X, folder, n_outputs=1, std="c99"):
 
 
 def scaled_target():
-    regressor = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2, out_of_bounds="linear"))
+    regressor = make_pipeline(StandardScaler(), quick(n_mfs=2, out_of_bounds="linear"))
     return TransformedTargetRegressor(regressor, transformer=MinMaxScaler())
 
 
 TRAINED = {
-    "pipeline": lambda: make_pipeline(RobustScaler(), ANFISRegressor(n_mfs=[3, 2, 2])),
+    "pipeline": lambda: make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
     "scaled target": scaled_target,
-    "triangles untrained": lambda: ANFISRegressor(
+    "triangles untrained": lambda: quick(
         n_mfs=3, mf="triangular", solver="lse", out_of_bounds="linear"
     ),
-    "families by input": lambda: ANFISRegressor(
+    "families by input": lambda: quick(
         n_mfs=2, mf=["bell", "gaussian", "s_shaped"], out_of_bounds="linear"
     ),
-    "order 0": lambda: ANFISRegressor(n_mfs=[4, 1, 3], order=0),
-    "clusters": lambda: ANFISRegressor(partition=KMeans(5, n_init=1, random_state=0)),
-    "one cluster": lambda: ANFISRegressor(partition=KMeans(1), out_of_bounds="linear"),
-    "plane": lambda: ANFISRegressor(n_mfs=1, out_of_bounds="linear"),
-    "constant": lambda: ANFISRegressor(n_mfs=1, order=0, out_of_bounds="linear"),
-    "scheduled": lambda: ANFISRegressor(
-        n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"
-    ),
-    "rules of others": lambda: ANFISRegressor(
-        partition=ANFISRegressor(n_mfs=2).fit(*surface()), out_of_bounds="linear"
+    "order 0": lambda: quick(n_mfs=[4, 1, 3], order=0),
+    "clusters": lambda: quick(partition=KMeans(5, n_init=1, random_state=0)),
+    "one cluster": lambda: quick(partition=KMeans(1), out_of_bounds="linear"),
+    "plane": lambda: quick(n_mfs=1, out_of_bounds="linear"),
+    "constant": lambda: quick(n_mfs=1, order=0, out_of_bounds="linear"),
+    "scheduled": lambda: quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
+    "rules of others": lambda: quick(
+        partition=quick(n_mfs=2).fit(*surface()), out_of_bounds="linear"
     ),
 }
 
@@ -180,7 +178,7 @@ def test_trained_models_answer_as_predict(dtype, tolerance, flags, tmp_path):
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
 def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     X, y = surface(n_outputs=2)
-    estimator = ANFISRegressor(n_mfs=2, max_iter=5, solver=VariableProjection(tol=1.0)).fit(X, y)
+    estimator = quick(n_mfs=2, max_iter=5, solver=VariableProjection(tol=1.0)).fit(X, y)
     Z = around(X, np.float32 if dtype == "float" else float)
     expected = estimator.predict(Z.astype(float))
     limits = np.quantile(expected, [0.2, 0.7], axis=0).T
@@ -210,7 +208,7 @@ def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     ],
 )
 def test_what_are_no_limits_is_refused(saturate, message):
-    estimator = ANFISRegressor(n_mfs=1).fit(*surface())
+    estimator = quick(n_mfs=1).fit(*surface())
     with pytest.raises(ValueError, match=message):
         export_c(estimator, name="m", saturate=saturate)
 
@@ -221,7 +219,7 @@ def test_single_precision_bears_an_offset(tmp_path):
     X, y = surface()
     X[:, 0] = 1.7e9 + 1e4 * X[:, 0]
     X = X.astype(np.float32).astype(float)
-    estimator = ANFISRegressor(n_mfs=3).fit(X, y + 1e4)
+    estimator = quick(n_mfs=3).fit(X, y + 1e4)
     Z = X.astype(np.float32)
     code = export_c(estimator, name="m", dtype="float", min_coverage=None)
     found, status = answers_of(code, Z, tmp_path)
@@ -233,7 +231,7 @@ def test_single_precision_bears_an_offset(tmp_path):
 @needs_compiler
 def test_row_that_is_not_finite_gets_no_answer(tmp_path):
     X, y = surface()
-    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, y).model_
+    model = quick(n_mfs=2, solver="lse").fit(X, y).model_
     # Each of the three in each of the columns, between rows that have an answer.
     Z = X[:9].repeat(2, axis=0)
     Z[np.arange(0, 18, 2), np.arange(9) % 3] = np.repeat([np.nan, np.inf, -np.inf], 3)
@@ -250,7 +248,7 @@ def test_row_that_is_not_finite_gets_no_answer(tmp_path):
 @needs_compiler
 def test_largest_numbers_are_answered(tmp_path):
     X, y = surface()
-    model = ANFISRegressor(n_mfs=2, mf="bell", solver="lse").fit(X, y).model_
+    model = quick(n_mfs=2, mf="bell", solver="lse").fit(X, y).model_
     Z = np.array([[1.0, -1.0, 1.0]]) * [[1e100], [1e150], [np.finfo(float).max]]
     codes = [
         export_c(model.with_out_of_bounds(policy), name=policy) for policy in ("clip", "linear")
@@ -269,7 +267,7 @@ def test_constant_and_lone_columns(tmp_path):
     X, y = surface()
     X[:, 1] = 20.0
     with pytest.warns(ConstantInputWarning):
-        estimator = ANFISRegressor(n_mfs=[3, 1, 2]).fit(X, y)
+        estimator = quick(n_mfs=[3, 1, 2]).fit(X, y)
     code = export_c(estimator, name="m", min_coverage=None)
     found, _ = answers_of(code, X, tmp_path)
     np.testing.assert_allclose(found[:, 0], estimator.predict(X), rtol=1e-11, atol=1e-11)
@@ -280,7 +278,7 @@ def test_constant_and_lone_columns(tmp_path):
 def test_units_do_not_matter_to_single_precision(scale, tmp_path):
     X, y = surface()
     X, y = (X * scale).astype(np.float32).astype(float), y / scale
-    estimator = ANFISRegressor(n_mfs=2).fit(X, y)
+    estimator = quick(n_mfs=2).fit(X, y)
     found, _ = answers_of(
         export_c(estimator, name="m", dtype="float"), X.astype(np.float32), tmp_path
     )
@@ -297,7 +295,7 @@ def test_units_do_not_matter_to_single_precision(scale, tmp_path):
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
     X, y = surface()
-    model = ANFISRegressor(n_mfs=2).fit(X * scale_x, y * scale_y)
+    model = quick(n_mfs=2).fit(X * scale_x, y * scale_y)
     with pytest.raises(ValueError, match=rf"Single precision cannot hold .*{what}"):
         export_c(model, name="m", dtype="float")
     export_c(model, name="m", dtype="double")
@@ -410,7 +408,7 @@ def test_files_are_cpp_too(dtype, tmp_path):
 def test_grid_takes_an_exponential_per_term():
     g = np.random.default_rng(0)
     X = g.uniform(-1.0, 1.0, (800, 2))
-    model = ANFISRegressor(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1])
+    model = quick(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1])
     cost = export_c(model, name="m").cost
     assert cost.exponentials == 12
     assert cost.logarithms == 0
@@ -426,7 +424,7 @@ def test_grid_takes_an_exponential_per_term():
 @needs_compiler
 def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     X, y = surface()
-    code = export_c(ANFISRegressor(n_mfs=2).fit(X, y), tmp_path / "m")
+    code = export_c(quick(n_mfs=2).fit(X, y), tmp_path / "m")
     flags = ["-std=c89", *STRICT, *SANITIZE, "-DM_SELF_TEST", "-DM_SELF_TEST_MAIN"]
     gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 0
@@ -444,7 +442,7 @@ def far_off(mf, seed, offset=1e4):
     g = np.random.default_rng(seed)
     X = g.normal(size=(300, 2))
     y = np.sin(2.0 * X[:, 0]) + X[:, 1] ** 2
-    model = ANFISRegressor(3, mf=mf, out_of_bounds="linear", max_iter=5)
+    model = quick(3, mf=mf, out_of_bounds="linear", max_iter=5)
     return model.fit(X + offset, y), X + offset
 
 
@@ -492,7 +490,7 @@ HOSTILE = [
 def test_names_of_columns_cannot_leave_their_comment(std, tmp_path):
     g = np.random.default_rng(0)
     X = pd.DataFrame(g.uniform(size=(60, len(HOSTILE))), columns=HOSTILE)
-    estimator = ANFISRegressor(n_mfs=[2] + [1] * (len(HOSTILE) - 1)).fit(X, X.sum(axis=1))
+    estimator = quick(n_mfs=[2] + [1] * (len(HOSTILE) - 1)).fit(X, X.sum(axis=1))
     code = export_c(estimator, tmp_path / "m", std=std)
     assert (code.header + code.source).isascii()
     assert max(map(len, (code.header + code.source).splitlines())) < 200
@@ -504,11 +502,11 @@ def test_names_of_columns_cannot_leave_their_comment(std, tmp_path):
 
 def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
     X, y = surface()
-    code = export_c(ANFISRegressor(n_mfs=2).fit(X, y), str(tmp_path / "gyro"))
+    code = export_c(quick(n_mfs=2).fit(X, y), str(tmp_path / "gyro"))
     assert code.name == "gyro"
     assert (tmp_path / "gyro.h").read_text(encoding="ascii") == code.header
     assert (tmp_path / "gyro.c").read_text(encoding="ascii") == code.source
-    other = export_c(ANFISRegressor(n_mfs=2).fit(X, y), tmp_path / "a.b-c", name="gyro")
+    other = export_c(quick(n_mfs=2).fit(X, y), tmp_path / "a.b-c", name="gyro")
     assert '#include "a.b-c.h"' in other.source
     assert (tmp_path / "a.b-c.c").is_file()
 
@@ -548,7 +546,7 @@ def test_family_of_ones_own_is_refused():
         name = "own"
 
     X, y = surface()
-    model = ANFISRegressor(n_mfs=2, mf=Own).fit(X, y)
+    model = quick(n_mfs=2, mf=Own).fit(X, y)
     with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
         export_c(model, name="m")
 
@@ -603,7 +601,7 @@ def test_rows_on_a_thin_diagonal_are_covered_and_its_corners_are_not(dtype, tmp_
     g = np.random.default_rng(0)
     along = g.uniform(-1.0, 1.0, 600)
     X = np.column_stack([along, along + 0.02 * g.normal(size=600)]) * [1e3, 1e-3] + [5e5, 0.0]
-    estimator = ANFISRegressor(n_mfs=[3, 1]).fit(X, np.sin(3.0 * along))
+    estimator = quick(n_mfs=[3, 1]).fit(X, np.sin(3.0 * along))
     Z = around(X, np.float32 if dtype == "float" else np.float64)
     Z = np.vstack([Z, X.astype(Z.dtype)])
     limits = [0.05, 0.5, 0.95]

@@ -12,10 +12,10 @@ from sklearn.compose import ColumnTransformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
-from skanfis import ANFISRegressor
 from skanfis.export import fold, register_onnx_converter
 from skanfis.options import LinearExtrapolation
 
+from ..quick import quick
 from .every_model import FEWEST, full_scale, print_differences, rows, size_of_sum
 
 REASON = "{} IS NOT INSTALLED (pip install '.[onnx]'): THE ONNX CONVERTER IS NOT TESTED"
@@ -37,7 +37,7 @@ def holding(model):
     policy = model.out_of_bounds
     if policy == "linear":
         policy = LinearExtrapolation(model.max_extrapolation)
-    estimator = ANFISRegressor(out_of_bounds=policy)
+    estimator = quick(out_of_bounds=policy)
     g = np.random.default_rng(0)
     y = g.normal(size=(20, model.n_outputs))
     estimator.set_params(n_mfs=1).fit(g.normal(size=(20, model.n_inputs)), y.squeeze())
@@ -105,7 +105,7 @@ def test_pipeline_answers_as_predict(kind, dtype, tolerance):
     scaler, settings = PIPELINES[kind]
     # One output and two by turns, in either precision the other way round.
     X, y = surface(n_outputs=1 + (list(PIPELINES).index(kind) + (dtype is np.float32)) % 2)
-    pipeline = make_pipeline(clone(scaler), ANFISRegressor(**settings))
+    pipeline = make_pipeline(clone(scaler), quick(**settings))
     pipeline.fit(X, y)
     Z = (X.mean(axis=0) + 1.3 * (X - X.mean(axis=0))).astype(dtype)
     found, wanted = answers(pipeline, Z), pipeline.predict(Z.astype(float)).reshape(len(Z), -1)
@@ -122,7 +122,7 @@ def test_pipeline_answers_as_predict(kind, dtype, tolerance):
 def test_any_number_of_rows(n_rows, dtype, tolerance):
     X, y = surface()
     for settings in ({"n_mfs": 2}, {"n_mfs": 1, "order": 0}):
-        estimator = ANFISRegressor(**settings).fit(X, y)
+        estimator = quick(**settings).fit(X, y)
         graph = skl2onnx.to_onnx(estimator, X[:1].astype(dtype)).SerializeToString()
         session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
         (found,) = session.run(None, {"X": X[:n_rows].astype(dtype)})
@@ -135,7 +135,7 @@ def test_any_number_of_rows(n_rows, dtype, tolerance):
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
 def test_row_that_is_not_finite_gives_nan(policy):
     X, y = surface()
-    estimator = ANFISRegressor(n_mfs=2, out_of_bounds=policy).fit(X, y)
+    estimator = quick(n_mfs=2, out_of_bounds=policy).fit(X, y)
     Z = X[:6].copy()
     Z[[0, 1, 2], [0, 1, 2]] = [np.nan, np.inf, -np.inf]
     found = answers(estimator, Z)
@@ -144,7 +144,7 @@ def test_row_that_is_not_finite_gives_nan(policy):
 
 def test_policy_is_that_of_the_estimator_at_conversion():
     X, y = surface()
-    estimator = ANFISRegressor(n_mfs=2).fit(X, y)
+    estimator = quick(n_mfs=2).fit(X, y)
     Z = X.max(axis=0, keepdims=True) * 1.5
     estimator.set_params(out_of_bounds="clip")
     held = answers(estimator, Z)
@@ -158,7 +158,7 @@ def test_policy_is_that_of_the_estimator_at_conversion():
 
 def test_whole_numbers_are_taken():
     X, y = surface()
-    estimator = ANFISRegressor(n_mfs=2).fit(np.round(X), y)
+    estimator = quick(n_mfs=2).fit(np.round(X), y)
     whole = np.round(X).astype(np.int64)
     graph = skl2onnx.to_onnx(estimator, whole[:1]).SerializeToString()
     session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
@@ -168,14 +168,14 @@ def test_whole_numbers_are_taken():
 
 def test_raise_is_refused():
     X, y = surface()
-    estimator = ANFISRegressor(n_mfs=2, out_of_bounds="raise").fit(X, y)
+    estimator = quick(n_mfs=2, out_of_bounds="raise").fit(X, y)
     with pytest.raises(ValueError, match="out_of_bounds='raise' has no counterpart in ONNX"):
         skl2onnx.to_onnx(estimator, X[:1])
 
 
 def test_opset_too_old_is_refused():
     X, y = surface()
-    estimator = ANFISRegressor(n_mfs=2).fit(X, y)
+    estimator = quick(n_mfs=2).fit(X, y)
     with pytest.raises(ValueError, match="target_opset=12 is too old"):
         skl2onnx.to_onnx(estimator, X[:1], target_opset=12)
     expected = estimator.predict(X)

@@ -46,7 +46,7 @@ def test_gradient_of_the_cost_by_the_displacements(family, kind):
 def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     rng = np.random.default_rng(3)
     antecedent = oracles.random_grid(rng, [family] * 2, [3, 3])
-    X = rng.uniform(-1.0, 1.0, (250, 2))
+    X = rng.uniform(-1.0, 1.0, (120, 2))
     rows = StandardisedData.of(X, np.sin(3.0 * X[:, :1]) * np.cos(2.0 * X[:, 1:]))
     # Some term reaches every row by the textbook: the dense problem has no floor.
     Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T

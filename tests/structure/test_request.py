@@ -271,7 +271,7 @@ class TestWarmStart:
             assert after[-1] < before[-1]
 
     def test_the_ridge_that_was_chosen_stays(self, data):
-        model = ANFISRegressor(warm_start=True).fit(*data)
+        model = ANFISRegressor(warm_start=True, partition="grid").fit(*data)
         alpha, rules = model.alpha_, model.n_rules_
         model.fit(*surface(200, seed=3))
         assert (model.alpha_, model.n_rules_) == (alpha, rules)

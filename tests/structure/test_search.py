@@ -170,7 +170,7 @@ def test_more_noise_never_gives_more_rules(rng, partition):
     truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(300)
     found = [
         ANFISRegressor(partition=partition).fit(X, truth + s * noise).n_rules_
-        for s in (0.02, 0.3, 3.0, 30.0)
+        for s in (0.02, 1.0, 30.0)
     ]
     assert found == sorted(found, reverse=True)
     assert found[0] > 3
@@ -204,7 +204,7 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
 
 
 def test_many_rows_are_represented_by_few(rng, monkeypatch):
-    X = inputs(rng, 1500)
+    X = inputs(rng, 1500, 1)
     y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(1500)
     seen = []
     trained = search.SeparableProblem
@@ -230,7 +230,7 @@ def test_of_many_inputs_those_that_matter_are_found(rng, monkeypatch):
 
 def test_screened_inputs_hold_those_that_matter(monkeypatch):
     # Friedman 1 has five inputs that matter, one of them linearly and two by their product.
-    X, y = make_friedman1(500, n_features=40, noise=1.0, random_state=0)
+    X, y = make_friedman1(300, n_features=40, noise=1.0, random_state=0)
     kept = []
     screened = search.StructureSearch._screened
 
