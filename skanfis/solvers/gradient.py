@@ -140,9 +140,9 @@ class GradientDescent(DescentSolver):
     --------
     >>> from sklearn.model_selection import GridSearchCV
     >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_three_input
+    >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.solvers import GradientDescent
-    >>> X, y = make_jang_three_input()[:2]
+    >>> X, y = make_jang_sinc()
     >>> model = ANFISRegressor(n_mfs=2, solver=GradientDescent(), max_iter=20, out_of_bounds="clip")
     >>> search = GridSearchCV(model, {"solver__step_size": [0.001, 0.1]}, cv=3).fit(X, y)
     >>> search.best_params_
