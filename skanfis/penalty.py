@@ -36,7 +36,11 @@ from scipy import linalg
 
 from .consequent import LocalBasis
 
-__all__ = ["CommonLine", "Penalty", "disagreement_matrix"]
+__all__ = ["GREATEST_ALONE", "CommonLine", "Penalty", "disagreement_matrix"]
+
+# In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
+# explains three quarters of the variance; beyond, the rule says too little of the model.
+GREATEST_ALONE = 0.5
 
 
 @dataclass(frozen=True)

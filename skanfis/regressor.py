@@ -136,7 +136,9 @@ class ANFISRegressor(
         agreement / 2 times the mean over rows of :math:`\sum_r \bar w_r (f_r - \hat y)^2`, in
         variances of the target, is added to half its mean squared error. 0 lets rules compensate
         one another at will, 1 is local learning, where every rule is a model of the rows on which
-        it fires; the more, the more alike the rules. "auto": found by the evidence, see Notes.
+        it fires; the more, the more alike the rules. "auto": found by the evidence, and raised
+        until the strongest rule alone is within half a standard deviation of the model, unless that
+        would cost more than a tenth of the error, see Notes.
     alpha : "auto" or float, default="auto"
         Ridge penalty on the consequents, zero or positive, in standard deviations of inputs and
         target: alpha / 2 times the squares of each rule's departure from the rules' common line, in

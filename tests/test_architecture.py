@@ -99,7 +99,7 @@ TABLE = {
     ),
     "intervals": (["_sklearn", "_validation", "exceptions", "regressor"], LEARNING),
     "readable": (
-        ["exceptions", "membership", "model", "_validation", "export"],
+        ["exceptions", "membership", "penalty", "model", "_validation", "export"],
         [*NUMERIC, "pandas"],
     ),
     "inspection": (

@@ -409,6 +409,21 @@ def test_outputs_share_the_error_of_all_rows_as_they_share_that_of_the_sample():
     assert_allclose(found / found.sum(), of_sample / of_sample.sum(), rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["grid of both", "consequents in one input", "scattered"])
+def test_the_strongest_rule_alone_is_that_of_the_dense_design(name):
+    case = Case.named(name)
+    evaluation = case.problem.evaluate(case.point)
+    Z = np.stack([case.rows.read(slice(k, k + 1))[0][:, 0] for k in range(250)], axis=1)
+    strengths = evaluation.antecedent.strengths(Z)
+    strongest = np.repeat(strengths == strengths.max(axis=0), case.problem.n_basis, axis=0)
+    phi = case.dense.design(case.point)
+    share = np.repeat(strengths, case.problem.n_basis, axis=0).T
+    alone = np.where(strongest.T, phi / share, 0.0) - phi
+    squares = case.dense.weight @ (alone @ evaluation.coefficients) ** 2
+    found = case.problem.strongest_alone(evaluation)
+    assert_allclose(found, np.sqrt(squares.max() / case.dense.weight.sum()), rtol=1e-9)
+
+
 def test_rows_are_not_read_again_for_the_sums_at_the_start(case, monkeypatch):
     problem = case.problem
     start = problem.antecedent.parameters

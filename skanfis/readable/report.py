@@ -9,6 +9,7 @@ import numpy as np
 
 from ..membership import LEAST_TRUTH
 from ..model import TSKModel
+from ..penalty import GREATEST_ALONE
 from .measures import Measures, Source, measure
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
 
@@ -29,9 +30,6 @@ __all__ = [
 # Neighbours that cross above this are both all but true at one place: no reader can say which of
 # the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
 GREATEST_CROSSING = 0.9
-# In standard deviations of the target. Whoever reads the strongest rule alone is then as wrong as a
-# model that explains three quarters of the variance; beyond, the rule says too little of the model.
-GREATEST_ALONE = 0.5
 # In ranges of the target. Rules whose values lie in the target's range reach one at most. At two,
 # at least half of what the rules say on some row is there to cancel the rest.
 GREATEST_SUM = 2.0

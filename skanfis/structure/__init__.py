@@ -9,6 +9,7 @@ from .sample import SampleSize, effective_weight, representative_rows
 from .size import GridSize, term_counts
 from .start import Start
 from .terms import TermsFound, search_terms
+from .tuning import is_affordable, more_agreement
 
 __all__ = [
     "GridSize",
@@ -23,6 +24,8 @@ __all__ = [
     "grid_antecedent",
     "has_idle_term",
     "imported_antecedent",
+    "is_affordable",
+    "more_agreement",
     "report_constant",
     "representative_rows",
     "search_terms",

@@ -44,7 +44,7 @@ from .held_out import held_out_loss
 from .idle import has_idle_term
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
-from .tuning import FIRST_PENALTY, FIRST_STEPS, MOST_ROWS, Tuned, scaled, settled, tune
+from .tuning import FIRST_PENALTY, FIRST_STEPS, HOLDING, MOST_ROWS, Tuned, scaled, settled, tune
 
 __all__ = ["SEARCHED", "StructureSearch"]
 
@@ -289,9 +289,11 @@ class StructureSearch:
         tuned = self._tuned(candidate)
         if has_idle_term(self.sample, tuned.evaluation.antecedent):
             return np.inf
+        # What it would have cost is the least that rules which hold are worth.
+        error = (HOLDING if tuned.is_apart else 1.0) * tuned.expected_error
         # As the evidence, in units of twice the logarithm of a probability.
         with np.errstate(divide="ignore"):
-            return self.n_sample * tuned.posterior.n_outputs * np.log(tuned.expected_error)
+            return self.n_sample * tuned.posterior.n_outputs * np.log(error)
 
     def error(self, candidate):
         """RMS on the rows left out, or what is expected on new ones; of the standardised target."""

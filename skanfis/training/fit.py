@@ -35,6 +35,8 @@ from ..structure import (
     StructureRequest,
     effective_weight,
     has_idle_term,
+    is_affordable,
+    more_agreement,
     report_constant,
 )
 from .data import ValidatedData
@@ -160,23 +162,36 @@ class _Fit:
         return start
 
     def readable_run(self, rows: StandardisedData, start: Start) -> SolverRun:
-        """The best run from a start that leaves no term where hardly a row is.
+        """The best run from a start, whose rules can be read one by one.
 
         Rows that the search has not seen may draw a term into a gap between them, out of which no
         gradient leads. The premises are then held ten times as much, from the start again, unless
-        it was asked for how much they are held.
+        it was asked for how much they are held. Likewise agreement rises, unless it was asked for,
+        until the strongest rule holds alone.
         """
         seen = rows.sample or rows
         run = self.best_run(rows, start)
-        if "stiffness" in self.request.weights or has_idle_term(seen, start.antecedent):
+        if "stiffness" not in self.request.weights and not has_idle_term(seen, start.antecedent):
+            for _ in range(_MOST_STIFFER):
+                if not has_idle_term(seen, run.evaluation.antecedent):
+                    break
+                stiffer = replace(start.penalty, stiffness=10.0 * start.penalty.stiffness)
+                start = replace(start, penalty=stiffer)
+                run = self.best_run(rows, start)
+        if "agreement" in self.request.weights or start.is_free:
             return run
-        for _ in range(_MOST_STIFFER):
-            if not has_idle_term(seen, run.evaluation.antecedent):
-                break
-            stiffer = replace(start.penalty, stiffness=10.0 * start.penalty.stiffness)
-            start = replace(start, penalty=stiffer)
-            run = self.best_run(rows, start)
-        return run
+        return self.run_that_holds(rows, run)
+
+    def run_that_holds(self, rows: StandardisedData, apart: SolverRun) -> SolverRun:
+        """The run with so much more agreement that the strongest rule holds alone, if cheap."""
+        run = apart
+        while True:
+            penalty = more_agreement(run.problem, run.evaluation)
+            if penalty is None:
+                return run
+            run = self.best_run(rows, replace(run.start, penalty=penalty))
+            if not is_affordable(run.evaluation, apart.evaluation):
+                return apart
 
     def best_run(self, rows: StandardisedData, start: Start) -> SolverRun:
         """The run from a start, or the best from several: of the least leave-one-out error.

@@ -438,7 +438,8 @@ def test_searched_structure_is_tried_with_every_family(rng):
 
 
 def test_score_counts_rows_by_weight_and_all_outputs(rng):
-    # n m log FPE, from which what a larger model must gain is taken.
+    # n m log FPE, from which what a larger model must gain is taken; more where a rule does not
+    # hold alone.
     X = inputs(rng, 120, 1)
     y = np.column_stack([np.sin(3.0 * X[:, 0]), X[:, 0]]) + 0.1 * rng.standard_normal((120, 2))
     times = rng.integers(1, 4, 120)
@@ -447,4 +448,7 @@ def test_score_counts_rows_by_weight_and_all_outputs(rng):
     found.choose("grid")
     assert len(found.scores) > 1
     for candidate, score in found.scores.items():
-        assert_allclose(score, times.sum() * 2 * np.log(found.error(candidate) ** 2), rtol=1e-12)
+        worth = tuning.HOLDING if found.found[candidate].is_apart else 1.0
+        expected = times.sum() * 2 * np.log(worth * found.error(candidate) ** 2)
+        assert_allclose(score, expected, rtol=1e-12)
+    assert {tuned.is_apart for tuned in found.found.values()} == {True, False}

@@ -24,6 +24,7 @@ def two_rules(rng):
 
 def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
     # n kappa / sigma^2 x0^2 = 1; but where they come first, next to nothing holds them.
+    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
     noise = tuning.tune(*two_rules, FREE, 100.0, turns=0).posterior.noise_variance
     begun, varpro = [], tuning.varpro
     monkeypatch.setattr(
@@ -38,6 +39,7 @@ def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
 
 def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
     problem, premise = two_rules
+    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
     made = []
     for name in ("varpro", "reestimated"):
         whole = getattr(tuning, name)
@@ -79,6 +81,24 @@ def test_where_terms_are_freed_for_exact_data_nothing_holds_the_rules_together(r
     assert start.is_free
     # The least that rules would pay which are to be read: n_columns sigma^2 / n over two squared.
     assert start.penalty.agreement < 0.1 * 8 * start.expected_error / 120 / 2.0**2
+
+
+def test_agreement_rises_until_the_strongest_rule_holds_or_the_price_is_too_high(
+    monkeypatch, two_rules
+):
+    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
+    apart = tuning.tune(*two_rules, FREE, 100.0)
+    alone = apart.problem.strongest_alone(apart.evaluation)
+    for limit, holds in ((0.8 * alone, True), (0.01 * alone, False)):
+        monkeypatch.setattr(tuning, "GREATEST_ALONE", limit)
+        found = tuning.tune(*two_rules, FREE, 100.0)
+        error = found.evaluation.mean_squared_error / apart.evaluation.mean_squared_error
+        assert found.is_apart is not holds
+        assert (found.problem.strongest_alone(found.evaluation) <= limit) is holds
+        assert error == 1.0 if not holds else 1.0 < error < tuning.HOLDING
+        # What is given is not changed.
+        fixed = tuning.tune(*two_rules, FREE[1:], 100.0)
+        assert fixed.penalty.agreement == tuning.FIRST_PENALTY.agreement
 
 
 def test_turns_end_when_the_evidence_has_not_risen_twice(monkeypatch, two_rules):

@@ -41,6 +41,42 @@ def test_no_term_ends_in_a_gap_that_the_search_has_not_seen():
     assert obeyed == 0.1 * stiffness
 
 
+@pytest.mark.parametrize("n_mfs", ["auto", 4])
+def test_rules_hold_one_by_one_where_that_is_cheap(n_mfs):
+    """A dip and a rise: rules that cancel one another fit them, and so do rules that agree more."""
+    rng = np.random.default_rng(1)
+    x = rng.uniform(0.0, 1.0, 130)
+    truth = 1.5 * np.exp(-50.0 * (x - 0.6) ** 2) - 3.0 * np.exp(-100.0 * (x - 0.35) ** 2)
+    y = truth + 0.3 * rng.normal(size=x.size)
+
+    def alone_and_error(agreement="auto"):
+        model = ANFISRegressor(n_mfs=n_mfs, agreement=agreement).fit(x[:, None], y)
+        strengths, lines = model.strengths(x[:, None]), model.consequents_
+        predicted = model.predict(x[:, None])
+        strongest = lines[strengths.argmax(axis=1)]
+        away = strongest[:, 0] + strongest[:, 1] * x - predicted
+        error = np.sqrt(np.mean((predicted - truth) ** 2))
+        return np.sqrt(np.mean(away**2)) / y.std(), error, model.agreement_
+
+    alone, error, agreement = alone_and_error()
+    assert alone <= 0.5 + 1e-9
+    # What is asked for is obeyed, whatever it does to the rules.
+    apart, error_apart, obeyed = alone_and_error(0.05 * agreement)
+    assert apart > 0.6
+    assert obeyed == 0.05 * agreement
+    assert error < 1.15 * error_apart
+
+
+def test_next_to_exact_data_go_before_rules_that_hold():
+    X, y = data()
+    y = y + 1e-4 * np.random.default_rng(1).normal(size=y.size)
+    model = ANFISRegressor(n_mfs=3).fit(X, y)
+    assert model.readability_.summary["strongest_alone"] > 0.5
+    held = ANFISRegressor(n_mfs=3, agreement=1e3 * model.agreement_).fit(X, y)
+    assert held.score(X, y) < model.score(X, y)
+    assert np.mean((model.predict(X) - y) ** 2) < 0.5 * np.mean((held.predict(X) - y) ** 2)
+
+
 # --------------------------------------------------------------------------------------- clusterers
 
 
