@@ -10,23 +10,55 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .consequent import basis, rule_outputs
-from .gram import DesignMoments
+from .quadratic import QuadraticForm
 
-__all__ = ["DerivativeRows", "DeviationTables", "inner_products"]
+__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "points_of_range"]
+
+# What a form in fewer products may leave out, in squares of the noise.
+_SHORTENED = 4e-6
+# Of a term its middle and so many widths to either side, in so many points.
+_WIDTHS, _POINTS_PER_TERM = 4.0, 65
+
+
+def points_of_range(model, n_points, rng):
+    """Points all over the box, and as many where terms change, (n_inputs, n_points).
+
+    Of every input alone they are spread evenly; inputs go together at random. Where the box is much
+    wider than the terms, which outliers make it, the even ones say next to nothing of these.
+    """
+    half, points = n_points // 2, []
+    for j, (low, high) in enumerate(zip(model.minimum, model.maximum, strict=True)):
+        even = np.linspace(low, high, n_points)
+        near = _about_terms(model.antecedent, j)
+        if near.size:
+            near = np.sort(np.clip(near, low, high))
+            even[::2] = near[np.linspace(0, near.size - 1, n_points - half).astype(int)]
+        points.append(rng.permutation(even))
+    return np.stack(points)
+
+
+def _about_terms(antecedent, j):
+    """Points about all terms of an input, within ``_WIDTHS`` of their widths."""
+    found = [np.empty(0)]
+    for group in antecedent.groups:
+        natural = group.family.natural(group.theta[:, group.inputs == j])
+        kinds = np.array([parameter.kind for parameter in group.family.parameters])
+        width = _WIDTHS * natural[kinds == "log_width"].sum(axis=0)
+        found.append(np.linspace(natural[0] - width, natural[0] + width, _POINTS_PER_TERM).ravel())
+    return np.concatenate(found)
 
 
 @dataclass(frozen=True, eq=False)
 class DeviationTables:
     """F and B_k F for inputs in standard deviations: squares of others might be beyond floats.
 
-    ``factor`` is F, ``of_consequents`` the table of F' F for ``moments``; ``joint`` is T beside
+    ``factor`` is F, ``form`` the quadratic form of F' F; ``joint`` is T beside
     -B_k F, and under them Q_k times the whole half, whose squares are taken off: (n_outputs,
     n_displacements + n_pinned, n_premises + n_columns). ``unit`` is a power of two near the noise
     of every output, (n_outputs, 1), in which squares stay finite.
     """
 
-    moments: DesignMoments
-    of_consequents: np.ndarray
+    form: QuadraticForm
     factor: np.ndarray
     joint: np.ndarray
     unit: np.ndarray
@@ -36,6 +68,10 @@ class DeviationTables:
     def n_premises(self):
         """Derivatives by premises that ``joint`` takes, none where these were not learnt."""
         return self.joint.shape[2] - self.factor.shape[1]
+
+    def shortened(self, shares, basis_rows):
+        """The same with a form in fewer products, for rows all over the range."""
+        return replace(self, form=self.form.shortened(shares, basis_rows, _SHORTENED))
 
     def signed(self, one, other):
         """Inner products of ``joint`` times rows: those added less those taken off, (n_rows,)."""
@@ -55,7 +91,7 @@ class DeviationTables:
         with np.errstate(over="ignore", under="ignore"):
             return replace(
                 self,
-                of_consequents=self.of_consequents.astype(dtype),
+                form=self.form.astype(dtype),
                 factor=self.factor.astype(dtype),
                 joint=self.joint.astype(dtype),
             )
@@ -65,7 +101,7 @@ class DeviationTables:
         """Tables of a model's posterior, in double precision."""
         widths = np.concatenate([[1.0], model.spread[posterior.inputs]])
         factor = posterior.consequents * np.tile(widths, model.n_rules)
-        moments = DesignMoments(model.antecedent.share_counts, widths.size)
+        counts = model.antecedent.share_counts
         unit = np.ldexp(1.0, np.frexp(posterior.noise)[1])[:, None]
         n_added, n_columns = posterior.premises.shape[0], factor.shape[0]
         premises = posterior.premises if n_added else np.zeros((0, 0))
@@ -76,8 +112,8 @@ class DeviationTables:
             of_factor = posterior.pinned[k, :, :n_columns] @ factor
             pinned[:, premises.shape[1] :] += of_factor * (posterior.noise[k] / one)
             joint.append(np.vstack([own, pinned]))
-        table = moments.of_matrix(factor.T @ factor)
-        return cls(moments, table, factor, np.stack(joint), unit, n_added)
+        form = QuadraticForm.of(factor.T @ factor, counts, widths.size)
+        return cls(form, factor, np.stack(joint), unit, n_added)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from math import prod
 import numpy as np
 from scipy.linalg import blas
 
-__all__ = ["DesignMoments", "pairs"]
+__all__ = ["DesignMoments", "pair_index", "pairs"]
 
 # Columns up to which the places of moments are kept, 4 MB each; of more, they are soon worked out
 # beside a pass, and would hold memory after the fit.
@@ -43,7 +43,7 @@ def pairs(rows, others):
 
 
 @cache
-def _pair_index(n):
+def pair_index(n):
     """The row of :func:`pairs` that holds pair (i, j) or (j, i), (n, n); not to be changed."""
     index = np.zeros((n, n), dtype=np.int32)
     index[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
@@ -61,7 +61,7 @@ def _moment_of_pair(lengths):
     for length in lengths:
         # Digits of a mixed radix: of the two columns, and of the moments.
         size = length * (length + 1) // 2
-        place = place[:, None, :, None] * np.int32(size) + _pair_index(length)[None, :, None, :]
+        place = place[:, None, :, None] * np.int32(size) + pair_index(length)[None, :, None, :]
         place = place.reshape(place.shape[0] * length, -1)
     return place
 
@@ -111,31 +111,6 @@ class DesignMoments:
         left = _products(groups[: self._split], n_rows)
         right = _products(groups[self._split :], n_rows)
         blas.dgemm(1.0, left.T, right.T, beta=1.0, c=sums, trans_a=1, overwrite_c=1)
-
-    def quadratic(self, table, shares, basis_rows):
-        """Phi' A phi of every row, (n_rows,), by a table of :meth:`of_matrix` of A."""
-        groups, start = [], 0
-        for count in self._lengths[:-1]:
-            factor = shares[start : start + count]
-            groups.append(pairs(factor, factor))
-            start += count
-        groups.append(pairs(basis_rows, basis_rows))
-        n_rows = basis_rows.shape[1]
-        left = _products(groups[: self._split], n_rows)
-        right = _products(groups[self._split :], n_rows)
-        return np.einsum("in,in->n", left, table @ right)
-
-    def of_matrix(self, matrix):
-        """The table T of a symmetric matrix A: sum(T * moments) = phi' A phi for every row."""
-        n = len(self._lengths)
-        table = matrix.reshape(*self._lengths, *self._lengths)
-        table = table.transpose([axis for k in range(n) for axis in (k, n + k)])
-        table = table.reshape([length**2 for length in self._lengths])
-        for k, length in enumerate(self._lengths):
-            summed = np.zeros((self._sizes[k], *np.delete(table.shape, k)))
-            np.add.at(summed, _pair_index(length).ravel(), np.moveaxis(table, k, 0))
-            table = np.moveaxis(summed, 0, k)
-        return np.ascontiguousarray(table).reshape(self.shape)
 
     def gram(self, sums):
         """Phi' S Phi out of the sums, (n_columns, n_columns)."""

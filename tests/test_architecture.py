@@ -17,6 +17,7 @@ KERNEL = [
     "antecedent",
     "consequent",
     "gram",
+    "quadratic",
     "data",
     "sampling",
     "passes",

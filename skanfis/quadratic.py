@@ -1,0 +1,142 @@
+r"""A quadratic form of rows of the design, phi' A phi, out of few products.
+
+Columns of the design are products of one share per factor of the rule base and one basis function
+(see ``gram``), so that with the symmetric matrix A
+
+    phi' A phi = sum_(moments) T_(i, j) l_i r_j ,
+
+l and r products of pairs nu_k nu_l of every factor and of pairs of basis functions: one product
+with a table T and one inner product per row.
+
+The pairs of one factor are m (m + 1) / 2 functions, mostly of one input, and smooth: far fewer of
+them span the others to rounding. Terms that lie far apart have a product of zero, and Gaussian
+shares are near polynomials of a low degree. An interpolative decomposition (a QR decomposition with
+column pivoting, Cheng et al. 2005) picks those that are kept and writes the others as their
+combinations, which are folded into T: 6 x 6 terms need about 12 x 12 of their 21 x 21 pairs. What
+is left out is measured in units of the form itself, at points spread evenly over the range.
+"""
+
+from dataclasses import dataclass, replace
+from math import prod
+
+import numpy as np
+from scipy import linalg
+
+from .gram import pair_index
+
+__all__ = ["QuadraticForm"]
+
+# Pairs of a factor are compared at so many points for each of them at least, or all are kept.
+_POINTS_PER_PAIR = 2
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticForm:
+    """Phi' A phi by a table over kept pairs of every factor, the basis the last of them.
+
+    ``pairs`` holds for every factor the two columns of each pair, (2, n_kept); ``table`` has those
+    of the first ``split`` factors along its rows, of the others along its columns.
+    """
+
+    pairs: tuple[np.ndarray, ...]
+    table: np.ndarray
+    split: int
+
+    @classmethod
+    def of(cls, matrix, counts, n_basis):
+        """Of a symmetric matrix (n_columns, n_columns), for shares and basis functions."""
+        lengths = (*counts, n_basis)
+        n = len(lengths)
+        table = matrix.reshape(*lengths, *lengths)
+        table = table.transpose([axis for k in range(n) for axis in (k, n + k)])
+        table = table.reshape([length**2 for length in lengths])
+        for k, length in enumerate(lengths):
+            summed = np.zeros((length * (length + 1) // 2, *np.delete(table.shape, k)))
+            np.add.at(summed, pair_index(length).ravel(), np.moveaxis(table, k, 0))
+            table = np.moveaxis(summed, 0, k)
+        return cls._of_table([np.stack(np.triu_indices(length)) for length in lengths], table)
+
+    @classmethod
+    def _of_table(cls, pairs, table):
+        """With rows and columns shared out so that fewest products are formed."""
+        sizes = table.shape
+        split = min(range(len(sizes)), key=lambda k: prod(sizes[:k]) + prod(sizes[k:]))
+        table = np.ascontiguousarray(table).reshape(prod(sizes[:split]), -1)
+        return cls(tuple(pairs), table, split)
+
+    def astype(self, dtype):
+        """The same in another precision."""
+        with np.errstate(over="ignore", under="ignore"):
+            return replace(self, table=self.table.astype(dtype))
+
+    def values(self, shares, basis_rows):
+        """Phi' A phi of every row, (n_rows,); shares (n_shares, n_rows)."""
+        groups = self._groups(shares, basis_rows)
+        left = _products(groups[: self.split], basis_rows)
+        right = _products(groups[self.split :], basis_rows)
+        # The smaller side is what the product leaves to be read again.
+        if len(left) > len(right):
+            return np.einsum("in,in->n", right, self.table.T @ left)
+        return np.einsum("in,in->n", left, self.table @ right)
+
+    def shortened(self, shares, basis_rows, tol):
+        """The same up to ``tol`` for every factor, root mean square at given rows, in fewer pairs.
+
+        Rows are to lie all over the range, and in it.
+        """
+        groups, pairs = self._groups(shares, basis_rows), list(self.pairs)
+        table = self.table.reshape([len(group) for group in groups])
+        for k, group in enumerate(groups[:-1]):
+            if _POINTS_PER_PAIR * len(group) > basis_rows.shape[1]:
+                continue
+            rest = _products(groups[:k] + groups[k + 1 :], basis_rows)
+            first = np.moveaxis(table, k, 0)
+            weights = np.abs(first.reshape(len(group), -1) @ rest).max(axis=1)
+            kept, combined = _spanning(group, weights, tol)
+            table = np.moveaxis(np.tensordot(combined, first, axes=(0, 0)), 0, k)
+            groups[k], pairs[k] = group[kept], pairs[k][:, kept]
+        return self._of_table(pairs, table)
+
+    def _groups(self, shares, basis_rows):
+        groups, start = [], 0
+        for i, j in self.pairs[:-1]:
+            own = shares[start : start + j.max() + 1]
+            groups.append(own[i] * own[j])
+            start += len(own)
+        i, j = self.pairs[-1]
+        groups.append(basis_rows[i] * basis_rows[j])
+        return groups
+
+
+def _products(groups, like):
+    """Products of one row of each group, all combinations, the last group's row fastest."""
+    result = groups[0] if groups else np.ones((1, like.shape[1]), like.dtype)
+    for group in groups[1:]:
+        result = (result[:, None, :] * group).reshape(-1, like.shape[1])
+    return result
+
+
+def _spanning(functions, weights, tol):
+    """Some of the functions (n, n_points), by number, and all as their combinations, (n, n_kept).
+
+    Of every function its weight times the root mean square of what is left out counts, and the sum
+    of these stays within ``tol``.
+    """
+    n, n_points = functions.shape
+    weights = np.maximum(weights, np.finfo(float).tiny)
+    scaled = functions * (weights / np.sqrt(n_points))[:, None]
+    triangle, order = linalg.qr(scaled.T, mode="r", pivoting=True)
+    triangle = triangle[:n]
+    # Column norms of what is under each row: what is left of all that come after it.
+    left = np.sqrt(np.cumsum((triangle**2)[::-1], axis=0)[::-1]).sum(axis=1)
+    n_kept = max(int(np.count_nonzero(left > tol)), 1)
+    kept = np.sort(order[:n_kept])
+    place = np.argsort(order[:n_kept])
+    combined = np.zeros((n, n_kept))
+    combined[order[:n_kept], np.argsort(place)] = 1.0
+    dropped = order[n_kept:]
+    if dropped.size:
+        solved = linalg.solve_triangular(triangle[:n_kept, :n_kept], triangle[:n_kept, n_kept:])
+        back = (solved * weights[order[:n_kept], None] / weights[dropped]).T
+        combined[dropped] = back[:, place]
+    return kept, combined

@@ -1,0 +1,42 @@
+"""Quadratic forms of rows of the design: against the dense product, and with pairs left out."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.antecedent import GridAntecedent
+from skanfis.membership import Gaussian, Triangular
+from skanfis.quadratic import QuadraticForm
+
+
+def rows_of_grid(family, counts, Z):
+    """Shares, basis and dense design of a grid over [-1, 1], two inputs."""
+    thetas = [family.start(np.linspace(-1, 1, m), np.full(m, 2 / (m - 1)), 0.5) for m in counts]
+    antecedent = GridAntecedent.build([family] * 2, [0, 1], thetas)
+    strengths, shares = antecedent.strengths_and_shares(Z)
+    basis = np.vstack([np.ones(Z.shape[1]), Z])
+    return shares, basis, (strengths[:, None] * basis).reshape(-1, Z.shape[1])
+
+
+@pytest.mark.parametrize(("family", "at_most"), [(Gaussian, 13 * 6), (Triangular, 11 * 5)])
+def test_form_is_that_of_the_dense_design_and_stays_it_in_fewer_pairs(family, at_most):
+    rng, counts = np.random.default_rng(0), (6, 3)
+    half = rng.standard_normal((54, 54)) / 10.0
+    form = QuadraticForm.of(half.T @ half, counts, 3)
+    even = rng.permuted(np.tile(np.linspace(-1, 1, 128), (2, 1)), axis=1)
+    short = form.shortened(*rows_of_grid(family, counts, even)[:2], 1e-5)
+    shares, basis, design = rows_of_grid(family, counts, rng.uniform(-1, 1, (2, 500)))
+    expected = np.sum((half @ design) ** 2, axis=0)
+    assert form.table.size == 21 * 6 * 6
+    assert_allclose(form.values(shares, basis), expected, rtol=1e-12)
+    assert short.table.size <= at_most * 6
+    assert_allclose(short.values(shares, basis), expected, atol=3e-5)
+
+
+def test_of_scattered_rules_with_more_pairs_than_points_all_are_kept():
+    rng = np.random.default_rng(1)
+    shares = rng.dirichlet(np.ones(5), 20).T
+    form = QuadraticForm.of(np.eye(5), (5,), 1)
+    short = form.shortened(shares, np.ones((1, 20)), 1.0)
+    assert (short.table == form.table).all()
+    assert_allclose(short.values(shares, np.ones((1, 20))), np.sum(shares**2, axis=0))
