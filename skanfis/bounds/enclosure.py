@@ -37,6 +37,7 @@ from math import prod
 import numpy as np
 
 from ..model import TSKModel
+from .corners import slope_by_corners
 from .intervals import product, size, square
 from .rounding import Rounding
 from .shares import Shares, enclosed, factors, largest_mean, smallest_mean, term_ranges
@@ -64,6 +65,7 @@ class _Parts:
     half: np.ndarray  # half the widths of the boxes in the range, (n_inputs, n_boxes)
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # of D, broadcast to the shape of f
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 log w / dx_j^2, likewise
+    third: dict[int, np.ndarray]  # size of d^3 log w / dx_j^3, likewise
     way: tuple[np.ndarray, np.ndarray]  # of h, (n_inputs, n_boxes)
     slack: np.ndarray | None = None  # (n_boxes,), what values are off by
     slope_slack: np.ndarray | None = None  # (n_inputs, n_boxes)
@@ -151,17 +153,24 @@ class Enclosure:
             by_bends = most[0] + rise.sum(axis=0) * (1.0 + _ROUNDINGS * EPS)
             # Beyond the range the tangent's own slope changes by what is not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
-            by_bends = np.where(inside.all(axis=0), by_bends, np.inf)
-            bound = np.fmin(natural, by_bends)
+            inside = inside.all(axis=0)
+            by_bends = np.where(inside, by_bends, np.inf)
             gain = np.where(
                 np.isfinite(by_bends),
                 (up - down) * (high - low),
                 self._gain_of_slope(parts, low, high, j),
             )
+            by_corners, corners, slopes, widths = slope_by_corners(self, parts, low, high, j)
+            by_corners = np.where(inside, by_corners, np.inf)
+            gain = np.where(by_corners < by_bends, widths, gain)
+            bound = np.fmin(np.fmin(natural, by_bends), by_corners)
             # Where the output may be held its slope may be zero.
             bound = np.where(self._may_be_held(parts), np.maximum(bound, 0.0), bound)
+            is_steeper = inside & (slopes > least[0])
+            points = np.where(is_steeper, corners, points)
             said = self.say(points.T)
-            attained = np.where(said == self.hold(said), least[0], 0.0)
+            attained = np.where(is_steeper, slopes, least[0])
+            attained = np.where(said == self.hold(said), attained, 0.0)
         return bound, points, attained, gain
 
     def _may_be_held(self, parts):
@@ -214,10 +223,12 @@ class Enclosure:
         value = self._shaped(centre - radius), self._shaped(centre + radius)
         departure: dict = {}
         curvature: dict = {}
+        third: dict = {}
         for place, one in enumerate(shares):
             for found, of_factor in ((departure, one.departure), (curvature, one.curvature)):
                 for j, ends in of_factor.items():
                     found[j] = tuple(self.placed(end, place) for end in ends)
+            third |= {j: self.placed(most, place) for j, most in one.third.items()}
         parts = _Parts(
             shares,
             value,
@@ -225,6 +236,7 @@ class Enclosure:
             half,
             departure,
             curvature,
+            third,
             way,
         )
         return self._with_slack(parts, near, far)
@@ -264,11 +276,15 @@ class Enclosure:
             parts.known[places] = self._found_centred(parts, places)
         return parts.known[places]
 
+    def centred_slopes(self, parts, j, *places):
+        """Slopes of the consequents by input j less their means along the axes of these factors."""
+        return self._less_means(parts, self._shaped(self.slopes[:, j, None]), places)
+
     def _found_centred(self, parts, places):
         middle = self._less_means(parts, parts.middle, places)
         radius = 0.0
         for i in np.flatnonzero(self.slopes.any(axis=0)):
-            own = self._less_means(parts, self._shaped(self.slopes[:, i, None]), places)
+            own = self.centred_slopes(parts, i, *places)
             radius = radius + np.abs(own) * parts.half[i]
         return middle - radius, middle + radius
 
@@ -335,8 +351,7 @@ class Enclosure:
         low, high = np.zeros((2, *parts.value[0].shape))
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
-                own = self._shaped(self.slopes[:, other, None])
-                own = self._less_means(parts, own, [self.place[one]])
+                own = self.centred_slopes(parts, other, self.place[one])
                 least, most = product(parts.departure[one], (own, own))
                 low, high = low + least, high + most
         if i in parts.departure and j in parts.departure:

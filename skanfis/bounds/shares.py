@@ -64,6 +64,7 @@ class Shares:
     error: np.ndarray  # of the logarithm of a share as it is computed, at most
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
+    third: dict[int, np.ndarray]  # size of d^3 l / dx_j^3, at most
 
 
 def factors(antecedent: Antecedent):
@@ -104,7 +105,7 @@ def enclosed(factor: Factor, terms: TermRanges, log_mu, half):
     slopes_low, slopes_high = factor.along(terms.slope_low), factor.along(terms.slope_high)
     slack = EPS * (_ROUNDINGS + least.shape[0])
     for _ in range(2):
-        shares = Shares(middle, least, most, error, {}, {})
+        shares = Shares(middle, least, most, error, {}, {}, {})
         departure = _departures(shares, slopes_low, slopes_high)
         # The mean error of all counts for each: the sum of the softmax.
         common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
@@ -115,7 +116,8 @@ def enclosed(factor: Factor, terms: TermRanges, log_mu, half):
         most = np.fmin(most, middle * np.exp(radius))
     curve_low, curve_high = factor.along(terms.curve_low), factor.along(terms.curve_high)
     curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
-    return Shares(middle, least, most, each, departure, curvature)
+    third = factor.along(terms.third)
+    return Shares(middle, least, most, each, departure, curvature, third)
 
 
 def _by_range(low, high):

@@ -46,6 +46,8 @@ __all__ = ["EPS", "TermRanges", "is_known", "ranges", "widened"]
 EPS = float(np.finfo(float).eps)
 # Roundings that a membership takes, with room to spare.
 _ROUNDINGS = 16.0
+# Largest s (1 - s) (1 - 2 s) of a sigmoid, at s = (3 - 3^(1/2)) / 6, rounded up.
+_STEEPEST_CURVE = 0.0963
 
 _LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, SigmoidProduct)
 _ONE_SIDED = (SShaped, ZShaped)
@@ -73,6 +75,7 @@ class TermRanges:
     slope_high: np.ndarray
     curve_low: np.ndarray  # of d^2 log mu / dx^2; NaN where it has no bound
     curve_high: np.ndarray
+    third: np.ndarray  # size of d^3 log mu / dx^3 at most; NaN where the second jumps, or not known
     error: np.ndarray  # of log mu as it is computed, at most
 
 
@@ -108,7 +111,8 @@ def ranges(group: TermGroup, low, high):
         size = np.maximum(np.abs(slope_low), np.abs(slope_high))
         error = reach * size + _ROUNDINGS * EPS * np.abs(bottom)
     curve_low, curve_high = widened(*_curvature(group, lo, hi))
-    return TermRanges(bottom, top, slope_low, slope_high, curve_low, curve_high, error)
+    third = _third(group, lo, hi)
+    return TermRanges(bottom, top, slope_low, slope_high, curve_low, curve_high, third, error)
 
 
 def _plateau(group):
@@ -172,6 +176,22 @@ def _curvature(group, lo, hi):
         return _bell_curve(theta, lo, hi)
     nothing = np.full(lo.shape, np.nan)
     return nothing, nothing
+
+
+def _third(group, lo, hi):
+    """The size of d^3 log mu / dx^3 at most; NaN where the second jumps, or no bound is known."""
+    family, theta = group.family, group.theta[:, :, None]
+    if family is Gaussian:
+        return np.zeros(lo.shape)
+    if family is TwoSidedGaussian:
+        half = 0.5 * np.exp(theta[3])
+        jumps = [(lo <= at) & (at <= hi) for at in (theta[0] - half, theta[0] + half)]
+        return np.where(jumps[0] | jumps[1], np.nan, 0.0)
+    if family in (SigmoidDifference, SigmoidProduct):
+        widths = theta[2:4] if family is SigmoidProduct else theta[[2, 2]]
+        size = _STEEPEST_CURVE * np.exp(-3.0 * widths).sum(axis=0)
+        return np.broadcast_to(size, lo.shape)
+    return np.full(lo.shape, np.nan)
 
 
 def _sigmoid_curve(lo, hi):

@@ -74,6 +74,13 @@ def test_ranges_of_curvature_hold(family, rng):
         # 2b < 1: the slope jumps at the centre.
         assert ((found.curve_low <= curve + slack) | ~is_bounded).all()
         assert ((curve - slack <= found.curve_high) | ~is_bounded).all()
+    # Differences of differences: in narrow boxes nothing but rounding is left of them.
+    width = (high - low) / (len(steps) - 1)
+    is_unknown = np.isnan(found.third) | (high - low < 0.03)
+    for before, here, after in zip(at, at[1:], at[2:], strict=False):
+        third = np.abs(after - 2.0 * here + before) / width**2
+        slack = 1e-14 * (np.abs(here) + np.abs(low) * np.abs(found.curve_low)) / width**2
+        assert ((third <= found.third * (1.0 + 1e-6) + slack) | is_unknown).all()
 
 
 @pytest.mark.parametrize("name", ["gaussian", "two_sided_gaussian", "triangular", "trapezoidal"])
