@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
 from sklearn.dummy import DummyRegressor
 from sklearn.frozen import FrozenEstimator
@@ -203,8 +203,11 @@ def test_by_group_covers_new_groups_where_by_row_does_not(method):
         model = ConformalRegressor(NearestRun(), method=method, scaled=False, cv=20)
         by_row.append(covered(model.fit(X[known], y[known]).predict_interval(X[~known]), y[~known]))
         model.fit(X[known], y[known], groups=run[known])
-        by_group.append(covered(model.predict_interval(X[~known]), y[~known]))
+        lower, upper = model.predict_interval(X[~known], 0.9, confidence=None)
+        by_group.append(covered((lower, upper), y[~known]))
         assert model.n_units_ == 12
+        # By default it is every run that counts.
+        assert_array_equal(model.predict_interval(X, 0.7), model.predict_interval(X, 0.7, 0.7))
         lower, upper = model.predict_interval(X[~known], 0.7, confidence=0.9)
         inside = ((lower <= y[~known]) & (y[~known] <= upper)).astype(float)
         by_run += list(np.bincount(run[~known] - 12, inside) / np.bincount(run[~known] - 12))
@@ -326,6 +329,8 @@ def test_bad_input_is_refused_by_name():
         model.predict_interval([[np.nan]])
     with pytest.raises(ValueError, match="confidence is of whole groups, and fit was given none"):
         model.predict_interval(X, confidence=0.9)
+    with pytest.raises(ValueError, match="confidence='all' must be a number, 'auto' or None"):
+        model.predict_interval(X, confidence="all")
     model.set_params(cv=list(KFold(5).split(X)), method="cross")
     model.fit(X, y, groups=np.arange(24) // 2)
     with pytest.raises(ValueError, match="confidence takes folds that hold out whole groups"):
