@@ -41,6 +41,7 @@ from ..structure import (
 )
 from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
+from .knowing import grown
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
 from .restarts import displaced_starts, leave_one_out_error
@@ -93,6 +94,19 @@ def fit_rules(
     """
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
+
+    def fit(counts=None):
+        if counts is None:
+            return _fitted(estimator, data, request, callbacks)
+        return _fitted(estimator, data, replace(request, n_mfs=counts, partition="grid"), None)
+
+    may_grow = request.is_searched and request.partition in ("auto", "grid")
+    if data.wishes is None or not may_grow:
+        return fit()
+    return grown(data, request.premise_inputs, fit)
+
+
+def _fitted(estimator, data, request, callbacks) -> Fitted:
     fit = _Fit(estimator, data, request, callbacks)
     report_constant(fit.rows, data.input_names)
     weights = None
@@ -104,10 +118,12 @@ def fit_rules(
     fit.warn_unless_converged(run)
     firing = fit.builder.firing(run.evaluation)
     model, result, kept = fit.builder.model(run.start, run.evaluation, firing), run.result, None
+    share = np.nan
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
     model = replace(model, posterior=fit.posterior(run, robust))
     if data.wishes is not None:
         model, result, kept = fit.constrained(model, run)
+        share = fit.effective_share(run)
     return Fitted(
         model,
         result,
@@ -116,6 +132,7 @@ def fit_rules(
         weights,
         run.validation_losses,
         kept,
+        share,
     )
 
 
@@ -378,6 +395,15 @@ class _Fit:
         rows = run.problem.rows
         n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
         return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
+
+    def effective_share(self, run):
+        """Effective number of parameters over rows; NaN of too many for a posterior."""
+        posterior = self.posterior(run, None)
+        if posterior is None:
+            return np.nan
+        # noise^2 = MSE / (1 - k / n) of every output.
+        noise = np.sum((posterior.noise / run.problem.rows.targets.scale) ** 2)
+        return 1.0 - run.evaluation.mean_squared_error / noise if noise > 0.0 else 0.0
 
     def constrained(self, model, run):
         """The nearest model that keeps what is known, its result, and a report."""

@@ -46,3 +46,4 @@ class Fitted:
     robust_weights: np.ndarray | None = None
     validation_losses: tuple[float, ...] | None = None
     constraints: dict | None = None
+    effective_share: float = np.nan  # of parameters in rows, before any constraint

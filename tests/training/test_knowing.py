@@ -1,0 +1,95 @@
+"""Structures grown under constraints: what is tried, what is taken, what is told of it."""
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.constraints.wishes import Wishes
+from skanfis.membership import Gaussian
+from skanfis.structure import Start
+from skanfis.training.data import ValidatedData
+from skanfis.training.knowing import grown
+from skanfis.training.result import Fitted
+
+N_ROWS = 100
+
+
+def rules(counts):
+    """A grid, or, of a number, so many scattered rules."""
+    if isinstance(counts, int):
+        return ScatteredAntecedent.build(Gaussian, np.arange(2), np.zeros((2, counts, 2)))
+    used = [j for j, count in enumerate(counts) if count > 1]
+    thetas = [np.zeros((2, counts[j])) for j in used]
+    return GridAntecedent.build([Gaussian] * len(used), used, thetas)
+
+
+def grow(errors, found, groups=None, candidates=()):
+    """The terms that are chosen where fits of so many have these errors, and all that were tried.
+
+    Logarithms of the expected error, times the number of rows.
+    """
+    tried = []
+
+    def fit(counts=None):
+        counts = found if counts is None else tuple(counts)
+        tried.append(counts)
+        if counts not in errors:
+            raise ValueError("cannot keep it")
+        warnings.warn(f"{counts} told", UserWarning, stacklevel=2)
+        known = {"loss_before": 0.9, "loss_after": np.exp(errors[counts] / N_ROWS)}
+        start = Start(rules(counts), None, candidates=list(candidates))
+        model = SimpleNamespace(antecedent=rules(counts))
+        return Fitted(model, None, start, [], constraints=known, effective_share=0.0)
+
+    X = np.column_stack([np.arange(N_ROWS), np.arange(N_ROWS) % 3])
+    wishes = Wishes(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
+    data = ValidatedData(X, None, None, groups, (), (), wishes=wishes)
+    with pytest.warns(UserWarning, match="told") as told:
+        best = grown(data, np.arange(2), fit)
+    assert best.start.candidates == list(candidates)
+    chosen = best.model.antecedent
+    text = str(told[0].message)
+    assert len(told) == 1
+    return text.removesuffix(" told"), chosen, tried
+
+
+def test_a_grid_grows_while_a_term_gains_two():
+    errors = {(2, 1): 0.0, (3, 1): -3.0, (2, 2): -1.0, (4, 1): -5.5, (5, 1): -7.4}
+    chosen, _, tried = grow(errors, (2, 1))
+    # (3, 2) and (4, 2) cannot keep it; of (5, 1) the gain is too small.
+    assert chosen == "(4, 1)"
+    assert tried == [(2, 1), (3, 1), (2, 2), (4, 1), (3, 2), (5, 1), (4, 2)]
+    # Groups are what there is of observations: ten of them tell a tenth.
+    assert grow(errors, (2, 1), groups=np.arange(N_ROWS) // 10)[0] == "(2, 1)"
+
+
+def test_no_more_terms_than_values_and_scattered_rules_beside_their_best_grid():
+    errors = {4: 0.0, (1, 3): -5.0, (2, 3): -6.0}
+    grids = [{"n_mfs": None}, {"n_mfs": [1, 3]}, {"n_mfs": [1, 1]}]
+    chosen, _, tried = grow(errors, 4, candidates=grids)
+    assert chosen == "(1, 3)"
+    assert tried == [4, (1, 3), (2, 3)]
+
+
+def test_what_costs_nothing_is_left_alone():
+    assert grow({(2, 2): N_ROWS * np.log(0.9) + 1.9}, (2, 2))[2] == [(2, 2)]
+
+
+def test_a_step_that_must_rise_takes_more_terms_and_is_nearer_to_the_truth():
+    """Two lines that fall away from a step are the best two rules; rising ones are not."""
+    rng = np.random.default_rng(4)
+    X = rng.uniform(-1, 1, (100, 2))
+    new = 0.95 * X[::-1]
+    truth, exact = (1.0 / (1.0 + np.exp(-8.0 * x[:, 0])) + 0.5 * x[:, 1] for x in (X, new))
+    y = truth + 0.3 * truth.std() * rng.standard_normal(100)
+    few = ANFISRegressor(n_mfs=[2, 1], monotonic_cst=[1, 0]).fit(X, y)
+    more = ANFISRegressor(monotonic_cst=[1, 0]).fit(X, y)
+    off = [np.mean((one.predict(new) - exact) ** 2) for one in (few, more)]
+    assert more.constraints_["certified"]
+    assert more.n_rules_ > 2
+    assert more.structures_[0]["n_mfs"] == [2, 1]
+    assert off[1] < 0.75 * off[0]
