@@ -31,22 +31,26 @@ def run(options):
     return Results([Row(work, measures)])
 
 
-def write_log(path):
+def write_log(path, n_runs=_N_RUNS):
+    """A row a second, of so many runs of 83,341 rows; CSV or Parquet, by its name."""
     log = make_ofog(
         n_devices=1,
-        n_runs=_N_RUNS,
+        n_runs=n_runs,
         duration=_RUN,
         sampling_interval=1.0,
         profile="ramps",
         random_state=0,
     )
-    log[_COLUMNS].to_csv(path, index=False, float_format="%.9g")
+    if path.suffix == ".parquet":
+        log[_COLUMNS].to_parquet(path)
+    else:
+        log[_COLUMNS].to_csv(path, index=False, float_format="%.9g")
     return len(log)
 
 
-def calibrate(folder):
+def calibrate(folder, *arguments):
     """Wall time and CPU time [s] and peak memory [GB] of the command."""
-    command = [sys.executable, "-m", "skanfis.gyro", "log.csv", "--quiet"]
+    command = [sys.executable, "-m", "skanfis.gyro", *(arguments or ("log.csv",)), "--quiet"]
     start = time.perf_counter()
     # Where it runs there is no skanfis to import but the one that runs this.
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}

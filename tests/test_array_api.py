@@ -1,5 +1,6 @@
 """Arrays of other libraries go in as NumPy's; with dispatch, predictions stay what they are."""
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from skanfis import ANFISRegressor
 strict = pytest.importorskip("array_api_strict")
 
 WITH_DISPATCH = """
-import array_api_strict as xp, numpy as np, pytest, sklearn, warnings
+import LIBRARY as xp, numpy as np, pytest, sklearn, warnings
 from numpy.testing import assert_allclose
 from sklearn.preprocessing import StandardScaler
 from sklearn.pipeline import make_pipeline
@@ -70,13 +71,17 @@ def test_strict_arrays_are_the_same_as_numpys():
 
 
 @pytest.mark.slow
-def test_with_dispatch_predictions_are_computed_in_the_arrays_library():
+@pytest.mark.parametrize("library", ["array_api_strict", "torch"])
+def test_with_dispatch_predictions_are_computed_in_the_arrays_library(library):
+    if importlib.util.find_spec(library) is None:
+        pytest.skip(f"{library} is not installed")
     if parse_version(sklearn.__version__) < parse_version("1.7"):
         # scikit-learn brings its own from 1.7 on.
         pytest.importorskip("array_api_compat")
     # SciPy reads its own switch when it is imported.
     environment = {**os.environ, "SCIPY_ARRAY_API": "1"}
-    command = [sys.executable, "-W", "error::UserWarning", "-c", WITH_DISPATCH]
+    script = WITH_DISPATCH.replace("LIBRARY", library)
+    command = [sys.executable, "-W", "error::UserWarning", "-c", script]
     subprocess.run(command, env=environment, check=True)
 
 

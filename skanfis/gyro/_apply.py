@@ -4,14 +4,14 @@ from pathlib import Path
 
 import joblib
 import numpy as np
-import pandas as pd
 
 from ..export.c.status import STATUS
+from ._carried import Carried
 from ._console import UsageError, refuse_existing, say
 from ._files import check_different, find_logs
 from ._logs import request_of
 from ._staging import Staging
-from ._stream import LogStream, rows_before
+from ._stream import LogStream
 from ._units import SIGNALS
 from .compensator import GyroCompensator
 from .errors import LogError
@@ -39,11 +39,12 @@ def apply(options, tell):
             for number, path in enumerate(paths, start=1):
                 stream = _open(path, options, sorted(needed), compensator, tell)
                 tell(f"compensating {path} ({number} of {len(paths)})")
-                carried = _Carried(compensator)
+                carried = Carried(compensator.inputs, compensator.time_constant)
                 for log in stream.pieces():
                     if len(paths) > 1 and "run" not in log:
                         log["run"] = Path(path).stem
-                    compensated = carried.apply(log)
+                    X, indicated = carried.features(log), compensator.indicated(log)
+                    compensated = compensator._compensated(X, indicated)
                     labels = [name for name in ("device", "run", "time") if name in log]
                     table = log[labels].join(compensated)
                     # Twelve digits are beyond any gyro, and short beside the 17 of a double.
@@ -76,61 +77,6 @@ def _open(path, options, needed, compensator, tell):
         tell(f"note: {note}")
     tell(f"{stream.n_rows:,} rows")
     return stream
-
-
-class _Carried:
-    """A compensator over the pieces of a log, whose runs go on from one piece to the next.
-
-    A run that goes on begins with two rows made up: the second is its last one, and between them
-    the temperature rises by what leaves the low-pass at the rate that it had there.
-    """
-
-    def __init__(self, compensator):
-        self._compensator = compensator
-        self._state: dict = {}  # by run: first time, last time, temperature and its rate there
-
-    def apply(self, log):
-        """Compensate the next rows."""
-        compensator = self._compensator
-        if not {"time", "temperature_rate"} & set(compensator.inputs):
-            return compensator.apply(log)
-        runs = log["run"].astype(object) if "run" in log else pd.Series(None, log.index, object)
-        known = [run for run in runs.unique() if run in self._state]
-        before = [row for run in known for row in self._before(run, "run" in log)]
-        columns = [part for part in ("time", "temperature", "output", "run") if part in log]
-        own = log[columns].assign(run=runs) if "run" in log else log[columns]
-        X = compensator.features(rows_before(before, own))
-        X = X.iloc[len(before) :].set_axis(log.index)
-        lag = compensator.time_constant
-        if "time" in X:
-            began = {run: self._state[run][1] - lag - self._state[run][0] for run in known}
-            X["time"] += runs.map(began).fillna(0.0).astype(float)
-        self._remember(log, runs, X)
-        return compensator._compensated(X, compensator.indicated(log))
-
-    def _before(self, run, has_run):
-        _, time, temperature, rate = self._state[run]
-        lag = self._compensator.time_constant
-        earlier = temperature + rate * lag / np.expm1(-1.0)
-        rows = [
-            {"time": time - lag, "temperature": earlier, "output": 0.0},
-            {"time": time, "temperature": temperature, "output": 0.0},
-        ]
-        return [row | {"run": run} for row in rows] if has_run else rows
-
-    def _remember(self, log, runs, X):
-        ends = ~runs.duplicated(keep="last").to_numpy()
-        begins = ~runs.duplicated().to_numpy()
-        for run, time in zip(runs[begins], log["time"][begins], strict=True):
-            self._state.setdefault(run, (time, None, None, None))
-        for place in np.flatnonzero(ends):
-            run = runs.iloc[place]
-            self._state[run] = (
-                self._state[run][0],
-                log["time"].iloc[place],
-                log["temperature"].iloc[place] if "temperature" in log else 0.0,
-                X["temperature_rate"].iloc[place] if "temperature_rate" in X else 0.0,
-            )
 
 
 def load(path, tell):

@@ -60,6 +60,7 @@ class Calibration:
     chosen from its fold's training rows, or None where nothing was chosen. ``simpler`` are
     compensations without rules, judged with the model by ``verdict`` on the rows in range.
     ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    ``n_rows`` is how many rows there were, of which ``log`` holds some where they are too many.
     """
 
     recipe: Recipe
@@ -77,6 +78,12 @@ class Calibration:
     n_fit_rows: int
     warnings: list
     glitches: list
+    n_rows: int
+
+    @property
+    def is_thinned(self):
+        """Whether the log has more rows than are held."""
+        return self.n_rows > len(self.log)
 
     @property
     def rate(self):
@@ -99,16 +106,17 @@ class Calibration:
         return [*_what_is_worse(before, after, self.inside, unit), *self.glitches]
 
 
-def calibrate(log, split, recipe, tell, name_row="row {}".format):
+def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, n_rows=None):
     """Choose the structure, compensate every row by a model that is new to it, fit to all rows.
 
     ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
+    ``made`` are inputs that are there already, and ``n_rows`` is of how many rows these are some.
     """
     factor = 1.0
     if recipe.output_unit in SIGNALS:
         at_rest = np.ptp(log["rate"]) == 0.0
         factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
-    X = features(log, recipe.inputs, recipe.time_constant)
+    X = features(log, recipe.inputs, recipe.time_constant, made)
     before = log["output"].to_numpy() / factor
     error = before - log["rate"].to_numpy()
     glitches = _glitches(log, error, name_row, tell)
@@ -143,6 +151,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
         n_fit_rows=rows.size,
         warnings=caught,
         glitches=glitches,
+        n_rows=len(log) if n_rows is None else n_rows,
     )
 
 

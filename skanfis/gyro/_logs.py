@@ -8,6 +8,7 @@ from ._checks import LARGEST_AT_REST, check_at_rest, check_log
 from ._console import UsageError, pairs
 from ._layout import Request
 from ._table import LogFile
+from ._thinned import read_thinned
 from ._units import SIGNALS
 from .compensator import INPUTS
 from .errors import LogError
@@ -82,20 +83,34 @@ def read_for(options, paths, require, tell, columns=None):
     if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
         require = (*require, "time")
     try:
-        reading = read(
-            paths, request_of(options, require, columns), max_gap=options.max_gap, tell=tell
-        )
-    except LogError:
+        reading = _read(options, paths, request_of(options, require, columns), tell)
+    except (LogError, UsageError):
         raise
     except ValueError as error:
         # Signs that do not go together.
         raise UsageError(str(error)) from error
-    if options.device is not None:
-        reading = _of_device(reading, options.device)
     for note in reading.notes:
         tell(f"note: {note}")
-    tell(f"{len(reading.log):,} rows{_counts(reading.log)}")
+    tell(f"{reading.n_rows:,} rows{_counts(reading.log)}")
     return reading
+
+
+def _read(options, paths, request, tell):
+    """All rows of the files, or of a device; some of them where they are too many to be held."""
+    most_rows = options.check_rows
+    reading = read(paths, request, max_gap=options.max_gap, tell=tell, most_rows=most_rows)
+    if reading is not None:
+        return reading if options.device is None else _of_device(reading, options.device)
+    tell(f"more than {most_rows:,} rows: not all are held")
+    return read_thinned(
+        paths,
+        request,
+        max_gap=options.max_gap,
+        most_rows=most_rows,
+        time_constant=options.time_constant,
+        tell=tell,
+        device=options.device,
+    )
 
 
 def read_task(options, paths, task, tell):

@@ -231,6 +231,14 @@ def _add_model(group):
         help="fit to so many rows, chosen at random, of a longer log (100000); all are checked",
     )
     group.add_argument(
+        "--check-rows",
+        type=count,
+        default=1_000_000,
+        metavar="N",
+        help="hold so many rows of a longer log, drawn evenly from every run, for fit, check and "
+        "report (1000000): memory does not grow beyond. All rows are read and checked for errors",
+    )
+    group.add_argument(
         "--jobs", type=jobs, metavar="N", help="threads for a fit (1); -1 is one per core"
     )
 

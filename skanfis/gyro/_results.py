@@ -61,7 +61,7 @@ class Results:
             if self.time is not None
             else None
         )
-        self.run = self.log["run"].astype(str).to_numpy(dtype=object) if "run" in self.log else None
+        self.run = _texts(self.log["run"]) if "run" in self.log else None
 
     @property
     def unit(self):
@@ -101,7 +101,8 @@ class Results:
             self.after,
             temperature=self.temperature,
             temperature_rate=self.temperature_rate,
-            time=self.time,
+            # Of some rows, means over a time are not those of all.
+            time=None if self.calibration.is_thinned else self.time,
             run=self.run,
             # At rest there is no scale factor; any full scale will do.
             full_scale=np.abs(self.rate).max() or 1.0,
@@ -167,6 +168,8 @@ class Results:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:
             return "the log has no time"
+        if self.calibration.is_thinned:
+            return "only some of the rows are held: see --check-rows and --average"
         steps = self.steps
         if not steps.size or np.ptp(steps) > _UNEVEN * np.median(steps):
             return "the rows are not evenly spaced in time"
@@ -207,6 +210,12 @@ class Results:
         """Whether the temperature both rises and falls."""
         rates = self.temperature_rate
         return rates is not None and rates.min() < -_CLEARLY < _CLEARLY < rates.max()
+
+
+def _texts(labels):
+    """Labels as text: one for all rows of a label, not one for each."""
+    own = labels.astype("category").cat
+    return own.categories.astype(str).to_numpy(dtype=object)[own.codes.to_numpy()]
 
 
 def _read_off(curve, name):

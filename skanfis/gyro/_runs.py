@@ -172,15 +172,19 @@ class Splitter:
         """For the same log from the beginning."""
         return Splitter(self._max_gap, self._longest)
 
-    def numbers(self, sequence, time):
-        """Number of every row's run in its sequence, from 1; ``sequence`` are labels or None."""
+    def numbers(self, sequence, time, owner=None):
+        """Number of every row's run in its sequence, from 1; ``sequence`` are labels or None.
+
+        What has another ``owner``, such as a file, is another sequence.
+        """
         codes, names = pd.factorize(np.zeros(time.size) if sequence is None else sequence)
         numbers = np.empty(time.size, dtype=int)
         for code, name in enumerate(names):
             rows = np.flatnonzero(codes == code)
-            numbers[rows] = own = self._of_one(name, time[rows])
+            numbers[rows] = own = self._of_one((owner, name), time[rows])
             for number, count in zip(*np.unique(own, return_counts=True), strict=True):
-                self._lengths[name, number] = self._lengths.get((name, number), 0) + int(count)
+                key = owner, name, number
+                self._lengths[key] = self._lengths.get(key, 0) + int(count)
         return numbers
 
     def _of_one(self, name, time):

@@ -33,56 +33,83 @@ class LogStream:
         Longest step of the time within a run [s].
     device : str, optional
         The rows of this device alone.
+    after : LogStream, optional
+        That of a file before, of the same log: its columns, and its usual step of the time, hold.
     """
 
-    def __init__(self, path, request, max_gap, device=None):
+    def __init__(self, path, request, max_gap, device=None, after=None):
         self.path, self._request, self._device = path, request, device
-        self._file = LogFile.open(path, request)
-        self._parts = self._file.layout.places
+        self._first = None if after is None else after._first or after.file
+        self.file = LogFile.open(path, request, self._first)
+        self._parts = self.file.layout.places
         can_split = "time" in self._parts and "run" not in self._parts
         self._splitter = Splitter(max_gap) if can_split else None
+        self._lost = LostRows()
+        if after is not None:
+            self._splitter, self._lost = after._splitter, after._lost
         self._names: dict = {}  # of the runs, by device and label or number
         self.n_rows = 0
+        self.counts: dict = {}  # rows of each run, by device and label or number
 
     @property
     def units(self):
         """Units of the parts in the file."""
-        return self._file.layout.units
+        return self.file.layout.units
+
+    @property
+    def is_split(self):
+        """Whether the time tells several runs."""
+        return self._splitter is not None and self._splitter.is_split
 
     def scan(self, tell):
         """Read the file for the first time; LogError where it cannot be compensated.
 
         Returns what was found out, in sentences.
         """
-        runs, lost = _Runs(), LostRows()
-        for n_pieces, (codes, keys, piece) in enumerate(self._keyed(self._file, self._splitter), 1):
+        self.check(tell)
+        self.check_device({device for device, _ in self.counts})
+        if "run" in self._parts or self.is_split:
+            self._name(list(self.counts))
+        return [*self.file.notes, *self.found(len(self.file.dropped))]
+
+    def check(self, tell):
+        """Read the file for the first time, and count the rows of its runs."""
+        runs = _Runs()
+        for n_pieces, (codes, keys, piece) in enumerate(self._keyed(self.file, self._splitter), 1):
             log = pd.DataFrame(piece | {"run": codes})
             try:
-                runs.check(log.drop(columns="device", errors="ignore"), keys, self.units, lost)
+                runs.check(
+                    log.drop(columns="device", errors="ignore"), keys, self.units, self._lost
+                )
             except LogError as error:
                 if error.row is not None:
                     error.row += self.n_rows
                 is_exact = self._request.average is None
-                raise Reading(log, [self._file], [], is_exact).located(error) from error
+                raise Reading(log, [self.file], [], len(log), is_exact).located(error) from error
             self.n_rows += len(log)
+            for key, count in zip(keys, np.bincount(codes).tolist(), strict=True):
+                self.counts[key] = self.counts.get(key, 0) + count
             if n_pieces % _PIECES_TOLD == 0:
-                tell(f"{self.path}: {self._file.n_rows:,} rows so far")
-        notes = list(self._file.notes)
-        self._check_device({device for device, _ in runs.seen})
-        if self._splitter is not None and self._splitter.is_split:
-            notes.append(self._splitter.why)
-        if "run" in self._parts or (self._splitter is not None and self._splitter.is_split):
-            self._name(list(runs.seen))
-        said = lost.sentence(len(self._file.dropped))
-        return [*notes, said] if said else notes
+                tell(f"{self.path}: {self.file.n_rows:,} rows so far")
+
+    def found(self, n_dropped):
+        """What the time has told of all files read so far: runs, and rows that are missing."""
+        lost = self._lost.sentence(n_dropped)
+        split = self._splitter.why if self._splitter is not None and self.is_split else ""
+        return [sentence for sentence in (split, lost) if sentence]
+
+    def check_device(self, devices):
+        """UsageError where the device that is asked for is none of these."""
+        if self._device is None:
+            return
+        if "device" not in self._parts:
+            raise UsageError("--device: the log has no column for the device.")
+        if self._device not in devices:
+            raise UsageError(f"--device {self._device}: the log has {', '.join(devices)}.")
 
     def pieces(self):
         """Its rows as logs, one after the other."""
-        splitter = None
-        if self._splitter is not None and self._splitter.is_split:
-            splitter = self._splitter.again()
-        file = LogFile.open(self.path, self._request)
-        for codes, keys, piece in self._keyed(file, splitter):
+        for codes, keys, piece in self.again():
             log = pd.DataFrame({part: piece[part] for part in COLUMNS if part in piece})
             if self._names:
                 names = pd.Index([self._names[key] for key in keys])
@@ -92,6 +119,13 @@ class LogStream:
             if len(log):
                 yield log
 
+    def again(self):
+        """Pieces of the file from the beginning: numbers of runs, their keys, and the parts."""
+        splitter = None
+        if self._splitter is not None and self._splitter.is_split:
+            splitter = self._splitter.again()
+        yield from self._keyed(LogFile.open(self.path, self._request, self._first), splitter)
+
     def _keyed(self, file, splitter):
         """Pieces of the file, with the run of every row: its place among keys (device, label)."""
         for piece in file.pieces():
@@ -100,7 +134,7 @@ class LogStream:
                 continue
             device, run = piece.get("device"), piece.get("run")
             if splitter is not None:
-                run = splitter.numbers(device, piece["time"])
+                run = splitter.numbers(device, piece["time"], self.path)
             owners = [
                 pd.factorize(np.zeros(n_rows, dtype=int) if labels is None else labels)
                 for labels in (device, run)
@@ -115,14 +149,6 @@ class LogStream:
                 for pair in pairs.tolist()
             ]
             yield codes, keys, piece
-
-    def _check_device(self, devices):
-        if self._device is None:
-            return
-        if "device" not in self._parts:
-            raise UsageError("--device: the log has no column for the device.")
-        if self._device not in devices:
-            raise UsageError(f"--device {self._device}: the log has {', '.join(devices)}.")
 
     def _name(self, keys):
         """The shortest label that tells the runs apart."""

@@ -1,5 +1,6 @@
 """The rows of one file: its parts in the units of a log, piece by piece, with a place for each."""
 
+from array import array
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -12,7 +13,7 @@ from ._clock import Clock
 from ._layout import Layout, Request, settle
 from ._parquet import ParquetLog, is_parquet
 from ._text import TextLog
-from ._units import convert
+from ._units import SIGNALS, convert
 from .errors import LogError
 
 __all__ = ["LogFile"]
@@ -31,7 +32,7 @@ class LogFile:
     ----------
     n_rows : int
         Rows of the file that were read.
-    dropped : list of int
+    dropped : array of int
         Positions of those that lack a value, and are left out.
     missing : dict of str to int
         How many values each part lacks.
@@ -42,19 +43,22 @@ class LogFile:
     layout: Layout
     request: Request
     n_rows: int = 0
-    dropped: list = field(default_factory=list)
+    dropped: array = field(default_factory=lambda: array("q"))
     missing: dict = field(default_factory=dict)
     notes: list = field(default_factory=list)
 
     @classmethod
     def open(cls, path, request, first=None):
-        """Look at a file's head; LogError where it is no log."""
+        """Look at a file's head; LogError where it is no log, or not like the first file of it."""
         if is_parquet(path):
             source: TextLog | ParquetLog = ParquetLog(path)
         else:
             source = TextLog(path, request.separator, request.decimal, request.encoding)
         layout = settle(source, request, None if first is None else first.layout)
-        return cls(path, source, layout, request, notes=[*source.notes, *layout.said])
+        file = cls(path, source, layout, request, notes=[*source.notes, *layout.said])
+        if first is not None:
+            _check_alike(file, first)
+        return file
 
     def pieces(self):
         """Parts as arrays, those of labels as lists of strings, so many rows at a time."""
@@ -171,7 +175,7 @@ class LogFile:
             return piece
         for part, bad in missing.items():
             self.missing[part] = self.missing.get(part, 0) + int(bad.sum())
-        self.dropped += (self.n_rows + np.flatnonzero(lacking)).tolist()
+        self.dropped.extend((self.n_rows + np.flatnonzero(lacking)).tolist())
         return {part: values[~lacking] for part, values in piece.items()}
 
     def _check_times(self, texts, seconds):
@@ -211,6 +215,19 @@ class LogFile:
 
     def _first_dropped(self):
         return self.source.place_of(self.dropped[0])
+
+
+def _check_alike(file, first):
+    """LogError where a file has other parts than the first, or another kind of output."""
+    differ = sorted(set(file.layout.places) ^ set(first.layout.places))
+    if differ:
+        raise LogError(f"{file.path}: the files differ in having {', '.join(differ)}.")
+    units = [one.layout.units["output"] for one in (first, file)]
+    if units[0] != units[1] and set(units) & set(SIGNALS):
+        raise LogError(
+            f"{file.path}: the output is in {units[1]}, in {first.path} in {units[0]}; say which "
+            "it is (units: output=UNIT)."
+        )
 
 
 def _shortened(text):

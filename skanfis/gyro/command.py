@@ -151,7 +151,16 @@ def _calibration(options, paths, task, tell, may_skip):
     split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
     tell(f"inputs: {', '.join(inputs)}")
     tell(f"check: {split.sentence}")
-    return calibrate(reading.log, split, recipe, tell, reading.name_row), reading.notes
+    calibration = calibrate(
+        reading.log,
+        split,
+        recipe,
+        tell,
+        reading.name_row,
+        made=reading.made,
+        n_rows=reading.n_rows,
+    )
+    return calibration, reading.notes
 
 
 def _box(sides, inputs):

@@ -252,14 +252,17 @@ class GyroCompensator:
         return predicted, inside, ask(self.estimator, "coverage", X)
 
 
-def features(log, inputs, time_constant):
-    """Columns that are known on board, in the order of ``inputs``."""
+def features(log, inputs, time_constant, made=None):
+    """Columns that are known on board, in the order of ``inputs``; ``made`` are there already."""
+    made = made or {}
     has_run = "run" in log
     roles = {"time": "time", "run": "run" if has_run else None}
     columns = {}
     for name in inputs:
         clock = log[[part for part in ("time", "run") if part in log]]
-        if name == "time":
+        if name in made:
+            columns[name] = made[name]
+        elif name == "time":
             columns[name] = TimeSincePowerOn(**roles).fit_transform(clock)[:, 0]
         elif name == "temperature_rate":
             rate = ThermalRate(time_constant, **roles)

@@ -7,7 +7,7 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,20 @@ from ._files import check_different
 from ._layout import COLUMNS, Request
 from ._runs import lost_rows, name_runs, split_runs
 from ._table import LogFile
-from ._units import SIGNALS, declared_units
+from ._units import declared_units
 from .errors import LogError
 
-__all__ = ["LogError", "Reading", "check_log", "checked_request", "read", "read_log"]
+__all__ = [
+    "Columns",
+    "LogError",
+    "Reading",
+    "check_log",
+    "checked_request",
+    "notes_of",
+    "read",
+    "read_log",
+    "short_names",
+]
 
 
 # After so many pieces of a long file, a line of progress.
@@ -114,14 +124,23 @@ class Reading:
     files : list of LogFile
     notes : list of str
         What was found out, in sentences without a full stop.
+    n_rows : int
+        Rows that there were, held or not.
     is_exact : bool
         Whether every row of the log is one of a file, in the order of the files.
+    places : ndarray of shape (n_rows,), optional
+        Which of the files' rows they are, where the log is too long and only some are held.
+    made : dict of str to ndarray
+        Inputs that were made while all rows were at hand.
     """
 
     log: pd.DataFrame
     files: list
     notes: list
+    n_rows: int
     is_exact: bool = True
+    places: np.ndarray | None = None
+    made: dict = field(default_factory=dict)
 
     @property
     def units(self):
@@ -131,11 +150,12 @@ class Reading:
     def name_row(self, row):
         """In words, where a row of the log is found."""
         if self.is_exact:
+            left = row if self.places is None else int(self.places[row])
             for file in self.files:
                 n_kept = file.n_rows - len(file.dropped)
-                if row < n_kept:
-                    return file.place_of(row)
-                row -= n_kept
+                if left < n_kept:
+                    return file.place_of(left)
+                left -= n_kept
         if "run" in self.log:
             return f"row {row}, in run {self.log['run'].iloc[row]}"
         return f"row {row}"
@@ -158,33 +178,35 @@ class Reading:
         for part in ("run", "device"):
             if part in log:
                 log[part] = log[part].cat.remove_unused_categories()
-        return replace(self, log=log, is_exact=False)
+        return replace(self, log=log, n_rows=len(log), is_exact=False)
 
 
-def read(paths, request, *, max_gap=None, tell=None):
-    """Read files as :func:`read_log` does; returns a :class:`Reading`.
+def read(paths, request, *, max_gap=None, tell=None, most_rows=None):
+    """Read files as :func:`read_log` does; returns a :class:`Reading`, or None of too many rows.
 
     ``max_gap`` is the longest step of the time within a run [s], "auto", or None: no file is split.
-    ``tell`` is called with a line of text for every file, where there are several.
+    ``tell`` is called with a line of text for every file, where there are several. More than
+    ``most_rows`` are not held.
     """
     request = checked_request(request)
     if not paths:
         raise ValueError("paths: at least one file is needed.")
     check_different(paths)
     files: list[LogFile] = []
-    columns = _Columns()
+    columns = Columns()
     for path in paths:
         file = LogFile.open(path, request, files[0] if files else None)
         files.append(file)
-        _check_alike(file, files[0])
         for n_pieces, piece in enumerate(file.pieces(), start=1):
             columns.add(piece, len(files) - 1)
+            if most_rows is not None and columns.n_rows > most_rows:
+                return None
             if tell is not None and n_pieces % _PIECES_TOLD == 0:
                 tell(f"{path}: {file.n_rows:,} rows so far")
         if tell is not None and len(paths) > 1:
             tell(f"read {len(files):,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
-    log = columns.table(list(files[0].layout.places), _short_names(paths))
-    notes = _notes(files)
+    log = columns.table(list(files[0].layout.places), short_names(paths))
+    notes = notes_of(files)
     number = None
     if max_gap is not None and "run" not in log:
         number, why = split_runs(log, max_gap)
@@ -193,29 +215,17 @@ def read(paths, request, *, max_gap=None, tell=None):
     log = log[[part for part in COLUMNS if part in log]]
     if lost := lost_rows(log, sum(len(file.dropped) for file in files)):
         notes.append(lost)
-    return Reading(log, files, notes, is_exact=request.average is None)
+    return Reading(log, files, notes, len(log), is_exact=request.average is None)
 
 
-def _check_alike(file, first):
-    """LogError where a file has other parts than the first, or another kind of output."""
-    differ = sorted(set(file.layout.places) ^ set(first.layout.places))
-    if differ:
-        raise LogError(f"{file.path}: the files differ in having {', '.join(differ)}.")
-    units = [one.layout.units["output"] for one in (first, file)]
-    if units[0] != units[1] and set(units) & set(SIGNALS):
-        raise LogError(
-            f"{file.path}: the output is in {units[1]}, in {first.path} in {units[0]}; say which "
-            "it is (units: output=UNIT)."
-        )
-
-
-class _Columns:
+class Columns:
     """Columns that grow piece by piece; labels as numbers."""
 
     def __init__(self):
         self._parts: dict = {}
         self._labels: dict = {}
         self._files: list = []
+        self.n_rows = 0
 
     def add(self, piece, file):
         """Append a piece of a file."""
@@ -232,6 +242,7 @@ class _Columns:
             self._files[-1][1] += n_rows
         else:
             self._files.append([file, n_rows])
+        self.n_rows += n_rows
 
     def table(self, parts, names):
         """The log, with a column "file" where there are several."""
@@ -252,12 +263,13 @@ class _Columns:
         return log
 
 
-def _short_names(paths):
+def short_names(paths):
+    """Names of the files without folders and endings, where these tell them apart."""
     stems = [Path(path).stem for path in paths]
     return stems if len(set(stems)) == len(stems) else [os.fspath(path) for path in paths]
 
 
-def _notes(files):
+def notes_of(files):
     """What was found out about the files; what holds for several is said once."""
     by_note: dict = {}
     for file in files:

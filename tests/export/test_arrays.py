@@ -9,14 +9,17 @@ from skanfis.export.arrays import predict_in
 
 from .every_model import CASES, rows, size_of_sum
 
-xp = pytest.importorskip("array_api_strict")
-
 # Of the largest sum over rules: rounding, of some hundred operations.
 TOLERANCE = {np.float64: 1e-12, np.float32: 3e-5}
 
 
 @pytest.mark.parametrize("dtype", TOLERANCE)
-def test_every_model(dtype, monkeypatch):
+@pytest.mark.parametrize("library", ["array_api_strict", "torch"])
+def test_every_model(library, dtype, monkeypatch):
+    xp = pytest.importorskip(library)
+    if library == "torch":
+        # Its own functions are not quite those of the standard; scikit-learn brings what is.
+        xp = pytest.importorskip("sklearn.externals.array_api_compat.torch")
     monkeypatch.setattr(arrays, "_BLOCK_ROWS", 128)
     X = rows(dtype, 300)
     worst = {}

@@ -16,6 +16,14 @@ def check(page, results):
     """The folds, the terms of each, and the comparison with simpler compensations."""
     calibration = results.calibration
     page.section("How it was checked")
+    if calibration.is_thinned:
+        page.paragraph(
+            f"The log has {calibration.n_rows:,} rows. All were read and looked at for errors; "
+            f"what is said here is of {len(calibration.log):,} of them, drawn at random in equal "
+            "parts from every stretch of every run, with those at the ends of the ranges. Figures "
+            "that need every row, of bias stability and Allan's deviation, are left out: see "
+            "--check-rows and --average."
+        )
     page.paragraph(
         f"Every row was compensated by a model that had not seen its group: "
         f"{calibration.split.sentence}. A row outside the range of that model's training data is "

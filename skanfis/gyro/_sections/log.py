@@ -11,14 +11,17 @@ def log(page, results):
     calibration = results.calibration
     rows = results.log
     page.section("The log and the options")
-    lines = [("rows", f"{len(rows):,}", "")]
+    lines = [("rows", f"{calibration.n_rows:,}", "")]
+    if calibration.is_thinned:
+        lines.append(("rows kept, drawn at random", f"{len(rows):,}", ""))
     for name in ("run", "device"):
         if name in rows:
             lines.append((f"{name}s", f"{rows[name].nunique():,}", ""))
     if calibration.n_fit_rows < len(rows):
         lines.append(("rows fitted to, chosen at random", f"{calibration.n_fit_rows:,}", ""))
     if results.time is not None:
-        lines.append(("time between rows, median", f"{results.interval:.4g}", "s"))
+        which = "rows kept" if calibration.is_thinned else "rows"
+        lines.append((f"time between {which}, median", f"{results.interval:.4g}", "s"))
     ranges = {"temperature": "°C", "rate": "°/s", "output": unit_of(calibration, "output")}
     for name, unit in ranges.items():
         lines.append((name, f"{rows[name].min():.5g} to {rows[name].max():.5g}", unit))
