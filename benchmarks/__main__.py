@@ -28,6 +28,7 @@ ON_REQUEST = (
     "compiled",
     "large_data",
     "long_logs",
+    "workers",
 )
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
@@ -52,7 +53,7 @@ def parse():
         type=int,
         default=10_000_000,
         metavar="N",
-        help="large_data: rows on the cluster, 0 for none; long_logs: rows of the longer log",
+        help="large_data, workers: rows on the cluster (0: none); long_logs: rows of a log",
     )
     many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems, how_sure")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")

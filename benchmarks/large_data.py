@@ -105,8 +105,10 @@ class Pass:
     name: str
     wall: float
     cpu: float
+    client_cpu: float  # the scheduler's too
     to_workers: int
     to_client: int
+    work: bytes  # pickled: what it needs, and what it does with a block
 
 
 @dataclass(frozen=True)
@@ -145,11 +147,12 @@ def on_cluster(files, n_workers):
     passes, whole = [], rows.reduce_blocks
 
     def recorded(blocks, of_loaded, merge):
-        start, spent = perf_counter(), worker_time()
+        spent, own, start = worker_time(), process_time(), perf_counter()
         result = whole(blocks, of_loaded, merge)
-        wall, cpu = perf_counter() - start, worker_time() - spent
-        there = n_workers * len(pickle.dumps((blocks.without_pieces(), of_loaded)))
-        passes.append(Pass(_name(of_loaded), wall, cpu, there, len(pickle.dumps(result))))
+        wall, own, spent = perf_counter() - start, process_time() - own, worker_time() - spent
+        work = pickle.dumps((blocks.without_pieces(), of_loaded))
+        there, here = n_workers * len(work), len(pickle.dumps(result))
+        passes.append(Pass(_name(of_loaded), wall, spent, own, there, here, work))
         return result
 
     def worker_time():

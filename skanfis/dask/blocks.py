@@ -7,6 +7,7 @@ import numpy as np
 
 from .._validation import check_finite, positive_weights
 from ..data import Scale, StandardisedData, column_statistics
+from .fusing import Unread, fused
 
 __all__ = ["Blocks", "Layout", "Loaded", "describe", "is_collection", "joined_scales"]
 
@@ -67,7 +68,8 @@ class Loaded:
 class Blocks:
     """Partitions of X, y, weights and groups, side by side, not computed."""
 
-    pieces: list[tuple]  # of delayed X, y, sample_weight or None, groups or None
+    # Of delayed X, y, sample_weight or None, groups or None; or of Unread or delayed Loaded alone.
+    pieces: list[tuple]
     layout: Layout
 
     @classmethod
@@ -88,12 +90,16 @@ class Blocks:
                     "sizes of unknown chunks (compute_chunk_sizes) so that they can be rechunked."
                 )
             pieces.append(parts)
-        return cls(list(zip(*pieces, strict=True)), layout)
+        return cls(fused(list(zip(*pieces, strict=True))), layout)
 
-    def load(self, number, X, y, sample_weight, groups):
+    def load(self, number, *parts):
         """One block, checked; runs where the data are. ValueError names the partition."""
+        if isinstance(parts[0], Loaded):
+            return parts[0]
+        if isinstance(parts[0], Unread):
+            parts = parts[0].read()
         try:
-            return _loaded(self.layout, X, y, sample_weight, groups)
+            return _loaded(self.layout, *parts)
         except (TypeError, ValueError) as error:
             raise type(error)(f"Partition {number}: {error}") from error
 

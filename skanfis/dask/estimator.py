@@ -251,7 +251,7 @@ class DaskANFISRegressor(ANFISRegressor):
         self.__dict__.pop("feature_names_in_", None)
         if layout.given_input_names == layout.input_names:
             self.__dict__["feature_names_in_"] = np.array(layout.input_names, dtype=object)
-        return data
+        return data.kept()
 
     def _refuse_what_needs_residuals(self):
         for name, is_asked in (

@@ -10,6 +10,7 @@ from .._memory import keeps_freed_memory
 from ..constraints.wishes import Wishes
 from ..data import Scale, StandardisedData, check_scales
 from .blocks import Blocks, Described, describe, joined
+from .keeping import kept_blocks
 
 __all__ = ["ClusterData", "ClusterRows", "reduce_blocks"]
 
@@ -28,16 +29,16 @@ def reduce_blocks(blocks: Blocks, of_loaded: Callable, merge: Callable):
     # One key for all tasks: what they have in common is sent to a worker once.
     common = delayed((blocks.without_pieces(), of_loaded), traverse=False)
     apply, add = delayed(_apply, pure=False), delayed(_merge_all, pure=False)
-    level = [apply(number, *parts, common) for number, parts in enumerate(blocks.pieces)]
+    level = [apply(common, number, *parts) for number, parts in enumerate(blocks.pieces)]
     while len(level) > 1:
         groups = [level[start : start + _FAN_IN] for start in range(0, len(level), _FAN_IN)]
         level = [add(group, merge) for group in groups]
     return _computed(level[0])
 
 
-def _apply(number, X, y, sample_weight, groups, common):
+def _apply(common, number, *parts):
     blocks, of_loaded = common
-    loaded = blocks.load(number, X, y, sample_weight, groups)
+    loaded = blocks.load(number, *parts)
     try:
         with keeps_freed_memory():
             return of_loaded(loaded)
@@ -145,6 +146,10 @@ class ClusterData:
     def output_names(self):
         """Names of the outputs."""
         return self.blocks.layout.output_names
+
+    def kept(self):
+        """The same, loaded once and for all where the workers have memory enough."""
+        return replace(self, blocks=kept_blocks(self.blocks, self.described.n_given))
 
     def rows(self):
         """The rows on their scales."""

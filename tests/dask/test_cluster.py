@@ -1,7 +1,8 @@
-"""A cluster of real processes: one of them dies in the middle of a pass, and one is closed."""
+"""A cluster of real processes: they die in the middle of a fit, and in the end it is closed."""
 
 import os
 import signal
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ import dask.array as da
 from distributed import Client, LocalCluster
 
 from skanfis import ANFISRegressor, sampling
-from skanfis.dask import DaskANFISRegressor
+from skanfis.dask import DaskANFISRegressor, rows
 
 N_ROWS = 4000
 
@@ -35,7 +36,7 @@ def ends_once(flag, calls):
 @pytest.mark.filterwarnings(
     "ignore::DeprecationWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
 )
-def test_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypatch):
+def test_workers_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypatch):
     monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS - 1)
     monkeypatch.setattr(sampling, "SAMPLE_ROWS", 1000)
     g = np.random.default_rng(0)
@@ -43,15 +44,32 @@ def test_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypa
     y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(N_ROWS)
     expected = ANFISRegressor(n_mfs=2).fit(X, y).model_.coefficients
     flag = tmp_path / "calls"
+    passes, whole = [], rows.reduce_blocks
+
+    def last_but_one(blocks, of_loaded, merge):
+        passes.append(len(blocks.pieces[0]))
+        if len(passes) == 5:
+            # With it goes what it has kept.
+            os.kill(client.run(os.getpid).popitem()[1], signal.SIGKILL)
+        return whole(blocks, of_loaded, merge)
+
+    monkeypatch.setattr(rows, "reduce_blocks", last_but_one)
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
-    with LocalCluster(**options) as cluster, Client(cluster):
+    with LocalCluster(**options) as cluster, Client(cluster) as client:
         blocks = da.from_array(X, chunks=(1000, 2)).blocks
-        fragile = blocks[1].map_blocks(ends_once(str(flag), 3), dtype=float, meta=X[:0])
+        fragile = blocks[1].map_blocks(ends_once(str(flag), 2), dtype=float, meta=X[:0])
         lazy_X = da.concatenate([blocks[0], fragile, blocks[2:]])
         lazy_y = da.from_array(y, chunks=1000)
         model = DaskANFISRegressor(n_mfs=2).fit(lazy_X, lazy_y)
-        assert flag.stat().st_size > 3  # one ended in the third pass, and there were more
+        # Loaded for the first pass, for the others, and anew after each death.
+        assert flag.stat().st_size == 4
+        assert set(passes) == {1}
         assert_allclose(model.model_.coefficients, expected, rtol=0.0, atol=1e-10)
+        # Nothing is kept beyond the fit; it is let go a moment after.
+        end = monotonic() + 10.0
+        while n_tasks := client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks)):
+            assert monotonic() < end, n_tasks
+            sleep(0.05)
         predicted = model.predict(lazy_X)
         assert_allclose(predicted.compute(), model.predict(X), rtol=1e-12)
         lazy_X, lazy_y = da.from_array(X, chunks=(1000, 2)).persist(), lazy_y.persist()

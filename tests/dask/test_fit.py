@@ -280,6 +280,17 @@ def test_prediction_wants_the_columns_of_training():
         model.predict(da.zeros((10, 3)))
 
 
+def test_a_partition_is_one_task(tmp_path):
+    table = frame(300)
+    table.to_parquet(tmp_path / "a.parquet")
+    table.to_parquet(tmp_path / "b.parquet")
+    lazy = dd.read_parquet(tmp_path)
+    pieces = blocks.Blocks.of(lazy[NAMES], lazy["error"]).pieces
+    assert [len(piece) for piece in pieces] == [1, 1]
+    X, y, *rest = pieces[1][0].read()
+    assert (X.equals(table[NAMES]), y.equals(table["error"]), rest) == (True, True, [None, None])
+
+
 def test_layout_gives_names_where_there_are_none():
     layout = blocks.Blocks.of(*cut(100, *data(300))).layout
     assert (layout.input_names, layout.output_names) == (("x0", "x1"), ("y",))
