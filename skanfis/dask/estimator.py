@@ -1,5 +1,6 @@
 """DaskANFISRegressor: ANFISRegressor on dask collections."""
 
+import warnings
 from dataclasses import replace
 from functools import partial
 from typing import Any, Self
@@ -193,11 +194,11 @@ class DaskANFISRegressor(ANFISRegressor):
         measures = self.readability_.measures
         return measures.mean
 
-    def _local(self):
-        """The model alone, as sent to the workers."""
+    def _local(self, has_names=True):
+        """The model alone, as sent to the workers; of inputs without names it expects none."""
         local = ANFISRegressor(out_of_bounds=self.out_of_bounds)
         for name in ("model_", "n_features_in_", "feature_names_in_", "_single_output"):
-            if hasattr(self, name):
+            if hasattr(self, name) and (has_names or name != "feature_names_in_"):
                 setattr(local, name, getattr(self, name))
         return local
 
@@ -206,7 +207,8 @@ class DaskANFISRegressor(ANFISRegressor):
         check_is_fitted(self)
         names = getattr(X, "columns", None)
         self._check_names(None if names is None else tuple(names), X.shape[1])
-        of_block = partial(_apply, model=self._local(), method=method, columns=columns, name=name)
+        local = self._local(has_names=names is not None)
+        of_block = partial(_apply, model=local, method=method, columns=columns, name=name)
         if names is not None:
             meta = _as_frame(np.empty((0, len(columns)) if columns else 0, dtype), columns, name)
             return X.map_partitions(of_block, meta=meta)
@@ -217,7 +219,10 @@ class DaskANFISRegressor(ANFISRegressor):
         return X.map_blocks(of_block, chunks=chunks, dtype=dtype, meta=np.empty((0, 0), dtype))
 
     def _check_names(self, names, n_columns):
-        """ValueError where X has other columns than in training."""
+        """ValueError where X has other columns than in training; a warning where it has no names.
+
+        Here, once: a worker would warn of each block, where nobody looks.
+        """
         expected = getattr(self, "feature_names_in_", None)
         if names is not None and expected is not None and names != tuple(expected):
             raise ValueError(
@@ -228,6 +233,13 @@ class DaskANFISRegressor(ANFISRegressor):
             raise ValueError(
                 f"X has {n_columns} features, but {type(self).__name__} is expecting "
                 f"{self.n_features_in_} features as input."
+            )
+        if names is None and expected is not None:
+            warnings.warn(
+                f"X does not have valid feature names, but {type(self).__name__} was fitted with "
+                "feature names",
+                UserWarning,
+                stacklevel=3,
             )
 
     def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):

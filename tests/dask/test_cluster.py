@@ -32,6 +32,14 @@ def ends_once(flag, calls):
     return end_once
 
 
+def count_tasks(dask_scheduler):
+    return len(dask_scheduler.tasks)
+
+
+def forgive_none(dask_scheduler):
+    dask_scheduler.allowed_failures = 0
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings(
     "ignore::DeprecationWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
@@ -67,11 +75,15 @@ def test_workers_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeyp
         assert_allclose(model.model_.coefficients, expected, rtol=0.0, atol=1e-10)
         # Nothing is kept beyond the fit; it is let go a moment after.
         end = monotonic() + 10.0
-        while n_tasks := client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks)):
+        while n_tasks := client.run_on_scheduler(count_tasks):
             assert monotonic() < end, n_tasks
             sleep(0.05)
         predicted = model.predict(lazy_X)
         assert_allclose(predicted.compute(), model.predict(X), rtol=1e-12)
+        client.run_on_scheduler(forgive_none)
+        flag.unlink()
+        with pytest.raises(RuntimeError, match="same partition ended several workers"):
+            model.fit(lazy_X.map_blocks(ends_once(str(flag), 1), dtype=float, meta=X[:0]), lazy_y)
         lazy_X, lazy_y = da.from_array(X, chunks=(1000, 2)).persist(), lazy_y.persist()
     with pytest.raises(RuntimeError, match="was closed"):
         model.fit(lazy_X, lazy_y)

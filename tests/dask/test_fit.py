@@ -204,6 +204,18 @@ def with_other_columns():
     return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
 
 
+def with_whole_numbers_in_one():
+    table = frame(300).round()
+    lazy = parts_of(table[:100].astype({"rate": int}), table[100:])
+    return lazy[NAMES], lazy["error"], table
+
+
+def test_whole_numbers_in_one_partition_are_read_as_floats():
+    X, y, table = with_whole_numbers_in_one()
+    single = ANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    assert_array_equal(DaskANFISRegressor(n_mfs=2).fit(X, y).consequents_, single.consequents_)
+
+
 def with_text():
     table = frame(300)
     lazy = parts_of(table[NAMES][:100], table[NAMES][100:].astype({"rate": str}))
@@ -289,6 +301,16 @@ def test_a_partition_is_one_task(tmp_path):
     assert [len(piece) for piece in pieces] == [1, 1]
     X, y, *rest = pieces[1][0].read()
     assert (X.equals(table[NAMES]), y.equals(table["error"]), rest) == (True, True, [None, None])
+
+
+def test_arrays_without_names_are_warned_of_once_and_not_by_every_block():
+    table = frame(300)
+    model = DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    X = table[NAMES].to_numpy()
+    with pytest.warns(UserWarning, match="X does not have valid feature names") as caught:
+        lazy = model.predict(da.from_array(X, chunks=(100, 2)))
+    assert len(caught) == 1
+    assert_array_equal(lazy.compute(), model.predict(table[NAMES]))  # a warning would be an error
 
 
 def test_layout_gives_names_where_there_are_none():
