@@ -122,10 +122,10 @@ class Laplace:
         )
 
     @property
-    def n_effective(self):
-        """Effective number of parameters, consequents of one output and premises."""
-        held = sum(after for _, _, after in self.by_weight.values())
-        return self.n_columns + self.curvature.size - held
+    def n_effective_premises(self):
+        """Effective number of the displacements: of each, the part that the data decide on."""
+        _, before, after = self.by_weight.get("stiffness", (0.0, 0.0, 0.0))
+        return before - after
 
 
 def _weighted(penalty):

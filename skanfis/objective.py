@@ -50,9 +50,11 @@ from .penalty import CommonLine, Penalty, disagreement_matrix
 
 __all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "SeparableProblem"]
 
+_TINY = float(np.finfo(float).tiny)
+# A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
+_SMALLEST_FREEDOM = 1e-6
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
 # a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
-_TINY = float(np.finfo(float).tiny)
 _BLOCK_BYTES = 2**22
 _FEWEST_ROWS, _MOST_ROWS = 128, 4096
 
@@ -357,6 +359,20 @@ class SeparableProblem:
             total += (residual**2).sum(axis=1) if weight is None else residual**2 @ weight
             total_weight += residual.shape[1] if weight is None else weight.sum()
         return total / total_weight
+
+    def leave_one_out_error(self, evaluation, n_rows):
+        """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
+
+        The mean of (r_i / (1 - h_i))^2. The weights are those of so many rows: of a row that stands
+        for several, one is left out.
+        """
+        solved = self.evaluate(evaluation.antecedent.parameters, evaluation.coefficients)
+        total, unit = 0.0, self._weight / n_rows
+        for part, residual, weight in self.residuals(solved):
+            kept = np.maximum(1.0 - unit * self.leverage(solved, part), _SMALLEST_FREEDOM)
+            squares = np.sum((residual / kept) ** 2, axis=0)
+            total += squares.sum() if weight is None else weight @ squares
+        return float(total / self._weight)
 
     def leverage(self, evaluation, part):
         """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,)."""

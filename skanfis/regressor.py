@@ -260,11 +260,12 @@ class ANFISRegressor(
     not only at rows; with ``out_of_bounds="clip"`` then everywhere.
 
     Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
-    compared by Akaike's final prediction error [4]_, MSE (1 + k / n) / (1 - k / n), with the
-    effective number of parameters k that the penalty leaves. Nothing is held out, and nothing is
-    random. It counts rows, and cannot see that the rows of one run are alike: where they come in
-    runs, give these to ``fit`` as ``groups``. The structures are then compared by their error on
-    the groups left out, a fifth of them at a time.
+    compared by their error on rows that are left out one by one, which for the consequents takes no
+    training [4]_, times what the effective number k of the premises' parameters costs in Akaike's
+    final prediction error, (1 + k / n) / (1 - k / n) [5]_. Nothing is random. A row left out may
+    have others of its run beside it: where rows come in runs, give these to ``fit`` as ``groups``.
+    The structures are then compared by their error on the groups left out, a fifth of them at a
+    time.
 
     References
     ----------
@@ -274,7 +275,9 @@ class ANFISRegressor(
        squares problems whose variables separate", SIAM Journal on Numerical Analysis 10 (1973)
        413-432.
     .. [3] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447.
-    .. [4] H. Akaike, "Fitting autoregressive models for prediction", Annals of the Institute of
+    .. [4] D. M. Allen, "The relationship between variable selection and data augmentation and a
+       method for prediction", Technometrics 16 (1974) 125-127.
+    .. [5] H. Akaike, "Fitting autoregressive models for prediction", Annals of the Institute of
        Statistical Mathematics 21 (1969) 243-247.
 
     Examples

@@ -449,3 +449,26 @@ def test_reference_leaves_nothing_behind_where_only_the_shift_holds():
     found = problem.evaluate(start, reference.reshape(12, 1)).coefficients.reshape(4, 3)
     # Of the shift, which is at the level of rounding, rounding leaves the first digit.
     assert abs(found[1, 0] - found[3, 0]) < 0.5
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs):
+    g = np.random.default_rng(1)
+    rows = oracles.bumpy_rows(g, 40, 2, n_outputs, weighted)
+    penalty = Penalty(agreement=0.3, alpha=1e-2, slope=0.1)
+    antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    evaluation = problem.evaluate(antecedent.parameters)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
+    phi, total = dense.design(antecedent.parameters), 0.0
+    held = dense.residual_matrix(antecedent.parameters)[40:]
+    # The weights may be those of other numbers of rows than there are of them.
+    n_rows = 0.8 * rows.total_weight
+    for i in range(40):
+        weight = dense.weight.copy()
+        weight[i] -= 1.0 / n_rows  # as much as one row has
+        gram = (phi.T * weight) @ phi + held.T @ held
+        beta = np.linalg.solve(gram, (phi.T * weight) @ dense.y)
+        total += dense.weight[i] * np.sum((dense.y[i] - phi[i] @ beta) ** 2)
+    assert_allclose(problem.leave_one_out_error(evaluation, n_rows), total, rtol=1e-8)

@@ -2,11 +2,11 @@ r"""Structure by itself: how many terms or rules, chosen by the error to be expe
 
 What is compared are short trainings of candidate models on the rows themselves; no row is held out.
 The weights of every candidate's penalty are found by the evidence (``tuning``). The candidate wins
-whose final prediction error is the smallest, which counts the parameters that the penalty leaves
-(``Tuned.expected_error``); those are trained that promise most by it before any premise moves. The
-evidence itself would be the other criterion: it ranks penalties well, but one prior for the large
-and the small departures of all rules makes it too sparing with rules (docs/mathematics.rst has both
-on the same data). A candidate with a term that is hardly true on any row is out of the running.
+whose error is the smallest on rows that are left out one by one, which of the consequents is known
+without further training (``Tuned.expected_error``); those are trained that promise most by it
+before any premise moves. docs/mathematics.rst has the other criteria on the same data: the evidence
+itself, which ranks penalties well, but is too sparing with rules, and the final prediction error. A
+candidate with a term that is hardly true on any row is out of the running.
 
 The search is greedy and small. Grids grow from the linear model, one term at a time, on the input
 where it pays most, from where the terms of the others are already; inputs that need no terms get
@@ -69,9 +69,9 @@ _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
 _MOST_FOLDS = 5
-# What a larger model must gain in n log FPE: "very strong" in the words of Kass and Raftery (1995).
-# The best of many candidates gains up to this on a plane with noise. Where the score is an error, a
-# part of it and a part over the root of the rows.
+# What a larger model must gain in n log of the error: "very strong" in the words of Kass and
+# Raftery (1995). The best of many candidates gains up to this on a plane with noise. Where the score is an
+# error, a part of it and a part over the root of the rows.
 _DECISIVE = 10.0
 _WORTHWHILE_ERROR = 0.005
 _ERROR_OF_ERROR = 0.5
@@ -276,7 +276,7 @@ class StructureSearch:
         return KMeans(candidate.size, n_init=3, random_state=self.seed)
 
     def _score(self, candidate):
-        """N log FPE, or the error on rows left out; infinite where there are too few rows."""
+        """N log of the expected error, or the error on groups left out."""
         if candidate not in self.scores:
             self.scores[candidate] = self._train_and_score(candidate)
         return self.scores[candidate]

@@ -14,6 +14,7 @@ evidence is for it and half of the noise is gone.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -60,7 +61,7 @@ _MOST_COLUMNS = 512
 _FEW_STEPS, _FEW_TURNS = 3, 2
 # Distinct rows per consequent from which on the classic freedom is tried.
 _ROWS_EACH = 2.0
-# Part of the rows that effective parameters may be.
+# Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
 _STEPS = 2
 _ITERATIONS = 4
@@ -103,17 +104,20 @@ class Tuned:
         """-2 log p."""
         return self.posterior.minus_twice_log
 
-    @property
+    @cached_property
     def expected_error(self):
         """Mean squared error to be expected on new rows, of the standardised target.
 
-        Akaike's final prediction error, MSE (1 + k / n) / (1 - k / n), with the effective number of
-        parameters k of a penalised model; infinite where that is more than half of the rows.
+        That of the consequents on rows that are left out one by one, times what Akaike's final
+        prediction error takes for the premises, (1 + k / n) / (1 - k / n) with their effective
+        number k; infinite where that is more than half of the rows.
         """
-        share = self.posterior.n_effective / self.posterior.n_rows
+        n_rows = self.posterior.n_rows
+        share = self.posterior.n_effective_premises / n_rows
         if share > _MOST_EFFECTIVE:
             return np.inf
-        return self.evaluation.mean_squared_error * (1.0 + share) / (1.0 - share)
+        left_out = self.problem.leave_one_out_error(self.evaluation, n_rows)
+        return left_out * (1.0 + share) / (1.0 - share)
 
     def is_beaten_loosely(self, loose, part=_LESS_NOISE):
         """Whether a loose training has found what this one took for noise, down to a part of it."""

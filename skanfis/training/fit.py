@@ -44,7 +44,7 @@ from .freezing import ModelBuilder, as_given
 from .knowing import grown
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
-from .restarts import displaced_starts, leave_one_out_error
+from .restarts import displaced_starts
 from .result import Fitted, SolverRun
 from .robust import (
     MANY_ROWS,
@@ -237,7 +237,8 @@ class _Fit:
     def run_and_error(self, rows, start, displacement):
         """One of several runs, and by what it is judged."""
         run = self.run(rows, start, displacement, is_alone=False)
-        return run, leave_one_out_error(run.problem, run.evaluation)
+        n_rows = effective_weight(run.problem.rows)
+        return run, run.problem.leave_one_out_error(run.evaluation, n_rows)
 
     def run(self, rows: StandardisedData, start: Start, displacement, is_alone=True) -> SolverRun:
         """One run of the solver, watched; the iterations of one among several are not told."""

@@ -12,13 +12,11 @@ of two minima that meet the data alike, it prefers the one whose rules each rest
 
 import numpy as np
 
-__all__ = ["displaced_starts", "leave_one_out_error"]
+__all__ = ["displaced_starts"]
 
 # Standard deviation of a start's displacements: a third of a spacing, beyond which terms would swap
 # places and the start would be another structure.
 _SPREAD = 0.3
-# A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
-_SMALLEST_FREEDOM = 1e-6
 
 
 def displaced_starts(premise, first, n_starts, rng):
@@ -26,14 +24,3 @@ def displaced_starts(premise, first, n_starts, rng):
     starts = rng.normal(scale=_SPREAD, size=(n_starts, premise.size))
     starts[0] = 0.0 if first is None else first
     return np.clip(starts, premise.lower, premise.upper)
-
-
-def leave_one_out_error(problem, evaluation):
-    """Mean squared leave-one-out error of the consequents at fixed premises, per unit of weight."""
-    solved = problem.evaluate(evaluation.antecedent.parameters, evaluation.coefficients)
-    total = 0.0
-    for part, residual, weight in problem.residuals(solved):
-        leverage = problem.leverage(solved, part)
-        squares = np.sum((residual / np.maximum(1.0 - leverage, _SMALLEST_FREEDOM)) ** 2, axis=0)
-        total += squares.sum() if weight is None else weight @ squares
-    return total / problem.rows.total_weight
