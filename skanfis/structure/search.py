@@ -70,8 +70,8 @@ _RULE_NUMBERS = (2, 3, 5, 8, 12)
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
 _MOST_FOLDS = 5
 # What a larger model must gain in n log of the error: "very strong" in the words of Kass and
-# Raftery (1995). The best of many candidates gains up to this on a plane with noise. Where the score is an
-# error, a part of it and a part over the root of the rows.
+# Raftery (1995). The best of many candidates gains up to this on a plane with noise. Where the
+# score is an error, a part of it and a part over the root of the rows.
 _DECISIVE = 10.0
 _WORTHWHILE_ERROR = 0.005
 _ERROR_OF_ERROR = 0.5
