@@ -153,6 +153,19 @@ class DerivativeRows:
         by_rule[:, 0] = self.strengths
         np.multiply(self.strengths[:, None], self.basis[1:], out=by_rule[:, 1:])
 
+    def part(self, part):
+        """Some of the rows; all of them as they are."""
+        if isinstance(part, slice):
+            return self
+        return DerivativeRows(
+            self.strengths[:, part],
+            self.shares[:, part],
+            self.basis[:, part],
+            self.outputs[:, part],
+            [one[:, part] for one in self.by_term],
+            [one[:, :, part] for one in self.gradients],
+        )
+
     def astype(self, dtype):
         """The same in another precision, but for outputs and ``changes``."""
         if dtype == np.float64:

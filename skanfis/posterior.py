@@ -35,12 +35,12 @@ product 2 h0 h1 counts where it is positive only: a deviation never falls on the
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
-from scipy.linalg import blas
 from scipy.special import ndtr
 
 from .antecedent import Antecedent
 from .consequent import NormalFactor
-from .deviation import DerivativeRows, DeviationTables, inner_products, points_of_range
+from .deviation import DerivativeRows, DeviationTables, points_of_range
+from .faces import Face, faces_of, products_off_faces, products_on_face
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
@@ -270,42 +270,56 @@ class Posterior:
         ``unfollowed`` (n_outputs, n_rows) what the prediction leaves out of the tangent.
 
         With h at one step inside and e what it changes by from two steps to one, h + e is the half
-        at the edge, e times steps the slope. Both are linear in the rows of the design and of d:
-        they are subtracted first, and F, T and B_k applied to h and e alone.
+        at the edge, e times steps the slope.
         """
         length = np.sqrt(np.sum((way / model.spread[:, None]) ** 2, axis=0))
         step = way * (_STEP / np.maximum(length, np.finfo(float).tiny))
         once, twice = (self._row(model, Z - k * step) for k in (1, 2))
-        tables = self._tables(model, exact)
-        n_premises, unit = tables.n_premises, tables.unit
-        sides = np.empty((2, tables.joint.shape[2], Z.shape[1]), tables.dtype)
-        designs, changes = sides[:, n_premises:], sides[:, :n_premises]
-        once.astype(tables.dtype).design(designs[0])
-        once.write_change_from(twice, designs[1])
-        # Half the work of a full product.
-        product = blas.get_blas_funcs("trmm", dtype=tables.dtype)
-        u = [product(1.0, tables.factor.T, one.T, side=1, lower=0).T for one in designs]
-        found = (self.noise[:, None] / unit) ** 2 * np.stack(inner_products(*u))[:, None]
-        if tables.joint.shape[1]:
-            for k, joint in enumerate(tables.joint):
-                if n_premises:
-                    first, second = (one.changes(k, unit) for one in (once, twice))
-                    changes[0], changes[1] = first, first - second
-                half, change = (joint @ one for one in sides)
-                found[:, k] += inner_products(half, change, tables.signed)
+        tables, n_rows = self._tables(model, exact), Z.shape[1]
+        found = np.empty((3, self.noise.size, n_rows))
+        left = np.full(n_rows, True)
+        for j, side, rows in faces_of(way, model.antecedent, self.consequents.shape[0]):
+            face = self._face(model, tables, j, side)
+            part = slice(None) if rows.size == n_rows else rows
+            found[:, :, part] = products_on_face(
+                self.noise, tables, face, once.part(part), twice.part(part)
+            )
+            left[rows] = False
+        if left.any():
+            part = slice(None) if left.all() else left
+            found[:, :, part] = products_off_faces(
+                self.noise, tables, once.part(part), twice.part(part)
+            )
         near, both, change = found
-        steps = length / _STEP
+        unit, steps = tables.unit, length / _STEP
         square = (self.noise[:, None] / unit) ** 2 + near + 2.0 * both + change
         square += 2.0 * np.maximum((both + change) * steps, 0.0) + change * steps**2
         np.maximum(square, (self.noise[:, None] / unit) ** 2, out=square)
         return np.sqrt(square + (unfollowed / unit) ** 2) * unit
 
+    def _face(self, model, tables, j, side):
+        """What rows beyond one end of input j are multiplied with, found once."""
+        edge = float((model.maximum if side > 0 else model.minimum)[j])
+        known, key = self.__dict__.setdefault("_faces", {}), (j, side, edge, tables.dtype)
+        if key not in known:
+            at = np.tile(model.minimum[:, None], 2)
+            at[j] = edge
+            at[j] -= side * _STEP * model.spread[j] * np.array([1.0, 2.0])
+            rows = [self._row(model, np.ascontiguousarray(one[:, None])) for one in at.T]
+            double = self._tables(model, exact=True)
+            face = Face.of(model.antecedent, double, self.inputs, j, *rows)
+            known[key] = face.astype(tables.dtype)
+        return known[key]
+
     def _tables(self, model, exact):
         """What rows are multiplied with, found once; in fewer digits where they will do."""
-        if not hasattr(self, "_cached"):
+        known, box = self.__dict__.setdefault("_tables_of", {}), (model.minimum, model.maximum)
+        key = b"".join(end.tobytes() for end in box)
+        if key not in known:
             double = DeviationTables.of(self, model)
-            object.__setattr__(self, "_cached", (double, self._quickest(model, double)))
-        return self.__dict__["_cached"][0 if exact else 1]
+            known.clear()
+            known[key] = double, self._quickest(model, double)
+        return known[key][0 if exact else 1]
 
     def _quickest(self, model, double):
         """The quickest tables by which deviations are right to ``_DIGITS`` in the range."""

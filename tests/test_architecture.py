@@ -28,6 +28,7 @@ KERNEL = [
     "naming",
     "support",
     "deviation",
+    "faces",
     "posterior",
     "policies",
     "model",

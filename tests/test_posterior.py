@@ -15,6 +15,7 @@ from sklearn.preprocessing import RobustScaler, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
+from skanfis.constraints import FixedPoint
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
 from skanfis.membership import Bell, Gaussian
@@ -310,9 +311,13 @@ def test_blocks_change_nothing(monkeypatch):
     X, y = wave(rng, 200)
     model = ANFISRegressor(n_mfs=2, max_iter=5, solver=VariableProjection(tol=0.1)).fit(X, y)
     new = wave(rng, 300)[0] * 1.1
-    whole = model.predict(new, return_std=True)[1]
+    whole = [one.copy() for one in model.predict(new, return_std=True)]
+    exact = model.model_.standard_deviation(new)
     monkeypatch.setattr("skanfis.model._BLOCK_BYTES", 1)
-    assert_allclose(model.predict(new, return_std=True)[1], whole, rtol=1e-12)
+    assert_allclose(model.predict(new, return_std=True)[0], whole[0], rtol=1e-12)
+    # Out of the range, how many rows of a block are on one face says how they are added up.
+    assert_allclose(model.predict(new, return_std=True)[1], whole[1], rtol=1e-5)
+    assert_allclose(model.model_.standard_deviation(new), exact, rtol=1e-9)
 
 
 def test_what_has_no_posterior_says_why(monkeypatch):
@@ -375,3 +380,31 @@ def test_json_of_a_posterior_that_is_none_is_refused(change, message):
     change(document["posterior"])
     with pytest.raises(ValueError, match=message):
         parse_json(json.dumps(document))
+
+
+@pytest.mark.parametrize("kind", ["grid", "order 0", "one slope", "two outputs", "known", "linear"])
+def test_on_a_face_fewer_columns_say_the_same(kind, monkeypatch):
+    """Rows beyond one input alone, beside those of whom there are too few for tables."""
+    rng = np.random.default_rng(11)
+    X, y = wave(rng, 150)
+    X = np.column_stack([X, rng.normal(size=150)])
+    settings = {"n_mfs": [3, 2, 1], "max_iter": 5, **quick(0.1)}
+    settings |= {
+        "order 0": {"order": 0, "n_mfs": [3, 2, 2]},
+        "one slope": {"consequent_features": [1]},
+        "known": {"constraints": [FixedPoint([20.0, 0.0, 0.0], 0.3)]},
+        "linear": {"n_mfs": 1},
+    }.get(kind, {})
+    y = np.column_stack([y, y**2]) if kind == "two outputs" else y
+    model = ANFISRegressor(**settings).fit(X, y).model_
+    new = rng.uniform(model.minimum, model.maximum, (600, 3))
+    for i, (j, end) in enumerate([(0, -1.0), (0, 1.0), (1, 1.0), (2, -1.0)]):
+        own = slice(100 * i, 100 * (i + 1))
+        new[own, j] = (model.maximum if end > 0 else model.minimum)[j]
+        new[own, j] += end * model.spread[j] * rng.exponential(size=100)
+    new[500:] += 2.0 * model.spread * rng.normal(size=(100, 3))
+    exact, single = model.standard_deviation(new), model.predict_with_deviation(new)[1]
+    assert len(model.posterior._faces) == 8
+    monkeypatch.setattr("skanfis.faces._ENOUGH", 10_000)
+    assert_allclose(exact, model.standard_deviation(new), rtol=1e-8)
+    assert_allclose(single, exact, rtol=1e-4)

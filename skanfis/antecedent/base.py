@@ -130,6 +130,11 @@ class Antecedent(ABC):
     def share_counts(self):
         """How many shares each factor of the strengths has: w is a product of one of each."""
 
+    @property
+    def share_inputs(self):
+        """The input that each factor's shares depend on; None of a factor of several inputs."""
+        return (None,) * len(self.share_counts)
+
     @abstractmethod
     def normalise(self, log_mu):
         """Strengths w and term shares nu from log mu, which is overwritten."""

@@ -62,6 +62,11 @@ class GridAntecedent(Antecedent):
         return self.counts
 
     @property
+    def share_inputs(self):
+        inputs = [int(j) for group in self.groups for j in group.inputs]
+        return tuple(inputs[start] for start in accumulate((0, *self.counts[:-1])) if inputs)
+
+    @property
     def rule_terms(self):
         return _grid_rule_terms(self.counts) if self.counts else np.empty((1, 0), dtype=int)
 
