@@ -24,6 +24,8 @@ __all__ = ["run"]
 _ROWS = 250_000
 _BLOCK = 50_000
 _STARTS = 8
+# Of the gyro-like models, and rows that the bounds of every slope are held against.
+_INPUTS, _SLOPES = ("time", "temperature", "rate"), 1_000_000
 _POLICIES = ("linear", "clip", LinearExtrapolation(2.0))
 _SEEDS = range(10)
 # Truths that rise with the first input, on [-1, 1]^2.
@@ -50,7 +52,7 @@ def run(options):
 def _gyro_like():
     """Time and boxes of bounds of 36 rules, by tightness."""
     X, y, _, _ = make_surface(seed=0)
-    rows, lines = [], []
+    rows, lines, beyond, rng = [], [], 0, np.random.default_rng(0)
     for n_mfs in ([1, 6, 6], [4, 3, 3]):
         model = ANFISRegressor(n_mfs=n_mfs).fit(X, y)
         name = " x ".join(str(n) for n in n_mfs if n > 1) + " terms"
@@ -64,14 +66,42 @@ def _gyro_like():
                 time = Measure("time", seconds, "s", 1.0)
                 measures = [time, Measure("boxes", found.n_boxes, "")]
                 rows.append(Row(f"bounds of {name}, to 1 % of the range", measures))
+            elif what.startswith("slope"):
+                beyond += _slopes_beyond(model.model_, what, found, rng)
+                if "time" in what and n_mfs[0] > 1:
+                    time = Measure("time", seconds, "s", 2.0)
+                    tight = Measure("tightness", found.tightness[0], "", 0.01)
+                    rows.append(Row(f"{what} of the largest, {name}", [time, tight]))
+    measures = [Measure("rows and optima beyond", beyond, "", 0)]
+    measures.append(Measure("rows", 6 * _SLOPES, ""))
+    rows.append(Row("bounds of slopes against random rows and L-BFGS-B", measures))
     return rows, Table("Bounds of 36 rules", ["what", "s", "boxes", "tightness"], lines)
+
+
+def _slopes_beyond(model, what, found, rng):
+    """How many rows of many, and optima, have a slope beyond its bounds."""
+    j = [f"slope by {name} to 0.01" for name in _INPUTS].index(what)
+    low, high, beyond = found.box[:, 0], found.box[:, 1], 0
+    for _ in range(_SLOPES // _BLOCK):
+        slopes = model.gradient(rng.uniform(low, high, (_BLOCK, 3)))[:, j, 0]
+        beyond += int(np.sum((slopes < found.lower[0]) | (slopes > found.upper[0])))
+    scale = max(-found.lower[0], found.upper[0])
+    for sign, bound in ((1.0, found.upper[0]), (-1.0, -found.lower[0])):
+
+        def cost(u, sign=sign):
+            return -sign * model.gradient((low + u * (high - low))[None])[0, j, 0] / scale
+
+        for u in rng.uniform(size=(_STARTS, 3)):
+            best = minimize(cost, u, bounds=[(0.0, 1.0)] * 3, method="L-BFGS-B")
+            beyond += int(-best.fun * scale > bound)
+    return beyond
 
 
 def _jobs():
     """What is bounded of a model, by what it is called."""
     jobs = {f"outputs to {tol:g}": partial(bounds, tol=tol) for tol in (0.01, 1e-3)}
     jobs["outputs anywhere to 0.01"] = partial(bounds, box=[(-np.inf, np.inf)] * 3)
-    for j, name in enumerate(("time", "temperature", "rate")):
+    for j, name in enumerate(_INPUTS):
         jobs[f"slope by {name} to 0.01"] = partial(gradient_bounds, feature=j)
     return jobs
 

@@ -5,7 +5,8 @@ and cold starts of a dozen simulated gyros at rest, thirty to train on and thirt
 by so few runs the mean coverage of one gyro is uncertain by 4 %. Beside the deviation alone, taken
 for normal, and the intervals of ``ConformalRegressor``, a Gaussian process (of at most 400 rows)
 and gradient boosting of two quantiles, conformalised (Romano, Patterson and Candes 2019). Of "run",
-90 % of a new run's rows are to be covered with a probability of 90 %. Coverages are of rows that
+the default where runs are given, 90 % of a new run's rows are to be covered with a probability of
+90 %; of the others 90 % of rows on average. Coverages are of rows that
 nothing has seen. Widths are beside one another at equal coverage: each method's intervals are
 stretched or shrunk about their centres until they cover 90 % of these rows.
 """
@@ -30,8 +31,6 @@ from .report import Measure, Results, Row, Table
 __all__ = ["cases", "run"]
 
 COVERAGE = 0.9
-# Of "run": that so much of a new run's rows is covered.
-CONFIDENCE = 0.9
 _NORMAL = 1.6448536269514722
 _EVERY = 20
 _MOST_ROWS, _GP_ROWS = 500, 400
@@ -120,7 +119,7 @@ def intervals(X, y, groups, new):
         if method == "split" and groups is not None:
             model.set_params(calibration_fraction=0.5)
         kept[:] = [model.fit(X, y, **given)]
-        return model.predict_interval(new, COVERAGE)
+        return model.predict_interval(new, COVERAGE, confidence=None)
 
     def gaussian_process():
         rows = np.random.default_rng(0).permutation(len(X))[:_GP_ROWS]
@@ -131,9 +130,9 @@ def intervals(X, y, groups, new):
     add("std", deviation)
     add("folds", lambda: conformal("folds"))
     if groups is not None:
-        add("run", lambda: kept[0].predict_interval(new, COVERAGE, CONFIDENCE))
+        add("run", lambda: kept[0].predict_interval(new, COVERAGE))
     # Of the same fits.
-    add("cross", lambda: kept[0].set_params(method="cross").predict_interval(new, COVERAGE))
+    add("cross", lambda: kept[0].set_params(method="cross").predict_interval(new, COVERAGE, None))
     add("split", lambda: conformal("split"))
     if groups is None:
         add("loo", lambda: conformal("loo"))

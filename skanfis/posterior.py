@@ -315,11 +315,13 @@ class Posterior:
         """What rows are multiplied with, found once; in fewer digits where they will do."""
         known, box = self.__dict__.setdefault("_tables_of", {}), (model.minimum, model.maximum)
         key = b"".join(end.tobytes() for end in box)
-        if key not in known:
+        found = known.get(key)
+        if found is None:
             double = DeviationTables.of(self, model)
+            found = double, self._quickest(model, double)
             known.clear()
-            known[key] = double, self._quickest(model, double)
-        return known[key][0 if exact else 1]
+            known[key] = found
+        return found[0 if exact else 1]
 
     def _quickest(self, model, double):
         """The quickest tables by which deviations are right to ``_DIGITS`` in the range."""
