@@ -3,7 +3,7 @@
 import warnings
 from functools import partial
 from itertools import product
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 from scipy.optimize import minimize
@@ -57,9 +57,9 @@ def _gyro_like():
         model = ANFISRegressor(n_mfs=n_mfs).fit(X, y)
         name = " x ".join(str(n) for n in n_mfs if n > 1) + " terms"
         for what, job in _jobs().items():
-            start = perf_counter()
+            start = process_time()
             found = job(model)
-            seconds = perf_counter() - start
+            seconds = process_time() - start
             tightness = f"{found.tightness[0]:.2g}"
             lines.append([f"{name}, {what}", f"{seconds:.2f}", found.n_boxes, tightness])
             if what == "outputs to 0.01":
@@ -123,9 +123,9 @@ def _checked(options):
     for label, model in _models(options):
         width = model.maximum - model.minimum
         box = np.stack([model.minimum - 0.4 * width, model.maximum + 0.4 * width], axis=1)
-        start = perf_counter()
+        start = process_time()
         found = bounds(model, box)
-        seconds = perf_counter() - start
+        seconds = process_time() - start
         for _ in range(_ROWS // _BLOCK):
             y = model.predict(rng.uniform(box[:, 0], box[:, 1], (_BLOCK, 3)))[:, 0]
             beyond += int(np.sum((y < found.lower[0]) | (y > found.upper[0])))
@@ -167,9 +167,9 @@ def _constrained(options):
             y = truth(*X.T) + 0.3 * exact.std() * rng.standard_normal(100)
             found = []
             for known in ({}, {"monotonic_cst": [1, 0]}):
-                start = perf_counter()
+                start = process_time()
                 model = ANFISRegressor(**params, **known).fit(X, y)
-                seconds = perf_counter() - start
+                seconds = process_time() - start
                 found.append((np.sqrt(np.mean((model.predict(X_test) - exact) ** 2)), seconds))
             errors.append(found[1][0] / found[0][0])
             times.append(found[1][1] / found[0][1])

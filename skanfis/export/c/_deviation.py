@@ -40,8 +40,7 @@ from ._text import literals
 
 __all__ = ["DeviationSource", "deviation_test"]
 
-# Steps inside, in standard deviations of the inputs; and the weights of what is found there.
-_STEP = {np.dtype(np.float64): 2.0**-14, np.dtype(np.float32): 2.0**-7}
+# Weights of what is found at the steps inside.
 _OF_SLOPE = {np.dtype(np.float64): (1.0, -1.0), np.dtype(np.float32): (2.5, -4.0, 1.5)}
 _AT_EDGE = {np.dtype(np.float64): (2.0, -1.0), np.dtype(np.float32): (3.0, -3.0, 1.0)}
 # As parts of a deviation: what rounding leaves of differences, or in range.
@@ -309,7 +308,7 @@ class DeviationSource(Source):
         if self.answers_beyond:
             lines.append(BEYOND.replace("$unfollowed", self.unfollowed()).strip("\n"))
         lines.append(SUM.replace("$growth", GROWTH if self.answers_beyond else "").strip("\n"))
-        step = self.dialect.number(_STEP[numbers.dtype])
+        step = self.dialect.number(self.found.step)
         weights = {
             name: ", ".join(self.dialect.number(weight) for weight in own[numbers.dtype])
             for name, own in (("of_slope", _OF_SLOPE), ("at_edge", _AT_EDGE))

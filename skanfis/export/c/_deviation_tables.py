@@ -9,6 +9,11 @@ from ...membership import Trapezoidal, Triangular
 __all__ = ["Deviation", "deviation_of", "fitting"]
 
 _HAVE_CORNERS = {Triangular, Trapezoidal}
+# Steps of differences out of the range, as in Python; in single precision longer, because a
+# difference has the fewer digits the shorter it is, and three of them. Before a corner they are
+# halved, so many times at the most.
+_STEP = {np.dtype(np.float64): 2.0**-14, np.dtype(np.float32): 2.0**-7}
+_N_STEPS, _HALVINGS, _DIGITS_OF_STEP = 3, 3, 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,7 @@ class Deviation:
     cross: np.ndarray
     terms: np.ndarray
     pinned: np.ndarray  # times [u, v]; what is known of the output and taken off
+    step: float  # by which differences go out of the range, in standard deviations of the inputs
     reach: np.ndarray | None = None
     coverage: float | None = None
 
@@ -50,13 +56,9 @@ def deviation_of(model, numbers, reach=None, coverage=None):
     if posterior is None:
         # Says why there is none.
         model.standard_deviation(model.reference[None])
-    families = {group.family for group in model.antecedent.groups}
-    if _HAVE_CORNERS & families and numbers.dtype == np.float32 and _answers_beyond(model):
-        raise ValueError(
-            "deviation=True with straight flanks takes dtype='double': out of the range it goes by "
-            "differences, which single precision can only take across corners. Or use "
-            "out_of_bounds='nan' or 'raise'."
-        )
+    step = _STEP[numbers.dtype]
+    if numbers.dtype == np.float32 and _answers_beyond(model):
+        step = _step_before_corners(model)
     factor, shift = posterior.consequents.copy(), numbers.reference.astype(float) - model.reference
     by_rule = factor.reshape(len(factor), model.n_rules, -1)
     by_rule[:, :, 0] += by_rule[:, :, 1:] @ shift[posterior.inputs]
@@ -80,8 +82,40 @@ def deviation_of(model, numbers, reach=None, coverage=None):
         (posterior.cross @ factor) / unit[:, None, None],
         np.concatenate([[], *terms]).astype(int),
         _pinned(posterior, unit),
+        step,
         reach,
         coverage,
+    )
+
+
+def _step_before_corners(model):
+    """The longest step, a power of two, of which three meet no corner of a flank inside an edge."""
+    nearest, name = np.inf, ""
+    for group in model.antecedent.groups:
+        if group.family not in _HAVE_CORNERS:
+            continue
+        numbers = group.family.natural(group.theta)
+        half = 0.5 * numbers[3] if len(numbers) > 3 else 0.0
+        shoulders = numbers[0] - half, numbers[0] + half
+        corners = np.stack([shoulders[0] - numbers[1], *shoulders, shoulders[1] + numbers[2]])
+        for j, own in zip(group.inputs, corners.T, strict=True):
+            for inside in (model.maximum[j] - own, own - model.minimum[j]):
+                ahead = inside / model.spread[j]
+                ahead = ahead[ahead > 0.0].min(initial=np.inf)
+                if ahead < nearest:
+                    nearest, name = ahead, model.input_names[j]
+    steps = _STEP[np.dtype(np.float32)] * 2.0 ** -np.arange(_HALVINGS + 1)
+    # Shorter steps are lost in the last digits of a column that lies far from the origin.
+    farthest = np.maximum(np.abs(model.minimum), np.abs(model.maximum)) / model.spread
+    digits = steps > _DIGITS_OF_STEP * np.finfo(np.float32).eps * farthest.max()
+    clear = steps[((_N_STEPS + 0.5) * steps < nearest) & (digits | (steps == steps[0]))]
+    if clear.size:
+        return float(clear[0])
+    raise ValueError(
+        f"deviation=True with dtype='float': out of the range it goes by differences, and a corner "
+        f"of a straight flank lies {nearest:.2g} standard deviations inside the range of {name!r}, "
+        "within the shortest step that single precision can take. Use dtype='double', or "
+        "out_of_bounds='nan' or 'raise'."
     )
 
 
