@@ -65,6 +65,8 @@ def plain(files, passes, start):
 def side_by_side(files, passes, n_processes):
     """Plain processes, each on its part of the files: longest by the clock, processors in all."""
     context = get_context("spawn")
+    # dask sets it for the workers that it starts from here.
+    os.environ.pop("MALLOC_TRIM_THRESHOLD_", None)
     with (
         context.Manager() as manager,
         ProcessPoolExecutor(n_processes, mp_context=context) as pool,

@@ -17,7 +17,7 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.export.c import CCode
-from skanfis.gyro import GyroCompensator, command
+from skanfis.gyro import GyroCompensator, _pictures, command
 from skanfis.gyro.command import main
 
 from ..export.c_compiler import COMPILER, evaluate_all
@@ -32,6 +32,8 @@ def simulated(**options):
     return make_ofog(n_devices=1, duration=900.0, random_state=0, **options)
 
 
+# A fit of the smallest kind, where it is not the question.
+SMALL = ["--inputs", "temperature", "output", "--terms", "1,2"]
 MEASURED = ("time", "temperature", "output", "rate", "run")
 
 
@@ -51,6 +53,20 @@ def no_report(monkeypatch):
     monkeypatch.setattr(
         "skanfis.gyro.command.report_page", lambda calibration, title, dossier: title
     )
+
+
+@pytest.fixture(autouse=True, scope="module")
+def coarse_pictures():
+    """What is drawn is looked at elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skanfis.gyro._html._DOTS_PER_INCH", 30)
+        yield
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """A report of words and tables."""
+    monkeypatch.setattr("skanfis.gyro.html_report.PICTURES", ())
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +234,7 @@ def test_at_rest(tmp_path, capsys):
 def test_one_device_of_several(tmp_path, capsys):
     log = make_ofog(n_devices=3, n_runs=3, duration=600.0, random_state=0)
     path = write_log(tmp_path / "log.csv", log, [*MEASURED, "device"])
-    arguments = [path, "--terms", "1,1,1,2", "--output", str(tmp_path / "out"), "--quiet"]
+    arguments = [path, *SMALL, "--output", str(tmp_path / "out"), "--quiet"]
     assert main([*arguments, "--device", "1"]) == 0
     assert "whole runs held out (3 runs" in capsys.readouterr().out
     with pytest.raises(SystemExit):
@@ -403,11 +419,12 @@ def test_a_damaged_joblib_is_refused(calibrated, tmp_path, content, capsys):
     assert "loading it runs whatever code it holds" in err
 
 
-def test_labels_of_all_kinds_are_drawn_and_told(tmp_path, log, capsys):
+def test_labels_of_all_kinds_are_drawn_and_told(tmp_path, log, capsys, monkeypatch):
+    monkeypatch.setattr("skanfis.gyro.html_report.PICTURES", (_pictures.draw_groups,))
     labels = dict(enumerate([r"$\frac{0$", "$$", "\x1b[31mred", "a\nb", "\u202ecba"]))
     labelled = log.assign(run=log["run"].map(labels))
     path, out = write_log(tmp_path / "log.csv", labelled), tmp_path / "out"
-    assert main([path, "--terms", "1,1,1,2", "--output", str(out)]) == 0
+    assert main([path, *SMALL, "--output", str(out)]) == 0
     told = "".join(capsys.readouterr())
     assert all(sign.isprintable() or sign == "\n" for sign in told)
 
@@ -419,8 +436,7 @@ def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     path = os.fsdecode(b"raw\xff.csv")
     shutil.copy(calibrated / "raw.csv", path)
-    how = ["--terms", "1,1,1,2"]
-    how = ["--apply", str(calibrated / "out" / "compensator.json")] if apply else how
+    how = ["--apply", str(calibrated / "out" / "compensator.json")] if apply else SMALL
     assert main([path, *RENAMED, *UNITS, *how]) == 0
     told = "".join(capsys.readouterr())
     assert "raw\\udcff" in told
@@ -448,16 +464,17 @@ def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, 
         raise errors.pop()
 
     # What is written is the question: one calibration serves every attempt.
-    calibrate = lru_cache(maxsize=None)(lambda: real(*told))
-    real, told = command.calibrate, []
+    calibrate = lru_cache(maxsize=None)(lambda: real(*told, **options))
+    real, told, options = command.calibrate, [], {}
 
-    def once(*arguments):
+    def once(*arguments, **others):
         told[:] = told or arguments
+        options.update(others)
         return calibrate()
 
     monkeypatch.setattr(command, "calibrate", once)
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "new" / "out"
-    arguments = [path, "--terms", "1,1,1,2", "--output", str(out), "--quiet"]
+    arguments = [path, *SMALL, "--output", str(out), "--quiet"]
     with monkeypatch.context() as patch:
         patch.setattr(command, "rules_text", fail)
         assert main(arguments) == 1
@@ -545,12 +562,12 @@ def test_a_compensation_that_makes_it_worse_says_so(tmp_path, log, capsys):
     assert err.endswith("done, but see the warnings\n")
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
     spoilt = log.copy()
     spoilt.loc[100, "output"] += 140.0
     path, out = write_log(tmp_path / "log.csv", spoilt), tmp_path / "out"
-    arguments = ["--terms", "1,1,2,2", "--output", str(out), "--quiet"]
-    assert main([path, *arguments]) == 0
+    assert main([path, *SMALL, "--output", str(out), "--quiet"]) == 0
     page = (out / "report.html").read_text(encoding="utf-8")
     last = capsys.readouterr().out.splitlines()[-1]
     assert last.startswith(f"WARNING        {path}, line 102: the output of")
