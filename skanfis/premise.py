@@ -4,14 +4,16 @@ Every entry is without unit and zero at the start, and one means much the same f
 change of some length by a factor of e. Terms stay what a person can read, by construction:
 
 * *In order, and where there are data.* The m terms that an input has, where no two are in the same
-  place, divide its range, and a little beyond, into m + 1 gaps g. What moves are the logarithms of
-  the gaps, whose sum is fixed: log g = log g(0) + B x up to a constant, with orthonormal columns of
-  B that sum to zero. No term can pass its neighbour or leave the data.
-* *Of a width that goes with their distance.* With s_k the distance to the nearest neighbour, or
-  rather its smooth minimum over the two sides, (g_l^-4 + g_r^-4)^(-1/4), the logarithms of a term's
-  widths are those of the start, plus log s_k / s_k(0), plus x. Terms that come together so become
-  narrower by themselves. At the upper bound of x a term is 0.9 true at half the distance s_k, so
-  that min(mu_k, mu_l) of two neighbours nowhere exceeds 0.9: they can be told apart.
+  place, divide its range, and a little beyond, into m + 1 gaps g. What moves are the ratios of
+  neighbouring gaps, within bounds. No term can pass its neighbour or leave the data, and no gap is
+  much wider than the next.
+* *Of a width that goes with their distance.* With g_l and g_r the gaps beside term k, let its width
+  be w_k where it is half true at half the wider of them, and W_k where it is 0.9 true at half the
+  narrower one (smooth maximum and minimum, (g_l^p + g_r^p)^(1/p), p = 8 and -8). Its own width is
+  w_k^(1 - v) W_k^v, and what moves is v, from 0 to 1. So two neighbours cross nowhere above 0.9:
+  they can be told apart. And nowhere below 0.5: wherever a row is between two terms, one of them is
+  true. An outermost term that moves inward has as its outer gap twice the way that it has gone: it
+  stays true where it came from.
 * Terms of scattered rules, and terms that share their place, move by themselves: a location by its
   shift in units of the term's own width, at most one width beyond the data.
 
@@ -21,18 +23,31 @@ be four times as wide. It fits exact data better, by rules that cannot be read.
 Shape parameters are logarithms, and move as these.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
 
 from .antecedent import Antecedent, ScatteredAntecedent
+from .membership import LEAST_TRUTH
 
 __all__ = ["Premise"]
 
-# Widths may shrink, and the gaps between terms change, by these factors.
-_LOG_SHRINKAGE = np.log(1.3)
-_LOG_GAP = np.log(4.0)
+# Neighbouring gaps differ at most by this factor, the outer ones by the second from the next.
+_LOG_RATIO, _LOG_OUTER = np.log(2.2), np.log(1.45)
+# A ratio of gaps changes by so much, as a logarithm, per displacement: a term between two others
+# that moves by some part of a gap then pays about as much as a width that changes by it.
+_LOG_UNIT = 3.0**0.5
+# Where the least a term may reach to passes the most, there is nothing between. Families that are
+# flat at the top leave less room than this; their widths go with the nearer neighbour alone, and
+# shrink by the factor by which Gaussians may where gaps are even.
+_LOG_ROOM = np.log(2.5)
+_LOG_SHRINKAGE = np.log(1.165)
+# What is free to move has room to, wherever it starts. Of the room between the ends, what is left
+# wherever the gaps are.
+_MOBILE = 0.01
+_LEAST_SLOPE = 0.1
 # Shapes, and widths of terms that share their place with others, may change by this one.
 _LOG_FACTOR = np.log(4.0)
 # A shape that makes the top of an ordered term flat, and so truer next to a neighbour, by this.
@@ -42,14 +57,15 @@ _LOG_FLATTER = np.log(1.5)
 _BEYOND, _FREE_BEYOND = 0.25, 1.0
 # Neighbours can be told apart where they cross below this.
 _HIGHEST_CROSSING = 0.9
-# Of the smooth minimum of two gaps.
-_POWER = 4.0
+# Of the smooth minimum and maximum of two gaps.
+_POWER = 8.0
 # A gap that a step has closed, as part of the range.
 _SMALLEST_GAP = 1e-9
 # Displacements this near to an edge of the box are on it.
 _ON_EDGE = 1e-9
-# Widths that are looked at for the widest.
+# Widths that are looked at for the widest; digits of a term by which it is looked up, and how many.
 _CHANGES = 128
+_DIGITS, _MOST_KEPT = 9, 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +73,10 @@ class _Ordered:
     """The terms of one input, one after another.
 
     ``locations`` are their positions in the vector, ``widths`` those of all their widths, ``terms``
-    which term each of these belongs to; ``low`` and ``high`` the ends of the range.
+    which term each of these belongs to; ``low`` and ``high`` the ends of the range. ``basis`` and
+    ``inverse`` lead from displacements to logarithms of gaps, but for a constant, and back. Both
+    ``part`` and ``span`` are of every term: where its widths start between the least and the most,
+    and how far these are apart.
     """
 
     locations: np.ndarray
@@ -66,18 +85,47 @@ class _Ordered:
     low: float
     high: float
     log_gaps: np.ndarray
-    log_spacing: np.ndarray
     basis: np.ndarray
+    inverse: np.ndarray
+    part: np.ndarray
+    span: np.ndarray
 
     @classmethod
-    def of(cls, locations, widths, terms, values, low, high, beyond):
-        margin = beyond * (values[-1] - values[0]) / (values.size - 1)
-        low, high = min(low, values[0]) - margin, max(high, values[-1]) + margin
+    def of(cls, locations, widths, terms, values, low, high, is_free):
+        spacing = (values[-1] - values[0]) / (values.size - 1)
+        low, high = min(low, values[0]), max(high, values[-1])
+        if not is_free:
+            # Where the data go on further, as in a heavy tail, there is hardly a row.
+            low = max(low, 2.0 * values[0] - values[1])
+            high = min(high, 2.0 * values[-1] - values[-2])
+        margin = (_FREE_BEYOND if is_free else _BEYOND) * spacing
+        low, high = low - margin, high + margin
         gaps = np.diff(np.concatenate([[low], values, [high]]))
         n = gaps.size
-        # Orthonormal columns that sum to zero: all right singular vectors of (1, ..., 1) but that.
-        basis = np.linalg.svd(np.ones((1, n)))[2][1:].T
-        return cls(locations, widths, terms, low, high, np.log(gaps), _log_spacing(gaps), basis)
+        if is_free:
+            # Orthonormal columns that sum to zero: right singular vectors of ones.
+            basis = np.linalg.svd(np.ones((1, n)))[2][1:].T
+            inverse = basis.T
+        else:
+            basis = _LOG_UNIT * np.tril(np.ones((n, n - 1)), -1)
+            inverse = np.diff(np.eye(n), axis=0) / _LOG_UNIT
+        # The nearer neighbour alone counts, until it is known what the terms may be.
+        part, span = np.ones(n - 1), np.full(n - 1, np.inf)
+        return cls(locations, widths, terms, low, high, np.log(gaps), basis, inverse, part, span)
+
+    def between(self, least, most):
+        """The same with widths between two ends, given by the change of their logarithms."""
+        return replace(self, part=-least / (most - least), span=most - least)
+
+    def bounds(self):
+        """Of the displacements of the gaps: neighbouring gaps stay of one size."""
+        ratios = np.diff(self.log_gaps)
+        lower, upper = np.full(ratios.size, -_LOG_RATIO), np.full(ratios.size, _LOG_RATIO)
+        # Beyond the outermost term there is no other to share a gap with; nor is there need of one.
+        lower[0], upper[-1] = -_LOG_OUTER, _LOG_OUTER
+        upper[0], lower[-1] = ratios[0] + _LOG_FACTOR, ratios[-1] - _LOG_FACTOR
+        lower, upper = np.minimum(lower - ratios, -_MOBILE), np.maximum(upper - ratios, _MOBILE)
+        return lower / _LOG_UNIT, upper / _LOG_UNIT
 
     def gaps(self, displacement):
         logs = self.log_gaps + self.basis @ displacement[self.locations]
@@ -89,24 +137,80 @@ class _Ordered:
         gaps = np.diff(np.concatenate([[self.low], values, [self.high]]))
         return np.maximum(gaps, _SMALLEST_GAP * (self.high - self.low))
 
-    def jacobian(self, gaps):
-        """Derivatives of the locations, and of every term's log spacing, by the displacements."""
+    def from_gaps(self, gaps):
+        """The displacements of the locations at which the gaps are these."""
+        return self.inverse @ (np.log(gaps) - self.log_gaps)
+
+    def near(self, gaps):
+        """Log of every term's distance to the nearer neighbour, and its derivatives by the gaps."""
+        steep = gaps[1:-1] ** -_POWER
+        total = np.append(steep, 0.0) + np.append(0.0, steep)
+        slope = np.zeros((total.size, gaps.size))
+        k = np.arange(steep.size)
+        slope[k, k + 1] = steep / gaps[1:-1] / total[:-1]
+        slope[k + 1, k + 1] = steep / gaps[1:-1] / total[1:]
+        return -np.log(total) / _POWER, slope
+
+    def far(self, gaps):
+        """The same for the farther one; an outermost term covers where it has moved from, too."""
+        # As far as if there were a neighbour on the other side of that place.
+        low, high = 2.0 * np.maximum(gaps[[0, -1]] - np.exp(self.log_gaps[[0, -1]]), 0.0)
+        left, right = np.append(low, gaps[1:-1]), np.append(gaps[1:-1], high)
+        total = left**_POWER + right**_POWER
+        slope = np.zeros((total.size, gaps.size))
+        k = np.arange(total.size)
+        slope[k, k] = left ** (_POWER - 1.0) / total
+        slope[k, k + 1] = right ** (_POWER - 1.0) / total
+        slope[0, 0] *= 2.0
+        slope[-1, -1] *= 2.0
+        return np.log(total) / _POWER, slope
+
+    @cached_property
+    def at_start(self):
+        """What near and far are there."""
+        start = np.exp(self.log_gaps)
+        return self.near(start)[0], self.far(start)[0]
+
+    def _since_start(self, gaps):
+        """What near and far have changed by, and their derivatives."""
+        (near, by_near), (far, by_far) = self.near(gaps), self.far(gaps)
+        near, far = near - self.at_start[0], far - self.at_start[1]
+        # The ends never pass each other, nor quite meet.
+        lowest = far - (1.0 - _LEAST_SLOPE) * self.span
+        meets = (near < lowest)[:, None]
+        return np.maximum(near, lowest), far, np.where(meets, by_far, by_near), by_far
+
+    def widening(self, displacement, gaps):
+        """What the logarithms of the widths change by, beside their displacements."""
+        near, far, _, _ = self._since_start(gaps)
+        t = self.terms
+        between = self.part[t] + displacement[self.widths] / self.span[t]
+        return (1.0 - between) * far[t] + between * near[t]
+
+    def from_widths(self, change, gaps):
+        """The displacements at which the logarithms of the widths have changed by so much."""
+        near, far, _, _ = self._since_start(gaps)
+        t = self.terms
+        own = change - (1.0 - self.part[t]) * far[t] - self.part[t] * near[t]
+        return own / self._slope(near, far)[t]
+
+    def _slope(self, near, far):
+        """Of a term's log widths by their displacements: the ends come nearer, or part."""
+        return 1.0 + (near - far) / self.span
+
+    def jacobian(self, displacement):
+        """Derivatives of locations and log widths by the locations' displacements.
+
+        And those of the log widths by their own.
+        """
+        gaps = self.gaps(displacement)
         by_gap = gaps[:, None] * (self.basis - (gaps @ self.basis) / gaps.sum())
-        between = gaps[1:-1]
-        steep = between ** (-_POWER)
-        total = np.concatenate([steep, [0.0]]) + np.concatenate([[0.0], steep])
-        by_spacing = np.zeros((between.size + 1, between.size))
-        k = np.arange(between.size)
-        by_spacing[k, k] = steep / between / total[:-1]
-        by_spacing[k + 1, k] = steep / between / total[1:]
-        return np.cumsum(by_gap, axis=0)[:-1], by_spacing @ by_gap[1:-1]
-
-
-def _log_spacing(gaps):
-    """Log of every term's distance to its neighbours, from all gaps."""
-    steep = gaps[1:-1] ** (-_POWER)
-    total = np.concatenate([steep, [0.0]]) + np.concatenate([[0.0], steep])
-    return -np.log(total) / _POWER
+        t = self.terms
+        between = (self.part[t] + displacement[self.widths] / self.span[t])[:, None]
+        near, far, by_near, by_far = self._since_start(gaps)
+        by_width = (1.0 - between) * by_far[t] + between * by_near[t]
+        own = self._slope(near, far)[t]
+        return np.cumsum(by_gap, axis=0)[:-1], by_width @ by_gap, own
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,19 +242,14 @@ class Premise:
                     raw[locations],
                     minimum[j],
                     maximum[j],
-                    _FREE_BEYOND if is_free else _BEYOND,
+                    is_free,
                 )
+                if not is_free:
+                    lower[locations], upper[locations] = row.bounds()
+                    row, least, most = _within_reach(row, own, raw)
+                    lower[row.widths], upper[row.widths] = least[row.terms], most[row.terms]
+                    upper[np.concatenate([term.shapes for term in own])] = _LOG_FLATTER
                 ordered.append(row)
-                lower[locations], upper[locations] = -_LOG_GAP, _LOG_GAP
-                if is_free:
-                    continue
-                lower[row.widths] = -_LOG_SHRINKAGE
-                upper[np.concatenate([term.shapes for term in own])] = _LOG_FLATTER
-                widest = [
-                    _widest(term, raw, np.exp(s))
-                    for term, s in zip(own, row.log_spacing, strict=True)
-                ]
-                upper[row.widths] = np.array(widest)[row.terms]
                 continue
             widths = np.exp([raw[term.widths[0]] for term in own])
             unit[locations] = widths
@@ -173,7 +272,7 @@ class Premise:
         for row in self._ordered:
             gaps = row.gaps(displacement)
             raw[row.locations] = row.low + np.cumsum(gaps)[:-1]
-            raw[row.widths] += (_log_spacing(gaps) - row.log_spacing)[row.terms]
+            raw[row.widths] += row.widening(displacement, gaps)
         return raw
 
     def displacement(self, parameters):
@@ -181,8 +280,8 @@ class Premise:
         x = (parameters - self.antecedent.parameters) / self._unit
         for row in self._ordered:
             gaps = row.gaps_of(parameters[row.locations])
-            x[row.locations] = row.basis.T @ (np.log(gaps) - row.log_gaps)
-            x[row.widths] -= (_log_spacing(gaps) - row.log_spacing)[row.terms]
+            x[row.locations] = row.from_gaps(gaps)
+            x[row.widths] = row.from_widths(x[row.widths], gaps)
         # What stands on an edge stays there whatever rounding says: it is what does not move.
         for edge in (self.lower, self.upper):
             x = np.where(np.abs(x - edge) < _ON_EDGE, edge, x)
@@ -192,9 +291,10 @@ class Premise:
         """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
         jacobian = np.diag(self._unit)
         for row in self._ordered:
-            by_location, by_spacing = row.jacobian(row.gaps(displacement))
+            by_location, by_gaps, own = row.jacobian(displacement)
             jacobian[np.ix_(row.locations, row.locations)] = by_location
-            jacobian[np.ix_(row.widths, row.locations)] = by_spacing[row.terms]
+            jacobian[np.ix_(row.widths, row.locations)] = by_gaps
+            jacobian[row.widths, row.widths] = own
         return jacobian.T @ gradient, jacobian.T @ gauss_newton @ jacobian
 
 
@@ -224,26 +324,72 @@ def _terms(antecedent):
     return terms
 
 
-def _widest(term, raw, spacing):
+def _within_reach(row, own, raw):
+    """The terms with widths between their ends, and these: the changes of their logarithms."""
+    near, far = row.at_start
+    most = np.array(
+        [_widest(term, raw, reach) for term, reach in zip(own, np.exp(near), strict=True)]
+    )
+    least = np.array(
+        [_narrowest(term, raw, reach) for term, reach in zip(own, np.exp(far), strict=True)]
+    )
+    # Between gaps of whatever sizes are allowed, the ends must not pass each other.
+    is_even = (far - near <= _LOG_RATIO + _MOBILE).all()
+    has_room = (most - least + far - near >= _LOG_ROOM).all() and (most - least > _MOBILE).all()
+    if is_even and has_room:
+        row = row.between(least, most)
+    else:
+        least = np.full(most.size, -_LOG_SHRINKAGE)
+    return row, np.minimum(least, -_MOBILE), np.maximum(most, 0.0)
+
+
+def _narrowest(term, raw, reach):
+    """The least change of a term's log widths at which it is half true half its reach away."""
+    return _in_units_of(reach, term, raw, _least_change)
+
+
+def _widest(term, raw, reach):
     """How much a term's widths may grow, the rest of it anywhere: the change of their logarithm."""
+    return _in_units_of(reach, term, raw, _most_growth)
+
+
+def _in_units_of(reach, term, raw, find):
+    """What is found for the same term about zero, with lengths in units of its reach."""
+    theta = raw[term.positions].copy()
+    is_width = np.isin(term.positions, term.widths)
+    theta[is_width] -= np.log(reach)
+    theta[term.positions == term.location] = 0.0
+    # To digits that rounding errors do not reach: terms of one kind are looked up.
+    return find(term.family, tuple(np.round(theta, _DIGITS)), tuple(is_width))
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _least_change(family, theta, is_width):
+    changes = np.linspace(-_LOG_FACTOR, _LOG_FACTOR, 2 * _CHANGES)
+    moved = np.array(theta)[:, None] + np.array(is_width)[:, None] * changes
+    log_truth = [family.log_value(np.full((changes.size, 1), x), moved)[:, 0] for x in (-0.5, 0.5)]
+    is_true = np.exp(np.min(log_truth, axis=0)) >= LEAST_TRUTH
+    return float(changes[is_true.argmax()]) if is_true.any() else np.inf
+
+
+@lru_cache(maxsize=_MOST_KEPT)
+def _most_growth(family, theta, is_width):
     growth = np.linspace(0.0, _LOG_FACTOR, _CHANGES)
-    sides = raw[term.location] + np.array([-0.5, 0.5]) * spacing
     # A steep flank beside a large width is truer than both at their largest: all are tried.
     ranges = [
         (growth, np.full(_CHANGES, -_LOG_SHRINKAGE))
-        if position in term.widths
+        if is_one
         else np.full((2, _CHANGES), [[_LOG_FLATTER], [-_LOG_FACTOR]])
-        for position in term.positions
-        if position != term.location
+        for is_one in is_width[1:]
     ]
     truth = np.zeros((2, _CHANGES))
     for changes in product(*ranges):
         # A family's location is its first parameter.
-        theta = raw[term.positions][:, None] + np.vstack([np.zeros(_CHANGES), *changes])
-        logs = [term.family.log_value(np.full((_CHANGES, 1), x), theta)[:, 0] for x in sides]
+        moved = np.array(theta)[:, None] + np.vstack([np.zeros(_CHANGES), *changes])
+        logs = [family.log_value(np.full((_CHANGES, 1), x), moved)[:, 0] for x in (-0.5, 0.5)]
         truth = np.maximum(truth, np.exp(logs))
     # A term that is true to one side for good has its flank on the other.
     flanks = [values for values in truth if values[0] < _HIGHEST_CROSSING]
     if not flanks:
         return 0.0
-    return growth[np.flatnonzero(np.max(flanks, axis=0) <= _HIGHEST_CROSSING)[-1]]
+    return float(growth[np.flatnonzero(np.max(flanks, axis=0) <= _HIGHEST_CROSSING)[-1]])

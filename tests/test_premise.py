@@ -15,7 +15,7 @@ from . import oracles
 LOW, HIGH = np.array([-2.0, -3.0, -1.0]), np.array([2.5, 1.0, 4.0])
 # As in the module.
 MARGIN, FREE_MARGIN = 0.25, 1.0
-SHRINKAGE, FACTOR = np.log(1.3), np.log(4.0)
+FACTOR, RATIO, OUTER, UNIT = np.log(4.0), np.log(2.2), np.log(1.45), 3.0**0.5
 
 
 def grid(families, counts, inputs=None):
@@ -101,23 +101,28 @@ def kind_of(antecedent):
     return np.concatenate(kinds)
 
 
-def spacing(places):
-    """Distance of each term to its neighbours: the smooth minimum, one by one."""
-    found = []
-    for k in range(len(places)):
-        gaps = [
-            abs(places[k] - places[other])
-            for other in (k - 1, k + 1)
-            if other in range(len(places))
-        ]
-        found.append(sum(gap**-4.0 for gap in gaps) ** -0.25)
-    return np.array(found)
+def distances(places, start):
+    """To the nearer and to the farther neighbour of each term, smooth, one by one."""
+    near, far = [], []
+    for k, place in enumerate(places):
+        gaps = [abs(place - places[o]) for o in (k - 1, k + 1) if o in range(len(places))]
+        # How far the outer ones have moved inward, twice.
+        inward = [2.0 * (place - start[0])] * (k == 0) + [2.0 * (start[-1] - place)] * (
+            k == len(places) - 1
+        )
+        near.append(sum(gap**-8.0 for gap in gaps) ** -0.125)
+        far.append(sum(gap**8.0 for gap in [*gaps, *inward] if gap > 0.0) ** 0.125)
+    return np.array(near), np.array(far)
 
 
 def span(places, j, margin):
     """Where the terms of an input may stand."""
+    low, high = min(LOW[j], places[0]), max(HIGH[j], places[-1])
+    if margin == MARGIN:
+        low = max(low, places[0] - (places[1] - places[0]))
+        high = min(high, places[-1] + (places[-1] - places[-2]))
     beyond = margin * (places[-1] - places[0]) / (len(places) - 1)
-    return min(LOW[j], places[0]) - beyond, max(HIGH[j], places[-1]) + beyond
+    return low - beyond, high + beyond
 
 
 @ALL
@@ -157,35 +162,62 @@ def test_gaps_are_what_moves(antecedent, rng):
             ]
             change = changes[0] - changes[1]
             own = np.array([int(t[0]) for _, _, t in terms(antecedent, at)[j]])
-            # The basis is orthonormal: lengths are kept, the mean is of no account.
-            assert_allclose(
-                np.linalg.norm(change - change.mean()),
-                np.linalg.norm(displacement[own]),
-                rtol=1e-9,
-            )
+            assert_allclose(np.diff(change), UNIT * displacement[own], rtol=1e-7, atol=1e-9)
 
 
 @ON_ORDERED
-@FREE_OR_NOT
-def test_widths_go_with_the_distance_to_the_neighbours(antecedent, is_free, rng):
-    premise = Premise.of(antecedent, LOW, HIGH, is_free)
-    start = antecedent.parameters
-    for displacement in in_the_box(premise, rng, 5):
-        moved = terms(antecedent, premise.parameters(displacement))
-        by_hand = terms(antecedent, start + displacement)
+def test_widths_of_free_terms_go_with_the_nearer_neighbour(antecedent, rng):
+    premise = Premise.of(antecedent, LOW, HIGH, is_free=True)
+    raw = antecedent.parameters
+    for displacement in in_the_box(premise, rng, 3):
+        moved, by_hand = (
+            terms(antecedent, v) for v in (premise.parameters(displacement), raw + displacement)
+        )
+        start = locations(antecedent, raw)
         for j, own in moved.items():
-            growth = np.log(
-                spacing(locations(antecedent, premise.parameters(displacement))[j])
-                / spacing(locations(antecedent, start)[j])
-            )
-            for (_, family, found), (_, _, expected), log_spacing in zip(
+            places = np.array([t[0] for _, _, t in own])
+            growth = np.log(distances(places, start[j])[0] / distances(start[j], start[j])[0])
+            for (_, family, found), (_, _, expected), widening in zip(
                 own, by_hand[j], growth, strict=True
             ):
-                for parameter, one, other in zip(family.parameters, found, expected, strict=True):
-                    if parameter.kind == "location":
-                        continue
-                    widening = log_spacing if parameter.kind == "log_width" else 0.0
-                    assert_allclose(one, other + widening, rtol=1e-10, atol=1e-10)
+                kinds = np.array([p.kind for p in family.parameters])
+                expected = expected + np.where(kinds == "log_width", widening, 0.0)
+                assert_allclose(found[1:], expected[1:], rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("counts", [2, 3, 5])
+def test_widths_stand_between_half_true_at_half_the_way_and_hardly_told_apart(counts, rng):
+    places = np.sort(np.linspace(-1.5, 2.0, counts) + rng.uniform(-0.02, 0.02, counts))
+    theta = Gaussian.start(places, np.full(counts, 3.5 / (counts - 1)), 0.6)
+    premise = Premise.of(GridAntecedent.build([Gaussian], [0], [theta]), LOW[:1], HIGH[:1])
+    # Half true, or 0.9 true, at half the distance.
+    least, most = (1.0 / np.sqrt(-8.0 * np.log(truth)) for truth in (0.5, 0.9))
+    for displacement in in_the_box(premise, rng, 5):
+        found = premise.parameters(displacement).reshape(2, counts)
+        near, far = distances(found[0], places)
+        ends = np.log(least * far), np.log(most * near)
+        x = displacement[counts:]
+        between = (x - premise.lower[counts:]) / (premise.upper - premise.lower)[counts:]
+        # The ends are looked for on a grid.
+        expected = (1.0 - between) * ends[0] + between * ends[1]
+        assert_allclose(found[1], expected, atol=0.02)
+
+
+@pytest.mark.parametrize("counts", [2, 3, 4, 6])
+def test_some_term_is_true_wherever_there_are_rows(counts, rng):
+    places = np.linspace(LOW[0], HIGH[0], counts)
+    theta = Gaussian.start(places, np.full(counts, places[1] - places[0]), 0.6)
+    premise = Premise.of(GridAntecedent.build([Gaussian], [0], [theta]), LOW[:1], HIGH[:1])
+    x = np.linspace(LOW[0], HIGH[0], 400)[None]
+    widths = kind_of(premise.antecedent) == "log_width"
+    least = []
+    for displacement in in_the_box(premise, rng, 40):
+        for d in (displacement, np.where(widths, premise.lower, displacement)):
+            antecedent = premise.antecedent.with_parameters(premise.parameters(d))
+            least.append(np.exp(antecedent.log_memberships(x)).max(axis=0).min())
+    assert min(least) > 0.48
+    # The bound is not idle.
+    assert min(least) < 0.55
 
 
 def crossing(left, right):
@@ -214,7 +246,7 @@ PLACES = {
 @pytest.mark.parametrize("places", PLACES.values(), ids=list(PLACES))
 @pytest.mark.parametrize("overlap", [0.4, 0.6])
 def test_neighbours_can_be_told_apart_anywhere_in_the_box(family, places, overlap, rng):
-    theta = family.start(places, spacing(places), overlap)
+    theta = family.start(places, distances(places, places)[0], overlap)
     antecedent = GridAntecedent.build([family], [0], [theta])
     premise = Premise.of(antecedent, LOW[:1], HIGH[:1])
     truth = on_flanks if family.name in {"s_shaped", "z_shaped"} else crossing
@@ -233,9 +265,20 @@ def test_neighbours_can_be_told_apart_anywhere_in_the_box(family, places, overla
 @ON_ORDERED
 def test_box_of_ordered_terms(antecedent):
     premise, kinds = Premise.of(antecedent, LOW, HIGH), kind_of(antecedent)
-    assert_array_equal(premise.lower[kinds == "location"], -FACTOR)
-    assert_array_equal(premise.upper[kinds == "location"], FACTOR)
-    assert_array_equal(premise.lower[kinds == "log_width"], -SHRINKAGE)
+    start = locations(antecedent, antecedent.parameters)
+    at = np.cumsum(np.ones(premise.size)) - 1.0
+    for j, own in terms(antecedent, at).items():
+        own = np.array([int(t[0]) for _, _, t in own])
+        ends = span(start[j], j, MARGIN)
+        ratios = np.diff(np.log(np.diff(np.concatenate([ends[:1], start[j], ends[1:]]))))
+        low, high = np.full(ratios.size, -RATIO), np.full(ratios.size, RATIO)
+        low[0], high[-1] = -OUTER, OUTER
+        high[0], low[-1] = ratios[0] + FACTOR, ratios[-1] - FACTOR
+        # What is out of bounds at the start can just move.
+        low, high = np.minimum(low, ratios - 0.01), np.maximum(high, ratios + 0.01)
+        assert_allclose(premise.lower[own], (low - ratios) / UNIT, rtol=1e-9)
+        assert_allclose(premise.upper[own], (high - ratios) / UNIT, rtol=1e-9)
+    assert (premise.lower[kinds == "log_width"] < 0.0).all()
     assert (premise.upper[kinds == "log_width"] <= FACTOR).all()
     assert_array_equal(premise.lower[kinds == "log_shape"], -FACTOR)
     # Sharper corners make a term truer next to its neighbour.
@@ -340,7 +383,7 @@ def test_pull_back_is_the_chain_rule(antecedent, is_free, rng):
     gradient = rng.normal(size=premise.size)
     root = rng.normal(size=(premise.size, premise.size))
     for displacement in in_the_box(premise, rng, 2):
-        jacobian = oracles.central_difference(premise.parameters, displacement, 1e-2)
+        jacobian = oracles.central_difference(premise.parameters, displacement, 1e-4)
         slope, curvature = premise.pull_back(displacement, gradient, root.T @ root)
         assert_allclose(slope, jacobian.T @ gradient, rtol=1e-8, atol=1e-8)
         half = root @ jacobian

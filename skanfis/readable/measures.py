@@ -8,7 +8,9 @@ of training, weights s of the rows, and m, sd and range of the target:
   strong count in equal parts, so that neither order nor units decide;
 * disagreement, sqrt(mean sum_r w_r (f_r - yhat)^2) / sd: the same for a rule drawn by its strength;
 * greatest sum, max sum_r |w_r (f_r - m)| / range: how much of the contributions cancels;
-* the value of each rule at its own center, the mean of the rows by s w_r.
+* the value of each rule at its own center, the mean of the rows by s w_r;
+* the part of the rows on which no term of an input is more true than false: whatever is said of
+  them there, the input has no word for it.
 
 Means over rows are by s. All is computed in standard deviations of the target about its mean, block
 by block: memory does not grow with the rows.
@@ -18,6 +20,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+from ..membership import LEAST_TRUTH
 
 __all__ = ["Measures", "Source", "TargetScale", "measure", "rule_sums"]
 
@@ -73,6 +77,9 @@ class Measures:
         Of the target, in its units; a constant target has a deviation and a range of one.
     truth : ndarray of shape (n_terms,)
         Greatest membership of each term on a row.
+    wordless : ndarray of shape (n_inputs,)
+        Part of the rows' weight on which every term of an input has a membership below one half;
+        NaN for inputs without terms.
     rule_weights, rule_rows : ndarray of shape (n_rules,)
         Part of the rows' weight on which each rule fires, and weight of the rows on which it is the
         strongest.
@@ -91,6 +98,7 @@ class Measures:
     low: np.ndarray
     high: np.ndarray
     truth: np.ndarray
+    wordless: np.ndarray
     rule_weights: np.ndarray
     rule_rows: np.ndarray
     rule_alone: np.ndarray
@@ -223,6 +231,10 @@ class _Sums:
         self.by_rule = np.ascontiguousarray(by_rule.transpose(2, 0, 1))
         n_rules, n_outputs = model.n_rules, model.n_outputs
         self.truth = np.full(model.antecedent.n_terms, -np.inf)
+        groups = model.antecedent.groups
+        inputs = np.concatenate([g.inputs for g in groups] or [np.empty(0, dtype=int)])
+        self.terms_of = {int(j): np.flatnonzero(inputs == j) for j in np.unique(inputs)}
+        self.wordless = np.zeros(model.n_inputs)
         self.mass, self.rows = np.zeros(n_rules), np.zeros(n_rules)
         self.first = np.zeros((n_rules, model.n_inputs))
         self.alone, self.disagreement = np.zeros((2, n_rules, n_outputs))
@@ -239,6 +251,8 @@ class _Sums:
         np.clip(Z, model.minimum[:, None], model.maximum[:, None], out=Z)
         log_mu = model.antecedent.log_memberships(Z)
         np.maximum(self.truth, log_mu.max(axis=1), out=self.truth)
+        for j, own in self.terms_of.items():
+            self.wordless[j] += weight @ (log_mu[own].max(axis=0) < np.log(LEAST_TRUTH))
         strengths, _ = model.antecedent.normalise(log_mu)
         mass = strengths * weight
         self.mass += mass.sum(axis=1)
@@ -258,7 +272,7 @@ class _Sums:
             self.greatest[k] = max(self.greatest[k], greatest)
 
     def joined(self, other):
-        for name in ("mass", "rows", "first", "alone", "disagreement"):
+        for name in ("mass", "rows", "first", "alone", "disagreement", "wordless"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         for name in ("truth", "greatest"):
             setattr(self, name, np.maximum(getattr(self, name), getattr(other, name)))
@@ -273,6 +287,9 @@ class _Sums:
             change = np.einsum("orj,rj->ro", slopes, centers[:, : slopes.shape[2]])
             rule_alone = np.sqrt(self.alone / self.rows[:, None])
             rule_disagreement = np.sqrt(self.disagreement / self.mass[:, None])
+        wordless = np.full(self.model.n_inputs, np.nan)
+        for j in self.terms_of:
+            wordless[j] = self.wordless[j] / target.weight
         return Measures(
             weight=target.weight,
             mean=target.mean,
@@ -280,6 +297,7 @@ class _Sums:
             low=target.low,
             high=target.high,
             truth=np.exp(self.truth),
+            wordless=wordless,
             rule_weights=self.mass / target.weight,
             rule_rows=self.rows,
             rule_alone=rule_alone,

@@ -21,6 +21,7 @@ __all__ = [
     "GREATEST_BEYOND",
     "GREATEST_CROSSING",
     "GREATEST_SUM",
+    "GREATEST_WORDLESS",
     "LEAST_TRUTH",
     "Readability",
     "findings_without_rows",
@@ -36,6 +37,10 @@ GREATEST_SUM = 2.0
 # In ranges of the target. A rule may say a little more than was ever seen, for its neighbours take
 # part everywhere; a quarter of the range beyond is no mean of anything that was.
 GREATEST_BEYOND = 0.25
+
+# Of the rows. Outer terms stand a little inside of the data, so that a few rows on either side have
+# no true term; beyond, a stretch of the input has no name.
+GREATEST_WORDLESS = 0.05
 
 # A sentence names so many terms, pairs or rules; beyond, it counts them.
 _MOST_NAMED = 5
@@ -65,6 +70,9 @@ class Readability:
         "greatest_truth", its greatest membership on a row; "crossing", the greatest value of the
         smaller of its membership and the next one's between the two locations, missing for the
         last. Both are from 0 to 1.
+    inputs : DataFrame
+        One row per input that has terms, labelled by its name. Columns: "terms", their number;
+        "wordless", the part of the rows' weight on which none of them is truer than 0.5.
     rules : DataFrame
         One row per rule, labelled by its number, and output. Columns: "if", the rule's terms;
         "output"; "weight", the part of the rows' weight on which it fires; "rows", the weight of
@@ -82,8 +90,8 @@ class Readability:
         of the target; "rules_beyond", the number of rules whose value at their own center lies
         beyond the target's range by more than a quarter of it.
     summary : Series
-        The worst of each column of ``outputs``, and "least_truth" and "greatest_crossing" of the
-        terms, missing where there are no terms, or no two on an input.
+        The worst of each column of ``outputs``; "least_truth" and "greatest_crossing" of the terms
+        and "wordless" of the inputs, missing where there are no terms, or no two on an input.
     findings : list of str
         What is not fit to be read, in sentences; an empty list if all is well.
     line : str
@@ -123,6 +131,7 @@ class Readability:
         "rules_beyond": 0,
         "least_truth": LEAST_TRUTH,
         "greatest_crossing": GREATEST_CROSSING,
+        "wordless": GREATEST_WORDLESS,
     }
 
     @property
@@ -140,6 +149,20 @@ class Readability:
                 "crossing": crossings(self.model.antecedent)[own],
             },
             index=pd.Index(own, name="term", dtype=int),
+        )
+
+    @property
+    def inputs(self) -> "pd.DataFrame":
+        """The inputs that have terms; see the class."""
+        import pandas as pd
+
+        terms = distinct_terms(self.model.antecedent)
+        return pd.DataFrame(
+            {
+                "terms": [len(own) for own in terms.values()],
+                "wordless": self.measures.wordless[list(terms)],
+            },
+            index=pd.Index([self.model.input_names[j] for j in terms], name="input", dtype=object),
         )
 
     @property
@@ -200,7 +223,7 @@ class Readability:
         found, model = self.measures, self.model
         own = own_terms(model.antecedent)
         sentences = _on_truth(model, own, found.truth, "on any row")
-        sentences += _on_crossings(model)
+        sentences += _on_crossings(model) + _on_wordless(model, found.wordless)
         for k, name in enumerate(model.output_names):
             of_output = f" of {name!r}" if model.n_outputs > 1 else ""
             sentences += _on_compensation(found, k, of_output)
@@ -220,6 +243,8 @@ class Readability:
             parts.append(f"least true term {_figure(found['least_truth'])}")
         if np.isfinite(found["greatest_crossing"]):
             parts.append(f"highest crossing {_figure(found['greatest_crossing'])}")
+        if np.isfinite(found["wordless"]):
+            parts.append(f"rows on which no term of an input is true {found['wordless']:.1%}")
         return "; ".join(parts)
 
     def __repr__(self):
@@ -230,7 +255,7 @@ class Readability:
 
     def _repr_html_(self):
         rules = self.rules.sort_values("weight", ascending=False, kind="stable")
-        tables = [self.terms, rules.head(_MOST_LINES)]
+        tables = [self.terms, self.inputs, rules.head(_MOST_LINES)]
         left_out = len(rules) - _MOST_LINES
         more = f"<div>and {left_out} more lines</div>" if left_out > 0 else ""
         return (
@@ -263,6 +288,7 @@ class Readability:
             "rules_beyond": int((found.rule_beyond > GREATEST_BEYOND).sum(axis=0).max()),
             "least_truth": float(found.truth[own].min()) if own.size else np.nan,
             "greatest_crossing": float(heights.max()) if heights.size else np.nan,
+            "wordless": float(np.nanmax(found.wordless)) if own.size else np.nan,
         }
 
 
@@ -333,6 +359,17 @@ def _on_crossings(model):
         f"{what} can hardly be told apart, for they cross above {GREATEST_CROSSING}: "
         f"{_named(too_high)}."
     ]
+
+
+def _on_wordless(model, wordless):
+    # An input without terms has none, which is no more than a limit.
+    beyond = np.flatnonzero(np.nan_to_num(wordless) > GREATEST_WORDLESS)
+    beyond = beyond[np.argsort(-wordless[beyond], kind="stable")]
+    if not beyond.size:
+        return []
+    named = _named([f"{model.input_names[j]!r} ({wordless[j]:.0%} of the rows)" for j in beyond])
+    many = "an input" if beyond.size == 1 else f"{beyond.size} inputs"
+    return [f"Rows lie where no term of {many} is truer than {LEAST_TRUTH}: {named}."]
 
 
 def _on_compensation(found, k, of_output):

@@ -7,7 +7,8 @@ input are: rules stand there on a handful of rows. So terms stand at even steps 
 
 which is where the optimal quantiser of a density f has its points: as dense as f^(1/3) (Panter and
 Dite 1951). Even values give even terms; and no step is in units of the input, so that none depends
-on them. The outer terms stand at quantiles and not at the outermost row.
+on them. The outer terms stand at quantiles and not at the outermost row. No two neighbouring gaps
+differ by more than a factor: a term has one width, which has to reach into both.
 """
 
 import numpy as np
@@ -19,9 +20,13 @@ from .sample import representative_rows
 __all__ = ["Spacing", "grid_antecedent"]
 
 _EDGE = 0.02
-_POWER = 2.0 / 3.0
-# Of a term's distances to its neighbours, the nearer one counts: as in ``premise``.
-_NEARER = 4.0
+_QUANTISER = 2.0 / 3.0
+# Neighbouring gaps differ by this factor at most; ``premise`` allows them a little more.
+_RATIO = 1.8
+# Of a term's distances to its neighbours the nearer one counts by this part of its logarithm: where
+# an overlap of 0.6 at even distances stands between the least and the most of ``premise``. Of the
+# smooth minimum and maximum of the two.
+_NEARER, _POWER = 1.0 / 6.0, 8.0
 _MOST_ROWS = 20_000
 
 
@@ -44,7 +49,17 @@ class Spacing:
     def centers(self, j, count):
         """Places of ``count`` terms on input ``j``, standardised."""
         values, levels = self._columns[j]
-        return np.interp(np.linspace(0.0, 1.0, count), levels, values)
+        places = np.interp(np.linspace(0.0, 1.0, count), levels, values)
+        gaps = np.diff(places)
+        for this, before in (
+            *((k, k - 1) for k in range(1, gaps.size)),
+            *((k, k + 1) for k in range(gaps.size - 2, -1, -1)),
+        ):
+            gaps[this] = max(gaps[this], gaps[before] / _RATIO)
+        if not gaps.any():
+            return places
+        gaps *= (places[-1] - places[0]) / gaps.sum()
+        return np.append(places[0], places[0] + np.cumsum(gaps))
 
 
 def _levels(column, weight):
@@ -55,7 +70,7 @@ def _levels(column, weight):
         low, high = column[order[0]], column[order[-1]]
     values = np.unique(column)
     values = values[(values >= low) & (values <= high)]
-    levels = np.concatenate([[0.0], np.cumsum(np.diff(values) ** _POWER)])
+    levels = np.concatenate([[0.0], np.cumsum(np.diff(values) ** _QUANTISER)])
     return values, levels / max(levels[-1], np.finfo(float).tiny)
 
 
@@ -76,9 +91,16 @@ def grid_antecedent(families, counts, spacing: Spacing, overlap):
     thetas = []
     for j in inputs:
         centers = spacing.centers(j, counts[j])
-        steep = np.diff(centers) ** -_NEARER
-        sides = np.concatenate([steep, [0.0]]) + np.concatenate([[0.0], steep])
-        n_sides = np.minimum(np.arange(counts[j]) + 1, np.arange(counts[j])[::-1] + 1).clip(max=2)
-        distance = (sides / n_sides) ** (-1.0 / _NEARER)
-        thetas.append(families[j].start(centers, distance, overlap))
+        thetas.append(families[j].start(centers, _distance(np.diff(centers)), overlap))
     return GridAntecedent.build([families[j] for j in inputs], inputs, thetas)
+
+
+def _distance(gaps):
+    """Of every term to its neighbours: mostly to the farther one, so that no gap is left open."""
+    n_sides = np.full(gaps.size + 1, 2)
+    n_sides[[0, -1]] = 1
+    near, far = (
+        ((np.append(steep, 0.0) + np.append(0.0, steep)) / n_sides) ** (1.0 / power)
+        for power, steep in ((-_POWER, gaps**-_POWER), (_POWER, gaps**_POWER))
+    )
+    return far ** (1.0 - _NEARER) * near**_NEARER

@@ -79,6 +79,8 @@ _RISE = 0.5
 _RAISE = 3.0
 _LEAST_RAISE, _LARGEST_RAISE = 2.0, 100.0
 _MOST_AGREEMENT = 1.0
+# What is found here is trained further, and on more rows.
+_MARGIN = 0.9
 # Rules that hold one by one are worth a tenth of the error, a fifth of its square. Where they would
 # cost more, as they do where the data are next to exact, the model goes before its rules.
 HOLDING = 1.2
@@ -250,7 +252,8 @@ def _together(tuned: Tuned, weights: _Weights, premise: Premise, free) -> Tuned:
     others = [key for key in free if key != "agreement"]
     found: Tuned | None = tuned
     while found is not None:
-        before, penalty = found, more_agreement(found.problem, found.evaluation)
+        before = found
+        penalty = more_agreement(found.problem, found.evaluation, _MARGIN * GREATEST_ALONE)
         if penalty is None:
             return before
         found = _turned(weights, premise, penalty, before.displacement, others, _ITERATIONS, 0)
@@ -259,9 +262,11 @@ def _together(tuned: Tuned, weights: _Weights, premise: Premise, free) -> Tuned:
     return replace(tuned, is_apart=True)
 
 
-def more_agreement(problem: SeparableProblem, evaluation: Evaluation) -> Penalty | None:
+def more_agreement(
+    problem: SeparableProblem, evaluation: Evaluation, limit=GREATEST_ALONE
+) -> Penalty | None:
     """The penalty with more agreement where the strongest rule does not hold alone; else None."""
-    apart = problem.strongest_alone(evaluation) / GREATEST_ALONE
+    apart = problem.strongest_alone(evaluation) / limit
     penalty = problem.penalty
     if apart <= 1.0 or penalty.agreement >= _MOST_AGREEMENT:
         return None

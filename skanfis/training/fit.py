@@ -184,33 +184,47 @@ class _Fit:
         Rows that the search has not seen may draw a term into a gap between them, out of which no
         gradient leads. The premises are then held ten times as much, from the start again, unless
         it was asked for how much they are held. Likewise agreement rises, unless it was asked for,
-        until the strongest rule holds alone.
+        until the strongest rule holds alone, if that is cheap. Of many rows a sample decides; runs
+        that are repeated are not watched.
         """
         seen = rows.sample or rows
-        run = self.best_run(rows, start)
-        if "stiffness" not in self.request.weights and not has_idle_term(seen, start.antecedent):
-            for _ in range(_MOST_STIFFER):
-                if not has_idle_term(seen, run.evaluation.antecedent):
-                    break
-                stiffer = replace(start.penalty, stiffness=10.0 * start.penalty.stiffness)
-                start = replace(start, penalty=stiffer)
-                run = self.best_run(rows, start)
-        if "agreement" in self.request.weights or start.is_free:
+        run = first = self.best_run(rows, start)
+        if self.was_stopped(run):
             return run
-        return self.run_that_holds(rows, run)
+        given = self.request.weights
+        if "stiffness" not in given and not has_idle_term(seen, start.antecedent):
+            run = self.without_idle_terms(seen, run)
+        if "agreement" not in given and not start.is_free:
+            run = self.with_rules_that_hold(seen, run)
+        if rows.sample is None or run is first:
+            return run
+        start = replace(run.start, displacement=run.displacement)
+        return self.best_run(rows, start, is_watched=False)
 
-    def run_that_holds(self, rows: StandardisedData, apart: SolverRun) -> SolverRun:
-        """The run with so much more agreement that the strongest rule holds alone, if cheap."""
+    def was_stopped(self, run: SolverRun) -> bool:
+        """Whether a callback has asked for the end."""
+        return self.callbacks is not None and run.result.status == "stopped"
+
+    def without_idle_terms(self, rows, run: SolverRun) -> SolverRun:
+        """The run with premises as stiff as leaves every term true somewhere."""
+        for _ in range(_MOST_STIFFER):
+            if not has_idle_term(rows, run.evaluation.antecedent):
+                break
+            penalty = run.start.penalty
+            penalty = replace(penalty, stiffness=10.0 * penalty.stiffness)
+            run = self.best_run(rows, replace(run.start, penalty=penalty), is_watched=False)
+        return run
+
+    def with_rules_that_hold(self, rows, apart: SolverRun) -> SolverRun:
+        """The run with so much agreement that the strongest rule holds alone, if that is cheap."""
         run = apart
-        while True:
-            penalty = more_agreement(run.problem, run.evaluation)
-            if penalty is None:
-                return run
-            run = self.best_run(rows, replace(run.start, penalty=penalty))
+        while (penalty := more_agreement(run.problem, run.evaluation)) is not None:
+            run = self.best_run(rows, replace(run.start, penalty=penalty), is_watched=False)
             if not is_affordable(run.evaluation, apart.evaluation):
                 return apart
+        return run
 
-    def best_run(self, rows: StandardisedData, start: Start) -> SolverRun:
+    def best_run(self, rows: StandardisedData, start: Start, is_watched=True) -> SolverRun:
         """The run from a start, or the best from several: of the least leave-one-out error.
 
         Workers are threads: passes over the data release Python's lock.
@@ -218,9 +232,10 @@ class _Fit:
         n_init = self.estimator.n_init
         premise = _premise(rows, start)
         if n_init == 1 or premise.size == 0:
-            return self.run(rows, start, start.displacement)
+            return self.run(rows, start, start.displacement, is_watched)
         if rows.sample is not None:
-            return self.run(rows, start, self.best_run(rows.sample, start).displacement)
+            best_of_sample = self.best_run(rows.sample, start, is_watched)
+            return self.run(rows, start, best_of_sample.displacement, is_watched)
         displacements = displaced_starts(premise, start.displacement, n_init, self.rng)
         parallel = Parallel(self.estimator.n_jobs, backend="threading", return_as="generator")
         best, smallest = None, np.inf
@@ -229,18 +244,18 @@ class _Fit:
         ):
             if best is None or error < smallest:
                 best, smallest = run, error
-            if self.tell_run(run):
+            if is_watched and self.tell_run(run):
                 break
         assert best is not None
         return best
 
     def run_and_error(self, rows, start, displacement):
         """One of several runs, and by what it is judged."""
-        run = self.run(rows, start, displacement, is_alone=False)
+        run = self.run(rows, start, displacement, is_watched=False)
         n_rows = effective_weight(run.problem.rows)
         return run, run.problem.leave_one_out_error(run.evaluation, n_rows)
 
-    def run(self, rows: StandardisedData, start: Start, displacement, is_alone=True) -> SolverRun:
+    def run(self, rows: StandardisedData, start: Start, displacement, is_watched=True) -> SolverRun:
         """One run of the solver, watched; the iterations of one among several are not told."""
         estimator = self.estimator
         problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)
@@ -253,7 +268,7 @@ class _Fit:
                 self.stopping.tol,
             )
         watchers: list[Callable | None] = [validation]
-        if is_alone:
+        if is_watched:
             watchers += [self.printer, self.iteration_watcher(start)]
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
@@ -338,7 +353,10 @@ class _Fit:
             start = self.start(without_outliers(rows, weights))
             if run is not None and turn > 1 and _is_of_one_size(start, run.start):
                 break
-            run = self.readable_run(reweighted(rows, weights), start)
+            # What the first start makes of outliers need not be read.
+            is_kept = turn > 0 or n_starts == 1
+            first_run = self.readable_run if is_kept else self.best_run
+            run = first_run(reweighted(rows, weights), start)
             run, weights = self.settled(rows, run, weights, epsilon)
         assert run is not None
         return run, weights

@@ -53,6 +53,10 @@ def by_loops(model, X, y, weight):
         for r in range(n_rules):
             disagreement2[r] += weight[i] * w[i, r] * (f[r] - yhat) ** 2
         sums = np.maximum(sums, sum(abs(w[i, r] * (f[r] - mean)) for r in range(n_rules)))
+    inputs = np.concatenate([g.inputs for g in model.antecedent.groups] or [np.empty(0)])
+    wordless = np.full(model.n_inputs, np.nan)
+    for j in set(inputs.astype(int)):
+        wordless[j] = weight @ [all(mu[inputs == j, i] < 0.5) for i in range(len(X))] / total
     mass = weight @ w
     with np.errstate(invalid="ignore"):
         centers = (w * weight[:, None]).T @ X / mass[:, None]
@@ -64,6 +68,7 @@ def by_loops(model, X, y, weight):
             "low": low,
             "high": high,
             "truth": mu.max(axis=1),
+            "wordless": wordless,
             "rule_weights": mass / total,
             "rule_rows": rule_rows,
             "rule_alone": np.sqrt(alone2 / rule_rows[:, None]) / sd,

@@ -15,6 +15,7 @@ from skanfis.readable import (
     GREATEST_BEYOND,
     GREATEST_CROSSING,
     GREATEST_SUM,
+    GREATEST_WORDLESS,
     LEAST_TRUTH,
     Readability,
     crossings,
@@ -42,6 +43,7 @@ def all_well(model, **changes):
         truth=np.ones_like(found.measures.truth),
         alone=np.full(model.n_outputs, GREATEST_ALONE),
         greatest_sum=np.full(model.n_outputs, GREATEST_SUM),
+        wordless=np.where(np.isnan(found.measures.wordless), np.nan, GREATEST_WORDLESS),
         rule_values=np.zeros((model.n_rules, model.n_outputs)),
     )
     return replace(found, measures=replace(measures, **changes))
@@ -79,6 +81,11 @@ def test_tables_hold_the_measures(model):
     if len(terms):
         assert found.summary["least_truth"] == terms["greatest_truth"].min()
         assert found.summary["greatest_crossing"] == np.nanmax(terms["crossing"])
+        assert found.summary["wordless"] == found.inputs["wordless"].max()
+    counts = terms.groupby("input").size()
+    assert_array_equal(found.inputs["terms"], counts[found.inputs.index])
+    places = [model.input_names.index(name) for name in found.inputs.index]
+    assert_array_equal(found.inputs["wordless"], measures.wordless[places])
 
 
 def test_terms_of_a_rule_are_told_in_words():
@@ -107,6 +114,7 @@ def changed(name, value):
         ("truth", LEAST_TRUTH - 0.01, "A term is never truer than 0.5 on any row: 'low' of 'time'"),
         ("alone", GREATEST_ALONE + 0.01, "misses the model by 0.51 standard deviations"),
         ("greatest_sum", GREATEST_SUM + 0.01, "add up, in size, to 2.01 ranges of the target"),
+        ("wordless", 0.23, "no term of an input is truer than 0.5: 'time' (23% of the rows)"),
         ("rule_values", 1e3, "A rule says where it fires what the target never was"),
         ("rule_values", -1e3, "by more than 0.25 of it: rule 0 (by "),
     ],

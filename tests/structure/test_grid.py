@@ -13,7 +13,7 @@ from skanfis.membership import (
     SigmoidProduct,
 )
 from skanfis.structure import Spacing, grid_antecedent
-from skanfis.structure.grid import _EDGE, _POWER
+from skanfis.structure.grid import _EDGE, _QUANTISER
 
 N_ROWS = 1001
 
@@ -110,7 +110,7 @@ class TestSpacing:
         found = Spacing(rows).centers(0, 5) * rows.inputs.scale + rows.inputs.offset
         edges = 1.0 - np.cbrt(1.0 - np.array([_EDGE, 1.0 - _EDGE]))
         expected = -3.0 * np.log1p(-np.linspace(*edges, 5))
-        assert _POWER == 2.0 / 3.0
+        assert _QUANTISER == 2.0 / 3.0
         assert_allclose(found, expected, rtol=1e-2)
 
     @pytest.mark.parametrize("draw", ["lognormal", "standard_cauchy", "normal"])

@@ -76,8 +76,8 @@ class TestCallbacks:
         assert seen.torn_down
 
     def test_wish_to_stop_is_honoured(self):
-        model = ANFISRegressor(n_mfs=3).set_callbacks(Recorder(most=2)).fit(X, Y)
-        assert model.n_iter_ == 2
+        model = ANFISRegressor(n_mfs=3).set_callbacks(Recorder(most=1)).fit(X, Y)
+        assert model.n_iter_ == 1
         assert "callback asked for the end" in model.status_
 
     def test_starts_are_told_one_by_one(self):

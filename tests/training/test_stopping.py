@@ -32,7 +32,7 @@ def held_out_by_default(X, y):
 
 def test_best_parameters_are_restored():
     X, y = overfitting()
-    model = ANFISRegressor(n_mfs=4, **LOOSE).fit(X, y)
+    model = ANFISRegressor(n_mfs=6, **LOOSE).fit(X, y)
     validation = held_out_by_default(X, y)
     kept = np.setdiff1d(np.arange(150), validation)
     loss = np.mean((y[validation] - model.predict(X[validation])) ** 2) / np.var(y[kept])
@@ -78,7 +78,7 @@ def test_whole_groups_are_held_out():
     alone, grouped = (
         ANFISRegressor(n_mfs=10, **LOOSE).fit(X, level, groups=given) for given in (None, groups)
     )
-    assert grouped.validation_loss_curve_.min() > 5 * alone.validation_loss_curve_.min()
+    assert grouped.validation_loss_curve_.min() > 1.5 * alone.validation_loss_curve_.min()
 
 
 def test_groups_mean_nothing_where_nothing_is_held_out():

@@ -17,6 +17,7 @@ _FIGURES_OF_READING = {
     "rules_beyond": "rules whose value at their own center lies far beyond the range",
     "least_truth": "truth of the least true term",
     "greatest_crossing": "highest crossing of neighbouring terms",
+    "wordless": "part of the rows on which no term of an input is true",
 }
 
 _NOT_FIT = "The rules are not fit to be read one by one"
