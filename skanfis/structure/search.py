@@ -63,8 +63,10 @@ _MOST_GROWING = 8
 _MOST_TRAINED = 3
 # More inputs than this are screened before terms are tried on them.
 _MOST_UNSCREENED = 16
-# Turns of weights and premises of a candidate.
-_TURNS = 4
+# Turns of weights and premises of a candidate; after the first of them, those whose expected error
+# is beyond the best one's by this factor are left as they are.
+_TURNS, _FIRST_TURNS = 4, 1
+_BEHIND = 1.05
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
@@ -132,6 +134,7 @@ class StructureSearch:
         self.n_sample = effective_weight(self.sample)
         self.parent: Tuned | None = None  # of the grids that are tried
         self.found: dict[Candidate, Tuned] = {}
+        self.begun: dict[Candidate, Tuned] = {}
         self.scores: dict[Candidate, float] = {}
         self.max_rules = max_rules
         self.folds = (split or _folds)(self.sample.groups)
@@ -168,7 +171,7 @@ class StructureSearch:
             if not small:
                 return best
             inputs = [grown[candidate] for candidate in small[:_MOST_GROWING]]
-            grown_best = min(small[: self._n_trained(small[0])], key=self._score)
+            grown_best = self._leading(small[: self._n_trained(small[0])])
             if not self._is_better(grown_best, best):
                 return best
             best = grown_best
@@ -240,7 +243,7 @@ class StructureSearch:
         promising = self._promising([Candidate(None, size, clustering) for size in sizes])
         # Beside grids, further ones hardly ever win, and take a fifth of the search.
         n_trained = 1 if clustering == "k-means" else _MOST_TRAINED
-        return min(promising[:n_trained], key=self._score, default=None)
+        return self._leading(promising[:n_trained]) if promising else None
 
     def _better(self, smaller, larger):
         return larger if self._is_better(larger, smaller) else smaller
@@ -250,6 +253,18 @@ class StructureSearch:
             return self._score(candidate) < self._score(than) - _DECISIVE
         worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(self.n_sample))
         return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
+
+    def _leading(self, candidates):
+        """The best of some candidates, of which only those that lead at first are trained out."""
+        if not self.folds and len(candidates) > 1:
+            for candidate in candidates:
+                if candidate not in self.found:
+                    self.begun[candidate] = self._train(candidate, self.sample, _FIRST_TURNS)
+            errors = [{**self.begun, **self.found}[c].expected_error for c in candidates]
+            for candidate, error in zip(candidates, errors, strict=True):
+                if error > _BEHIND * min(errors) and candidate in self.begun:
+                    self.found[candidate] = self.begun.pop(candidate)
+        return min(candidates, key=self._score)
 
     def _antecedent(self, candidate, rows):
         families = self.families
@@ -303,7 +318,8 @@ class StructureSearch:
 
     def _tuned(self, candidate):
         if candidate not in self.found:
-            self.found[candidate] = self._train(candidate, self.sample)
+            begun = self.begun.pop(candidate, None)
+            self.found[candidate] = self._train(candidate, self.sample, begun=begun)
         return self.found[candidate]
 
     @staticmethod
@@ -333,12 +349,19 @@ class StructureSearch:
             weight += rest.total_weight
         return np.sqrt(total / weight) if weight else np.inf
 
-    def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS):
+    def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
         """A short training on some rows, from the weights that were best so far."""
-        antecedent = self._antecedent(candidate, rows)
-        problem = SeparableProblem(
-            rows, antecedent, self.order, self.first, consequent_inputs=self.consequent_inputs
-        )
+        if begun is None:
+            problem = SeparableProblem(
+                rows,
+                self._antecedent(candidate, rows),
+                self.order,
+                self.first,
+                consequent_inputs=self.consequent_inputs,
+            )
+        else:
+            problem, turns = begun.problem, turns - _FIRST_TURNS
+        antecedent = problem.antecedent
         premise = Premise.of(antecedent, rows.inputs.minimum, rows.inputs.maximum)
         return tune(
             problem,
@@ -347,8 +370,10 @@ class StructureSearch:
             effective_weight(rows),
             turns,
             first_steps,
-            self._inherited(antecedent, premise),
+            self._inherited(antecedent, premise) if begun is None else None,
             is_loose=candidate.is_loose,
+            begun=begun,
+            is_last=turns + (_FIRST_TURNS if begun is not None else 0) == _TURNS,
         )
 
     def _inherited(self, antecedent, premise):

@@ -168,6 +168,8 @@ def tune(
     displacement=None,
     is_loose=False,
     is_free=False,
+    begun: Tuned | None = None,
+    is_last=True,
 ) -> Tuned:
     """Find the free weights, and the premises that go with them.
 
@@ -190,26 +192,33 @@ def tune(
         Whether the premises come before the weights.
     is_free : bool
         Whether rules may compensate one another beyond all reading.
+    begun : Tuned, optional
+        What earlier turns of the same have found: these go on from there.
+    is_last : bool
+        Whether no turns follow; then the rules are made to hold one by one.
     """
-    x = np.zeros(premise.size) if displacement is None else displacement
     steps_a_turn = _STEPS
     if problem.n_columns > _MOST_COLUMNS:
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
-    weights, penalty = _Weights(problem, n_rows, is_free), problem.penalty
-    if is_loose:
-        penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
-    evaluation = problem.evaluate(premise.parameters(x))
-    posterior = weights.improved(evaluation, x, penalty, 0 if is_loose else first_steps, free)
-    penalty = posterior.penalty
-    if premise.size == 0 or turns == 0:
-        return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
-    if "stiffness" in free and not is_loose:
-        stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
-        penalty = replace(penalty, stiffness=stiffness)
-    best: Tuned | None = None
+    weights, best = _Weights(problem, n_rows, is_free), begun
+    if begun is None:
+        x = np.zeros(premise.size) if displacement is None else displacement
+        penalty = problem.penalty
+        if is_loose:
+            penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
+        evaluation = problem.evaluate(premise.parameters(x))
+        posterior = weights.improved(evaluation, x, penalty, 0 if is_loose else first_steps, free)
+        penalty = posterior.penalty
+        if premise.size == 0 or turns == 0:
+            return Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
+        if "stiffness" in free and not is_loose:
+            stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
+            penalty = replace(penalty, stiffness=stiffness)
+    else:
+        x, penalty = begun.displacement, begun.penalty
     without_rise = 0
     for turn in range(turns):
-        is_first = is_loose and turn == 0
+        is_first = is_loose and turn == 0 and begun is None
         iterations = _LOOSE_ITERATIONS if is_first else _ITERATIONS
         steps = FIRST_STEPS if is_first else steps_a_turn
         found = _turned(weights, premise, penalty, x, free, iterations, steps)
@@ -221,7 +230,7 @@ def tune(
         if without_rise == _PATIENCE:
             break
     assert best is not None
-    if "agreement" in free and not is_free:
+    if "agreement" in free and not is_free and is_last:
         best = _together(best, weights, premise, free)
     return best
 

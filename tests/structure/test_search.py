@@ -117,7 +117,9 @@ def test_grid_tries_no_scattered_rules(rng):
     assert ANFISRegressor(n_mfs=2).fit(X, y).structures_ == []
 
 
-def test_candidates_are_listed_from_the_best(rng):
+def test_candidates_are_listed_from_the_best(monkeypatch, rng):
+    # Those whose rules do not hold alone would come further down than their error says.
+    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
     X = inputs(rng)
     y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
     model = ANFISRegressor().fit(X, y)
@@ -438,6 +440,22 @@ def test_searched_structure_is_tried_with_every_family(rng):
     # What is trained is what promised most.
     name = model.model_.antecedent.groups[0].family.name
     assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"
+
+
+def test_only_candidates_that_lead_are_trained_out(rng):
+    X = inputs(rng, 300, 2)
+    rows = StandardisedData.of(X, np.sin(3.0 * X[:, :1]) + 0.1 * rng.standard_normal((300, 1)))
+    used = np.arange(2)
+    found = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
+    others = [Candidate(counts) for counts in ((1, 1), (3, 1), (1, 3))]
+    best = found._leading(others)
+    assert best == Candidate((3, 1))
+    alone = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
+    assert found.error(best) == alone.error(best)
+    # What terms on the other input leave after a turn is left as it is.
+    assert not found.begun
+    assert found.error(others[2]) > 1.5 * found.error(best)
+    assert found.found[others[2]].score == alone._train(others[2], alone.sample, turns=1).score
 
 
 def test_score_counts_rows_by_weight_and_all_outputs(rng):

@@ -100,6 +100,15 @@ def test_agreement_rises_until_the_strongest_rule_holds_or_the_price_is_too_high
         assert fixed.penalty.agreement == tuning.FIRST_PENALTY.agreement
 
 
+def test_turns_go_on_from_where_they_were_left(two_rules):
+    problem, premise = two_rules
+    whole = tuning.tune(problem, premise, FREE, 100.0, turns=2)
+    begun = tuning.tune(problem, premise, FREE, 100.0, turns=1, is_last=False)
+    more = tuning.tune(begun.problem, premise, FREE, 100.0, turns=1, begun=begun)
+    assert whole.penalty == more.penalty
+    assert_allclose(more.displacement, whole.displacement, rtol=1e-12)
+
+
 def test_turns_end_when_the_evidence_has_not_risen_twice(monkeypatch, two_rules):
     # -2 log p by turn: it rises by more than a half in the third; the last is not reached.
     told, seen = [10.0, 9.8, 5.0, 4.8, 4.9, 0.0], []
