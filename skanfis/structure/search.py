@@ -3,10 +3,12 @@ r"""Structure by itself: how many terms or rules, chosen by the error to be expe
 What is compared are short trainings of candidate models on the rows themselves; no row is held out.
 The weights of every candidate's penalty are found by the evidence (``tuning``). The candidate wins
 whose error is the smallest on rows that are left out one by one, which of the consequents is known
-without further training (``Tuned.expected_error``); those are trained that promise most by it
-before any premise moves. docs/mathematics.rst has the other criteria on the same data: the evidence
-itself, which ranks penalties well, but is too sparing with rules, and the final prediction error. A
-candidate with a term that is hardly true on any row is out of the running.
+without further training (``Tuned.expected_error``); those are begun that promise most by it before
+any premise moves, and those trained out that lead after a turn. docs/mathematics.rst has the other
+criteria on the same data: the evidence itself, which ranks penalties well, but is too sparing with
+rules, and the final prediction error. A candidate with a term that is hardly true on any row is out
+of the running; one whose strongest rule does not hold alone must be as much better as rules that
+hold are worth.
 
 The search is greedy and small. Grids grow from the linear model, one term at a time, on the input
 where it pays most, from where the terms of the others are already; inputs that need no terms get
