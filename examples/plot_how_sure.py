@@ -59,7 +59,7 @@ panel.legend(ncols=3, loc="upper left", fontsize="small")
 # next. Twelve are there to learn from. With an input that tells the runs apart, such as the
 # temperature that each was made at, rules learn the offsets of these runs with the rest, and
 # intervals by rows, which come from rows of the same runs, know nothing of those of new ones. Held
-# out by whole runs, the intervals are for a row of a new run.
+# out by whole runs, the intervals are for a new run as a whole.
 
 run = np.repeat(np.arange(60), 25)
 temperature = rng.uniform(-40.0, 80.0, size=60)[run] + rng.normal(scale=0.2, size=run.size)

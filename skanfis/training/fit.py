@@ -103,7 +103,7 @@ def fit_rules(
     may_grow = request.is_searched and request.partition in ("auto", "grid")
     if data.wishes is None or not may_grow:
         return fit()
-    return grown(data, request.premise_inputs, fit)
+    return grown(data.wishes, request.premise_inputs, fit)
 
 
 def _fitted(estimator, data, request, callbacks) -> Fitted:
@@ -133,6 +133,7 @@ def _fitted(estimator, data, request, callbacks) -> Fitted:
         run.validation_losses,
         kept,
         share,
+        fit.n_units,
     )
 
 
@@ -414,6 +415,12 @@ class _Fit:
         rows = run.problem.rows
         n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
         return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
+
+    @property
+    def n_units(self):
+        """How many rows there are, or, where they are given, groups."""
+        groups = (self.rows.sample or self.rows).groups
+        return self.rows.n_rows if groups is None else np.unique(groups).size
 
     def effective_share(self, run):
         """Effective number of parameters over rows; NaN of too many for a posterior."""

@@ -23,7 +23,7 @@ import numpy as np
 
 from .._validation import warn_user
 from ..antecedent import GridAntecedent
-from .data import ValidatedData
+from ..constraints.wishes import Wishes
 from .result import Fitted
 
 __all__ = ["grown"]
@@ -35,26 +35,26 @@ _MOST_TERMS, _MOST_RULES = 6, 36
 _FEW_INPUTS = 4
 
 
-def grown(data: ValidatedData, inputs, fit: Callable[..., Fitted]) -> Fitted:
+def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
     """The fit of a structure found, or of the same with more terms, if what is known asks for it.
 
     Parameters
     ----------
-    data : ValidatedData
-        With wishes.
+    wishes : Wishes
+        What is known.
     inputs : ndarray of int
         Those that may have terms.
     fit : callable
         A fit of the structure that the data ask for; or, given them, of so many terms per input.
     """
     best, told = _quiet(fit)
-    found, counts = best, _counts(best, data.X.shape[1])
-    n_rows = data.X.shape[0] if data.groups is None else np.unique(data.groups).size
-    if n_rows * _cost(best) > _WORTHWHILE:
-        most = np.minimum([np.unique(column).size for column in data.X.T], _MOST_TERMS)
-        while trials := [*_fits(_next(data, inputs, counts, found), most, fit)]:
+    found, counts, n_units = best, _counts(best), best.n_units
+    if n_units * _cost(best) > _WORTHWHILE:
+        model = best.model
+        most = np.where(model.minimum < model.maximum, _MOST_TERMS, 1)
+        while trials := [*_fits(_next(wishes, inputs, counts, found), most, fit)]:
             trial, told_by_trial, more = min(trials, key=lambda one: _log_error(one[0]))
-            gain = n_rows * (_log_error(best) - _log_error(trial))
+            gain = n_units * (_log_error(best) - _log_error(trial))
             if not gain > _WORTHWHILE:
                 break
             best, told, counts = trial, told_by_trial, more
@@ -70,22 +70,22 @@ def _quiet(fit, *args):
         return fit(*args), told
 
 
-def _counts(fitted, n_inputs):
+def _counts(fitted):
     """Terms per input of a grid; None of other rules."""
     antecedent = fitted.model.antecedent
     if not isinstance(antecedent, GridAntecedent):
         return None
     inputs = np.concatenate([group.inputs for group in antecedent.groups] or [np.empty(0, int)])
-    return np.maximum(np.bincount(inputs, minlength=n_inputs), 1)
+    return np.maximum(np.bincount(inputs, minlength=fitted.model.n_inputs), 1)
 
 
-def _next(data, inputs, counts, found):
+def _next(wishes, inputs, counts, found):
     """Terms per input of what is tried next: one more on an input; beside other rules a grid."""
     if counts is None:
         grids = [one["n_mfs"] for one in found.start.candidates if one["n_mfs"] is not None]
         return [np.array(grid) for grid in grids[:1]]
     if len(inputs) > _FEW_INPUTS:
-        known = data.wishes.signs.any(axis=0)
+        known = wishes.signs.any(axis=0)
         inputs = [j for j in inputs if counts[j] > 1 or known[j]]
     return [counts + (np.arange(counts.size) == j) for j in inputs]
 

@@ -47,3 +47,4 @@ class Fitted:
     validation_losses: tuple[float, ...] | None = None
     constraints: dict | None = None
     effective_share: float = np.nan  # of parameters in rows, before any constraint
+    n_units: int = 0  # rows, or groups where they are given

@@ -325,3 +325,14 @@ def test_plain_estimator_names_the_one_for_dask():
         ANFISRegressor().fit(lazy_X, lazy_y)
     with pytest.raises(TypeError, match=r"X\.compute"):
         ANFISRegressor(n_mfs=1).fit(X, y).predict(lazy_X)
+
+
+def test_what_is_known_is_kept_as_in_one_process(few_are_many):
+    g = np.random.default_rng(1)
+    X = g.uniform(-1.0, 1.0, (N_ROWS, 2))
+    y = 1.0 / (1.0 + np.exp(-8.0 * X[:, 0])) + X[:, 1] + 0.3 * g.normal(size=N_ROWS)
+    known = {"partition": "grid", "max_iter": 2, "monotonic_cst": [1, 0]}
+    single = ANFISRegressor(**known).fit(X, y)
+    spread = DaskANFISRegressor(**known).fit(*cut(700, X, y))
+    assert spread.constraints_["certified"]
+    assert_same_model(spread, single, 1e-7)

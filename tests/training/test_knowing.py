@@ -11,7 +11,6 @@ from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.constraints.wishes import Wishes
 from skanfis.membership import Gaussian
 from skanfis.structure import Start
-from skanfis.training.data import ValidatedData
 from skanfis.training.knowing import grown
 from skanfis.training.result import Fitted
 
@@ -27,7 +26,7 @@ def rules(counts):
     return GridAntecedent.build([Gaussian] * len(used), used, thetas)
 
 
-def grow(errors, found, groups=None, candidates=()):
+def grow(errors, found, n_units=N_ROWS, candidates=(), varies=1.0):
     """The terms that are chosen where fits of so many have these errors, and all that were tried.
 
     Logarithms of the expected error, times the number of rows.
@@ -42,14 +41,14 @@ def grow(errors, found, groups=None, candidates=()):
         warnings.warn(f"{counts} told", UserWarning, stacklevel=2)
         known = {"loss_before": 0.9, "loss_after": np.exp(errors[counts] / N_ROWS)}
         start = Start(rules(counts), None, candidates=list(candidates))
-        model = SimpleNamespace(antecedent=rules(counts))
-        return Fitted(model, None, start, [], constraints=known, effective_share=0.0)
+        box = {"minimum": np.zeros(2), "maximum": np.array([1.0, varies])}
+        model = SimpleNamespace(antecedent=rules(counts), n_inputs=2, **box)
+        kept = {"constraints": known, "effective_share": 0.0, "n_units": n_units}
+        return Fitted(model, None, start, [], **kept)
 
-    X = np.column_stack([np.arange(N_ROWS), np.arange(N_ROWS) % 3])
     wishes = Wishes(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
-    data = ValidatedData(X, None, None, groups, (), (), wishes=wishes)
     with pytest.warns(UserWarning, match="told") as told:
-        best = grown(data, np.arange(2), fit)
+        best = grown(wishes, np.arange(2), fit)
     assert best.start.candidates == list(candidates)
     chosen = best.model.antecedent
     text = str(told[0].message)
@@ -64,15 +63,15 @@ def test_a_grid_grows_while_a_term_gains_two():
     assert chosen == "(4, 1)"
     assert tried == [(2, 1), (3, 1), (2, 2), (4, 1), (3, 2), (5, 1), (4, 2)]
     # Groups are what there is of observations: ten of them tell a tenth.
-    assert grow(errors, (2, 1), groups=np.arange(N_ROWS) // 10)[0] == "(2, 1)"
+    assert grow(errors, (2, 1), n_units=10)[0] == "(2, 1)"
 
 
-def test_no_more_terms_than_values_and_scattered_rules_beside_their_best_grid():
-    errors = {4: 0.0, (1, 3): -5.0, (2, 3): -6.0}
-    grids = [{"n_mfs": None}, {"n_mfs": [1, 3]}, {"n_mfs": [1, 1]}]
-    chosen, _, tried = grow(errors, 4, candidates=grids)
-    assert chosen == "(1, 3)"
-    assert tried == [4, (1, 3), (2, 3)]
+def test_scattered_rules_beside_their_best_grid_and_no_terms_where_nothing_varies():
+    errors = {4: 0.0, (3, 1): -5.0, (4, 1): -6.0, (3, 2): -9.0}
+    grids = [{"n_mfs": None}, {"n_mfs": [3, 1]}, {"n_mfs": [1, 1]}]
+    chosen, _, tried = grow(errors, 4, candidates=grids, varies=0.0)
+    assert chosen == "(3, 1)"
+    assert tried == [4, (3, 1), (4, 1)]
 
 
 def test_what_costs_nothing_is_left_alone():
