@@ -47,7 +47,7 @@ _CHANCE = 1e-3
 _CORNERS = 8
 
 
-def constrained(model: TSKModel, evaluation, problem, wishes, in_user_units):
+def constrained(model: TSKModel, evaluation, problem, wishes, in_user_units, is_trial=False):
     """The consequents nearest to those of an evaluation that keep all wishes.
 
     Parameters
@@ -60,6 +60,8 @@ def constrained(model: TSKModel, evaluation, problem, wishes, in_user_units):
     wishes : Wishes
     in_user_units : callable
         Coefficients of a TSKModel from those on [1, z].
+    is_trial : bool
+        A sample will do: nothing is proven, nothing warned of.
 
     Returns
     -------
@@ -75,7 +77,7 @@ def constrained(model: TSKModel, evaluation, problem, wishes, in_user_units):
         If no consequents keep the wishes; it says which.
     """
     exchange = _Exchange(model, problem, wishes, in_user_units)
-    return exchange.run(evaluation)
+    return exchange.run(evaluation, is_trial)
 
 
 class _Exchange:
@@ -94,15 +96,18 @@ class _Exchange:
             parts.append(np.where(corners == 1, high, low))
         self.sample = np.vstack(parts)
 
-    def run(self, evaluation):
-        solved, is_proven = self._proven(evaluation)
-        if not is_proven:
+    def run(self, evaluation, is_trial):
+        solved, is_proven = (
+            (self._on_sample(evaluation), False) if is_trial else self._proven(evaluation)
+        )
+        if not (is_proven or is_trial):
             # A margin that does not help is not paid for.
             self.held.margin = _FIRST_MARGIN
             solved = self._on_sample(evaluation)
             self._warn()
         ended = self._ended(evaluation, solved)
-        self._warn_of_contradictions(evaluation, solved, ended)
+        if not is_trial:
+            self._warn_of_contradictions(evaluation, solved, ended)
         report = {
             "certified": is_proven,
             "margin": self.held.margin,

@@ -95,10 +95,11 @@ def fit_rules(
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
 
-    def fit(counts=None):
+    def fit(counts=None, is_trial=False):
         if counts is None:
             return _fitted(estimator, data, request, callbacks)
-        return _fitted(estimator, data, replace(request, n_mfs=counts, partition="grid"), None)
+        grid = replace(request, n_mfs=counts, partition="grid")
+        return _fitted(estimator, data, grid, None, is_trial)
 
     may_grow = request.is_searched and request.partition in ("auto", "grid")
     if data.wishes is None or not may_grow:
@@ -106,7 +107,7 @@ def fit_rules(
     return grown(data.wishes, request.premise_inputs, fit)
 
 
-def _fitted(estimator, data, request, callbacks) -> Fitted:
+def _fitted(estimator, data, request, callbacks, is_trial=False) -> Fitted:
     fit = _Fit(estimator, data, request, callbacks)
     report_constant(fit.rows, data.input_names)
     weights = None
@@ -122,7 +123,7 @@ def _fitted(estimator, data, request, callbacks) -> Fitted:
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
     model = replace(model, posterior=fit.posterior(run, robust))
     if data.wishes is not None:
-        model, result, kept = fit.constrained(model, run)
+        model, result, kept = fit.constrained(model, run, is_trial)
         share = fit.effective_share(run)
     return Fitted(
         model,
@@ -431,14 +432,14 @@ class _Fit:
         noise = np.sum((posterior.noise / run.problem.rows.targets.scale) ** 2)
         return 1.0 - run.evaluation.mean_squared_error / noise if noise > 0.0 else 0.0
 
-    def constrained(self, model, run):
+    def constrained(self, model, run, is_trial):
         """The nearest model that keeps what is known, its result, and a report."""
         evaluation = run.evaluation
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         evaluation, report, known = constrained(
-            model, evaluation, run.problem, self.data.wishes, self.builder.in_user_units
+            model, evaluation, run.problem, self.data.wishes, self.builder.in_user_units, is_trial
         )
         model = replace(model, coefficients=self.builder.in_user_units(evaluation.coefficients))
         if not self.data.wishes.are_kept_within(model.output_limits):

@@ -45,7 +45,8 @@ def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
     inputs : ndarray of int
         Those that may have terms.
     fit : callable
-        A fit of the structure that the data ask for; or, given them, of so many terms per input.
+        A fit of the structure that the data ask for; or, given them, of so many terms per input, as
+        a trial, of which nothing need be proven, or for good.
     """
     best, told = _quiet(fit)
     found, counts, n_units = best, _counts(best), best.n_units
@@ -53,11 +54,13 @@ def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
         model = best.model
         most = np.where(model.minimum < model.maximum, _MOST_TERMS, 1)
         while trials := [*_fits(_next(wishes, inputs, counts, found), most, fit)]:
-            trial, told_by_trial, more = min(trials, key=lambda one: _log_error(one[0]))
+            trial, more = min(trials, key=lambda one: _log_error(one[0]))
             gain = n_units * (_log_error(best) - _log_error(trial))
             if not gain > _WORTHWHILE:
                 break
-            best, told, counts = trial, told_by_trial, more
+            best, counts = trial, more
+    if best is not found:
+        best, told = _quiet(fit, counts.tolist())
     for message in told:
         warn_user(str(message.message), message.category)
     return replace(best, start=replace(best.start, candidates=found.start.candidates))
@@ -91,12 +94,12 @@ def _next(wishes, inputs, counts, found):
 
 
 def _fits(every, most, fit):
-    """Fits of grids that are not too large, what they warn of, and their terms."""
+    """Fits of grids that are not too large, and their terms."""
     for counts in every:
         if (counts > most).any() or prod(counts.tolist()) > _MOST_RULES:
             continue
         try:
-            yield *_quiet(fit, counts.tolist()), counts
+            yield _quiet(fit, counts.tolist(), True)[0], counts
         except ValueError:
             # These rules cannot keep what is known at all, and are none of the candidates.
             continue

@@ -33,9 +33,10 @@ def grow(errors, found, n_units=N_ROWS, candidates=(), varies=1.0):
     """
     tried = []
 
-    def fit(counts=None):
+    def fit(counts=None, is_trial=False):
+        if is_trial or counts is None:
+            tried.append(found if counts is None else tuple(counts))
         counts = found if counts is None else tuple(counts)
-        tried.append(counts)
         if counts not in errors:
             raise ValueError("cannot keep it")
         warnings.warn(f"{counts} told", UserWarning, stacklevel=2)
