@@ -12,6 +12,7 @@ pytest.importorskip("distributed")
 
 import dask.array as da
 from distributed import Client, LocalCluster
+from distributed.scheduler import KilledWorker
 
 from skanfis import ANFISRegressor, sampling
 from skanfis.dask import DaskANFISRegressor, rows
@@ -34,10 +35,6 @@ def ends_once(flag, calls):
 
 def count_tasks(dask_scheduler):
     return len(dask_scheduler.tasks)
-
-
-def forgive_none(dask_scheduler):
-    dask_scheduler.allowed_failures = 0
 
 
 @pytest.mark.slow
@@ -80,10 +77,15 @@ def test_workers_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeyp
             sleep(0.05)
         predicted = model.predict(lazy_X)
         assert_allclose(predicted.compute(), model.predict(X), rtol=1e-12)
-        client.run_on_scheduler(forgive_none)
-        flag.unlink()
-        with pytest.raises(RuntimeError, match="same partition ended several workers"):
-            model.fit(lazy_X.map_blocks(ends_once(str(flag), 1), dtype=float, meta=X[:0]), lazy_y)
         lazy_X, lazy_y = da.from_array(X, chunks=(1000, 2)).persist(), lazy_y.persist()
     with pytest.raises(RuntimeError, match="was closed"):
         model.fit(lazy_X, lazy_y)
+
+
+def test_a_partition_that_ends_its_workers_is_said_to_be_too_large():
+    class Lazy:
+        def compute(self):
+            raise KilledWorker("sum-3", None, 3)
+
+    with pytest.raises(RuntimeError, match="same partition ended several workers.*KilledWorker"):
+        rows._computed(Lazy())
