@@ -3,6 +3,7 @@
 import os
 import signal
 from time import monotonic, sleep
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -85,7 +86,7 @@ def test_workers_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeyp
 def test_a_partition_that_ends_its_workers_is_said_to_be_too_large():
     class Lazy:
         def compute(self):
-            raise KilledWorker("sum-3", None, 3)
+            raise KilledWorker("sum-3", SimpleNamespace(address="tcp://w"), 3)
 
-    with pytest.raises(RuntimeError, match="same partition ended several workers.*KilledWorker"):
+    with pytest.raises(RuntimeError, match=r"same partition ended several workers.*KilledWorker"):
         rows._computed(Lazy())
