@@ -9,6 +9,7 @@ take in all over what one takes is what they cost each other.
 
 import os
 import pickle
+import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack
@@ -26,14 +27,22 @@ __all__ = ["run"]
 
 _ROUNDS = 2
 _BAR = 1.7
+# What dask's processes watch themselves by, off or less often; see docs/large_data.
+_NO_WATCH = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+}
 
 
-def by_dask(files, n_workers, keeps):
+def by_dask(files, n_workers, keeps=True, config=None):
     """Seconds of the passes by the clock, of the workers' processors and of client and scheduler.
 
     And the passes themselves, pickled: what they need, and what each does with a block.
     """
+    import dask
+
     with ExitStack() as stack:
+        stack.enter_context(dask.config.set(config or {}))
         if not keeps:
             stack.enter_context(patch.object(keeping, "_SHARE", 0.0))
         found = on_cluster(files, n_workers)
@@ -80,17 +89,20 @@ def side_by_side(files, passes, n_processes):
 
 def measure(files):
     """Seconds of each way, by the number of workers: the best of some rounds, in turn."""
-    passes = by_dask(files[:2], 1, True)[-1]
+    passes = by_dask(files[:2], 1)[-1]
     ways = {
         "plain processes": lambda n: side_by_side(files, passes, n),
-        "dask, rows kept": lambda n: by_dask(files, n, True)[:3],
-        "dask, rows read anew": lambda n: by_dask(files, n, False)[:3],
+        "dask, rows kept": lambda n: by_dask(files, n)[:3],
+        "dask, rows kept, without its watch": lambda n: by_dask(files, n, config=_NO_WATCH)[:3],
+        "dask, rows read anew": lambda n: by_dask(files, n, keeps=False)[:3],
     }
     found: dict = {}
     for _ in range(_ROUNDS):
         for way, seconds in ways.items():
             for n_workers in (1, 2):
                 found.setdefault((way, n_workers), []).append(seconds(n_workers))
+                told = ", ".join(f"{one:.2f} s" for one in found[way, n_workers][-1])
+                print(f"{way}, {n_workers}: {told}", file=sys.stderr, flush=True)
     return {key: min(values) for key, values in found.items()}
 
 
