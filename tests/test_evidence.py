@@ -520,7 +520,7 @@ class TestWholeFits:
             parameters.append(effective_parameters(model, X, y))
         # In between there may be more rules, of which each then says less.
         assert rules[2] == 1 < rules[0]
-        assert (np.diff(parameters) < -1.0).all()
+        assert (np.diff(parameters) < 0.0).all()
 
     def test_repeated_rows_and_whole_weights_are_the_same_fit(self):
         X, y = surface(80, 0.2)

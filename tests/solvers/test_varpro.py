@@ -291,7 +291,8 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     g = np.random.default_rng(seed)
     rows = spread_rows(kind, g)
     antecedent = start_of(kind, rows)
-    premise = Premise.of(antecedent, *oracles.box(rows))
+    # A truth that is displaced at random lies in the box of free terms, whatever the start.
+    premise = Premise.of(antecedent, *oracles.box(rows), is_free=True)
     truth = premise.parameters(displaced * g.uniform(-1.0, 1.0, premise.size))
     Z = rows.inputs.apply(rows.X.T, np.empty(rows.X.T.shape))
     phi = oracles.dense_design(antecedent, truth, Z, 1)
