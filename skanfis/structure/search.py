@@ -69,6 +69,9 @@ _MOST_UNSCREENED = 16
 # is beyond the best one's by this factor are left as they are.
 _TURNS, _FIRST_TURNS = 4, 1
 _BEHIND = 1.05
+# But where less than this is left of the target's variance, premises have a long way to go, and the
+# first turn says little of the last.
+_NEARLY_EXACT = 0.01
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
@@ -264,7 +267,8 @@ class StructureSearch:
                     self.begun[candidate] = self._train(candidate, self.sample, _FIRST_TURNS)
             errors = [{**self.begun, **self.found}[c].expected_error for c in candidates]
             for candidate, error in zip(candidates, errors, strict=True):
-                if error > _BEHIND * min(errors) and candidate in self.begun:
+                is_behind = error > _BEHIND * min(errors) > _NEARLY_EXACT
+                if is_behind and candidate in self.begun:
                     self.found[candidate] = self.begun.pop(candidate)
         return min(candidates, key=self._score)
 
