@@ -17,6 +17,7 @@ from multiprocessing import get_context
 from time import perf_counter, process_time
 from unittest.mock import patch
 
+from skanfis._memory import keeps_freed_memory
 from skanfis.dask import keeping
 
 from .fresh import alone
@@ -67,15 +68,14 @@ def plain(files, passes, start):
             if number < 2:
                 table = pd.read_parquet(file, columns=[*_NAMES, "y"])
                 kept[file] = blocks.load(0, table[_NAMES], table["y"], None, None)
-            of_loaded(kept[file])
+            with keeps_freed_memory():
+                of_loaded(kept[file])
     return perf_counter() - began, process_time() - spent
 
 
 def side_by_side(files, passes, n_processes):
     """Plain processes, each on its part of the files: longest by the clock, processors in all."""
     context = get_context("spawn")
-    # dask sets it for the workers that it starts from here.
-    os.environ.pop("MALLOC_TRIM_THRESHOLD_", None)
     with (
         context.Manager() as manager,
         ProcessPoolExecutor(n_processes, mp_context=context) as pool,
@@ -89,7 +89,7 @@ def side_by_side(files, passes, n_processes):
 
 def measure(files):
     """Seconds of each way, by the number of workers: the best of some rounds, in turn."""
-    passes = by_dask(files[:2], 1)[-1]
+    passes = by_dask(files, 1)[-1]
     ways = {
         "plain processes": lambda n: side_by_side(files, passes, n),
         "dask, rows kept": lambda n: by_dask(files, n)[:3],
