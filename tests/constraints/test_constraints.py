@@ -71,7 +71,9 @@ def test_predictions_rise_everywhere(params, rng):
     assert held.constraints_["loss_after"] >= held.constraints_["loss_before"] * (1.0 - 1e-12)
     assert falls(held, 0, rng) <= 1e-12
     assert monotonicity(held, 0) == 1
-    assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
+    # A structure that is found may grow under what is held.
+    if params.get("n_mfs") != "auto":
+        assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
 
 
 def test_what_is_held_is_certain_and_is_so_in_a_file(rng):
