@@ -59,7 +59,7 @@ class Waiting(LeastSquares):
 
 def fit(solver):
     X = np.linspace(-1.0, 1.0, 30).reshape(-1, 1)
-    ANFISRegressor(n_mfs=2, solver=solver).fit(X, np.sin(3.0 * X[:, 0]))
+    ANFISRegressor(n_mfs=2, agreement=0.1, solver=solver).fit(X, np.sin(3.0 * X[:, 0]))
 
 
 @pytest.mark.parametrize("first_to_end", [0, 1])

@@ -26,6 +26,7 @@ longer, whatever the number of rows.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import reduce
 from math import prod
 
 import numpy as np
@@ -248,7 +249,12 @@ class StructureSearch:
         promising = self._promising([Candidate(None, size, clustering) for size in sizes])
         # Beside grids, further ones hardly ever win, and take a fifth of the search.
         n_trained = 1 if clustering == "k-means" else _MOST_TRAINED
-        return self._leading(promising[:n_trained]) if promising else None
+        if not promising:
+            return None
+        self._leading(promising[:n_trained])
+        # Radii fall where numbers rise: from few clusters to many.
+        by_size = sorted(promising[:n_trained], key=lambda c: sizes.index(c.size))
+        return reduce(self._better, by_size)
 
     def _better(self, smaller, larger):
         return larger if self._is_better(larger, smaller) else smaller

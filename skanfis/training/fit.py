@@ -183,25 +183,35 @@ class _Fit:
     def readable_run(self, rows: StandardisedData, start: Start) -> SolverRun:
         """The best run from a start, whose rules can be read one by one.
 
+        Of many rows a sample decides on how much premises are held and rules agree, and where the
+        premises are: what is left to do on all rows is a step or two.
+        """
+        if rows.sample is None:
+            return self.best_readable_run(rows, start)
+        # Iterations on a sample are not told, but starts are.
+        on_sample = self.best_readable_run(rows.sample, start, self.estimator.n_init > 1)
+        start = on_sample.start
+        if isinstance(self.solver, VariableProjection) or self.estimator.n_init > 1:
+            start = replace(start, displacement=on_sample.displacement)
+        return self.run(rows, start, start.displacement)
+
+    def best_readable_run(self, rows, start: Start, is_watched=True) -> SolverRun:
+        """The best run, repeated until its rules can be read; unwatched then.
+
         Rows that the search has not seen may draw a term into a gap between them, out of which no
         gradient leads. The premises are then held ten times as much, from the start again, unless
         it was asked for how much they are held. Likewise agreement rises, unless it was asked for,
-        until the strongest rule holds alone, if that is cheap. Of many rows a sample decides; runs
-        that are repeated are not watched.
+        until the strongest rule holds alone, if that is cheap.
         """
-        seen = rows.sample or rows
-        run = first = self.best_run(rows, start)
+        run = self.best_run(rows, start, is_watched)
         if self.was_stopped(run):
             return run
         given = self.request.weights
-        if "stiffness" not in given and not has_idle_term(seen, start.antecedent):
-            run = self.without_idle_terms(seen, run)
+        if "stiffness" not in given and not has_idle_term(rows, start.antecedent):
+            run = self.without_idle_terms(rows, run)
         if "agreement" not in given and not start.is_free:
-            run = self.with_rules_that_hold(seen, run)
-        if rows.sample is None or run is first:
-            return run
-        start = replace(run.start, displacement=run.displacement)
-        return self.best_run(rows, start, is_watched=False)
+            run = self.with_rules_that_hold(rows, run)
+        return run
 
     def was_stopped(self, run: SolverRun) -> bool:
         """Whether a callback has asked for the end."""
@@ -221,12 +231,17 @@ class _Fit:
         """The run with so much agreement that the strongest rule holds alone, if that is cheap."""
         run = apart
         while (penalty := more_agreement(run.problem, run.evaluation)) is not None:
-            run = self.best_run(rows, replace(run.start, penalty=penalty), is_watched=False)
+            start = replace(run.start, penalty=penalty)
+            if self.solver.goes_on_from_tuning:
+                start = replace(start, displacement=run.displacement)
+            run = self.best_run(rows, start, is_watched=False, is_settled=True)
             if not is_affordable(run.evaluation, apart.evaluation):
                 return apart
         return run
 
-    def best_run(self, rows: StandardisedData, start: Start, is_watched=True) -> SolverRun:
+    def best_run(
+        self, rows: StandardisedData, start: Start, is_watched=True, is_settled=False
+    ) -> SolverRun:
         """The run from a start, or the best from several: of the least leave-one-out error.
 
         Workers are threads: passes over the data release Python's lock.
@@ -234,10 +249,7 @@ class _Fit:
         n_init = self.estimator.n_init
         premise = _premise(rows, start)
         if n_init == 1 or premise.size == 0:
-            return self.run(rows, start, start.displacement, is_watched)
-        if rows.sample is not None:
-            best_of_sample = self.best_run(rows.sample, start, is_watched)
-            return self.run(rows, start, best_of_sample.displacement, is_watched)
+            return self.run(rows, start, start.displacement, is_watched, is_settled)
         displacements = displaced_starts(premise, start.displacement, n_init, self.rng)
         parallel = Parallel(self.estimator.n_jobs, backend="threading", return_as="generator")
         best, smallest = None, np.inf
@@ -257,7 +269,7 @@ class _Fit:
         n_rows = effective_weight(run.problem.rows)
         return run, run.problem.leave_one_out_error(run.evaluation, n_rows)
 
-    def run(self, rows: StandardisedData, start: Start, displacement, is_watched=True) -> SolverRun:
+    def run(self, rows, start: Start, displacement, is_watched=True, is_settled=False) -> SolverRun:
         """One run of the solver, watched; the iterations of one among several are not told."""
         estimator = self.estimator
         problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)
@@ -276,9 +288,13 @@ class _Fit:
             displacement = np.clip(displacement, premise.lower, premise.upper)
         settings = {"max_iter": estimator.max_iter, "stiffness": start.penalty.stiffness}
         if rows.sample is not None:
-            if isinstance(self.solver, VariableProjection):
-                displacement = self.on_sample(rows.sample, problem, premise, displacement, settings)
             problem = problem.on_all(rows)
+        elif (
+            rows is self.rows.sample
+            and not is_settled
+            and isinstance(self.solver, VariableProjection)
+        ):
+            displacement = self.on_sample(rows, problem, premise, displacement, settings)
         result = self.solver.solve(
             problem,
             premise,
@@ -292,10 +308,7 @@ class _Fit:
         return SolverRun(start, problem, premise, result, tuple(validation.losses))
 
     def on_sample(self, sample, problem, premise, displacement, settings):
-        """Where the premises come to rest on a sample, by way of a part of it.
-
-        Unwatched: what is left to do on all rows is a step or two.
-        """
+        """Where the premises come to rest on a sample, by way of a part of it."""
         thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
         few = max(sample.n_rows // _PART_OF_SAMPLE, _ROWS_EACH * problem.n_columns)
         stages = [(thorough, problem)]

@@ -164,7 +164,7 @@ def test_window_after_a_first_call_that_is_a_fit():
     settings = {"agreement": model.agreement_, "alpha": model.alpha_}
     held = ANFISRegressor(partition=model, solver="lse", **settings)
     # The slope's weight is found beside these.
-    assert difference(model, held.fit(X[200:], y[200:]), X[200:]) < 0.02
+    assert difference(model, held.fit(X[200:], y[200:]), X[200:]) < 0.03
     assert model.model_.minimum == pytest.approx(X[200:].min(axis=0))
     assert model.n_samples_seen_ == 300
 
