@@ -142,54 +142,61 @@ class _Ordered:
         return self.inverse @ (np.log(gaps) - self.log_gaps)
 
     def near(self, gaps):
-        """Log of every term's distance to the nearer neighbour, and its derivatives by the gaps."""
+        """Log of every term's distance to the nearer neighbour."""
         steep = gaps[1:-1] ** -_POWER
-        total = np.append(steep, 0.0) + np.append(0.0, steep)
-        slope = np.zeros((total.size, gaps.size))
-        k = np.arange(steep.size)
-        slope[k, k + 1] = steep / gaps[1:-1] / total[:-1]
-        slope[k + 1, k + 1] = steep / gaps[1:-1] / total[1:]
-        return -np.log(total) / _POWER, slope
+        return -np.log(np.append(steep, 0.0) + np.append(0.0, steep)) / _POWER
 
     def far(self, gaps):
         """The same for the farther one; an outermost term covers where it has moved from, too."""
-        # As far as if there were a neighbour on the other side of that place.
+        left, right = self._sides(gaps)
+        return np.log(left**_POWER + right**_POWER) / _POWER
+
+    def _sides(self, gaps):
+        # As far as if there were a neighbour on the other side of where an outermost term was.
         low, high = 2.0 * np.maximum(gaps[[0, -1]] - np.exp(self.log_gaps[[0, -1]]), 0.0)
-        left, right = np.append(low, gaps[1:-1]), np.append(gaps[1:-1], high)
+        return np.append(low, gaps[1:-1]), np.append(gaps[1:-1], high)
+
+    def _slopes(self, gaps):
+        """Derivatives of near and far by the gaps."""
+        steep = gaps[1:-1] ** -_POWER
+        total = np.append(steep, 0.0) + np.append(0.0, steep)
+        by_near = np.zeros((total.size, gaps.size))
+        k = np.arange(steep.size)
+        by_near[k, k + 1] = steep / gaps[1:-1] / total[:-1]
+        by_near[k + 1, k + 1] = steep / gaps[1:-1] / total[1:]
+        left, right = self._sides(gaps)
         total = left**_POWER + right**_POWER
-        slope = np.zeros((total.size, gaps.size))
+        by_far = np.zeros((total.size, gaps.size))
         k = np.arange(total.size)
-        slope[k, k] = left ** (_POWER - 1.0) / total
-        slope[k, k + 1] = right ** (_POWER - 1.0) / total
-        slope[0, 0] *= 2.0
-        slope[-1, -1] *= 2.0
-        return np.log(total) / _POWER, slope
+        by_far[k, k] = left ** (_POWER - 1.0) / total
+        by_far[k, k + 1] = right ** (_POWER - 1.0) / total
+        by_far[0, 0] *= 2.0
+        by_far[-1, -1] *= 2.0
+        return by_near, by_far
 
     @cached_property
     def at_start(self):
         """What near and far are there."""
         start = np.exp(self.log_gaps)
-        return self.near(start)[0], self.far(start)[0]
+        return self.near(start), self.far(start)
 
     def _since_start(self, gaps):
-        """What near and far have changed by, and their derivatives."""
-        (near, by_near), (far, by_far) = self.near(gaps), self.far(gaps)
-        near, far = near - self.at_start[0], far - self.at_start[1]
+        """What near and far have changed by, and where the ends of a term's widths meet."""
+        near, far = self.near(gaps) - self.at_start[0], self.far(gaps) - self.at_start[1]
         # The ends never pass each other, nor quite meet.
         lowest = far - (1.0 - _LEAST_SLOPE) * self.span
-        meets = (near < lowest)[:, None]
-        return np.maximum(near, lowest), far, np.where(meets, by_far, by_near), by_far
+        return np.maximum(near, lowest), far, near < lowest
 
     def widening(self, displacement, gaps):
         """What the logarithms of the widths change by, beside their displacements."""
-        near, far, _, _ = self._since_start(gaps)
+        near, far, _ = self._since_start(gaps)
         t = self.terms
         between = self.part[t] + displacement[self.widths] / self.span[t]
         return (1.0 - between) * far[t] + between * near[t]
 
     def from_widths(self, change, gaps):
         """The displacements at which the logarithms of the widths have changed by so much."""
-        near, far, _, _ = self._since_start(gaps)
+        near, far, _ = self._since_start(gaps)
         t = self.terms
         own = change - (1.0 - self.part[t]) * far[t] - self.part[t] * near[t]
         return own / self._slope(near, far)[t]
@@ -207,7 +214,9 @@ class _Ordered:
         by_gap = gaps[:, None] * (self.basis - (gaps @ self.basis) / gaps.sum())
         t = self.terms
         between = (self.part[t] + displacement[self.widths] / self.span[t])[:, None]
-        near, far, by_near, by_far = self._since_start(gaps)
+        near, far, meets = self._since_start(gaps)
+        by_near, by_far = self._slopes(gaps)
+        by_near = np.where(meets[:, None], by_far, by_near)
         by_width = (1.0 - between) * by_far[t] + between * by_near[t]
         own = self._slope(near, far)[t]
         return np.cumsum(by_gap, axis=0)[:-1], by_width @ by_gap, own

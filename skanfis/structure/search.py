@@ -412,6 +412,7 @@ class StructureSearch:
             tuned.problem.antecedent,
             penalty,
             settled(tuned.displacement),
+            is_apart=tuned.is_apart,
             candidates=self._report(),
         )
 

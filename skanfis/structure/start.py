@@ -18,6 +18,7 @@ class Start:
     penalty: Penalty
     displacement: np.ndarray | None = None  # of the premises; None is zero
     is_free: bool = False  # whether terms may become what nobody can read (see ``premise``)
+    is_apart: bool = False  # the strongest rule does not hold alone, and making it would be dear
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
     expected_error: float = np.nan  # mean square on new rows, as far as it was sought

@@ -319,7 +319,16 @@ def tuned_start(
         low, high = sample.inputs.minimum, sample.inputs.maximum
         premise = Premise.of(antecedent, low, high, is_free)
         turns = _MOST_TURNS if premises_move else 0
-        return tune(problem, premise, free, n_sample, turns, is_loose=is_loose, is_free=is_free)
+        return tune(
+            problem,
+            premise,
+            free,
+            n_sample,
+            turns,
+            is_loose=is_loose,
+            is_free=is_free,
+            is_last=False,
+        )
 
     best, is_free = tuned(False), False
     # Where there are hardly more rows than consequents, any freedom passes through all.
@@ -335,12 +344,16 @@ def tuned_start(
             best = loose
         if best.is_beaten_loosely(free_terms, _LEAST_NOISE):
             best, is_free = free_terms, True
+    if "agreement" in free and best.displacement.size and premises_move and not is_free:
+        premise = Premise.of(antecedent, sample.inputs.minimum, sample.inputs.maximum)
+        best = _together(best, _Weights(problem, n_sample, is_free), premise, free)
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
     return Start(
         antecedent,
         penalty,
         settled(best.displacement),
         is_free,
+        best.is_apart,
         expected_error=best.expected_error,
     )
 
