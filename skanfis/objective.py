@@ -325,10 +325,8 @@ class SeparableProblem:
     def strongest_alone(self, evaluation):
         """RMS of the strongest rule's distance from the model, of the output where it is largest.
 
-        In deviations of the target, on the sample if there is one.
+        In deviations of the target.
         """
-        if self.on_sample is not None:
-            return self.on_sample.strongest_alone(evaluation)
         by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
         total, total_weight = np.zeros(self.n_outputs), 0.0
         for chunk in self.rows.chunks(self._block_rows):

@@ -52,8 +52,7 @@ def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeyp
     X, y = noisy_surface()
     quick = ANFISRegressor(n_mfs=3).fit(X, y)
     assert full_passes[:3] == ["FirstPass", "JointPass", "FirstPass"]
-    # The rules of the first run did not hold one by one: once more, from what the sample found.
-    assert len(full_passes) <= 5 + 3
+    assert len(full_passes) <= 5
     monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS)
     full = ANFISRegressor(n_mfs=3).fit(X, y)
     assert quick.loss_curve_[-1] < 1.001 * full.loss_curve_[-1]
