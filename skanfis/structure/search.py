@@ -363,6 +363,7 @@ class StructureSearch:
 
     def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
         """A short training on some rows, from the weights that were best so far."""
+        is_last = turns == _TURNS
         if begun is None:
             problem = SeparableProblem(
                 rows,
@@ -385,7 +386,7 @@ class StructureSearch:
             self._inherited(antecedent, premise) if begun is None else None,
             is_loose=candidate.is_loose,
             begun=begun,
-            is_last=turns + (_FIRST_TURNS if begun is not None else 0) == _TURNS,
+            is_last=is_last,
         )
 
     def _inherited(self, antecedent, premise):
