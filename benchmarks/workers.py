@@ -26,7 +26,7 @@ from .report import Measure, Results, Row, Table
 
 __all__ = ["run"]
 
-_ROUNDS = 2
+_ROUNDS = 4
 _BAR = 1.7
 # What dask's processes watch themselves by, off or less often; see docs/large_data.
 _NO_WATCH = {
@@ -67,7 +67,7 @@ def plain(files, passes, start):
         for file in files:
             if number < 2:
                 table = pd.read_parquet(file, columns=[*_NAMES, "y"])
-                kept[file] = blocks.load(0, table[_NAMES], table["y"], None, None)
+                (kept[file],) = blocks.load(0, table[_NAMES], table["y"], None, None)
             with keeps_freed_memory():
                 of_loaded(kept[file])
     return perf_counter() - began, process_time() - spent

@@ -59,6 +59,11 @@ class Loaded:
     groups: np.ndarray | None
     n_given: int
 
+    def __sizeof__(self):
+        """Bytes, as a scheduler asks that weighs the moving of rows against waiting for them."""
+        arrays = self.X, self.y, self.sample_weight, self.groups
+        return object.__sizeof__(self) + sum(one.nbytes for one in arrays if one is not None)
+
     def rows(self, inputs, targets):
         """The same on given scales."""
         return StandardisedData(self.X, self.y, self.sample_weight, inputs, targets, self.groups)
@@ -68,7 +73,8 @@ class Loaded:
 class Blocks:
     """Partitions of X, y, weights and groups, side by side, not computed."""
 
-    # Of delayed X, y, sample_weight or None, groups or None; or of Unread or delayed Loaded alone.
+    # Of delayed X, y, sample_weight or None, groups or None; or of one alone: Unread, or a delayed
+    # list of Loaded.
     pieces: list[tuple]
     layout: Layout
 
@@ -93,13 +99,13 @@ class Blocks:
         return cls(fused(list(zip(*pieces, strict=True))), layout)
 
     def load(self, number, *parts):
-        """One block, checked; runs where the data are. ValueError names the partition."""
-        if isinstance(parts[0], Loaded):
+        """One block, checked, or some; runs where the data are. ValueError names the partition."""
+        if isinstance(parts[0], list):
             return parts[0]
         if isinstance(parts[0], Unread):
             parts = parts[0].read()
         try:
-            return _loaded(self.layout, *parts)
+            return [_loaded(self.layout, *parts)]
         except (TypeError, ValueError) as error:
             raise type(error)(f"Partition {number}: {error}") from error
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import partial, reduce
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def reduce_blocks(blocks: Blocks, of_loaded: Callable, merge: Callable):
     from dask.delayed import delayed
 
     # One key for all tasks: what they have in common is sent to a worker once.
-    common = delayed((blocks.without_pieces(), of_loaded), traverse=False)
+    common = delayed((blocks.without_pieces(), of_loaded, merge), traverse=False)
     apply, add = delayed(_apply, pure=False), delayed(_merge_all, pure=False)
     level = [apply(common, number, *parts) for number, parts in enumerate(blocks.pieces)]
     while len(level) > 1:
@@ -37,20 +37,17 @@ def reduce_blocks(blocks: Blocks, of_loaded: Callable, merge: Callable):
 
 
 def _apply(common, number, *parts):
-    blocks, of_loaded = common
+    blocks, of_loaded, merge = common
     loaded = blocks.load(number, *parts)
     try:
         with keeps_freed_memory():
-            return of_loaded(loaded)
+            return reduce(merge, map(of_loaded, loaded))
     except ValueError as error:
         raise ValueError(f"Partition {number}: {error}") from error
 
 
 def _merge_all(results, merge):
-    total = results[0]
-    for result in results[1:]:
-        total = merge(total, result)
-    return total
+    return reduce(merge, results)
 
 
 def _computed(lazy):
