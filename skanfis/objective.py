@@ -261,6 +261,27 @@ class SeparableProblem:
             NormalEquations(gram, disagreement, penalty, factor, solved),
         )
 
+    def solved_again(self, evaluation):
+        """An evaluation of the same rows under this penalty; no pass over them."""
+        normal = evaluation.normal
+        penalty = self.penalty_matrix(normal.disagreement)
+        factor = NormalFactor(normal.gram + penalty)
+        penalty.flat[:: self.n_columns + 1] += factor.shift
+        # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 those of the evaluation.
+        slope = normal.penalty @ normal.coefficients
+        change = factor.solve(slope - penalty @ normal.coefficients)
+        solved = normal.coefficients + change
+        error = evaluation.mean_squared_error
+        error += np.sum(change * (normal.gram @ change - 2.0 * slope))
+        error = max(float(error), 0.0)
+        return replace(
+            evaluation,
+            cost=0.5 * (error + float(np.sum(solved * (penalty @ solved)))),
+            coefficients=evaluation.coefficients + self.local.to_global(change),
+            mean_squared_error=error,
+            normal=replace(normal, penalty=penalty, factor=factor, coefficients=solved),
+        )
+
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
         if self.on_sample is not None:
@@ -364,7 +385,7 @@ class SeparableProblem:
         The mean of (r_i / (1 - h_i))^2. The weights are those of so many rows: of a row that stands
         for several, one is left out.
         """
-        solved = self.evaluate(evaluation.antecedent.parameters, evaluation.coefficients)
+        solved = self.solved_again(evaluation)
         total, unit = 0.0, self._weight / n_rows
         for part, residual, weight in self.residuals(solved):
             kept = np.maximum(1.0 - unit * self.leverage(solved, part), _SMALLEST_FREEDOM)

@@ -143,36 +143,41 @@ class _Ordered:
 
     def near(self, gaps):
         """Log of every term's distance to the nearer neighbour."""
-        steep = gaps[1:-1] ** -_POWER
-        return -np.log(np.append(steep, 0.0) + np.append(0.0, steep)) / _POWER
+        steep = self._inner(gaps)
+        return -np.log(steep[:-1] + steep[1:]) / _POWER
 
     def far(self, gaps):
         """The same for the farther one; an outermost term covers where it has moved from, too."""
-        left, right = self._sides(gaps)
-        return np.log(left**_POWER + right**_POWER) / _POWER
+        high = self._covered(gaps) ** _POWER
+        return np.log(high[:-1] + high[1:]) / _POWER
 
-    def _sides(self, gaps):
-        # As far as if there were a neighbour on the other side of where an outermost term was.
-        low, high = 2.0 * np.maximum(gaps[[0, -1]] - np.exp(self.log_gaps[[0, -1]]), 0.0)
-        return np.append(low, gaps[1:-1]), np.append(gaps[1:-1], high)
+    @staticmethod
+    def _inner(gaps):
+        """The power of the gaps of the minimum, none beyond the outermost terms."""
+        steep = gaps**-_POWER
+        steep[0] = steep[-1] = 0.0
+        return steep
+
+    def _covered(self, gaps):
+        """The gaps, the outer ones as if there were a neighbour beyond where that term was."""
+        covered = gaps.copy()
+        covered[0] = 2.0 * max(gaps[0] - self._outer[0], 0.0)
+        covered[-1] = 2.0 * max(gaps[-1] - self._outer[1], 0.0)
+        return covered
 
     def _slopes(self, gaps):
         """Derivatives of near and far by the gaps."""
-        steep = gaps[1:-1] ** -_POWER
-        total = np.append(steep, 0.0) + np.append(0.0, steep)
-        by_near = np.zeros((total.size, gaps.size))
-        k = np.arange(steep.size)
-        by_near[k, k + 1] = steep / gaps[1:-1] / total[:-1]
-        by_near[k + 1, k + 1] = steep / gaps[1:-1] / total[1:]
-        left, right = self._sides(gaps)
-        total = left**_POWER + right**_POWER
-        by_far = np.zeros((total.size, gaps.size))
-        k = np.arange(total.size)
-        by_far[k, k] = left ** (_POWER - 1.0) / total
-        by_far[k, k + 1] = right ** (_POWER - 1.0) / total
+        steep, covered = self._inner(gaps), self._covered(gaps)
+        high = covered**_POWER
+        by_near = _beside(steep / gaps, steep[:-1] + steep[1:])
+        by_far = _beside(covered ** (_POWER - 1.0), high[:-1] + high[1:])
         by_far[0, 0] *= 2.0
         by_far[-1, -1] *= 2.0
         return by_near, by_far
+
+    @cached_property
+    def _outer(self):
+        return tuple(np.exp(self.log_gaps[[0, -1]]).tolist())
 
     @cached_property
     def at_start(self):
@@ -220,6 +225,15 @@ class _Ordered:
         by_width = (1.0 - between) * by_far[t] + between * by_near[t]
         own = self._slope(near, far)[t]
         return np.cumsum(by_gap, axis=0)[:-1], by_width @ by_gap, own
+
+
+def _beside(of_gap, total):
+    """A row per term: the parts of its two gaps, over its total."""
+    found = np.zeros((total.size, of_gap.size))
+    k = np.arange(total.size)
+    found[k, k] = of_gap[:-1] / total
+    found[k, k + 1] = of_gap[1:] / total
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,6 +331,7 @@ class _Term:
     location: int
     widths: np.ndarray
     shapes: np.ndarray
+    is_width: np.ndarray  # of every position
 
 
 def _terms(antecedent):
@@ -324,11 +339,12 @@ def _terms(antecedent):
     terms, start = [], 0
     for group in antecedent.groups:
         kinds = np.array([parameter.kind for parameter in group.family.parameters])
+        is_location, is_width = kinds == "location", kinds == "log_width"
+        is_shape = kinds == "log_shape"
         positions = start + np.arange(group.theta.size).reshape(group.theta.shape)
         for own, j in zip(positions.T, group.inputs, strict=True):
-            location = own[kinds == "location"][0]
-            widths, shapes = own[kinds == "log_width"], own[kinds == "log_shape"]
-            terms.append(_Term(group.family, int(j), own, location, widths, shapes))
+            location, widths, shapes = own[is_location][0], own[is_width], own[is_shape]
+            terms.append(_Term(group.family, int(j), own, location, widths, shapes, is_width))
         start += group.theta.size
     return terms
 
@@ -365,11 +381,10 @@ def _widest(term, raw, reach):
 def _in_units_of(reach, term, raw, find):
     """What is found for the same term about zero, with lengths in units of its reach."""
     theta = raw[term.positions].copy()
-    is_width = np.isin(term.positions, term.widths)
-    theta[is_width] -= np.log(reach)
+    theta[term.is_width] -= np.log(reach)
     theta[term.positions == term.location] = 0.0
     # To digits that rounding errors do not reach: terms of one kind are looked up.
-    return find(term.family, tuple(np.round(theta, _DIGITS)), tuple(is_width))
+    return find(term.family, tuple(np.round(theta, _DIGITS).tolist()), tuple(term.is_width.tolist()))
 
 
 @lru_cache(maxsize=_MOST_KEPT)

@@ -86,7 +86,10 @@ class _ReducedCost:
 
     def evaluate(self, x, reference=None):
         evaluation = self.problem.evaluate(self.premise.parameters(x), reference)
-        return evaluation, evaluation.cost + 0.5 * self.stiffness * (x @ x)
+        return evaluation, self.of(x, evaluation)
+
+    def of(self, x, evaluation):
+        return evaluation.cost + 0.5 * self.stiffness * (x @ x)
 
     def linearise(self, x, evaluation):
         raw = self.problem.linearise(evaluation)
@@ -112,7 +115,16 @@ def _propose(x, gradient, hessian, premise, free, radius, damping):
 
 
 def varpro(
-    problem, premise, *, max_iter, tol, stiffness=0.0, start=None, on_iteration=None, patience=2
+    problem,
+    premise,
+    *,
+    max_iter,
+    tol,
+    stiffness=0.0,
+    start=None,
+    on_iteration=None,
+    patience=2,
+    evaluation=None,
 ):
     """Minimise the reduced cost over the premises.
 
@@ -133,6 +145,8 @@ def varpro(
         Called with (n_iter, evaluation) after every accepted step; what is true ends the training.
     patience : int
         Twice, where nothing is known of the start; once, where a sample of the rows has settled.
+    evaluation : Evaluation, optional
+        That of the start, where it is known.
 
     Returns
     -------
@@ -140,7 +154,8 @@ def varpro(
     """
     cost_of = _ReducedCost(problem, premise, stiffness)
     x = np.zeros(premise.size) if start is None else start
-    current, cost = cost_of.evaluate(x)
+    current = problem.evaluate(premise.parameters(x)) if evaluation is None else evaluation
+    cost = cost_of.of(x, current)
     loss_curve = [current.mean_squared_error]
     status = "max_iter" if premise.size else "no_premise"
     radius, settled, n_iter = _FIRST_RADIUS, 0, 0

@@ -7,6 +7,9 @@ times sqrt(d), for the distance from the centre grows as sqrt(d) in d inputs and
 otherwise hardly overlap.
 """
 
+from itertools import pairwise
+from math import sqrt
+
 import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
@@ -20,7 +23,6 @@ _SMALLEST_WIDTH = 0.1
 # Terms that cross above this at the start are one term: training may bring them closer still, and
 # above 0.9 nobody could tell them apart.
 _HIGHEST_CROSSING = 0.85
-_POINTS = 65
 _MOST_TURNS = 4
 
 
@@ -112,14 +114,14 @@ def _merged(family, centers, widths, masses):
 
     Neighbours that cross highest are merged first, into a term of their common mean and deviation.
     """
-    order = np.argsort(centers, kind="stable")
-    terms = [(centers[r], widths[r] ** 2, masses[r], [int(r)]) for r in order]
-    crossings = _crossings(family, terms)
-    while len(terms) > 1 and max(crossings) > _HIGHEST_CROSSING:
-        k = int(np.argmax(crossings))
+    order = np.argsort(centers, kind="stable").tolist()
+    terms = [(centers[r], widths[r] ** 2, masses[r], [r]) for r in order]
+    distances = [_distance(*pair) for pair in pairwise(terms)]
+    while distances and _crossing(family, min(distances)) > _HIGHEST_CROSSING:
+        k = distances.index(min(distances))
         terms[k : k + 2] = [_joined(*terms[k : k + 2])]
         first = max(k - 1, 0)
-        crossings[first : k + 2] = _crossings(family, terms[first : k + 2])
+        distances[first : k + 2] = [_distance(*pair) for pair in pairwise(terms[first : k + 2])]
     term_of = np.empty(centers.size, dtype=int)
     for t, (_, _, _, rules) in enumerate(terms):
         term_of[rules] = t
@@ -137,12 +139,12 @@ def _joined(one, other):
     return center, variance, mass, one[3] + other[3]
 
 
-def _crossings(family, terms):
-    """Of every two neighbours, the greatest value that both have between their centres."""
-    centers = np.array([center for center, _, _, _ in terms])
-    theta = family.from_center_and_width(
-        centers, np.sqrt([variance for _, variance, _, _ in terms])
-    )
-    between = np.linspace(centers[:-1], centers[1:], _POINTS, axis=1)
-    pairs = [family.value(between, theta[:, side]) for side in (slice(-1), slice(1, None))]
-    return list(np.minimum(*pairs).max(axis=1))
+def _distance(one, other):
+    """From one term to the next, in units of both their widths together."""
+    return (other[0] - one[0]) / (sqrt(one[1]) + sqrt(other[1]))
+
+
+def _crossing(family, distance):
+    """Where two terms at this distance cross: as many of its own widths away from either."""
+    theta = family.from_center_and_width(np.zeros(1), np.ones(1))
+    return min(family.value(np.array([[side]]), theta)[0, 0] for side in (-distance, distance))

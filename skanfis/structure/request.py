@@ -131,7 +131,7 @@ class StructureRequest:
         """A start found on a sample, with the weights that were not given those of all rows."""
         free = [key for key in FREE if key not in self.weights]
         ratio = effective_weight(sample) / rows.total_weight
-        return replace(start, penalty=scaled(start.penalty, free, ratio))
+        return replace(start, penalty=scaled(start.penalty, free, ratio, start.is_held))
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""

@@ -408,12 +408,13 @@ class StructureSearch:
     def _start(self, best):
         tuned = self._tuned(best)
         n_rows = effective_weight(self.rows)
-        penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows)
+        penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows, tuned.is_held)
         return Start(
             tuned.problem.antecedent,
             penalty,
             settled(tuned.displacement),
             is_apart=tuned.is_apart,
+            is_held=tuned.is_held,
             candidates=self._report(),
         )
 

@@ -95,6 +95,7 @@ class Tuned:
     displacement: np.ndarray
     posterior: Laplace
     is_apart: bool = False  # the strongest rule does not hold alone
+    is_held: bool = False  # agreement was raised until it does
 
     @property
     def penalty(self):
@@ -215,14 +216,14 @@ def tune(
             stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
             penalty = replace(penalty, stiffness=stiffness)
     else:
-        x, penalty = begun.displacement, begun.penalty
+        x, penalty, evaluation = begun.displacement, begun.penalty, begun.evaluation
     without_rise = 0
     for turn in range(turns):
         is_first = is_loose and turn == 0 and begun is None
         iterations = _LOOSE_ITERATIONS if is_first else _ITERATIONS
         steps = FIRST_STEPS if is_first else steps_a_turn
-        found = _turned(weights, premise, penalty, x, free, iterations, steps)
-        x, penalty = found.displacement, found.penalty
+        found = _turned(weights, premise, penalty, x, evaluation, free, iterations, steps)
+        x, penalty, evaluation = found.displacement, found.penalty, found.evaluation
         rises = best is None or found.score < best.score - _RISE
         without_rise = 0 if rises else without_rise + 1
         if best is None or found.score < best.score:
@@ -235,7 +236,7 @@ def tune(
     return best
 
 
-def _turned(weights: _Weights, premise: Premise, penalty, x, free, iterations, steps):
+def _turned(weights: _Weights, premise: Premise, penalty, x, evaluation, free, iterations, steps):
     """One turn: premises down the cost, then weights up the evidence."""
     weighted = weights.problem.with_penalty(penalty)
     result = varpro(
@@ -245,6 +246,7 @@ def _turned(weights: _Weights, premise: Premise, penalty, x, free, iterations, s
         tol=_TOLERANCE,
         stiffness=penalty.stiffness,
         start=x,
+        evaluation=weighted.solved_again(evaluation),
     )
     evaluation = result.evaluation
     x = premise.displacement(evaluation.antecedent.parameters)
@@ -264,8 +266,9 @@ def _together(tuned: Tuned, weights: _Weights, premise: Premise, free) -> Tuned:
         before = found
         penalty = more_agreement(found.problem, found.evaluation, _MARGIN * GREATEST_ALONE)
         if penalty is None:
-            return before
-        found = _turned(weights, premise, penalty, before.displacement, others, _ITERATIONS, 0)
+            return replace(before, is_held=before is not tuned)
+        x, evaluation = before.displacement, before.evaluation
+        found = _turned(weights, premise, penalty, x, evaluation, others, _ITERATIONS, 0)
         if not is_affordable(found.evaluation, tuned.evaluation):
             found = None
     return replace(tuned, is_apart=True)
@@ -347,13 +350,14 @@ def tuned_start(
     if "agreement" in free and best.displacement.size and premises_move and not is_free:
         premise = Premise.of(antecedent, sample.inputs.minimum, sample.inputs.maximum)
         best = _together(best, _Weights(problem, n_sample, is_free), premise, free)
-    penalty = scaled(best.penalty, free, n_sample / effective_weight(rows))
+    penalty = scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held)
     return Start(
         antecedent,
         penalty,
         settled(best.displacement),
         is_free,
         best.is_apart,
+        best.is_held,
         expected_error=best.expected_error,
     )
 
@@ -363,13 +367,14 @@ def settled(displacement):
     return np.round(displacement, _DIGITS)
 
 
-def scaled(penalty: Penalty, free, ratio):
+def scaled(penalty: Penalty, free, ratio, is_held=False):
     """The free weights times a ratio: relative to a mean over rows, they fall with their number.
 
-    More digits than three say nothing, and would carry rounding errors into the model.
+    But agreement that makes rules hold one by one does so for any number of rows. More digits than
+    three say nothing, and would carry rounding errors into the model.
     """
     own = {
-        "agreement": penalty.agreement,
+        "agreement": penalty.agreement / (ratio if is_held else 1.0),
         "alpha": penalty.alpha,
         "slope": penalty.rho,
         "stiffness": penalty.stiffness,
