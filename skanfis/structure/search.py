@@ -160,7 +160,7 @@ class StructureSearch:
         self.parent = None
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
-            clusters = self._best_clusters(clustering)
+            clusters = self._best_clusters(clustering, best)
             best = best if clusters is None else self._better(best, clusters)
         if best.counts is None or max(best.counts) > 1:
             for family in self.other_families:
@@ -177,7 +177,7 @@ class StructureSearch:
             if not small:
                 return best
             inputs = [grown[candidate] for candidate in small[:_MOST_GROWING]]
-            grown_best = self._leading(small[: self._n_trained(small[0])])
+            grown_best = self._leading(small[: self._n_trained(small[0])], best)
             if not self._is_better(grown_best, best):
                 return best
             best = grown_best
@@ -241,7 +241,7 @@ class StructureSearch:
             and n_columns <= self._most_columns
         )
 
-    def _best_clusters(self, clustering):
+    def _best_clusters(self, clustering, grid):
         sizes = list(_RADII)
         if clustering != "subtractive":
             most = min(_MOST_COLUMNS, 2.0 * self.n_sample) / self.n_basis
@@ -251,7 +251,7 @@ class StructureSearch:
         n_trained = 1 if clustering == "k-means" else _MOST_TRAINED
         if not promising:
             return None
-        self._leading(promising[:n_trained])
+        self._leading(promising[:n_trained], grid)
         # Radii fall where numbers rise: from few clusters to many.
         by_size = sorted(promising[:n_trained], key=lambda c: sizes.index(c.size))
         return reduce(self._better, by_size)
@@ -265,15 +265,19 @@ class StructureSearch:
         worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(self.n_sample))
         return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
 
-    def _leading(self, candidates):
-        """The best of some candidates, of which only those that lead at first are trained out."""
-        if not self.folds and len(candidates) > 1:
+    def _leading(self, candidates, before):
+        """The best of some candidates, of which only those are trained out that may still lead.
+
+        ``before`` is what they are to be better than.
+        """
+        if not self.folds:
             for candidate in candidates:
                 if candidate not in self.found:
                     self.begun[candidate] = self._train(candidate, self.sample, _FIRST_TURNS)
             errors = [{**self.begun, **self.found}[c].expected_error for c in candidates]
+            least = min(*errors, self._tuned(before).expected_error)
             for candidate, error in zip(candidates, errors, strict=True):
-                is_behind = error > _BEHIND * min(errors) > _NEARLY_EXACT
+                is_behind = error > _BEHIND * least > _NEARLY_EXACT
                 if is_behind and candidate in self.begun:
                     self.found[candidate] = self.begun.pop(candidate)
         return min(candidates, key=self._score)
