@@ -384,7 +384,9 @@ def _in_units_of(reach, term, raw, find):
     theta[term.is_width] -= np.log(reach)
     theta[term.positions == term.location] = 0.0
     # To digits that rounding errors do not reach: terms of one kind are looked up.
-    return find(term.family, tuple(np.round(theta, _DIGITS).tolist()), tuple(term.is_width.tolist()))
+    return find(
+        term.family, tuple(np.round(theta, _DIGITS).tolist()), tuple(term.is_width.tolist())
+    )
 
 
 @lru_cache(maxsize=_MOST_KEPT)

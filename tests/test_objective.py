@@ -285,6 +285,21 @@ def test_reference_coefficients_do_not_change_the_answer(case, rng):
         assert_all_close(other.coefficients, plain.coefficients, 1e-9 * (1.0 + size))
 
 
+def test_other_weights_of_the_penalty_need_no_pass(case, monkeypatch):
+    before = case.problem.evaluate(case.point)
+    other = case.problem.with_penalty(Penalty(agreement=0.02, alpha=3e-3, slope=1e-3))
+    expected = other.evaluate(case.point)
+    slope = other.linearise(expected).gradient
+    with monkeypatch.context() as patched:
+        patched.delattr(SeparableProblem, "_sum")
+        found = other.solved_again(before)
+    assert_allclose(found.cost, expected.cost, rtol=1e-10)
+    assert_allclose(found.mean_squared_error, expected.mean_squared_error, rtol=1e-9)
+    assert_all_close(found.coefficients, expected.coefficients, 1e-8)
+    assert_all_close(found.normal.penalty, expected.normal.penalty, 1e-12)
+    assert_all_close(other.linearise(found).gradient, slope, 1e-8)
+
+
 def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     # |r|^2 is 1e-18 of |y|^2: out of y'y it would come as nothing but rounding.
     antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])

@@ -442,20 +442,37 @@ def test_searched_structure_is_tried_with_every_family(rng):
     assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"
 
 
-def test_only_candidates_that_lead_are_trained_out(rng):
+def search_of(X, y):
+    used = np.arange(X.shape[1])
+    rows, families = StandardisedData.of(X, y[:, None]), [Gaussian] * used.size
+    return search.StructureSearch(rows, families, 1, used, used, 0, {}, overlap=0.6)
+
+
+def test_only_candidates_that_may_still_lead_are_trained_out(rng):
     X = inputs(rng, 300, 2)
-    rows = StandardisedData.of(X, np.sin(3.0 * X[:, :1]) + 0.1 * rng.standard_normal((300, 1)))
-    used = np.arange(2)
-    found = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
-    others = [Candidate(counts) for counts in ((1, 1), (3, 1), (1, 3))]
-    best = found._leading(others)
-    assert best == Candidate((3, 1))
-    alone = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(300)
+    found, alone = search_of(X, y), search_of(X, y)
+    linear, best, other = (Candidate(counts) for counts in ((1, 1), (3, 1), (1, 3)))
+    assert found._leading([best, other], linear) == best
     assert found.error(best) == alone.error(best)
     # What terms on the other input leave after a turn is left as it is.
     assert not found.begun
-    assert found.error(others[2]) > 1.5 * found.error(best)
-    assert found.found[others[2]].score == alone._train(others[2], alone.sample, turns=1).score
+    assert found.error(other) > 1.5 * found.error(best)
+    turned_once = alone._train(other, alone.sample, turns=1).score
+    assert found.found[other].score == turned_once
+    # So it is where there is one candidate, which is to be better than what came before.
+    assert alone._leading([other], best) == other
+    assert alone.found[other].score == turned_once
+
+
+def test_next_to_exact_data_all_candidates_are_trained_out(rng):
+    X = inputs(rng, 300, 2)
+    y = X[:, 1] + 0.03 * np.sin(3.0 * X[:, 0])
+    found, alone = search_of(X, y), search_of(X, y)
+    best, other = Candidate((3, 1)), Candidate((1, 3))
+    assert found._leading([best, other], Candidate((1, 1))) == best
+    assert found.error(other) > 1.5 * found.error(best)
+    assert found.error(other) == alone.error(other)
 
 
 def test_score_counts_rows_by_weight_and_all_outputs(rng):
