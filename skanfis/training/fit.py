@@ -188,12 +188,29 @@ class _Fit:
         """
         if rows.sample is None:
             return self.best_readable_run(rows, start)
-        # Iterations on a sample are not told, but starts are.
-        on_sample = self.best_readable_run(rows.sample, start, self.estimator.n_init > 1)
-        start = on_sample.start
-        if isinstance(self.solver, VariableProjection) or self.estimator.n_init > 1:
-            start = replace(start, displacement=on_sample.displacement)
+        several = self.estimator.n_init > 1
+        for part in self.parts_of_sample(rows.sample, start):
+            # Iterations on a sample are not told, but starts are.
+            found = self.best_readable_run(part, start, is_watched=several)
+            start = found.start
+            if self.is_projecting or several:
+                start = replace(start, displacement=found.displacement)
         return self.run(rows, start, start.displacement)
+
+    @property
+    def is_projecting(self) -> bool:
+        """Whether premises can be trained on a sample, and go on from there on all rows."""
+        return isinstance(self.solver, VariableProjection)
+
+    def parts_of_sample(self, sample: StandardisedData, start: Start) -> list[StandardisedData]:
+        """What is trained on, one after the other: a part of the sample if that is enough, all."""
+        n_basis = 1 + (self.request.consequent_inputs.size if self.estimator.order else 0)
+        n_columns = start.antecedent.n_rules * n_basis
+        few = max(sample.n_rows // _PART_OF_SAMPLE, _ROWS_EACH * n_columns)
+        if self.estimator.n_init > 1 or not self.is_projecting or 2 * few > sample.n_rows:
+            return [sample]
+        # The first rows of a sample are a sample.
+        return [sample.part(slice(few)), sample]
 
     def best_readable_run(self, rows, start: Start, is_watched=True) -> SolverRun:
         """The best run, repeated until its rules can be read; unwatched then.
@@ -286,47 +303,23 @@ class _Fit:
             watchers += [self.printer, self.iteration_watcher(start)]
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
-        settings = {"max_iter": estimator.max_iter, "stiffness": start.penalty.stiffness}
+        solver = self.solver
         if rows.sample is not None:
             problem = problem.on_all(rows)
-        elif (
-            rows is self.rows.sample
-            and not is_settled
-            and isinstance(self.solver, VariableProjection)
-        ):
-            displacement = self.on_sample(rows, problem, premise, displacement, settings)
-        result = self.solver.solve(
+        elif self.rows.sample is not None and not is_settled and self.is_projecting:
+            solver = clone(solver).set_params(tol=_THOROUGH * solver.tol)
+        result = solver.solve(
             problem,
             premise,
+            max_iter=estimator.max_iter,
+            stiffness=start.penalty.stiffness,
             start=displacement,
             on_iteration=watch_all(*watchers),
-            **settings,
         )
         if validation is None:
             return SolverRun(start, problem, premise, result)
         result = validation.restored(result)
         return SolverRun(start, problem, premise, result, tuple(validation.losses))
-
-    def on_sample(self, sample, problem, premise, displacement, settings):
-        """Where the premises come to rest on a sample, by way of a part of it."""
-        thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
-        few = max(sample.n_rows // _PART_OF_SAMPLE, _ROWS_EACH * problem.n_columns)
-        stages = [(thorough, problem)]
-        if 2 * few <= sample.n_rows:
-            # The first rows of a sample are a sample.
-            part = SeparableProblem(
-                sample.part(slice(few)),
-                problem.antecedent,
-                problem.order,
-                problem.penalty,
-                self.map_ordered,
-                self.request.consequent_inputs,
-            )
-            stages.insert(0, (thorough, part))
-        for solver, one in stages:
-            found = solver.solve(one, premise, start=displacement, **settings)
-            displacement = premise.displacement(found.evaluation.antecedent.parameters)
-        return displacement
 
     def problem(self, rows: StandardisedData, start: Start) -> SeparableProblem:
         """The least-squares problem at a start."""
