@@ -12,6 +12,7 @@ import numpy as np
 from sklearn import get_config
 
 from ._callers import is_silent
+from .blocks import LARGE_BLOCK_ROWS, row_blocks
 
 __all__ = [
     "bearable_weights",
@@ -29,8 +30,6 @@ __all__ = [
     "warn_user",
 ]
 
-# Rows whose finiteness is looked up at once: some MB, where a sum has told that one is not finite.
-_READ_ROWS = 65_536
 # Exponent of two up to which weights are taken as they are: products of two, and sums of as many
 # rows as there can be, stay within 2^1023.
 _FAR = 400
@@ -202,16 +201,16 @@ def check_finite(values, what, names):
     with np.errstate(over="ignore", invalid="ignore"):
         if np.isfinite(np.sum(values)):
             return
-    for start in range(0, values.shape[0], _READ_ROWS):
-        bad = ~np.isfinite(values[start : start + _READ_ROWS])
+    for part in row_blocks(values.shape[0], LARGE_BLOCK_ROWS):
+        bad = ~np.isfinite(values[part])
         if bad.any():
             row, column = np.argwhere(bad)[0]
-            value = values[start + row, column]
+            value = values[part.start + row, column]
             kind = "NaN" if np.isnan(value) else "infinity"
             n_bad = int(np.count_nonzero(~np.isfinite(values[:, column])))
             raise ValueError(
                 f"Input {what} contains {kind} in column {names[column]!r}, first at row "
-                f"{start + row}; {n_bad} of its {values.shape[0]} values are not finite. Drop "
+                f"{part.start + row}; {n_bad} of its {values.shape[0]} values are not finite. Drop "
                 "these rows, or impute them in a Pipeline before (sklearn.impute)."
             )
 

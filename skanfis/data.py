@@ -10,14 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .blocks import BLOCK_ROWS, row_blocks
+
 __all__ = ["Scale", "StandardisedData", "check_scales", "column_statistics", "fingerprint"]
 
-# Rows that are read at once where no cache-sized working set asks for fewer.
-_READ_ROWS = 4096
 # Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
 # whatever the number of workers.
 _BLOCKS_PER_CHUNK = 16
-
 
 # Exponents of two beyond which a column is shifted: sums of squares stay finite up to there.
 _FAR = 400
@@ -68,10 +67,6 @@ class Scale:
         return out
 
 
-def _slices(n_rows, length):
-    return [slice(start, min(start + length, n_rows)) for start in range(0, n_rows, length)]
-
-
 def column_statistics(values, sample_weight=None):
     """The :class:`Scale` of every column of ``values`` (n_rows, n_columns), in two passes.
 
@@ -94,7 +89,7 @@ def column_statistics(values, sample_weight=None):
     # Deviations count in parts of the range: their squares neither overflow nor vanish.
     span = np.where(constant, 1.0, high - low)
     second = np.zeros(values.shape[1])
-    for part in _slices(values.shape[0], _READ_ROWS):
+    for part in row_blocks(values.shape[0], BLOCK_ROWS):
         block = _shifted(_columns(values, part), shift)
         block -= mean
         block /= span[:, None]
@@ -117,7 +112,7 @@ def _first_pass(values, sample_weight, shift, minimum, maximum):
     # Differences, so that columns far from the origin lose no digits.
     origin = _shifted(_columns(values, slice(1)), shift)
     total, first = 0.0, np.zeros(values.shape[1])
-    for part in _slices(values.shape[0], _READ_ROWS):
+    for part in row_blocks(values.shape[0], BLOCK_ROWS):
         block = _columns(values, part)
         np.minimum(minimum, block.min(axis=1), out=minimum)
         np.maximum(maximum, block.max(axis=1), out=maximum)
@@ -220,7 +215,7 @@ class StandardisedData:
 
     def chunks(self, block_rows):
         """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
-        blocks = _slices(self.n_rows, block_rows)
+        blocks = row_blocks(self.n_rows, block_rows)
         step = _BLOCKS_PER_CHUNK
         return [blocks[start : start + step] for start in range(0, len(blocks), step)]
 

@@ -42,6 +42,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .antecedent import Antecedent
+from .blocks import BLOCK_ROWS
 from .consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
 from .data import StandardisedData
 from .gram import DesignMoments
@@ -56,7 +57,7 @@ _SMALLEST_FREEDOM = 1e-6
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
 # a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
 _BLOCK_BYTES = 2**22
-_FEWEST_ROWS, _MOST_ROWS = 128, 4096
+_FEWEST_ROWS = 128
 
 
 def _keep_freed_memory():
@@ -215,7 +216,7 @@ class SeparableProblem:
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
-        return int(np.clip(fitting, _FEWEST_ROWS, _MOST_ROWS))
+        return int(np.clip(fitting, _FEWEST_ROWS, BLOCK_ROWS))
 
     def _sum(self, one_pass):
         """Means over the weight of what a pass sums."""

@@ -15,6 +15,7 @@ from functools import partial
 
 import numpy as np
 
+from .blocks import BLOCK_ROWS, row_blocks
 from .data import StandardisedData, fingerprint
 
 __all__ = ["MANY_ROWS", "SAMPLE_ROWS", "is_many", "with_sample"]
@@ -23,8 +24,6 @@ __all__ = ["MANY_ROWS", "SAMPLE_ROWS", "is_many", "with_sample"]
 # sample of m rows, q parameters cost a part q / m of the error's square: for 18 of them and 20,000
 # rows a thousandth, before all rows have their say.
 MANY_ROWS, SAMPLE_ROWS = 100_000, 20_000
-# Read at once; a block of this stays in the cache.
-_READ_ROWS = 4096
 # So many turns of the wheel per unit of the fingerprint; times a power of two nothing is rounded.
 _TURNS = 8192.0
 # More are drawn than are wanted, so that enough come: the standard deviation is below one percent.
@@ -95,8 +94,8 @@ def _join(one, other, most):
 def _draw(rows, most, limit):
     """Of some rows in memory, those of the smallest numbers, below ``limit``."""
     found, n_found = [_of_block(rows, slice(0, 0), limit)], 0
-    for start in range(0, rows.n_rows, _READ_ROWS):
-        found.append(_of_block(rows, slice(start, start + _READ_ROWS), limit))
+    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+        found.append(_of_block(rows, part, limit))
         n_found += found[-1].size
         if n_found > 2 * most:
             found = [_Drawn.of_all(found).smallest(most)]

@@ -20,15 +20,13 @@ from functools import partial
 import numpy as np
 
 from .antecedent import Antecedent
+from .blocks import fitting_rows, row_blocks
 from .consequent import basis
 from .data import StandardisedData, fingerprint
 from .gram import pairs
 
 __all__ = ["FIRES", "RuleFiring", "RuleSupport", "inverse_factor"]
 
-# Rows of one block, however few values it needs; and the bytes that these may take.
-_MOST_ROWS, _FEWEST_ROWS = 4096, 64
-_BLOCK_BYTES = 2**22
 # Standard deviation added to every standardised input.
 _THICKNESS = 0.1
 # A rule fires on the rows on which it has at least this part of the strongest rule's strength.
@@ -220,8 +218,7 @@ def _blocks(rows, antecedent):
     """Slices of rows whose memberships and strengths take a bounded number of bytes."""
     n_basis = 1 + rows.X.shape[1]
     n_values = 3 * (antecedent.n_rules + antecedent.n_terms) + n_basis * (n_basis + 9) // 2
-    n_rows = int(np.clip(_BLOCK_BYTES // (8 * n_values), _FEWEST_ROWS, _MOST_ROWS))
-    return [part for chunk in rows.chunks(n_rows) for part in chunk]
+    return row_blocks(rows.n_rows, fitting_rows(n_values))
 
 
 def inverse_factor(second, center):

@@ -13,6 +13,7 @@ PACKAGE = Path(skanfis.__file__).parent
 # From the bottom to the top; each may import those before it.
 KERNEL = [
     "exceptions",
+    "blocks",
     "membership",
     "antecedent",
     "consequent",
@@ -45,7 +46,7 @@ TABLE = {
     **{layer: (KERNEL[:place], NUMERIC) for place, layer in enumerate(KERNEL)},
     "_sklearn": ([], LEARNING),
     "_callers": ([], LEARNING),
-    "_validation": (["_sklearn", "_callers"], LEARNING),
+    "_validation": (["_sklearn", "_callers", "blocks"], LEARNING),
     "_threads": ([], LEARNING),
     "_memory": ([], []),
     "_dispatch": (["_sklearn"], [*NUMERIC, "sklearn"]),
@@ -101,7 +102,7 @@ TABLE = {
     ),
     "intervals": (["_sklearn", "_validation", "exceptions", "regressor"], LEARNING),
     "readable": (
-        ["exceptions", "membership", "penalty", "model", "_validation", "export"],
+        ["exceptions", "blocks", "membership", "penalty", "model", "_validation", "export"],
         [*NUMERIC, "pandas"],
     ),
     "inspection": (
@@ -112,6 +113,7 @@ TABLE = {
         [
             PUBLIC,
             "exceptions",
+            "blocks",
             "membership",
             "antecedent",
             "naming",
@@ -134,6 +136,7 @@ TABLE = {
         [
             PUBLIC,
             "exceptions",
+            "blocks",
             "policies",
             "options",
             "inspection",

@@ -5,12 +5,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis import data as rows
-from skanfis.data import StandardisedData, column_statistics, fingerprint
+from skanfis.blocks import BLOCK_ROWS
+from skanfis.data import _BLOCKS_PER_CHUNK, StandardisedData, column_statistics, fingerprint
 from skanfis.solvers import VariableProjection
 
 # Enough rows for several reads.
-N_ROWS = 2 * rows._READ_ROWS + 17
+N_ROWS = 2 * BLOCK_ROWS + 17
 
 
 def table(rng, n_rows=N_ROWS):
@@ -109,7 +109,7 @@ def test_column_that_varies_by_less_than_floats_can_halve_has_scale_one():
 
 def test_sums_that_overflow_on_either_side_are_taken_again():
     # One block of rows adds up to infinity, the next to minus infinity.
-    n, largest = rows._READ_ROWS, 1.7e308
+    n, largest = BLOCK_ROWS, 1.7e308
     found = column_statistics(np.repeat([0.0, largest, -largest], [1, n, n])[:, None])
     assert_allclose(found.offset / largest, 0.0, atol=1e-12)
     assert_allclose(found.scale / largest, np.sqrt(2 * n / (2 * n + 1)), rtol=1e-12)
@@ -208,7 +208,7 @@ def test_chunks_cover_every_row_once_in_order(n_rows, block_rows):
     parts = [part for chunk in chunks for part in chunk]
     assert_array_equal(np.concatenate([np.arange(n_rows)[p] for p in parts]), np.arange(n_rows))
     assert max(p.stop - p.start for p in parts) <= block_rows
-    assert max(map(len, chunks)) <= rows._BLOCKS_PER_CHUNK
+    assert max(map(len, chunks)) <= _BLOCKS_PER_CHUNK
 
 
 def test_total_weight_is_the_sum_or_the_number_of_rows(rng):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor, support
+from skanfis import ANFISRegressor, blocks, support
 from skanfis.data import StandardisedData
 from skanfis.exceptions import ConstantInputWarning
 from skanfis.support import RuleSupport
@@ -64,7 +64,7 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
     weight = rng.uniform(0.1, 3.0, len(X)) if weighted else None
     rows = StandardisedData.of(X, X[:, :1], weight)
     antecedent = ANTECEDENTS[kind](rng)
-    monkeypatch.setattr(support, "_BLOCK_BYTES", 1)  # 64 rows
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)  # 64 rows
     found = RuleSupport.of(rows, antecedent, n_coefficients)
     assert_array_equal(found.factor, np.tril(found.factor))
     for r, expected in enumerate(brute_force(rows, antecedent, n_coefficients)):

@@ -25,7 +25,7 @@ def message_of(values, what="X"):
     ("value", "kind"), [(np.nan, "NaN"), (np.inf, "infinity"), (-np.inf, "infinity")]
 )
 def test_first_place_is_found_in_any_block(monkeypatch, row, column, value, kind):
-    monkeypatch.setattr(_validation, "_READ_ROWS", 7)
+    monkeypatch.setattr(_validation, "LARGE_BLOCK_ROWS", 7)
     values = np.ones((20, 2))
     values[row, column] = value
     values[19, 1] = value

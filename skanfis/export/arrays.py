@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from ..blocks import LARGE_BLOCK_ROWS, row_blocks
 from ._graph import Value
 from ._numbers import Numbers
 from .onnx import Formula
 
 __all__ = ["predict_in"]
-
-# Rows whose intermediate results exist at a time.
-_BLOCK_ROWS = 65_536
 
 
 def predict_in(xp, model, X):
@@ -41,9 +39,8 @@ def predict_in(xp, model, X):
     dtype = np.float32 if X.dtype == xp.float32 else np.float64
     formula = Formula(Numbers.of(model, dtype), model.out_of_bounds, _AtOnce(xp, X, dtype))
     found = []
-    for start in range(0, X.shape[0], _BLOCK_ROWS):
-        block = X[start : min(start + _BLOCK_ROWS, X.shape[0]), :]
-        found.append(formula.outputs(Value(formula.graph, block)).name)
+    for part in row_blocks(X.shape[0], LARGE_BLOCK_ROWS):
+        found.append(formula.outputs(Value(formula.graph, X[part, :])).name)
     return found[0] if len(found) == 1 else xp.concat(found, axis=0)
 
 

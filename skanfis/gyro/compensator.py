@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 
+from ..blocks import LARGE_BLOCK_ROWS, row_blocks
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json, found_by_search
 from ..export.c.status import STATUS
@@ -31,8 +32,6 @@ _KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "
 _MOST_BYTES = 2**24
 # It is shown in tables and on axes.
 _LONGEST_UNIT = 40
-# Rows whose inputs, predictions and coverage are held at a time.
-_BLOCK_ROWS = 65_536
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +130,7 @@ class GyroCompensator:
 
     def _compensated(self, X, indicated):
         """What :meth:`apply` gives, of the estimator's inputs."""
-        blocks = [
-            self._apply_block(X.iloc[start : start + _BLOCK_ROWS])
-            for start in range(0, len(X), _BLOCK_ROWS)
-        ]
+        blocks = [self._apply_block(X.iloc[part]) for part in row_blocks(len(X), LARGE_BLOCK_ROWS)]
         predicted, inside, coverage = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
         compensated = self.compensate(indicated, predicted)
         refused = ~np.isfinite(compensated)

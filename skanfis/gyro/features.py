@@ -28,12 +28,11 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from ..blocks import LARGE_BLOCK_ROWS, row_blocks
 from ._columns import check_column
 from ._scalars import check_number
 
 __all__ = ["ThermalLag", "ThermalRate", "TimeSincePowerOn"]
-
-_BLOCK_ROWS = 65_536
 
 # By position in X, or by name.
 Column = int | str | None
@@ -419,9 +418,9 @@ def _filtered_rate(temperature, steps, gains, starts):
     restarts = np.zeros(len(temperature), dtype=bool)
     restarts[starts] = True
     rates, rate = np.empty(len(temperature)), 0.0
-    for start in range(0, len(temperature), _BLOCK_ROWS):
+    for part in row_blocks(len(temperature), LARGE_BLOCK_ROWS):
         # Numbers as Python's take four times the memory: some of them at a time.
-        part, found = slice(start, start + _BLOCK_ROWS), []
+        found = []
         for slope, gain, restart in zip(
             slopes[part].tolist(), gains[part].tolist(), restarts[part].tolist(), strict=True
         ):

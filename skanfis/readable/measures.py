@@ -21,12 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..blocks import LARGE_BLOCK_ROWS, row_blocks
 from ..membership import LEAST_TRUTH
 
 __all__ = ["Measures", "Source", "TargetScale", "measure", "rule_sums"]
 
-# Rows that are read at once, and bytes that the intermediate results of a block may take.
-_READ_ROWS = 65_536
+# Bytes that the intermediate results of a block may take.
 _BLOCK_BYTES = 2**21
 # Strengths that differ by rounding errors only are equal.
 _EQUALLY_STRONG = 1.0 - 1e-9
@@ -56,8 +56,7 @@ class Source:
 
     def blocks(self):
         """Slices of the rows, each with a mask of the rows that have weight, and their weights."""
-        for start in range(0, max(self.n_rows, 1), _READ_ROWS):
-            part = slice(start, min(start + _READ_ROWS, self.n_rows))
+        for part in row_blocks(self.n_rows, LARGE_BLOCK_ROWS) or [slice(0, 0)]:
             if self.sample_weight is None:
                 yield part, slice(None), np.ones(part.stop - part.start)
             else:

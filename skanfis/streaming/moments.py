@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent import Antecedent
+from ..blocks import fitting_rows, row_blocks
 from ..consequent import basis
 from ..data import Scale, StandardisedData
 from ..gram import DesignMoments
@@ -19,15 +20,11 @@ from .scales import Change, merged_scale
 
 __all__ = ["Moments", "blocks"]
 
-_MOST_ROWS = 4096
-_BLOCK_BYTES = 2**22
-
 
 def blocks(rows: StandardisedData, antecedent: Antecedent, n_more=0):
     """Slices of rows whose intermediate results take a bounded number of bytes."""
     n_values = 4 * (antecedent.n_rules + antecedent.n_terms + rows.X.shape[1]) + n_more
-    length = int(np.clip(_BLOCK_BYTES // (8 * n_values), 64, _MOST_ROWS))
-    return [slice(start, start + length) for start in range(0, rows.n_rows, length)]
+    return row_blocks(rows.n_rows, fitting_rows(n_values))
 
 
 @dataclass(frozen=True, eq=False)

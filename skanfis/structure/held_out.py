@@ -2,12 +2,11 @@
 
 import numpy as np
 
+from ..blocks import BLOCK_ROWS
 from ..consequent import basis, rule_outputs
 from ..data import StandardisedData
 
 __all__ = ["held_out_loss"]
-
-_READ_ROWS = 4096
 
 
 def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
@@ -19,7 +18,7 @@ def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
     coefficients = evaluation.coefficients
     by_rule = coefficients.reshape(evaluation.antecedent.n_rules, -1, coefficients.shape[1])
     total = 0.0
-    for chunk in rows.chunks(_READ_ROWS):
+    for chunk in rows.chunks(BLOCK_ROWS):
         for part in chunk:
             Z, target, weight = rows.read(part)
             np.clip(Z, low, high, out=Z)

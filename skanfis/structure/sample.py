@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..blocks import BLOCK_ROWS, row_blocks
 from ..data import Scale, StandardisedData, fingerprint
 
 __all__ = ["ENOUGH_ROWS", "SampleSize", "representative_rows", "search_sample", "unit_scale"]
 
 # More rows than this tell a clustering nothing new.
 _MOST_ROWS = 20_000
-_READ_ROWS = 4096
 # Distinct rows are counted up to here, unless more are asked for.
 ENOUGH_ROWS = 20_000
 
@@ -35,8 +35,8 @@ class SampleSize:
     def of(cls, rows: StandardisedData, enough=ENOUGH_ROWS):
         """Count, up to ``enough`` distinct ones."""
         inputs, whole = np.empty(0), np.empty(0)
-        for start in range(0, rows.n_rows, _READ_ROWS):
-            Z, target, _ = rows.read(slice(start, start + _READ_ROWS))
+        for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+            Z, target, _ = rows.read(part)
             inputs = np.union1d(inputs, fingerprint(Z))
             whole = np.union1d(whole, fingerprint(np.vstack([Z, target])))
             if inputs.size >= enough:

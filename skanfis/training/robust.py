@@ -26,6 +26,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
+from ..blocks import BLOCK_ROWS
 from ..data import column_statistics
 
 __all__ = ["MANY_ROWS", "huber_weights", "resistant", "reweighted", "some_rows", "without_outliers"]
@@ -37,8 +38,6 @@ _NORMAL_MEDIAN = 0.6744897501960817
 MANY_ROWS = 20_000
 # Any fixed one: the same data give the same model.
 _SEED = 0
-# Rows of one block, which stays in the processor's cache.
-_READ_ROWS = 4096
 # Of the linear model, robust standard deviations that no shape of a sound target leaves.
 _FAR = 10.0
 # Of its minimiser: so tight that the first weights do not depend on the order of the rows.
@@ -77,7 +76,7 @@ def resistant(rows):
     if lines is None:
         return rows, weights
     sizes = np.empty(rows.n_rows)
-    for chunk in rows.chunks(_READ_ROWS):
+    for chunk in rows.chunks(BLOCK_ROWS):
         for part in chunk:
             Z, target, _ = rows.read(part)
             squares = [

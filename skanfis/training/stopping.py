@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 from sklearn.model_selection import GroupShuffleSplit
 
+from ..blocks import BLOCK_ROWS
 from ..data import StandardisedData, fingerprint
 from ..structure.held_out import held_out_loss
 
 __all__ = ["ValidationLoss", "hold_out"]
-
-# Rows of one block, which stays in the processor's cache.
-_READ_ROWS = 4096
 
 
 def hold_out(rows: StandardisedData, validation_fraction, seed):
@@ -44,7 +42,7 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
 def _equal_rows(rows):
     """One number per row, the same for rows of equal inputs."""
     numbers = np.empty(rows.n_rows)
-    for chunk in rows.chunks(_READ_ROWS):
+    for chunk in rows.chunks(BLOCK_ROWS):
         for part in chunk:
             numbers[part] = fingerprint(rows.read(part)[0])
     return numbers

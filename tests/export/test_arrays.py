@@ -20,7 +20,7 @@ def test_every_model(library, dtype, monkeypatch):
     if library == "torch":
         # Its own functions are not quite those of the standard; scikit-learn brings what is.
         xp = pytest.importorskip("sklearn.externals.array_api_compat.torch")
-    monkeypatch.setattr(arrays, "_BLOCK_ROWS", 128)
+    monkeypatch.setattr(arrays, "LARGE_BLOCK_ROWS", 128)
     X = rows(dtype, 300)
     worst = {}
     for case in CASES:

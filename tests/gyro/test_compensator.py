@@ -80,7 +80,7 @@ def test_the_true_rate_is_not_used(log, compensator):
 
 def test_blocks_of_rows_change_nothing(log, compensator, monkeypatch):
     whole = compensator.apply(log)
-    monkeypatch.setattr("skanfis.gyro.compensator._BLOCK_ROWS", 7)
+    monkeypatch.setattr("skanfis.gyro.compensator.LARGE_BLOCK_ROWS", 7)
     parts = compensator.apply(log)
     np.testing.assert_allclose(parts, whole, rtol=1e-12)
 

@@ -108,7 +108,7 @@ def test_rows_are_read_block_by_block(tmp_path):
 
 def test_errors_name_the_row_and_the_column(monkeypatch):
     X = rows_of(A_GRID, 1.0)
-    monkeypatch.setattr(measures, "_READ_ROWS", 10)
+    monkeypatch.setattr(measures, "LARGE_BLOCK_ROWS", 10)
     bad = X.copy()
     bad[33, 1] = np.nan
     with pytest.raises(ValueError, match="'chip temperature', first at row 33; 1 of its 40 values"):

@@ -145,7 +145,7 @@ def test_blocks_do_not_matter(monkeypatch, has_target):
     weight[300:400] = 0.0  # a block without weight
     source = source_of(X, y if has_target else None, weight)
     expected = measure(A_TABLE, source)
-    monkeypatch.setattr(measures, "_READ_ROWS", 70)
+    monkeypatch.setattr(measures, "LARGE_BLOCK_ROWS", 70)
     monkeypatch.setattr(measures, "_BLOCK_BYTES", 1)
     assert_alike(measure(A_TABLE, source), expected)
 

@@ -264,7 +264,7 @@ def test_two_runs_are_the_same_to_the_last_bit(name):
 @every_solver
 def test_workers_do_not_matter(name, monkeypatch):
     monkeypatch.setattr("skanfis.data._BLOCKS_PER_CHUNK", 1)
-    monkeypatch.setattr("skanfis.objective._MOST_ROWS", 128)
+    monkeypatch.setattr("skanfis.objective.BLOCK_ROWS", 128)
     rows, premise = noisy()
     results = []
     for map_ordered in (map, lambda function, items: [function(item) for item in items]):

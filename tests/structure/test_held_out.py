@@ -16,7 +16,7 @@ from .. import oracles
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("consequent_inputs", [[0, 1], [1]])
 def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, consequent_inputs):
-    monkeypatch.setattr(held_out, "_READ_ROWS", 7)
+    monkeypatch.setattr(held_out, "BLOCK_ROWS", 7)
     g = np.random.default_rng(4)
     rows, used = oracles.bumpy_rows(g, 200, 2, 2, weighted), np.array(consequent_inputs)
     antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])

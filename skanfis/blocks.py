@@ -1,0 +1,27 @@
+"""Rows in blocks: how many are taken at once, so that memory does not grow with the rows."""
+
+import numpy as np
+
+__all__ = ["BLOCK_BYTES", "BLOCK_ROWS", "LARGE_BLOCK_ROWS", "fitting_rows", "row_blocks"]
+
+# Rows that NumPy works on at once: 32 kB a column, so that some columns stay in the second-level
+# cache, and a call costs little beside its work.
+BLOCK_ROWS = 4096
+# The same where a call costs much more than one of NumPy: other libraries' arrays, frames, and what
+# goes through a pipeline's steps. Half a megabyte a column.
+LARGE_BLOCK_ROWS = 65_536
+# Of all that is worked out at once from a block: a part of the third-level cache, whatever the
+# model's size. ``objective`` and ``model`` have measured sizes of their own.
+BLOCK_BYTES = 2**22
+# With fewer, the calls would cost more than the cache saves.
+_FEWEST_ROWS = 64
+
+
+def row_blocks(n_rows, length) -> list[slice]:
+    """Slices of at most ``length`` rows, in order."""
+    return [slice(start, min(start + length, n_rows)) for start in range(0, n_rows, length)]
+
+
+def fitting_rows(n_values) -> int:
+    """Rows of a block of which so many floats a row exist at one time."""
+    return int(np.clip(BLOCK_BYTES // (8 * n_values), _FEWEST_ROWS, BLOCK_ROWS))
