@@ -71,7 +71,6 @@ def law():
         temperature_rate="thermal_rate",
         amplitude_degree=2,
         bias_degree=2,
-        warn_out_of_bounds=False,
     )
 
 
@@ -226,7 +225,7 @@ def warm_up():
 
 
 def campaign_law():
-    return OpenLoopArcsineRegressor(warn_out_of_bounds=False)
+    return OpenLoopArcsineRegressor()
 
 
 def campaign_compensator():

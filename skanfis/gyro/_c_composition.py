@@ -1,5 +1,6 @@
 """The law and the rules that one C function is of, rounded to its type; and answers to compare."""
 
+import warnings
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,6 +10,7 @@ import pandas as pd
 from numpy.polynomial import Polynomial
 from scipy.stats import qmc
 
+from ..exceptions import OutOfBoundsWarning
 from ..export.c.builder import ROWS, STATUS, TOLERANCE, size_of_sum
 from ..policies import SILENT
 from ._frozen import FrozenRules
@@ -138,7 +140,10 @@ def known_answers(composition, part):
     out = beside | beyond | outside(composition.law_inputs, composition.low, composition.high)
     silent = beyond & (law.out_of_bounds in SILENT)
     silent |= beside & (rules.model.out_of_bounds in SILENT)
-    of_law = _answering(law).predict(whole)
+    with warnings.catch_warnings():
+        # The status tells, row by row.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
+        of_law = _answering(law).predict(whole)
     model, rows = _answering(rules.model), np.asarray(whole)[:, rules.positions]
     of_rules = model.predict(rows)
     if part.limits is not None:
@@ -160,5 +165,5 @@ def _answering(part):
     """A part that answers everywhere: by its own policy, or the nearest where that gives none."""
     policy = "linear" if part.out_of_bounds == "linear" else "clip"
     if isinstance(part, OpenLoopArcsineRegressor):
-        return copy(part).set_params(out_of_bounds=policy, warn_out_of_bounds=False)
+        return copy(part).set_params(out_of_bounds=policy)
     return part.with_out_of_bounds(policy)

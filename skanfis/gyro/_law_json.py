@@ -61,7 +61,6 @@ def read_law(document, inputs):
             for name, key in zip(("amplitude", "sagnac", "bias"), _POLYNOMIALS, strict=True)
         },
         reference_temperature=numbers["reference_temperature"],
-        warn_out_of_bounds=False,
         **{key: document[key] for key in _PARAMETERS},
     )
     check_parameters(law)

@@ -49,7 +49,6 @@ def make_law(inputs, degree, outside):
         amplitude_degree=degree,
         bias_degree=degree,
         out_of_bounds=outside,
-        warn_out_of_bounds=False,
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 
-from ..exceptions import ConstantInputWarning
+from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ._models import make_constant, make_law, make_law_and_line, make_polynomial
 
 __all__ = ["LAW_AND_LINE", "NOTHING", "Simpler", "simpler_compensations"]
@@ -73,6 +73,7 @@ def _fitted(kind, X, rate, before, folds, rows):
         # What it is worth is measured.
         warnings.simplefilter("ignore", ConvergenceWarning)
         warnings.simplefilter("ignore", ConstantInputWarning)
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
         for train, test in folds:
             predicted[test] = kind.make().fit(X.iloc[train], target[train]).predict(X.iloc[test])
         model = kind.make().fit(X.iloc[rows], target[rows])

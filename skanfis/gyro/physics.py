@@ -86,8 +86,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         "linear" goes on along the tangent; "nan" returns NaN; "raise" raises ValueError. Rows
         within ``max_phase`` but outside the training data follow the law, and are flagged by
         ``in_bounds``. It may be changed by ``set_params`` after training.
-    warn_out_of_bounds : bool, default=True
-        Whether ``predict`` warns of rows beyond ``max_phase`` or outside the training data.
 
     Attributes
     ----------
@@ -124,7 +122,9 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     ConvergenceWarning
         If the fit did not settle.
     OutOfBoundsWarning
-        From ``predict`` and ``score``; see ``out_of_bounds``.
+        From ``predict`` and ``score``, of rows that are extrapolated to: outside the training data,
+        where the law is followed, and with ``out_of_bounds="linear"`` beyond ``max_phase``. "clip"
+        and "nan" are answers that were asked for, and are given without a word.
 
     See Also
     --------
@@ -162,7 +162,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         reference_temperature: float | None = None,
         max_phase: float = 1.2,
         out_of_bounds: str = "clip",
-        warn_out_of_bounds: bool = True,
     ) -> None:
         self.output = output
         self.temperature = temperature
@@ -174,7 +173,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         self.reference_temperature = reference_temperature
         self.max_phase = max_phase
         self.out_of_bounds = out_of_bounds
-        self.warn_out_of_bounds = warn_out_of_bounds
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
@@ -242,8 +240,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         Warns
         -----
         OutOfBoundsWarning
-            If rows go beyond ``max_phase`` or outside the training data, unless
-            ``warn_out_of_bounds=False``.
+            If rows lie outside the training data, or with ``out_of_bounds="linear"`` beyond
+            ``max_phase``.
         """
         check_parameters(self)
         used = self._used(X)
@@ -251,8 +249,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         beyond = np.abs(sine) > limit
         if beyond.any() and self.out_of_bounds == "raise":
             raise ValueError(self._describe(beyond, "cannot be inverted"))
-        if self.warn_out_of_bounds:
-            self._warn(used, beyond)
+        self._warn(used, beyond)
         phase = np.arcsin(np.clip(sine, -limit, limit))
         if self.out_of_bounds == "linear":
             further = np.where(beyond, np.abs(sine) - limit, 0.0) / np.cos(self.max_phase)
@@ -388,15 +385,14 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
     def _warn(self, used, beyond):
         messages = []
-        if beyond.any():
-            policy = f"out_of_bounds={self.out_of_bounds!r}"
-            messages.append(self._describe(beyond, f"follow the policy {policy}"))
         outside = self._outside(used) & ~beyond
         if outside.any():
             messages.append(
-                f"{outside.sum()} of {outside.size} rows lie outside the output or temperature of "
-                "the training data and follow the law there."
+                f"X lies outside the training data: {outside.sum()} of {outside.size} rows are of "
+                "another output or temperature and follow the law there."
             )
+        if self.out_of_bounds == "linear" and beyond.any():
+            messages.append(self._describe(beyond, "follow the policy out_of_bounds='linear'"))
         if messages:
             warnings.warn(" ".join(messages), OutOfBoundsWarning, stacklevel=3)
 

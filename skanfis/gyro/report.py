@@ -118,7 +118,7 @@ def gyro_report(
     >>> from skanfis.gyro import OpenLoopArcsineRegressor, gyro_report
     >>> log = make_ofog(n_devices=1, n_runs=6, random_state=0)
     >>> train, test = log[log["run"] < 4], log[log["run"] >= 4]
-    >>> law = OpenLoopArcsineRegressor("output", "temperature", warn_out_of_bounds=False)
+    >>> law = OpenLoopArcsineRegressor("output", "temperature")
     >>> law = law.fit(train[["output", "temperature"]], train["rate"])
     >>> report = gyro_report(
     ...     test["rate"],

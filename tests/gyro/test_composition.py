@@ -22,7 +22,6 @@ from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.gyro.compose import ResidualRegressor
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
 
-QUIET = {"warn_out_of_bounds": False}
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 
 
@@ -34,7 +33,7 @@ def data():
 
 
 def compensator(**anfis):
-    return ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), ANFISRegressor(**anfis))
+    return ResidualRegressor(OpenLoopArcsineRegressor(), ANFISRegressor(**anfis))
 
 
 def test_the_second_learns_what_the_first_leaves(rng):
@@ -137,7 +136,7 @@ def test_flags_of_both_parts_come_through(data, scaled):
     X, rate = data
     anfis = ANFISRegressor(n_mfs=2)
     residual = make_pipeline(StandardScaler(), anfis) if scaled else anfis
-    model = ResidualRegressor(OpenLoopArcsineRegressor(**QUIET), residual)
+    model = ResidualRegressor(OpenLoopArcsineRegressor(), residual)
     model.fit(X.to_numpy(), rate)
     rows = X.to_numpy()[[0, 0, 0]]
     rows[1, 2] = 1e5  # a time that only the residual model looks at
@@ -175,7 +174,7 @@ def test_flags_exist_only_where_a_part_has_them(rng):
 
 def test_a_base_that_refuses_training_rows_is_refused(data):
     X, rate = data
-    base = OpenLoopArcsineRegressor(max_phase=0.3, out_of_bounds="nan", **QUIET)
+    base = OpenLoopArcsineRegressor(max_phase=0.3, out_of_bounds="nan")
     with pytest.raises(ValueError, match=r"base has no finite prediction for .* training rows"):
         ResidualRegressor(base, LinearRegression()).fit(X, rate)
 
@@ -186,7 +185,7 @@ def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
         make_column_transformer(("passthrough", ["time", "temperature"])),
         ANFISRegressor(n_mfs=2),
     )
-    base = OpenLoopArcsineRegressor("output", "temperature", **QUIET)
+    base = OpenLoopArcsineRegressor("output", "temperature")
     model = ResidualRegressor(base, selected).fit(X, rate)
     assert model.residual_[-1].n_features_in_ == 2
     assert model.in_bounds(X).all()
