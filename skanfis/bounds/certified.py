@@ -15,7 +15,8 @@ from .terms import is_known
 
 __all__ = ["Bounds", "bounds", "gradient_bounds", "monotonicity"]
 
-# Rows that are looked at first: the corners, of few inputs, and some between.
+# Rows that are looked at first: all corners, of so few inputs, and some between. They cost less
+# than a batch of boxes, and the better the first answer, the more boxes need no look.
 _CORNERS = 6
 _POINTS = 512
 # Of slopes, the strip beyond the edge in which they are zero, as part of the range.

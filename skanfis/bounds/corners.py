@@ -31,6 +31,8 @@ from .terms import EPS
 
 __all__ = ["slope_by_corners"]
 
+# Roundings of a bend, in EPS, with room to spare: of products of two slopes, each with as many as
+# in ``enclosure``.
 _ROUNDINGS = 64.0
 # Boxes with more sides have too many corners.
 _MOST_SIDES = 5
@@ -60,7 +62,7 @@ def slope_by_corners(enclosure, parts, low, high, j):
         gain[i] = (high[i] - low[i]) ** 2 / 8.0 * np.maximum(-least, 0.0)
     points, slopes = _steepest_corner(enclosure, low, high, sides, j)
     slack = 4.0 * parts.slope_slack[j]
-    bound = slopes + gain.sum(axis=0) * (1.0 + _ROUNDINGS * EPS) + slack
+    bound = slopes + gain.sum(axis=0) * (1.0 + EPS * (_ROUNDINGS + low.shape[0])) + slack
     return np.where(np.isnan(bound), np.inf, bound), points, slopes - slack, gain
 
 

@@ -45,6 +45,8 @@ from .terms import EPS
 
 __all__ = ["Enclosure", "reach_of"]
 
+# Roundings of a rule's slope or a tangent's rise, in EPS, with room to spare: of a dozen sums and
+# products one after another, beside those of the sum over shares or inputs, which are counted.
 _ROUNDINGS = 32.0
 
 
@@ -132,7 +134,8 @@ class Enclosure:
             points = _best_centres(down, up, low, high)
             attained = self.say(points.T)
             rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
-            by_slopes = attained + rise.sum(axis=0) * (1.0 + _ROUNDINGS * EPS) + 2.0 * parts.slack
+            rounded_up = 1.0 + EPS * (_ROUNDINGS + low.shape[0])
+            by_slopes = attained + rise.sum(axis=0) * rounded_up + 2.0 * parts.slack
             bound = np.fmin(np.where(np.isnan(natural), np.inf, natural), by_slopes)
             gain = (up - down) * (high - low)
         return self.hold(bound), points, self.hold(attained), gain
@@ -150,7 +153,7 @@ class Enclosure:
             points = _best_centres(down, up, low, high)
             least, most = self._slopes(self._parts(points, points), points, points, [j])
             rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
-            by_bends = most[0] + rise.sum(axis=0) * (1.0 + _ROUNDINGS * EPS)
+            by_bends = most[0] + rise.sum(axis=0) * (1.0 + EPS * (_ROUNDINGS + low.shape[0]))
             # Beyond the range the tangent's own slope changes by what is not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
             inside = inside.all(axis=0)

@@ -19,6 +19,8 @@ from .terms import EPS
 
 __all__ = ["Rounding"]
 
+# Roundings of a rule's output and its strength, in EPS, with room to spare: as in ``enclosure``,
+# beside those of the sums over rules and inputs, which are counted.
 _ROUNDINGS = 32.0
 
 

@@ -32,6 +32,8 @@ from .terms import EPS, TermRanges, ranges
 
 __all__ = ["Factor", "Shares", "factors", "largest_mean", "smallest_mean", "term_ranges"]
 
+# Roundings of one share, in EPS, with room to spare: two exponentials of two each, a difference, a
+# product and a quotient, beside those of the sum over shares, which are counted.
 _ROUNDINGS = 16.0
 
 

@@ -44,7 +44,8 @@ from ..membership.profiles import LinearProfile
 __all__ = ["EPS", "TermRanges", "is_known", "ranges", "widened"]
 
 EPS = float(np.finfo(float).eps)
-# Roundings that a membership takes, with room to spare.
+# Roundings that a membership takes, in EPS, with room to spare: a difference, a quotient, a power,
+# a logarithm and a product or two.
 _ROUNDINGS = 16.0
 # Largest s (1 - s) (1 - 2 s) of a sigmoid, at s = (3 - 3^(1/2)) / 6, rounded up.
 _STEEPEST_CURVE = 0.0963

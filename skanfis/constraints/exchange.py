@@ -38,8 +38,13 @@ __all__ = ["constrained"]
 
 # Margins, in standard deviations of the target (and of the input): the first, and the last tried.
 _FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.03, 3.0
+# A bound on time, where constraints nearly contradict one another: what is not proven by then is
+# said not to be.
 _MOST_ROUNDS = 40
+# A sample is looked at in milliseconds; each point of a round is a row of the quadratic program
+# from there on, so that half of them are the worst, and half are spread over the others.
 _SAMPLE, _POINTS_A_ROUND = 2048, 40
+# Of one proof: about a second's worth; beyond, a larger margin makes fewer do.
 _MOST_BOXES = 30_000
 # That data which keep the constraints are said to contradict them.
 _CHANCE = 1e-3

@@ -34,11 +34,13 @@ __all__ = [
 # Phase at the largest rate [rad]. Below 0.01 the sine is a straight line to 20 ppm; from pi/2 on
 # two rates give one output.
 _SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
+# A tenth of a radian apart: the fit goes the rest of the way.
 _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
 # A dozen coefficients at most: more rows only make many starts slow. The fit to all rows follows.
 _ROWS_FOR_START = 2000
 # Of a long log, the law is fitted to so many rows first: what is left takes an evaluation or two.
 _ROWS_FOR_TRIAL = 10_000
+# A bound on time; a log that the law describes takes a part of it.
 MAX_EVALUATIONS = 200
 _NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 

@@ -18,6 +18,8 @@ import numpy as np
 
 __all__ = ["Farthest"]
 
+# Of a circle, a polygon of so many corners is short by 1 - cos(pi / 256), 8e-5 of the radius. They
+# take 4 kB for each rule and input.
 _MOST_CORNERS = 256
 # Parts of the range of u in the table that rows are held against first.
 _PARTS = 64

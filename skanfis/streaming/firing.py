@@ -17,6 +17,8 @@ from .scales import Change
 
 __all__ = ["Distinct", "RuleFiring"]
 
+# 2^64 over the golden ratio, made odd: a product by it loses no bit, and spreads neighbours evenly
+# (Knuth, The Art of Computer Programming, volume 3, section 6.4).
 _ODD = np.uint64(0x9E3779B97F4A7C15)
 
 
