@@ -23,6 +23,8 @@ _SMALLEST_WIDTH = 0.1
 # Terms that cross above this at the start are one term: training may bring them closer still, and
 # above 0.9 nobody could tell them apart.
 _HIGHEST_CROSSING = 0.85
+# Widths go with the number of inputs that tell clusters apart, and that with the widths: a bound,
+# should they go to and fro.
 _MOST_TURNS = 4
 
 

@@ -54,10 +54,12 @@ __all__ = ["SEARCHED", "StructureSearch"]
 # The partitions whose size the data decide on: which candidates each of them has.
 SEARCHED = ("auto", "grid", "subtractive", "fcm")
 
-# Consequent parameters of a candidate; of many inputs, so many rules' worth.
+# Consequent parameters of a candidate, of which a pass costs the square; of many inputs, so many
+# rules' worth, up to a limit of time.
 _MOST_COLUMNS = 256
 _RULES_OF_MANY = 3
 _MOST_OF_MANY = 1000
+# More rules nobody reads, nor more names for one input.
 _MOST_RULES = 36
 _MOST_TERMS = 6
 # After each round, so many inputs stay in the running for a further term.
@@ -73,9 +75,11 @@ _BEHIND = 1.05
 # But where less than this is left of the target's variance, premises have a long way to go, and the
 # first turn says little of the last.
 _NEARLY_EXACT = 0.01
+# Of k-means and fuzzy c-means: each about half as many again.
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
 _RADII = (0.6, 0.5, 0.42, 0.35, 0.3)
+# As cross-validation has by custom: more cost time, and tell little more.
 _MOST_FOLDS = 5
 # What a larger model must gain in n log of the error: "very strong" in the words of Kass and
 # Raftery (1995). The best of many candidates gains up to this on a plane with noise. Where the

@@ -49,12 +49,15 @@ MOST_ROWS = 1000
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Loose: what rounding errors need.
 _LOOSE = 1e-12
+# Its first turn goes far: weights are found where the premises have come to, not on their way.
 _LOOSE_ITERATIONS = 25
 # Of the noise's variance, what a loose training must bring it down to: rules that compensate one
 # another are the price, and not to be paid for less.
 _LESS_NOISE = 0.5
 # The same where terms are freed too, beyond all reading: only for data that are next to exact.
 _LEAST_NOISE = 0.01
+# Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
+# lead from the start to any end.
 FIRST_STEPS = 5
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 _MOST_COLUMNS = 512
@@ -63,6 +66,8 @@ _FEW_STEPS, _FEW_TURNS = 3, 2
 _ROWS_EACH = 2.0
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
+# A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
+# finished while the other moves: what is left is done in the training that follows.
 _STEPS = 2
 _ITERATIONS = 4
 _MOST_TURNS = 8
@@ -70,6 +75,8 @@ _TOLERANCE = 1e-3
 # What a larger or freer model must gain in -2 log p: less is "not worth more than a bare mention"
 # (Kass and Raftery 1995).
 WORTHWHILE = 2.0
+# Of displacements, which are in spacings: no data tell a hundred-thousandth of a spacing, and
+# rounding errors stay below it.
 _DIGITS = 5
 # Turns without a rise of the evidence, and what counts as one, in -2 log p.
 _PATIENCE = 2
