@@ -4,8 +4,6 @@ import sys
 import warnings
 from collections import Counter
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
-from hashlib import sha256
 from numbers import Integral
 
 import numpy as np
@@ -20,7 +18,6 @@ __all__ = [
     "check_count",
     "check_finite",
     "check_not_negative",
-    "content_digest",
     "feature_indices",
     "group_numbers",
     "named_refusals",
@@ -281,29 +278,6 @@ def bearable_weights(sample_weight):
     """Weights by a power of two where their sum would overflow, or their digits be lost."""
     exponent = int(np.frexp(np.max(sample_weight, initial=0.0))[1])
     return np.ldexp(sample_weight, -exponent) if abs(exponent) > _FAR else sample_weight
-
-
-def content_digest(value) -> str:
-    """A word for what frozen dataclasses and arrays hold, the same for every copy of them."""
-    digest = sha256()
-    _add_content(digest, value)
-    return digest.hexdigest()
-
-
-def _add_content(digest, value):
-    if is_dataclass(value) and not isinstance(value, type):
-        digest.update(type(value).__qualname__.encode())
-        for field in fields(value):
-            _add_content(digest, getattr(value, field.name))
-    elif isinstance(value, tuple):
-        digest.update(b"tuple of %d" % len(value))
-        for entry in value:
-            _add_content(digest, entry)
-    elif isinstance(value, np.ndarray):
-        digest.update(f"{value.dtype} {value.shape}".encode())
-        digest.update(np.ascontiguousarray(value).tobytes())
-    else:
-        digest.update(repr(value).encode())
 
 
 def warn_user(message, category):

@@ -6,7 +6,7 @@ refused; what each may be by itself, scikit-learn checks before.
 
 from sklearn.utils import check_random_state
 
-from ._validation import content_digest, feature_indices
+from ._validation import feature_indices
 from .membership import TRIED_FAMILIES, membership_families
 from .model import TSKModel
 from .solvers import SOLVERS, Solver
@@ -16,29 +16,13 @@ __all__ = [
     "found_weights",
     "given_weights",
     "solver_of",
-    "structure_parameters",
     "structure_request",
 ]
 
 
 def structure_request(estimator, names):
     """What training starts from, with all names of columns and families resolved."""
-    start, n_mfs = _imported(estimator, names), estimator.n_mfs
-    solver, weights = solver_of(estimator), given_weights(estimator)
-    if estimator.warm_start and hasattr(estimator, "_start_parameters"):
-        changed = [
-            name
-            for name, value in structure_parameters(estimator).items()
-            if value != estimator._start_parameters[name]
-        ]
-        if changed:
-            raise ValueError(
-                f"warm_start=True goes on from the rules of the fit before, but {changed[0]} "
-                "has been changed since: set warm_start=False to start anew."
-            )
-        start, n_mfs = estimator.model_, "auto"
-        check_inputs(start, names, "warm_start=True")
-        weights = found_weights(estimator) | weights
+    solver, start = solver_of(estimator), _imported(estimator, names)
     if estimator.order == 0 and estimator.consequent_features is not None:
         raise ValueError(
             f"consequent_features={estimator.consequent_features!r} means nothing with order=0, "
@@ -49,13 +33,13 @@ def structure_request(estimator, names):
     state = estimator.random_state
     seed = 0 if state is None else check_random_state(state).randint(2**31 - 1)
     return StructureRequest(
-        n_mfs=n_mfs,
+        n_mfs=estimator.n_mfs,
         partition=start,
         families=membership_families(estimator.mf, names),
         order=estimator.order,
         premise_inputs=feature_indices(estimator.premise_features, names, "premise_features"),
         consequent_inputs=consequent if estimator.order == 1 else consequent[:0],
-        weights=weights,
+        weights=given_weights(estimator),
         premises_move=solver.moves_premises and estimator.max_iter > 0,
         seed=seed,
         names=names,
@@ -87,19 +71,6 @@ def found_weights(estimator):
         "alpha": estimator.alpha_,
         "slope": estimator.slope_alpha_,
         "stiffness": estimator.stiffness_,
-    }
-
-
-def structure_parameters(estimator):
-    """The parameters that the structure depends on, in a form that can be compared."""
-    names = ("n_mfs", "partition", "mf", "premise_features")
-    values = {name: getattr(estimator, name) for name in names}
-    # Models are their numbers, wherever they were pickled; all else says in words what it is.
-    return {
-        name: content_digest(getattr(value, "model_", value))
-        if hasattr(value, "strengths")
-        else repr(value)
-        for name, value in values.items()
     }
 
 

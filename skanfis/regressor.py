@@ -48,7 +48,7 @@ from .membership import (
 from .model import TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
-from .parameters import structure_parameters, structure_request
+from .parameters import structure_request
 from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
 from .solvers import SOLVERS, Solver
@@ -93,7 +93,8 @@ class ANFISRegressor(
         rules have terms of their own; clusters are sought in standardised inputs and targets
         together, as is the custom since Chiu's subtractive clustering. A fitted ANFISRegressor, or
         a model such as its ``model_`` or what a file was read into: training starts from its rules
-        and memberships, in the units of X. With ``solver="lse"`` only the consequents are then
+        and memberships, in the units of X: so ``partition=model`` goes on with further rows, or for
+        further iterations. With ``solver="lse"`` only the consequents are then
         learnt, with ``max_iter=0`` nothing is, and the model's own ``order`` holds.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, one for all inputs or one each: "gaussian",
@@ -154,8 +155,6 @@ class ANFISRegressor(
         Whether to hold out rows, stop when the error on them falls no more, and keep the parameters
         of its minimum. With ``groups`` given to ``fit``, whole groups are held out.
         :class:`~skanfis.options.EarlyStopping` says how many rows, and how patient to be.
-    warm_start : bool, default=False
-        Whether a further ``fit`` starts from the rules of the one before.
     out_of_bounds : {"linear", "clip", "nan", "raise"} or LinearExtrapolation, default="linear"
         What ``predict`` does with rows outside the range of the training data, input by input:
         "linear" warns, goes on along the tangent at the edge for half a standard deviation of the
@@ -321,7 +320,6 @@ class ANFISRegressor(
         "n_init": [Interval(Integral, 1, None, closed="left")],
         "max_iter": [Interval(Integral, 0, None, closed="left")],
         "early_stopping": ["boolean", EarlyStopping],
-        "warm_start": ["boolean"],
         "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
         "verbose": ["verbose"],
         "random_state": ["random_state"],
@@ -346,7 +344,6 @@ class ANFISRegressor(
         n_init: int = 1,
         max_iter: int = 500,
         early_stopping: bool | EarlyStopping = False,
-        warm_start: bool = False,
         out_of_bounds: str | LinearExtrapolation = "linear",
         verbose: bool | int = False,
         random_state: int | np.random.RandomState | None = None,
@@ -367,7 +364,6 @@ class ANFISRegressor(
         self.n_init = n_init
         self.max_iter = max_iter
         self.early_stopping = early_stopping
-        self.warm_start = warm_start
         self.out_of_bounds = out_of_bounds
         self.verbose = verbose
         self.random_state = random_state
@@ -451,7 +447,6 @@ class ANFISRegressor(
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
-        self._start_parameters = structure_parameters(self)
         self._forget_chunks()
         if callbacks is not None:
             callbacks.end(self.model_)

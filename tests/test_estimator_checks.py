@@ -22,9 +22,8 @@ pytestmark = [
 
 # The contract is about what comes in and goes out: validation, columns, weights, state, seeds.
 # Families, orders and solvers meet none of that, and are tested where they are; what does are rows
-# held out, a clusterer inside and starts drawn at random. Two are not here: warm_start, since the
-# checks fit one estimator twice and expect the same, which it is there to prevent; and Huber's
-# loss, which on so few rows passes through half of them, and through which is chance.
+# held out, a clusterer inside and starts drawn at random. Huber's loss is not here: on so few rows
+# it passes through half of them, and through which is chance.
 ESTIMATORS = {
     "default": ANFISRegressor(),
     "clusters": ANFISRegressor(

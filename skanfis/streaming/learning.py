@@ -16,7 +16,6 @@ from ..parameters import (
     found_weights,
     given_weights,
     solver_of,
-    structure_parameters,
     structure_request,
 )
 from ..readable import readability_of_rows
@@ -184,7 +183,6 @@ class LearnsFromChunksMixin:
         if holds:
             self.stiffness_, self.structures_ = 0.0, []
             self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
-            self._start_parameters = structure_parameters(self)
             self._learn_from(stream)
             self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
         else:

@@ -1,6 +1,5 @@
-"""Starts: imported rules, named partitions, mixed families, chosen features, warm starts."""
+"""Starts: imported rules, named partitions, mixed families, chosen features."""
 
-import pickle
 from inspect import signature
 from itertools import pairwise
 
@@ -48,6 +47,17 @@ def known(request, data):
 
 
 class TestImported:
+    @pytest.mark.filterwarnings("ignore:.*max_iter was reached")
+    def test_short_fits_one_after_another_go_on(self, data):
+        settings = {"solver": VariableProjection(tol=1e-9), "max_iter": 3}
+        model, losses = ANFISRegressor(n_mfs=3, **settings).fit(*data), []
+        for _ in range(3):
+            losses.append(model.loss_curve_)
+            model = ANFISRegressor(partition=model, **settings).fit(*data)
+        for before, after in pairwise(losses):
+            assert_allclose(after[0], before[-1], rtol=0.2)
+            assert after[-1] < before[-1]
+
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
     def test_without_iterations_nothing_is_learnt(self, data, known):
         X, y = surface(50, seed=1)
@@ -257,51 +267,6 @@ class TestFeatures:
     def test_what_does_not_fit_is_refused(self, data, settings, message):
         with pytest.raises(ValueError, match=message):
             ANFISRegressor(**settings).fit(*data)
-
-
-class TestWarmStart:
-    def test_two_short_fits_go_as_far_as_one(self, data):
-        X, y = data
-        settings = {"n_mfs": 3, "solver": VariableProjection(tol=1e-9), "max_iter": 3}
-        model = ANFISRegressor(warm_start=True, **settings)
-        with pytest.warns(match="max_iter was reached"):
-            losses = [model.fit(X, y).loss_curve_ for _ in range(3)]
-        for before, after in pairwise(losses):
-            assert_allclose(after[0], before[-1], rtol=0.2)
-            assert after[-1] < before[-1]
-
-    def test_the_ridge_that_was_chosen_stays(self, data):
-        model = ANFISRegressor(warm_start=True, partition="grid").fit(*data)
-        alpha, rules = model.alpha_, model.n_rules_
-        model.fit(*surface(200, seed=3))
-        assert (model.alpha_, model.n_rules_) == (alpha, rules)
-        assert model.structures_ == []
-
-    def test_other_parameters_of_the_start_are_refused(self, data):
-        model = ANFISRegressor(n_mfs=2, warm_start=True, solver=VariableProjection(tol=1e-1)).fit(
-            *data
-        )
-        with pytest.raises(ValueError, match="but n_mfs has been changed"):
-            model.set_params(n_mfs=3).fit(*data)
-        model.set_params(warm_start=False).fit(*data)
-        assert model.n_rules_ == 27
-
-    def test_a_model_is_known_by_what_it_holds(self, data, known):
-        solver = VariableProjection(tol=1e-1)
-        model = ANFISRegressor(partition=known, warm_start=True, solver=solver).fit(*data)
-        loaded = pickle.loads(pickle.dumps(model))
-        assert_array_equal(loaded.fit(*data).predict(data[0]), model.fit(*data).predict(data[0]))
-        loaded.set_params(partition=pickle.loads(pickle.dumps(known.model_))).fit(*data)
-        with pytest.raises(ValueError, match="but partition has been changed"):
-            loaded.set_params(partition=model.model_).fit(*data)
-
-    def test_other_inputs_are_refused(self, data):
-        X, y = data
-        model = ANFISRegressor(n_mfs=2, warm_start=True, solver=VariableProjection(tol=1e-1)).fit(
-            X, y
-        )
-        with pytest.raises(ValueError, match=r"warm_start=True has rules on 3 inputs"):
-            model.fit(X[["time", "rate"]], y)
 
 
 def test_names_of_terms_are_carried(data):
