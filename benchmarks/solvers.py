@@ -29,7 +29,6 @@ _STEP_SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SETTINGS = {
     "varpro": {},
     "varpro, tol=1e-6": {"solver": VariableProjection(tol=1e-6)},
-    "varpro, n_init=20": {"n_init": 20},
     "lbfgs": {"solver": LBFGS()},
     "lbfgs, tol=1e-6": {"solver": LBFGS(tol=1e-6), "max_iter": 5000},
     "lse": {"solver": "lse"},
@@ -88,9 +87,9 @@ def best_step(task, solver):
 
 
 def until(settings, model, loss):
-    """The settings that end as soon as ``loss`` is reached; None if a single start never did."""
+    """The settings that end as soon as ``loss`` is reached; None if it never was."""
     reached = np.flatnonzero(model.loss_curve_ <= loss)
-    if not reached.size or "n_init" in settings:
+    if not reached.size:
         return None
     # With no iteration at all, premises stay as they start: least squares alone.
     return {**settings, "max_iter": int(reached[0])}
@@ -113,8 +112,7 @@ def compare(task):
         step = getattr(settings[name].get("solver"), "step_size", None)
         label = name if step is None else f"{name}, step_size={step:g}"
         cells = [*task.errors(model), model.n_iter_, n_passes, seconds[name]]
-        missing = "" if "n_init" in settings[name] else "never"
-        lines.append([task.name, label, *cells, *reached.get(name, (missing, ""))])
+        lines.append([task.name, label, *cells, *reached.get(name, ("never", ""))])
     return lines, reached
 
 

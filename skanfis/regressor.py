@@ -146,9 +146,6 @@ class ANFISRegressor(
         its value at its own centre and in its slopes, and of the slopes of that line. Of a single
         rule it is scikit-learn's ``Ridge``. "auto": departures and common line have a weight each,
         found by the evidence. At zero, a ridge at the level of rounding errors remains.
-    n_init : int, default=1
-        Number of starts, 1 or more: the partition's own, and others displaced from it at random.
-        The model of the smallest leave-one-out error of the linear part is kept.
     max_iter : int, default=500
         Most iterations (epochs). With 0, premises stay as they start.
     early_stopping : bool or EarlyStopping, default=False
@@ -165,13 +162,12 @@ class ANFISRegressor(
         Whether to write a line per iteration. scikit-learn's callbacks (``set_callbacks``) work
         from scikit-learn 1.9 on.
     random_state : int, RandomState instance or None, default=None
-        Seed of everything random: the clusterings of "auto" and "fcm", the starts of ``n_init``,
-        the rows that early stopping holds out. None stands for one fixed seed, so that the same
+        Seed of everything random: the clusterings of "auto" and "fcm", the rows that early stopping
+        holds out. None stands for one fixed seed, so that the same
         data always give the same model. A clusterer given as ``partition`` has a seed of its own.
     n_jobs : int, default=None
-        Worker threads for the starts of ``n_init``, or else for the passes over the data; None is
-        one, -1 is one per core. The result is the same to the last bit for any number. For a single
-        start it pays from some 100,000 rows on.
+        Worker threads for the passes over the data; None is one, -1 is one per core. The result is
+        the same to the last bit for any number. It pays from some 100,000 rows on.
 
     Attributes
     ----------
@@ -317,7 +313,6 @@ class ANFISRegressor(
         "solver": [StrOptions(set(SOLVERS)), Solver],
         "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
         "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-        "n_init": [Interval(Integral, 1, None, closed="left")],
         "max_iter": [Interval(Integral, 0, None, closed="left")],
         "early_stopping": ["boolean", EarlyStopping],
         "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
@@ -341,7 +336,6 @@ class ANFISRegressor(
         solver: str | Solver = "varpro",
         agreement: str | float = "auto",
         alpha: str | float = "auto",
-        n_init: int = 1,
         max_iter: int = 500,
         early_stopping: bool | EarlyStopping = False,
         out_of_bounds: str | LinearExtrapolation = "linear",
@@ -361,7 +355,6 @@ class ANFISRegressor(
         self.solver = solver
         self.agreement = agreement
         self.alpha = alpha
-        self.n_init = n_init
         self.max_iter = max_iter
         self.early_stopping = early_stopping
         self.out_of_bounds = out_of_bounds
@@ -411,8 +404,7 @@ class ANFISRegressor(
         """
         context = None
         if hasattr(self, "_skl_callbacks"):
-            is_single_run = self.n_init == 1 and self.loss == "squared_error"
-            most = max(self.max_iter, 1) if is_single_run else None
+            most = max(self.max_iter, 1) if self.loss == "squared_error" else None
             context = self._init_callback_context(max_subtasks=most)
         before = self.__dict__.copy()
         try:

@@ -22,8 +22,8 @@ pytestmark = [
 
 # The contract is about what comes in and goes out: validation, columns, weights, state, seeds.
 # Families, orders and solvers meet none of that, and are tested where they are; what does are rows
-# held out, a clusterer inside and starts drawn at random. Huber's loss is not here: on so few rows
-# it passes through half of them, and through which is chance.
+# held out and a clusterer inside. Huber's loss is not here: on so few rows it passes through half
+# of them, and through which is chance.
 ESTIMATORS = {
     "default": ANFISRegressor(),
     "clusters": ANFISRegressor(
@@ -31,7 +31,6 @@ ESTIMATORS = {
         agreement=0.1,
         alpha=0.01,
         solver=VariableProjection(stiffness=1e-3),
-        n_init=2,
         max_iter=5,
     ),
     "rows held out": ANFISRegressor(

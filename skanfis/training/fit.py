@@ -3,7 +3,7 @@
 1. Rows are held out, where training is to stop early (``stopping``).
 2. With Huber's loss, what is far off is found before there is any model (``robust``).
 3. ``structure`` gives a start: the rules, the weights of the penalty, where the premises stand.
-4. A solver runs from there, or from several starts, of which the best is kept (``restarts``).
+4. A solver runs from there, again where its rules cannot be read one by one.
 5. With Huber's loss the rows are weighted anew by what that left, and 3 and 4 repeated.
 6. The model is frozen in the user's units (``freezing``), and rules that do nothing are listed
    (``pruning``).
@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from sklearn.base import BaseEstimator, clone
 from sklearn.exceptions import ConvergenceWarning
 
@@ -44,7 +43,6 @@ from .freezing import ModelBuilder, as_given
 from .knowing import grown
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
-from .restarts import displaced_starts
 from .result import Fitted, SolverRun
 from .robust import (
     MANY_ROWS,
@@ -151,8 +149,7 @@ class _Fit:
         self.huber = _object_for(estimator.loss, {"huber": Huber, "squared_error": None})
         self.stopping = _object_for(estimator.early_stopping, {True: EarlyStopping, False: None})
         self.rng = np.random.default_rng(request.seed)
-        # Workers share the starts, or else the rows.
-        self.map_ordered = map_in_threads(estimator.n_jobs if estimator.n_init == 1 else 1)
+        self.map_ordered = map_in_threads(estimator.n_jobs)
         self.rows, self.trained_on, self.held_out = data.rows(), slice(None), None
         if self.stopping is not None:
             seed = int(self.rng.integers(2**31 - 1))
@@ -181,21 +178,20 @@ class _Fit:
         return start
 
     def readable_run(self, rows: StandardisedData, start: Start) -> SolverRun:
-        """The best run from a start, whose rules can be read one by one.
+        """The run from a start, to rules that can be read one by one.
 
         Of many rows a sample decides on how much premises are held and rules agree, and where the
         premises are: what is left to do on all rows is a step or two.
         """
         if rows.sample is None:
-            return self.best_readable_run(rows, start)
-        several = self.estimator.n_init > 1
+            return self.run_until_readable(rows, start)
         for part in self.parts_of_sample(rows.sample, start):
-            # Iterations on a sample are not told, but starts are.
-            found = self.best_readable_run(part, start, is_watched=several)
+            # Iterations on a sample are not told.
+            found = self.run_until_readable(part, start, is_watched=False)
             start = found.start
-            if self.is_projecting or several:
+            if self.is_projecting:
                 start = replace(start, displacement=found.displacement)
-        return self.run(rows, start, start.displacement)
+        return self.run(rows, start)
 
     @property
     def is_projecting(self) -> bool:
@@ -207,20 +203,20 @@ class _Fit:
         n_basis = 1 + (self.request.consequent_inputs.size if self.estimator.order else 0)
         n_columns = start.antecedent.n_rules * n_basis
         few = max(sample.n_rows // _PART_OF_SAMPLE, _ROWS_EACH * n_columns)
-        if self.estimator.n_init > 1 or not self.is_projecting or 2 * few > sample.n_rows:
+        if not self.is_projecting or 2 * few > sample.n_rows:
             return [sample]
         # The first rows of a sample are a sample.
         return [sample.part(slice(few)), sample]
 
-    def best_readable_run(self, rows, start: Start, is_watched=True) -> SolverRun:
-        """The best run, repeated until its rules can be read; unwatched then.
+    def run_until_readable(self, rows, start: Start, is_watched=True) -> SolverRun:
+        """The run from a start, repeated until its rules can be read; unwatched then.
 
         Rows that the search has not seen may draw a term into a gap between them, out of which no
         gradient leads. The premises are then held ten times as much, from the start again, unless
         it was asked for how much they are held. Likewise agreement rises, unless it was asked for,
         until the strongest rule holds alone, if that is cheap.
         """
-        run = self.best_run(rows, start, is_watched)
+        run = self.run(rows, start, is_watched)
         if self.was_stopped(run):
             return run
         given = self.request.weights
@@ -241,7 +237,7 @@ class _Fit:
                 break
             penalty = run.start.penalty
             penalty = replace(penalty, stiffness=10.0 * penalty.stiffness)
-            run = self.best_run(rows, replace(run.start, penalty=penalty), is_watched=False)
+            run = self.run(rows, replace(run.start, penalty=penalty), is_watched=False)
         return run
 
     def with_rules_that_hold(self, rows, apart: SolverRun) -> SolverRun:
@@ -251,44 +247,16 @@ class _Fit:
             start = replace(run.start, penalty=penalty)
             if self.solver.goes_on_from_tuning:
                 start = replace(start, displacement=run.displacement)
-            run = self.best_run(rows, start, is_watched=False, is_settled=True)
+            run = self.run(rows, start, is_watched=False, is_settled=True)
             if not is_affordable(run.evaluation, apart.evaluation):
                 return apart
         return run
 
-    def best_run(
+    def run(
         self, rows: StandardisedData, start: Start, is_watched=True, is_settled=False
     ) -> SolverRun:
-        """The run from a start, or the best from several: of the least leave-one-out error.
-
-        Workers are threads: passes over the data release Python's lock.
-        """
-        n_init = self.estimator.n_init
-        premise = _premise(rows, start)
-        if n_init == 1 or premise.size == 0:
-            return self.run(rows, start, start.displacement, is_watched, is_settled)
-        displacements = displaced_starts(premise, start.displacement, n_init, self.rng)
-        parallel = Parallel(self.estimator.n_jobs, backend="threading", return_as="generator")
-        best, smallest = None, np.inf
-        for run, error in parallel(
-            delayed(self.run_and_error)(rows, start, displacement) for displacement in displacements
-        ):
-            if best is None or error < smallest:
-                best, smallest = run, error
-            if is_watched and self.tell_run(run):
-                break
-        assert best is not None
-        return best
-
-    def run_and_error(self, rows, start, displacement):
-        """One of several runs, and by what it is judged."""
-        run = self.run(rows, start, displacement, is_watched=False)
-        n_rows = effective_weight(run.problem.rows)
-        return run, run.problem.leave_one_out_error(run.evaluation, n_rows)
-
-    def run(self, rows, start: Start, displacement, is_watched=True, is_settled=False) -> SolverRun:
-        """One run of the solver, watched; the iterations of one among several are not told."""
-        estimator = self.estimator
+        """One run of the solver from a start; its iterations are told where it is watched."""
+        estimator, displacement = self.estimator, start.displacement
         problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)
         validation = None
         if self.held_out is not None:
@@ -363,7 +331,7 @@ class _Fit:
                 break
             # What the first start makes of outliers need not be read.
             is_kept = turn > 0 or n_starts == 1
-            first_run = self.readable_run if is_kept else self.best_run
+            first_run = self.readable_run if is_kept else self.run
             run = first_run(reweighted(rows, weights), start)
             run, weights = self.settled(rows, run, weights, epsilon)
         assert run is not None
@@ -374,7 +342,8 @@ class _Fit:
         for _ in range(_MOST_TURNS):
             before, own = weights, rows.sample_weight
             weights = huber_weights(run.problem, run.evaluation, epsilon, own)
-            run = self.run(reweighted(rows, weights), run.start, run.displacement)
+            start = replace(run.start, displacement=run.displacement)
+            run = self.run(reweighted(rows, weights), start)
             change = float(np.mean(np.abs(weights - before)))
             if change < _SETTLED:
                 return run, weights
@@ -395,14 +364,6 @@ class _Fit:
             return callbacks.task("iteration", lambda: self.builder.model(start, evaluation))
 
         return watch
-
-    def tell_run(self, run):
-        """Tell of one of several runs; whether a callback wants to stop."""
-        if self.printer is not None:
-            self.printer.tell_run(run.result)
-        if self.callbacks is None:
-            return False
-        return self.callbacks.task("start", lambda: self.builder.model(run.start, run.evaluation))
 
     def warn_unless_converged(self, run):
         """Warn where the solver would have gone on."""

@@ -34,11 +34,6 @@ class Printer:
             f"alpha {penalty.alpha:.3g}, stiffness {penalty.stiffness:.3g}"
         )
 
-    def tell_run(self, result):
-        """Write how one of several runs has ended."""
-        loss = result.evaluation.mean_squared_error
-        self._write(f"a start: loss {loss:.6g} after {result.n_iter} iterations")
-
     def _write(self, text):
         sys.stdout.write(f"[{self._name}] {text}\n")
         sys.stdout.flush()
@@ -51,7 +46,7 @@ class Printer:
 
 
 class Callbacks:
-    """scikit-learn's callbacks: told of every iteration or start, and asked whether to go on.
+    """scikit-learn's callbacks: told of every iteration, and asked whether to go on.
 
     Parameters
     ----------

@@ -50,8 +50,8 @@ class TestImported:
     @pytest.mark.filterwarnings("ignore:.*max_iter was reached")
     def test_short_fits_one_after_another_go_on(self, data):
         settings = {"solver": VariableProjection(tol=1e-9), "max_iter": 3}
-        model, losses = ANFISRegressor(n_mfs=3, **settings).fit(*data), []
-        for _ in range(3):
+        model, losses = ANFISRegressor(n_mfs=2, **settings).fit(*data), []
+        for _ in range(2):
             losses.append(model.loss_curve_)
             model = ANFISRegressor(partition=model, **settings).fit(*data)
         for before, after in pairwise(losses):
