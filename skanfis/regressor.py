@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._callers import is_silent, pipelines_above
 from ._dispatch import in_bounds, namespace_of, to_numpy
@@ -21,22 +21,11 @@ from ._sklearn import (
     Interval,
     StrOptions,
     check_parameters,
-    check_sample_weight,
     fit_context,
 )
 from ._threads import one_blas_thread
-from ._validation import (
-    bearable_weights,
-    check_finite,
-    group_numbers,
-    named_refusals,
-    on_host,
-    positive_weights,
-    refuse_lazy,
-    warn_user,
-)
+from ._validation import check_finite, warn_user
 from .constraints import FixedPoint, OutputLimits
-from .constraints.wishes import Wishes
 from .exceptions import OutOfBoundsWarning
 from .export import fold_with_rows, last_step
 from .export.arrays import predict_in
@@ -51,15 +40,21 @@ from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .parameters import structure_request
 from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
+from .row_checks import ChecksRowsMixin
 from .solvers import SOLVERS, Solver
 from .streaming.learning import LearnsFromChunksMixin
-from .training import Callbacks, ValidatedData, fit_rules, model_without_rules
+from .training import Callbacks, fit_rules, model_without_rules
 
 __all__ = ["ANFISRegressor"]
 
 
 class ANFISRegressor(
-    LearnsFromChunksMixin, RulesReprMixin, CallbackSupportMixin, RegressorMixin, BaseEstimator
+    LearnsFromChunksMixin,
+    ChecksRowsMixin,
+    RulesReprMixin,
+    CallbackSupportMixin,
+    RegressorMixin,
+    BaseEstimator,
 ):
     r"""Adaptive neuro-fuzzy inference system for regression.
 
@@ -672,67 +667,10 @@ class ANFISRegressor(
         check_is_fitted(self)
         return self.model_
 
-    def _input_names(self):
-        names = getattr(self, "feature_names_in_", None)
-        return [f"x{j}" for j in range(self.n_features_in_)] if names is None else list(names)
-
     def _tell_noise(self):
         posterior = self.model_.posterior
         noise = None if posterior is None else posterior.noise
         self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
-
-    def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
-        """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
-        refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
-        X, y, sample_weight, groups = map(on_host, (X, y, sample_weight, groups))
-        numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
-        output_names = _target_names(y)
-        with named_refusals(X=X, y=y):
-            X, y = validate_data(
-                self,
-                X,
-                y,
-                reset=not (is_chunk and hasattr(self, "n_features_in_")),
-                validate_separately=(
-                    {**numeric, "ensure_min_samples": 1 if is_chunk else 2},
-                    {**numeric, "ensure_2d": False},
-                ),
-            )
-        check_consistent_length(X, y, groups)
-        self._single_output = y.ndim == 1
-        targets = y.reshape(-1, 1) if y.ndim == 1 else y
-        if output_names is None or len(output_names) != targets.shape[1]:
-            n_outputs = targets.shape[1]
-            output_names = ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
-        check_finite(X, "X", self._input_names())
-        check_finite(targets, "y", output_names)
-        groups = None if groups is None else group_numbers(groups)
-        keep = None
-        if sample_weight is not None:
-            # A chunk may be without any weight, which scikit-learn refuses from some version on.
-            if not (is_chunk and np.array_equal(sample_weight, np.zeros(X.shape[0]))):
-                sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-            sample_weight = np.asarray(sample_weight, dtype=float)
-            # Weights of chunks count against one another: they stay as they are.
-            sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
-            keep = positive_weights(sample_weight, X.shape[0], 0 if is_chunk else 2)
-        if keep is not None:
-            X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
-            groups = None if groups is None else groups[keep]
-        names = tuple(map(str, self._input_names()))
-        wishes = Wishes.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
-        return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
-
-    def _check_inputs(self, X):
-        check_is_fitted(self)
-        if not self._is_plain_input(X):
-            X = on_host(X)
-            with named_refusals(X=X):
-                X = validate_data(
-                    self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
-                )
-        check_finite(X, "X", self.model_.input_names)
-        return X
 
     def _describe_out_of_bounds(self, model, X):
         """Which columns leave the box: those of the outermost pipeline that can be folded."""
@@ -745,23 +683,3 @@ class ANFISRegressor(
                 # A step that mixes columns: the columns that it makes are all that can be named.
                 continue
         return model.describe_out_of_bounds(X)
-
-    def _is_plain_input(self, X):
-        """Whether X is an array in which scikit-learn's checks, half of a call, find nothing."""
-        return (
-            type(X) is np.ndarray
-            and X.dtype == np.float64
-            and X.ndim == 2
-            and X.shape[0] > 0
-            and X.shape[1] == self.n_features_in_
-            and not hasattr(self, "feature_names_in_")
-        )
-
-
-def _target_names(y):
-    """Names of a Series or of a frame's columns, if all are str."""
-    names = getattr(y, "columns", None)
-    if names is None:
-        names = [getattr(y, "name", None)]
-    names = list(names)
-    return tuple(names) if all(isinstance(name, str) and name for name in names) else None

@@ -79,6 +79,10 @@ TABLE = {
         ],
         [*NUMERIC, "sklearn"],
     ),
+    "row_checks": (
+        [*KERNEL, "_sklearn", "_validation", "constraints", "training"],
+        [*NUMERIC, "sklearn"],
+    ),
     "regressor": (
         [
             *KERNEL,
@@ -94,6 +98,7 @@ TABLE = {
             "constraints",
             "export",
             "readable",
+            "row_checks",
             "solvers",
             "streaming",
             "training",
