@@ -2,7 +2,7 @@
 
 import numpy as np
 
-__all__ = ["check_column", "check_labels", "check_weights"]
+__all__ = ["check_column", "check_labels", "check_weights", "column_position"]
 
 
 def check_column(values, name, n_rows=None) -> np.ndarray:
@@ -51,3 +51,21 @@ def _check_shape(column, name, n_rows):
         raise ValueError(f"{name} is empty.")
     if n_rows is not None and column.size != n_rows:
         raise ValueError(f"{name} has {column.size} rows where the other columns have {n_rows}.")
+
+
+def column_position(names, role, given) -> int:
+    """Position of the column that a parameter gives by position or name, or ValueError.
+
+    ``names`` has an entry for every column of X: its name, or its position where it has none.
+    """
+    if isinstance(given, str):
+        if given not in names:
+            has_names = any(isinstance(name, str) for name in names)
+            found = f"its columns are {names}" if has_names else "it has no column names"
+            raise ValueError(f"X has no column {role}={given!r}: {found}.")
+        return names.index(given)
+    if not isinstance(given, int | np.integer) or isinstance(given, bool):
+        raise ValueError(f"{role}={given!r} must be the position or the name of a column.")
+    if not -len(names) <= given < len(names):
+        raise ValueError(f"{role}={given} is no column of X, which has {len(names)} feature(s).")
+    return int(given) % len(names)

@@ -20,125 +20,20 @@ nothing. In C, with the state {rate, previous} of one run, on every sample after
 where h is constant, the gain 1 - exp(-h / tau) is a constant too.
 """
 
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from ..blocks import LARGE_BLOCK_ROWS, row_blocks
-from ._columns import check_column
+from ._run_feature import Column, RunFeature
 from ._scalars import check_number
 
 __all__ = ["ThermalLag", "ThermalRate", "TimeSincePowerOn"]
 
-# By position in X, or by name.
-Column = int | str | None
 
-
-class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
-    """A feature that is computed run by run, from the past rows of the run alone.
-
-    Subclasses have the parameters ``time`` and ``run``, the columns that are no quantities.
-    """
-
-    def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Take note of the columns, and check them; nothing is learnt.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            A log.
-        y : None
-            Not used; here for scikit-learn.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-        """
-        self._check_parameters()
-        names, columns = self._columns_of(X, reset=True)
-        self._time, self._run = (
-            _position(names, role, getattr(self, role)) for role in ("time", "run")
-        )
-        if self._time is not None and self._time == self._run:
-            raise ValueError(f"time={self.time!r} and run={self.run!r} are one column.")
-        self._quantities = [i for i in range(len(names)) if i not in (self._time, self._run)]
-        self._check_quantities()
-        self._rows_by_run(names, columns)  # what transform refuses, fit refuses
-        return self
-
-    def transform(self, X: ArrayLike) -> np.ndarray:
-        """Compute the feature.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            A log: the rows of a run in time's order, whole runs. Runs may be mixed.
-
-        Returns
-        -------
-        features : ndarray of shape (n_samples, n_features_out)
-            The new columns alone.
-        """
-        check_is_fitted(self)
-        order, starts, steps, quantities = self._rows_by_run(*self._columns_of(X, reset=False))
-        features = np.empty((len(order), self._n_features_out))
-        features[order] = self._compute(quantities, steps, starts)
-        return features
-
-    def _columns_of(self, X, reset):
-        """Names, positions where there are none, and values of the columns of X."""
-        if hasattr(X, "columns"):
-            validate_data(self, X, reset=reset, skip_check_array=True)
-            return list(X.columns), [np.asarray(X[name]) for name in X.columns]
-        columns = validate_data(self, X, reset=reset, dtype="numeric").T
-        return list(range(len(columns))), list(columns)
-
-    def _rows_by_run(self, names, columns):
-        """Order of the rows by run; in this order, starts of runs, time steps and quantities."""
-        n_rows = len(columns[0])
-        runs = np.zeros(n_rows, dtype=np.intp)
-        time = np.arange(n_rows, dtype=float)
-        if self._run is not None:
-            runs = _run_numbers(columns[self._run], names[self._run])
-        if self._time is not None:
-            time = check_column(columns[self._time], f"column {names[self._time]!r} (time)")
-        order = np.argsort(runs, kind="stable")
-        starts = np.flatnonzero(np.diff(runs[order], prepend=-1))
-        steps = self._steps(time[order], starts, order)
-        return order, starts, steps, self._numbers(names, columns)[order]
-
-    def _numbers(self, names, columns):
-        """The quantities; none are needed where the subclass does not look at them."""
-        chosen = [check_column(columns[i], f"column {names[i]!r}") for i in self._quantities]
-        return np.column_stack(chosen)
-
-    def _check_parameters(self):
-        """Raise where a parameter makes no sense."""
-
-    def _check_quantities(self):
-        """Raise where there is nothing to compute the feature from."""
-
-    def _steps(self, time, starts, rows):
-        """Time since the row before, rows sorted by run; zero where a run starts."""
-        steps = np.diff(time, prepend=time[0])
-        steps[starts] = 0.0
-        wrong = steps <= 0
-        wrong[starts] = False
-        if wrong.any():
-            hint = "" if self.run is not None else " Is this where a run starts? Then give run."
-            raise ValueError(
-                f"time={self.time!r} must increase from row to row within a run; at row "
-                f"{rows[wrong.argmax()]} it does not.{hint}"
-            )
-        return steps
-
-
-class _ThermalFilter(_RunFeature):
+class _ThermalFilter(RunFeature):
     """A low-pass of every column that is neither time nor run."""
 
     def __init__(self, time_constant: Any, *, time: Any, run: Any) -> None:
@@ -320,7 +215,7 @@ class ThermalLag(_ThermalFilter):
         return quantities - self.time_constant * self._rates(quantities, steps, starts)
 
 
-class TimeSincePowerOn(_RunFeature):
+class TimeSincePowerOn(RunFeature):
     """Time since the first row of the run, from a clock that goes on from run to run.
 
     Warm-up depends on the time since power-on, and on no other; a log has a clock of its own.
@@ -380,31 +275,6 @@ class TimeSincePowerOn(_RunFeature):
         elapsed = np.cumsum(steps)
         n_rows = np.diff(starts, append=len(steps))
         return (elapsed - np.repeat(elapsed[starts], n_rows))[:, None]
-
-
-def _position(names, role, column):
-    """Position of a column that is given by position or name; None where it is None."""
-    if column is None:
-        return None
-    if isinstance(column, str):
-        if column not in names:
-            raise ValueError(f"X has no column {role}={column!r}; its columns are {names}.")
-        return names.index(column)
-    if not isinstance(column, int | np.integer) or isinstance(column, bool):
-        raise ValueError(f"{role}={column!r} must be the position or the name of a column.")
-    if not -len(names) <= column < len(names):
-        raise ValueError(f"{role}={column} is no column of X, which has {len(names)} feature(s).")
-    return int(column) % len(names)
-
-
-def _run_numbers(labels, name):
-    """Number of the run of each row, from 0 in order of appearance."""
-    codes = pd.factorize(labels)[0]
-    if np.any(codes < 0):
-        raise ValueError(
-            f"column {name!r} (run) has missing values, the first at row {codes.argmin()}."
-        )
-    return codes
 
 
 def _filtered_rate(temperature, steps, gains, starts):

@@ -29,7 +29,7 @@ from sklearn.utils.validation import check_is_fitted, check_scalar, validate_dat
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ..policies import OUT_OF_BOUNDS
-from ._columns import check_weights
+from ._columns import check_weights, column_position
 from ._law_fit import MAX_EVALUATIONS, Shape, check_log_fits, fit_law, standardise
 
 __all__ = ["OpenLoopArcsineRegressor", "check_parameters"]
@@ -298,27 +298,12 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             if self.temperature is None:
                 raise ValueError("temperature_rate is of no use with temperature=None.")
             roles.append("temperature_rate")
-        columns = [self._find_column(role) for role in roles]
+        names = list(getattr(self, "feature_names_in_", range(self.n_features_in_)))
+        columns = [column_position(names, role, getattr(self, role)) for role in roles]
         if len(set(columns)) < len(columns):
             given = ", ".join(f"{role}={getattr(self, role)!r}" for role in roles)
             raise ValueError(f"Two of {given} are one column.")
         return columns
-
-    def _find_column(self, role):
-        column, n_features = getattr(self, role), self.n_features_in_
-        if isinstance(column, str):
-            names = list(getattr(self, "feature_names_in_", []))
-            if column not in names:
-                found = f"its columns are {names}" if names else "it has no column names"
-                raise ValueError(f"X has no column {role}={column!r}: {found}.")
-            return names.index(column)
-        if not isinstance(column, int | np.integer) or isinstance(column, bool):
-            raise ValueError(f"{role}={column!r} must be the position or the name of a column.")
-        if not -n_features <= column < n_features:
-            raise ValueError(
-                f"{role}={column} is no column of X, which has {n_features} feature(s)."
-            )
-        return int(column) % n_features
 
     def _degrees(self, used):
         """Degrees in temperature, no higher than its number of different values can tell."""

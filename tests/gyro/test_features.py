@@ -304,7 +304,7 @@ def test_without_time_the_rows_are_one_unit_apart(rng):
         ({"time_constant": 0.0}, "time_constant=0.0 must be a positive number"),
         ({"time_constant": np.inf}, "time_constant=inf must be a positive number"),
         ({"time_constant": "1 min"}, "time_constant='1 min' must be a positive"),
-        ({"time": "seconds"}, r"no column time='seconds'; its columns are \['t', 'T'"),
+        ({"time": "seconds"}, r"no column time='seconds': its columns are \['t', 'T'"),
         ({"time": 4}, r"time=4 is no column of X, which has 4 feature"),
         ({"time": True}, "time=True must be the position or the name"),
         ({"run": "t"}, "time='t' and run='t' are one column"),
