@@ -13,7 +13,8 @@ from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._header import header
 from ._interval import check_deviation, read_interval
-from ._learner import LearningSource, learner_of, learning_test
+from ._learner import learner_of
+from ._learning_source import LearningSource, learning_test
 from ._saturation import read_limits
 from ._self_test import known_answers, self_test
 from ._source import Source
