@@ -28,7 +28,7 @@ def default_term_names(antecedent):
     Terms of a grid are in order and are called by it ("low", "medium", "high"); beyond seven they
     are numbered. Other terms are called by where they stand ("near 21.3").
     """
-    inputs, places = _terms(antecedent)
+    inputs, places = antecedent.term_inputs, antecedent.term_places
     names = np.empty(inputs.size, dtype=object)
     for j in np.unique(inputs):
         own = np.flatnonzero(inputs == j)
@@ -47,7 +47,7 @@ def given_term_names(antecedent, input_names, term_names):
     input names to such sequences. Inputs that it does not speak of keep the default names.
     """
     names = list(default_term_names(antecedent))
-    inputs, _ = _terms(antecedent)
+    inputs = antecedent.term_inputs
     is_mapping = isinstance(term_names, Mapping)
     if is_mapping and (unknown := [key for key in term_names if key not in input_names]):
         raise ValueError(
@@ -63,14 +63,6 @@ def given_term_names(antecedent, input_names, term_names):
         for t, name in zip(own, given, strict=True):
             names[t] = name
     return tuple(names)
-
-
-def _terms(antecedent):
-    """Input and place (first parameter, the location) of every term."""
-    if not antecedent.groups:
-        return np.empty(0, dtype=int), np.empty(0)
-    inputs = np.concatenate([group.inputs for group in antecedent.groups])
-    return inputs, np.concatenate([group.theta[0] for group in antecedent.groups])
 
 
 def _near(places):

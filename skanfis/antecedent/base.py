@@ -67,6 +67,17 @@ class Antecedent(ABC):
         return sum(group.n_terms for group in self.groups)
 
     @property
+    def term_inputs(self):
+        """Input of every term, shape (n_terms,)."""
+        every = [group.inputs for group in self.groups]
+        return np.concatenate(every) if every else np.empty(0, dtype=int)
+
+    @property
+    def term_places(self):
+        """Location of every term, its first parameter, shape (n_terms,)."""
+        return np.concatenate([group.theta[0] for group in self.groups] or [np.empty(0)])
+
+    @property
     @abstractmethod
     def n_rules(self):
         """Number of rules."""

@@ -71,7 +71,7 @@ class Shares:
 
 def factors(antecedent: Antecedent):
     """The factors of a rule base, in the order of its rules."""
-    inputs = np.concatenate([group.inputs for group in antecedent.groups] or [np.empty(0, int)])
+    inputs = antecedent.term_inputs
     if isinstance(antecedent, GridAntecedent):
         edges = np.cumsum([0, *antecedent.counts])
         spans = [np.arange(i, j) for i, j in itertools.pairwise(edges)]

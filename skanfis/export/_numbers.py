@@ -131,7 +131,7 @@ class Numbers:
             reference=reference,
             inverse_spread=_rounded(1.0 / model.spread, dtype, "the inverse spread of an input"),
             terms=tuple(_term_tables(model, low, high)),
-            term_inputs=np.concatenate([[], *(g.inputs for g in antecedent.groups)]).astype(int),
+            term_inputs=antecedent.term_inputs,
             counts=tuple(antecedent.counts) if is_grid else None,
             rule_terms=rule_terms,
             terms_per_rule=antecedent.rule_terms.shape[1],

@@ -60,9 +60,7 @@ def warn_if_unreadable(estimator, model):
 
 def conditions(model):
     """For every rule the positions (input, term) that it looks at."""
-    inputs = np.concatenate(
-        [group.inputs for group in model.antecedent.groups] or [np.empty(0, int)]
-    )
+    inputs = model.antecedent.term_inputs
     return [
         [(int(inputs[t]), int(t)) for t in rule if t >= 0] for rule in model.antecedent.rule_terms
     ]

@@ -94,18 +94,12 @@ def _count(number_of, what):
 def _term_hues(model):
     """A hue for every term: the rank of its place among those of its input, from blue to red."""
     hues = np.empty(model.antecedent.n_terms)
-    inputs, places = _inputs_and_places(model)
+    inputs, places = model.antecedent.term_inputs, model.antecedent.term_places
     for j in np.unique(inputs):
         own = np.flatnonzero(inputs == j)
         rank = np.argsort(np.argsort(places[own], kind="stable"))
         hues[own] = _HUES[0] + (_HUES[1] - _HUES[0]) * rank / max(own.size - 1, 1)
     return hues
-
-
-def _inputs_and_places(model):
-    groups = model.antecedent.groups
-    inputs = np.concatenate([group.inputs for group in groups] or [np.empty(0, dtype=int)])
-    return inputs, np.concatenate([group.theta[0] for group in groups] or [np.empty(0)])
 
 
 def _table(model, chosen, precision):
@@ -159,7 +153,7 @@ def _chip(model, term, hues):
 
 def _picture(model, j, hues, precision):
     """The membership functions of input j, and its name and range."""
-    own = np.flatnonzero(_inputs_and_places(model)[0] == j)
+    own = np.flatnonzero(model.antecedent.term_inputs == j)
     Z = np.zeros((model.n_inputs, _POINTS))
     Z[j] = np.linspace(model.minimum[j], model.maximum[j], _POINTS)
     mu = np.exp(model.antecedent.log_memberships(Z)[own])

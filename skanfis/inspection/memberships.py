@@ -153,8 +153,7 @@ class MembershipDisplay:
 def _terms_on(model, j, n_points, rows, bins):
     """The terms of input j over the box of the training data."""
     grid = np.linspace(model.minimum[j], model.maximum[j], n_points)
-    inputs = np.concatenate([group.inputs for group in model.antecedent.groups])
-    own = np.flatnonzero(inputs == j)
+    own = np.flatnonzero(model.antecedent.term_inputs == j)
     Z = np.zeros((model.n_inputs, n_points))
     Z[j] = grid
     edges = counts = None

@@ -230,8 +230,7 @@ class _Sums:
         self.by_rule = np.ascontiguousarray(by_rule.transpose(2, 0, 1))
         n_rules, n_outputs = model.n_rules, model.n_outputs
         self.truth = np.full(model.antecedent.n_terms, -np.inf)
-        groups = model.antecedent.groups
-        inputs = np.concatenate([g.inputs for g in groups] or [np.empty(0, dtype=int)])
+        inputs = model.antecedent.term_inputs
         self.terms_of = {int(j): np.flatnonzero(inputs == j) for j in np.unique(inputs)}
         self.wordless = np.zeros(model.n_inputs)
         self.mass, self.rows = np.zeros(n_rules), np.zeros(n_rules)

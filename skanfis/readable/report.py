@@ -1,49 +1,31 @@
-"""What the measures say to a reader: tables, a line, and sentences on what cannot be read."""
+"""What the measures say to a reader: tables, and a line."""
 
 from dataclasses import dataclass
 from html import escape
-from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..membership import LEAST_TRUTH
 from ..model import TSKModel
-from ..penalty import GREATEST_ALONE
+from .findings import (
+    GREATEST_ALONE,
+    GREATEST_BEYOND,
+    GREATEST_CROSSING,
+    GREATEST_SUM,
+    GREATEST_WORDLESS,
+    LEAST_TRUTH,
+    capital,
+    figure,
+    findings,
+)
 from .measures import Measures, Source, measure
-from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
+from .terms import crossings, distinct_terms, own_terms
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "GREATEST_ALONE",
-    "GREATEST_BEYOND",
-    "GREATEST_CROSSING",
-    "GREATEST_SUM",
-    "GREATEST_WORDLESS",
-    "LEAST_TRUTH",
-    "Readability",
-    "findings_without_rows",
-    "readability_of_rows",
-]
+__all__ = ["Readability", "readability_of_rows"]
 
-# Neighbours that cross above this are both all but true at one place: no reader can say which of
-# the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
-GREATEST_CROSSING = 0.9
-# In ranges of the target. Rules whose values lie in the target's range reach one at most. At two,
-# at least half of what the rules say on some row is there to cancel the rest.
-GREATEST_SUM = 2.0
-# In ranges of the target. A rule may say a little more than was ever seen, for its neighbours take
-# part everywhere; a quarter of the range beyond is no mean of anything that was.
-GREATEST_BEYOND = 0.25
-
-# Of the rows. Outer terms stand a little inside of the data, so that a few rows on either side have
-# no true term; beyond, a stretch of the input has no name.
-GREATEST_WORDLESS = 0.05
-
-# A sentence names so many terms, pairs or rules; beyond, it counts them.
-_MOST_NAMED = 5
 # Lines of the notebook's table of rules.
 _MOST_LINES = 10
 
@@ -140,7 +122,7 @@ class Readability:
         import pandas as pd
 
         own = own_terms(self.model.antecedent)
-        inputs, names = _inputs_of_terms(self.model), self.model.term_names
+        inputs, names = self.model.antecedent.term_inputs, self.model.term_names
         return pd.DataFrame(
             {
                 "input": [self.model.input_names[inputs[t]] for t in own],
@@ -220,29 +202,21 @@ class Readability:
     @property
     def findings(self) -> list[str]:
         """What is not fit to be read, in sentences; an empty list if all is well."""
-        found, model = self.measures, self.model
-        own = own_terms(model.antecedent)
-        sentences = _on_truth(model, own, found.truth, "on any row")
-        sentences += _on_crossings(model) + _on_wordless(model, found.wordless)
-        for k, name in enumerate(model.output_names):
-            of_output = f" of {name!r}" if model.n_outputs > 1 else ""
-            sentences += _on_compensation(found, k, of_output)
-            sentences += _on_values(found.rule_beyond[:, k], of_output)
-        return sentences
+        return findings(self.model, self.measures)
 
     @property
     def line(self) -> str:
         """The summary as one line of text."""
         found = self._summary()
         parts = [
-            f"strongest rule alone {_figure(found['strongest_alone'])} sd off the model",
-            f"disagreement {_figure(found['disagreement'])} sd",
-            f"greatest sum {_figure(found['greatest_sum'])} ranges",
+            f"strongest rule alone {figure(found['strongest_alone'])} sd off the model",
+            f"disagreement {figure(found['disagreement'])} sd",
+            f"greatest sum {figure(found['greatest_sum'])} ranges",
         ]
         if np.isfinite(found["least_truth"]):
-            parts.append(f"least true term {_figure(found['least_truth'])}")
+            parts.append(f"least true term {figure(found['least_truth'])}")
         if np.isfinite(found["greatest_crossing"]):
-            parts.append(f"highest crossing {_figure(found['greatest_crossing'])}")
+            parts.append(f"highest crossing {figure(found['greatest_crossing'])}")
         if np.isfinite(found["wordless"]):
             parts.append(f"rows on which no term of an input is true {found['wordless']:.1%}")
         return "; ".join(parts)
@@ -251,7 +225,7 @@ class Readability:
         return f"<Readability of {self.model!r}: {self.line}>"
 
     def __str__(self):
-        return "\n".join([_capital(self.line) + ".", *(self.findings or [_ALL_IS_WELL])])
+        return "\n".join([capital(self.line) + ".", *(self.findings or [_ALL_IS_WELL])])
 
     def _repr_html_(self):
         rules = self.rules.sort_values("weight", ascending=False, kind="stable")
@@ -273,7 +247,7 @@ class Readability:
         html : str
             A ``<div>`` for each, with names escaped.
         """
-        lines = [_capital(self.line) + ".", *(self.findings or [_ALL_IS_WELL])]
+        lines = [capital(self.line) + ".", *(self.findings or [_ALL_IS_WELL])]
         return "".join(f"<div>{escape(line)}</div>" for line in lines)
 
     def _summary(self):
@@ -317,116 +291,5 @@ def readability_of_rows(model, X, y=None, sample_weight=None):
     return Readability(model, measure(model, source))
 
 
-def findings_without_rows(model):
-    """What can be found without rows: terms that cross, or are true nowhere in the range.
-
-    Parameters
-    ----------
-    model : TSKModel
-
-    Returns
-    -------
-    findings : list of str
-    """
-    own = own_terms(model.antecedent)
-    truth = greatest_truth_in_box(model)
-    return _on_truth(model, own, truth, "in the range of training") + _on_crossings(model)
-
-
-def _on_truth(model, own, truth, where):
-    never = [t for t in own if truth[t] < LEAST_TRUTH]
-    if not never:
-        return []
-    what = "a term is" if len(never) == 1 else f"{len(never)} of {len(own)} terms are"
-    named = _named([f"{_term(model, t)} ({_figure(truth[t])})" for t in never])
-    return [f"{_capital(what)} never truer than {LEAST_TRUTH} {where}: {named}."]
-
-
-def _on_crossings(model):
-    heights = crossings(model.antecedent)
-    too_high, n_pairs = [], 0
-    for own in distinct_terms(model.antecedent).values():
-        n_pairs += len(own) - 1
-        for t, following in pairwise(own):
-            if heights[t] > GREATEST_CROSSING:
-                both = f"{model.term_names[t]!r} and {_term(model, following)}"
-                too_high.append(f"{both} ({_figure(heights[t])})")
-    if not too_high:
-        return []
-    many = len(too_high) > 1
-    what = f"{len(too_high)} of {n_pairs} pairs of neighbouring terms" if many else "Two terms"
-    return [
-        f"{what} can hardly be told apart, for they cross above {GREATEST_CROSSING}: "
-        f"{_named(too_high)}."
-    ]
-
-
-def _on_wordless(model, wordless):
-    # An input without terms has none, which is no more than a limit.
-    beyond = np.flatnonzero(np.nan_to_num(wordless) > GREATEST_WORDLESS)
-    beyond = beyond[np.argsort(-wordless[beyond], kind="stable")]
-    if not beyond.size:
-        return []
-    named = _named([f"{model.input_names[j]!r} ({wordless[j]:.0%} of the rows)" for j in beyond])
-    many = "an input" if beyond.size == 1 else f"{beyond.size} inputs"
-    return [f"Rows lie where no term of {many} is truer than {LEAST_TRUTH}: {named}."]
-
-
-def _on_compensation(found, k, of_output):
-    sentences = []
-    if found.alone[k] > GREATEST_ALONE:
-        sentences.append(
-            f"No rule{of_output} can be read without the others: the strongest alone misses the "
-            f"model by {_figure(found.alone[k])} standard deviations of the target (limit "
-            f"{GREATEST_ALONE})."
-        )
-    if found.greatest_sum[k] > GREATEST_SUM:
-        sentences.append(
-            f"The rules{of_output} cancel one another: on one row their contributions add up, in "
-            f"size, to {_figure(found.greatest_sum[k])} ranges of the target (limit "
-            f"{GREATEST_SUM:g})."
-        )
-    return sentences
-
-
-def _on_values(beyond, of_output):
-    rules = np.flatnonzero(beyond > GREATEST_BEYOND)
-    if not rules.size:
-        return []
-    rules = rules[np.argsort(-beyond[rules], kind="stable")]
-    what = "A rule says where it fires"
-    if rules.size > 1:
-        what = f"{rules.size} of {beyond.size} rules say where they fire"
-    named = _named([f"rule {r} (by {_figure(beyond[r])} ranges)" for r in rules])
-    return [
-        f"{what}{of_output} what the target never was, beyond its range by more than "
-        f"{GREATEST_BEYOND:g} of it: {named}."
-    ]
-
-
-def _named(parts):
-    if len(parts) <= _MOST_NAMED:
-        return ", ".join(parts)
-    return f"{', '.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
-
-
-def _term(model, t):
-    return f"{model.term_names[t]!r} of {model.input_names[_inputs_of_terms(model)[t]]!r}"
-
-
-def _inputs_of_terms(model):
-    groups = model.antecedent.groups
-    return np.concatenate([group.inputs for group in groups] or [np.empty(0, dtype=int)])
-
-
-def _figure(value):
-    """Three digits, and no exponent where a person would write none."""
-    return f"{float(f'{value:.3g}'):.10g}"
-
-
-def _capital(text):
-    return text[:1].upper() + text[1:]
-
-
 def _table(table):
-    return f"<div>{table.to_html(float_format=_figure, na_rep='', border=0)}</div>"
+    return f"<div>{table.to_html(float_format=figure, na_rep='', border=0)}</div>"

@@ -83,7 +83,7 @@ def crossings(antecedent):
     if not pairs:
         return heights
     lower, upper = np.array(pairs).T
-    places = _places(antecedent)
+    places = antecedent.term_places
 
     def smaller_of_both(x):
         return np.minimum(_log_truth(antecedent, lower, x), _log_truth(antecedent, upper, x))
@@ -106,7 +106,7 @@ def greatest_truth_in_box(model):
     antecedent = model.antecedent
     if not antecedent.n_terms:
         return np.empty(0)
-    inputs = np.concatenate([group.inputs for group in antecedent.groups])
+    inputs = antecedent.term_inputs
     every = np.arange(antecedent.n_terms)
 
     def log_truth(x):
@@ -126,10 +126,6 @@ def _described(antecedent):
             for j, theta, width in zip(group.inputs, group.theta.T, widths, strict=True)
         ]
     return described
-
-
-def _places(antecedent):
-    return np.concatenate([group.theta[0] for group in antecedent.groups])
 
 
 def _log_truth(antecedent, terms, x):

@@ -97,7 +97,7 @@ def _groups_with(groups, terms):
 
 def _grid_with(antecedent, terms):
     """A grid of fewer terms, and which; an input with one term left has no say any more."""
-    inputs = np.concatenate([group.inputs for group in antecedent.groups])
+    inputs = antecedent.term_inputs
     left, numbers = np.unique(inputs[terms], return_counts=True)
     terms = terms[np.isin(inputs[terms], left[numbers > 1])]
     counts = tuple(int(np.sum(inputs[terms] == j)) for j in dict.fromkeys(inputs[terms]))

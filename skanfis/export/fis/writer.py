@@ -174,8 +174,7 @@ def _premises(model):
 
     A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
     """
-    groups = model.antecedent.groups
-    inputs = np.concatenate([np.empty(0, dtype=int), *(group.inputs for group in groups)])
+    groups, inputs = model.antecedent.groups, model.antecedent.term_inputs
     terms = [
         function_of(group.family, natural)
         for group in groups
