@@ -73,25 +73,9 @@ def gradient(
 ):
     """Train by back-propagation.
 
-    Parameters
-    ----------
-    problem : SeparableProblem
-    premise : Premise
-    max_iter : int
-        Number of epochs. There is no other end than this and ``error_goal``.
-    tol : float
-        Stop where the projected gradient is zero for all that ``tol`` can tell.
-    stiffness : float
-        Weight of the pull of the premises to their start.
-    start : ndarray of shape (premise.size,), optional
-        Displacements to start from, inside the box; zero if not given.
-    on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every epoch; what is true ends the training. The
-        evaluation has no factor.
-    step_size : float
-        Length of the first step, in standardised units.
-    error_goal : float, optional
-        Stop when the root mean square error, in standard deviations of the target, is this small.
+    Takes what :meth:`Solver.solve` does, with epochs for iterations, whose evaluations have no
+    factor, and the settings of :class:`GradientDescent`. There is no other end than ``max_iter``,
+    ``error_goal`` and a projected gradient of zero.
 
     Returns
     -------

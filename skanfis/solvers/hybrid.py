@@ -209,26 +209,9 @@ def hybrid(
 ):
     """Train by Jang's hybrid rule.
 
-    Parameters
-    ----------
-    problem : SeparableProblem
-    premise : Premise
-    max_iter : int
-        Number of epochs: steps of the premises. The rule has no other end than this and
-        ``error_goal``.
-    tol : float
-        Stop where the projected gradient is zero for all that ``tol`` can tell; the error may rise
-        and fall for ever without that.
-    stiffness : float
-        Weight of the pull of the premises to their start.
-    start : ndarray of shape (premise.size,), optional
-        Displacements to start from, inside the box; zero if not given.
-    on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every epoch; what is true ends the training.
-    step_size : float
-        Length of the first step, in standard deviations of the inputs and units of the slope.
-    error_goal : float, optional
-        Stop when the root mean square error, in standard deviations of the target, is this small.
+    Takes what :meth:`Solver.solve` does, with epochs for iterations, each a step of the premises,
+    and the settings of :class:`Hybrid`. The rule has no other end than ``max_iter``, ``error_goal``
+    and a projected gradient of zero; without the last the error may rise and fall for ever.
 
     Returns
     -------

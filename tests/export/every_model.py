@@ -34,6 +34,14 @@ class Case:
         return self.family, self.partition, model.order, model.n_outputs, model.out_of_bounds
 
 
+def surface(n_rows=400, n_outputs=1):
+    """Rows in everyday units, and outputs that are no sum of functions of one input."""
+    g = np.random.default_rng(0)
+    X = g.uniform(-1.0, 1.0, (n_rows, 3)) * [300.0, 40.0, 100.0] + [300.0, 20.0, 0.0]
+    y = np.sin(X[:, 0] / 100.0) + 1e-3 * X[:, 1] * X[:, 2]
+    return X, np.column_stack([y, 1e3 + y**2])[:, :n_outputs].squeeze()
+
+
 def table_of(rng, family):
     """Four rules over terms of two families on three inputs; two do not look at all of them."""
     groups = []

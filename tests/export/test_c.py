@@ -28,7 +28,15 @@ from skanfis.solvers import VariableProjection
 from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
-from .every_model import CASES, FEWEST, full_scale, print_differences, rows, size_of_sum
+from .every_model import (
+    CASES,
+    FEWEST,
+    full_scale,
+    print_differences,
+    rows,
+    size_of_sum,
+    surface,
+)
 
 MIN_COVERAGE = 0.3
 
@@ -97,13 +105,6 @@ def test_every_model_answers_as_predict(dtype, std, every, flags, tmp_path, caps
 
 
 # What lies around the list: pipelines, policies, edges, numbers of unusual size.
-
-
-def surface(n_rows=400, n_outputs=1):
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (n_rows, 3)) * [300.0, 40.0, 100.0] + [300.0, 20.0, 0.0]
-    y = np.sin(X[:, 0] / 100.0) + 1e-3 * X[:, 1] * X[:, 2]
-    return X, np.column_stack([y, 1e3 + y**2])[:, :n_outputs].squeeze()
 
 
 def around(X, dtype=np.float64, n_rows=2000):

@@ -16,7 +16,7 @@ from skanfis.export import fold, register_onnx_converter
 from skanfis.options import LinearExtrapolation
 
 from ..quick import quick
-from .every_model import FEWEST, full_scale, print_differences, rows, size_of_sum
+from .every_model import FEWEST, full_scale, print_differences, rows, size_of_sum, surface
 
 REASON = "{} IS NOT INSTALLED (pip install '.[onnx]'): THE ONNX CONVERTER IS NOT TESTED"
 skl2onnx = pytest.importorskip("skl2onnx", reason=REASON.format("skl2onnx"))
@@ -71,13 +71,6 @@ def test_every_model_answers_as_predict(dtype, tolerance, capsys):
     with capsys.disabled():
         print_differences(f"ONNX, {np.dtype(dtype).name}", cases, differences)
     assert max(differences) < tolerance
-
-
-def surface(n_rows=400, n_outputs=1):
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (n_rows, 3)) * [300.0, 40.0, 100.0] + [300.0, 20.0, 0.0]
-    y = np.sin(X[:, 0] / 100.0) + 1e-3 * X[:, 1] * X[:, 2]
-    return X, np.column_stack([y, 1e3 + y**2])[:, :n_outputs].squeeze()
 
 
 COLUMNS = ColumnTransformer(

@@ -181,10 +181,7 @@ class DeviationSource(Source):
             "{",
             f"    $real phi[{found.n}];",
         ]
-        if self.has_shares:
-            lines.append(f"    $real l[{self.n_logarithms}];")
-        if not self.is_grid:
-            lines.append(f"    $real w[{numbers.n_rules}];")
+        lines += self.strength_arrays()
         if found.q:
             lines.append(f"    $real g[{found.terms.size}], change[{found.terms.size}];")
             lines.append(f"    $real t[{self.n_logarithms}], y[{numbers.n_outputs}];")
@@ -354,10 +351,8 @@ class DeviationSource(Source):
             "{",
         ]
         names = ["i"]
-        if self.has_shares:
-            lines.append(f"    $real l[{self.n_logarithms}];")
+        lines += self.strength_arrays()
         if not self.is_grid:
-            lines.append(f"    $real w[{numbers.n_rules}];")
             names += ["r", "k"]
         if self.has_slopes:
             lines.append(f"    $real z[{numbers.n_inputs}];")

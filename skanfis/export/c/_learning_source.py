@@ -271,10 +271,7 @@ class LearningSource(Source):
             "$real *phi)",
             "{",
         ]
-        if self.has_shares:
-            lines.append(f"    $real l[{self.n_logarithms}];")
-        if not self.is_grid:
-            lines.append(f"    $real w[{numbers.n_rules}];")
+        lines += self.strength_arrays()
         names = [name for name in self.loop_variables(tangent=False) if name != "o"]
         if not numbers.terms:
             names.remove("i")

@@ -73,6 +73,11 @@ class RuleLoops:
         """Logarithms that are kept: of terms, and the zero of "none"."""
         return self.numbers.n_terms + (self.numbers.rule_terms is not None)
 
+    def strength_arrays(self):
+        """Declarations of what strengths are worked out in."""
+        lines = [f"    $real l[{self.n_logarithms}];"] if self.has_shares else []
+        return lines if self.is_grid else [*lines, f"    $real w[{self.numbers.n_rules}];"]
+
     def loop_variables(self, tangent):
         n_loops = len(self.numbers.counts or ())
         names = ["r", "o", *(f"i{k}" for k in range(n_loops))]

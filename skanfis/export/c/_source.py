@@ -199,10 +199,7 @@ class Source(RuleLoops):
         ]
         if self.has_slopes:
             lines.append(f"    $real z[{numbers.n_inputs}];")
-        if self.has_shares:
-            lines.append(f"    $real l[{self.n_logarithms}];")
-        if not self.is_grid:
-            lines.append(f"    $real w[{numbers.n_rules}];")
+        lines += self.strength_arrays()
         if self.is_linear:
             lines.append(f"    $real e[{numbers.n_inputs}];")
         if self.judges_coverage:
