@@ -83,6 +83,7 @@ TABLE = {
         [*KERNEL, "_sklearn", "_validation", "constraints", "training"],
         [*NUMERIC, "sklearn"],
     ),
+    "fitted_rules": ([*KERNEL, "training"], [*NUMERIC, "sklearn"]),
     "regressor": (
         [
             *KERNEL,
@@ -97,6 +98,7 @@ TABLE = {
             "parameters",
             "constraints",
             "export",
+            "fitted_rules",
             "readable",
             "row_checks",
             "solvers",
