@@ -1,5 +1,6 @@
 """What all tests share, and that they leave nothing behind."""
 
+import gc
 import sys
 from pathlib import Path
 
@@ -30,6 +31,20 @@ def pytest_sessionfinish(session):
         if report is not None:
             report.section("the tests changed the folder that they run in", red=True)
             report.write("".join(f"{line}\n" for line in found))
+
+
+def pytest_collection_finish(session):
+    # Libraries and tests stay to the end: to go through them again and again finds nothing to free.
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(scope="session")
+def fresh_process(tmp_path_factory):
+    """What ``fresh_process.py`` saw, by the names of its functions."""
+    from .fresh_process import in_a_fresh_process
+
+    return in_a_fresh_process(tmp_path_factory.mktemp("fresh"))
 
 
 @pytest.fixture

@@ -1,9 +1,6 @@
 """The same data give the same model, to the last bit: whatever was fitted before, wherever."""
 
 import hashlib
-import json
-import subprocess
-import sys
 import warnings
 
 import numpy as np
@@ -55,23 +52,10 @@ def digest(name, n_rows=150, **more):
     return hashlib.sha256(b"".join(np.ascontiguousarray(part) for part in parts)).hexdigest()
 
 
-@pytest.fixture(scope="module", name="elsewhere")
-def digests_of_another_process():
-    """Every digest, each fitted first thing in a process of its own kind, in reverse order."""
-    script = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import test_reproducibility as t; "
-        "print(t.json.dumps({name: t.digest(name) for name in reversed(t.SETTINGS)}))"
-    )
-    folder = __file__.rpartition("/")[0]
-    done = subprocess.run(
-        [sys.executable, "-c", script, folder], capture_output=True, text=True, check=True
-    )
-    return json.loads(done.stdout)
-
-
 @pytest.mark.parametrize("name", SETTINGS)
-def test_nothing_fitted_before_matters(name, elsewhere):
-    assert digest(name) == elsewhere[name]
+def test_nothing_fitted_before_matters(name, fresh_process):
+    # There every digest comes of a process that has fitted none, in reverse order.
+    assert digest(name) == fresh_process["digests"][name]
 
 
 @pytest.mark.parametrize("name", ["default", "huber"])

@@ -1,10 +1,10 @@
 """The command: what it writes, says and refuses."""
 
+import io
 import json
 import os
 import pickle
 import shutil
-import subprocess
 import sys
 from functools import lru_cache
 
@@ -490,33 +490,22 @@ def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, 
     assert (out / "report.html").read_text() == "new"
 
 
-def test_a_backend_that_does_not_exist(tmp_path, log):
-    path = write_log(tmp_path / "log.csv", log)
-    done = subprocess.run(
-        [sys.executable, "-m", "skanfis.gyro", path, "--output", str(tmp_path / "out")],
-        env={**os.environ, "MPLBACKEND": "nonsense"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "matplotlib cannot be imported: Key backend: 'nonsense'" in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not (tmp_path / "out").exists()
+def test_a_backend_that_does_not_exist(fresh_process):
+    found = fresh_process["backend_that_does_not_exist"]
+    assert found["status"] == 1
+    assert "matplotlib cannot be imported: Key backend: 'nonsense'" in found["told"]
+    assert found["told"].count("\n") == 1
+    assert found["made"] == []
 
 
-def test_an_encoding_of_the_terminal_that_lacks_signs(tmp_path, log):
+def test_an_encoding_of_the_terminal_that_lacks_signs(tmp_path, log, monkeypatch):
+    # As Python opens them there; what the one cannot say is an error, of the other it is spelt.
+    told = io.TextIOWrapper(io.BytesIO(), "ascii", "backslashreplace", write_through=True)
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), "ascii", "strict"))
+    monkeypatch.setattr(sys, "stderr", told)
     path = write_log(tmp_path / "log-°.csv", log.drop(columns="rate"), MEASURED[:3])
-    done = subprocess.run(
-        [sys.executable, "-m", "skanfis.gyro", path],
-        env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 3
-    assert r"log-\xb0.csv" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert main([path]) == 3
+    assert rb"log-\xb0.csv" in told.buffer.getvalue()
 
 
 def test_every_row_a_run_is_refused(tmp_path, log, capsys):

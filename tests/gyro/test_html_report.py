@@ -3,8 +3,6 @@
 import base64
 import io
 import re
-import subprocess
-import sys
 from functools import cache
 from html.parser import HTMLParser
 
@@ -352,13 +350,9 @@ def test_paper_shows_what_a_click_opens(page):
     assert re.search(r"figure[^{}]*\{ break-inside: avoid", style)
 
 
-def test_no_screen_is_asked_for():
-    code = (
-        "import sys; import skanfis.gyro.command; assert 'matplotlib' not in sys.modules; "
-        "import skanfis.gyro._pictures as p; p._figure(1, 1); "
-        "assert 'matplotlib.pyplot' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
+def test_no_screen_is_asked_for(fresh_process):
+    assert fresh_process["matplotlib_of_the_command"] == []
+    assert fresh_process["pyplot_of_pictures"] == []
 
 
 def test_a_run_without_a_row_in_range_has_no_error(no_drawing):

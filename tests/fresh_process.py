@@ -1,0 +1,109 @@
+"""What can be seen only of a process that has imported nothing yet: one for all tests.
+
+Each such process takes seconds for its imports. Run with a folder, it does everything below in this
+order and prints it as JSON; the tests, by the fixture ``fresh_process``, say what it should be.
+"""
+
+import contextlib
+import io
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+
+def in_a_fresh_process(folder):
+    """Run this file in a process whose C library is told to give freed memory back at once."""
+    environment = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536", "MPLBACKEND": "nonsense"}
+    done = subprocess.run(
+        [sys.executable, __file__, str(folder)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def page_faults():
+    if not sys.platform.startswith("linux"):
+        return None
+    import resource
+
+    from skanfis._memory import keeps_freed_memory
+
+    def faults():
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        for _ in range(200):
+            np.ones(100_000) * 2.0  # the first one in its place: 195 pages
+        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+    with keeps_freed_memory():
+        with keeps_freed_memory():
+            pass
+        inside = faults()
+    return {"inside": inside, "after": faults()}
+
+
+def modules_for_measuring():
+    from skanfis import ANFISRegressor
+    from skanfis.readable import readability_of_rows
+
+    X = np.linspace(0, 1, 30)[:, None]
+    before = set(sys.modules)
+    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, X[:, 0]).model_
+    str(readability_of_rows(model, X, X))
+    return sorted(set(sys.modules) - before)
+
+
+def digests():
+    """First thing fitted but for the line above, in reverse order."""
+    sys.path.insert(0, str(Path(__file__).parent))
+    import test_reproducibility
+
+    return {
+        name: test_reproducibility.digest(name) for name in reversed(test_reproducibility.SETTINGS)
+    }
+
+
+def matplotlib_of_the_command():
+    from skanfis.gyro import command  # noqa: F401
+
+    return [name for name in sys.modules if name.startswith("matplotlib")]
+
+
+def backend_that_does_not_exist():
+    from skanfis.gyro.command import main
+
+    told = io.StringIO()
+    with contextlib.redirect_stderr(told):
+        status = main(["log.csv", "--output", "out"])
+    return {"status": status, "told": told.getvalue(), "made": os.listdir()}
+
+
+def pyplot_of_pictures():
+    del os.environ["MPLBACKEND"]
+    for half in [name for name in sys.modules if name.startswith("matplotlib")]:
+        del sys.modules[half]
+    from skanfis.gyro import _pictures
+
+    _pictures._figure(1, 1)
+    return [name for name in sys.modules if name == "matplotlib.pyplot"]
+
+
+STEPS = [
+    page_faults,
+    modules_for_measuring,
+    digests,
+    matplotlib_of_the_command,
+    backend_that_does_not_exist,
+    pyplot_of_pictures,
+]
+
+if __name__ == "__main__":
+    os.chdir(sys.argv[1])
+    print(json.dumps({step.__name__: step() for step in STEPS}))
