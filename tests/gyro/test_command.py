@@ -22,6 +22,8 @@ from skanfis.gyro.command import main
 
 from ..export.c_compiler import COMPILER, evaluate_all
 
+pytestmark = pytest.mark.usefixtures("given_weights")
+
 RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=table"]
 UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
 FACTOR = -27_000.0
@@ -48,8 +50,8 @@ def log():
 
 
 @pytest.fixture
-def no_report(monkeypatch):
-    """Leave out the report, which takes longer than all else together."""
+def no_report(monkeypatch, few_rivals):
+    """Leave out the report and what it compares with, which take longer than all else together."""
     monkeypatch.setattr(
         "skanfis.gyro.command.report_page", lambda calibration, title, dossier: title
     )
@@ -70,7 +72,7 @@ def no_pictures(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory, log):
+def calibrated(tmp_path_factory, log, given_weights):
     """A folder after one calibration from counts, milliseconds and kelvin."""
     folder = tmp_path_factory.mktemp("calibrated")
     raw = pd.DataFrame(
@@ -188,7 +190,7 @@ def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
     assert "held-out rows in range" in out
 
 
-@pytest.mark.usefixtures("no_report")
+@pytest.mark.usefixtures("no_report", "law_of_degree_one")
 def test_physics_and_policy(tmp_path, log, capsys):
     log = log[log["run"] < 3]
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
@@ -419,6 +421,7 @@ def test_a_damaged_joblib_is_refused(calibrated, tmp_path, content, capsys):
     assert "loading it runs whatever code it holds" in err
 
 
+@pytest.mark.usefixtures("few_rivals")
 def test_labels_of_all_kinds_are_drawn_and_told(tmp_path, log, capsys, monkeypatch):
     monkeypatch.setattr("skanfis.gyro.html_report.PICTURES", (_pictures.draw_groups,))
     labels = dict(enumerate([r"$\frac{0$", "$$", "\x1b[31mred", "a\nb", "\u202ecba"]))
@@ -527,6 +530,7 @@ def test_groups_that_never_overlap_cannot_be_checked(tmp_path, log, capsys):
     assert not out.exists()
 
 
+@pytest.mark.usefixtures("few_rivals")
 def test_short_runs_are_reported(tmp_path, log):
     path = write_log(tmp_path / "log.csv", log.groupby("run").head(6))
     arguments = [path, "--terms", "1,2", "--inputs", "temperature", "output", "--quiet"]
@@ -551,7 +555,7 @@ def test_a_compensation_that_makes_it_worse_says_so(tmp_path, log, capsys):
     assert err.endswith("done, but see the warnings\n")
 
 
-@pytest.mark.usefixtures("no_pictures")
+@pytest.mark.usefixtures("no_pictures", "few_rivals")
 def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
     spoilt = log.copy()
     spoilt.loc[100, "output"] += 140.0

@@ -51,13 +51,23 @@ class Outline(HTMLParser):
         self.text.append(data)
 
 
+pytestmark = pytest.mark.usefixtures("given_weights", "law_of_degree_one")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def coarse_pictures():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skanfis.gyro._html._DOTS_PER_INCH", 30)
+        yield
+
+
 def calibration_of(log, inputs=("time", "temperature", "temperature_rate", "output"), **options):
     split = choose_split(log, uses_output="output" in inputs)
     return calibrate(log, split, Recipe(inputs, **options), lambda text: None)
 
 
 @pytest.fixture(scope="module")
-def calibration():
+def calibration(given_weights):
     log = make_ofog(n_devices=1, n_runs=5, duration=900.0, profile="ramps", random_state=0)
     return calibration_of(log, terms=(1, 1, 1, 3))
 
@@ -183,7 +193,7 @@ def timeless(physics):
 
 
 @pytest.mark.parametrize("physics", [False, True])
-def test_says_whether_the_rules_can_be_read(physics, no_drawing):
+def test_says_whether_the_rules_can_be_read(physics, few_rivals, no_drawing):
     calibration = timeless(physics)
     estimator = calibration.compensator.estimator
     # What the rules were taught, by hand.
@@ -198,7 +208,7 @@ def test_says_whether_the_rules_can_be_read(physics, no_drawing):
     assert f"[sd]{figures(found.summary['strongest_alone'])}0.5" in section.replace("\n", "")
 
 
-def test_a_gyro_at_rest_has_no_scale_factor_pictures(no_drawing):
+def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
     log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
     calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
     text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
@@ -208,7 +218,7 @@ def test_a_gyro_at_rest_has_no_scale_factor_pictures(no_drawing):
 
 
 @pytest.mark.parametrize("has_time", [True, False])
-def test_physics_shows_its_law(has_time, no_drawing):
+def test_physics_shows_its_law(has_time, few_rivals, no_drawing):
     calibration = timeless(physics=True)
     if has_time:
         inputs = ("temperature", "temperature_rate", "output")
@@ -355,7 +365,7 @@ def test_no_screen_is_asked_for(fresh_process):
     assert fresh_process["pyplot_of_pictures"] == []
 
 
-def test_a_run_without_a_row_in_range_has_no_error(no_drawing):
+def test_a_run_without_a_row_in_range_has_no_error(few_rivals, no_drawing):
     # Every run at a temperature of its own: the outermost lie beyond what the others have seen.
     log = make_ofog(
         n_devices=1, n_runs=6, duration=600.0, max_residual_heat=0.0, rates=[0.0], random_state=3

@@ -1,0 +1,31 @@
+"""What a calibration does beside its fits, without the time that these take."""
+
+from functools import partial
+from itertools import islice
+
+import pytest
+
+from skanfis.gyro import _choice, _models, _simpler
+
+from ..quick import quick
+
+
+@pytest.fixture(scope="module")
+def given_weights():
+    """Rules whose weights are given: where it matters that they are fitted, and not how well."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_models, "ANFISRegressor", partial(quick, agreement=1e-8, alpha=1e-9))
+        yield
+
+
+@pytest.fixture
+def few_rivals(monkeypatch):
+    """Of what is simpler than rules the simplest alone; test_calibration.py asks for the others."""
+    every = _simpler._kinds
+    monkeypatch.setattr(_simpler, "_kinds", lambda inputs: islice(every(inputs), 2))
+
+
+@pytest.fixture
+def law_of_degree_one(monkeypatch):
+    """Nor is the degree of the law compared on every fold; that too is of test_calibration.py."""
+    monkeypatch.setattr(_choice, "_held_out_rms", lambda recipe, structure, *_: structure[0])
