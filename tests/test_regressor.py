@@ -138,7 +138,7 @@ def test_planted_model_is_found_under_noise():
     ],
 )
 def test_surface_is_learnt_between_the_points(settings, most):
-    train, check = surface(600), surface(500, seed=1)
+    train, check = surface(300), surface(500, seed=1)
     model = ANFISRegressor(**settings).fit(*train)
     # Of the target's deviation; a linear model leaves 0.4.
     assert np.sqrt(1 - model.score(*check)) < most
@@ -314,7 +314,10 @@ def test_loss_curve_of_weights_that_are_found_ends_at_the_error():
 
 
 def test_terms_of_an_input_stay_in_order():
-    model = ANFISRegressor(n_mfs=4, alpha=1e-6).fit(*surface(600, noise=0.01))
+    # Next to nothing else holds them apart.
+    solver = VariableProjection(stiffness=1e-6)
+    model = ANFISRegressor(n_mfs=4, agreement=1e-6, alpha=1e-6, solver=solver)
+    model.fit(*surface(600, noise=0.01))
     centers = np.reshape([term["center"] for term in model.memberships_], (3, 4))
     assert (np.diff(centers) > 0).all()
 
@@ -374,13 +377,13 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
     expected = design.reshape(len(X), -1) @ solution
     error = (model.predict(X) - expected) / np.ptp(targets, axis=0)
     assert np.abs(error).max() < 1e-6
-    for found in (model, ANFISRegressor(n_mfs=2).fit(X, targets)):
+    for found in (model, ANFISRegressor(**SHORT).fit(X, targets)):
         assert_allclose(found.predict(X)[:, 1], -5e6 * found.predict(X)[:, 0] + 1.0, rtol=1e-9)
 
 
 def test_order_of_the_outputs_does_not_matter():
     targets = np.column_stack([Y, np.cos(X[:, 1] / 40.0)])
-    one, other = (ANFISRegressor(n_mfs=2).fit(X, t) for t in (targets, targets[:, ::-1]))
+    one, other = (ANFISRegressor(**SHORT).fit(X, t) for t in (targets, targets[:, ::-1]))
     error = (one.predict(X) - other.predict(X)[:, ::-1]) / np.ptp(targets, axis=0)
     assert np.abs(error).max() < 1e-7
 
@@ -538,7 +541,7 @@ def test_another_fit_in_between_changes_nothing():
 @pytest.mark.parametrize("settings", [{}, {"partition": KMEANS}])
 def test_nothing_depends_on_chance_or_changes_the_global_seed(settings):
     # Few rows: "auto" clusters them.
-    few, targets = X[:100], Y[:100]
+    few, targets = surface(80, noise=0.01)
     np.random.seed(1)  # noqa: NPY002
     one = ANFISRegressor(random_state=None, solver=VariableProjection(tol=0.01), **settings).fit(
         few, targets
@@ -587,7 +590,7 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
 
 @pytest.mark.parametrize("settings", [{"n_mfs": 3}, {"partition": KMEANS, "mf": "bell"}])
 def test_loaded_model_is_the_same_to_the_last_bit(settings, tmp_path):
-    model = ANFISRegressor(solver=VariableProjection(tol=0.5), **settings).fit(X, Y)
+    model = ANFISRegressor(**SHORT | {"n_mfs": "auto"} | settings).fit(X, Y)
     path = tmp_path / "model"
     for through in ("pickle", "joblib", "compressed"):
         if through == "pickle":
@@ -754,7 +757,7 @@ def test_policy_may_be_changed_after_training(trained):
 def test_representations_show_what_was_changed():
     model = ANFISRegressor(n_mfs=[2, 3, 2], mf="bell")
     assert repr(model) == "ANFISRegressor(mf='bell', n_mfs=[2, 3, 2])"
-    for estimator in (model, model.fit(X, Y)):
+    for estimator in (model, clone(model).set_params(solver="lse").fit(X, Y)):
         html = estimator._repr_html_()
         assert "ANFISRegressor" in html
         assert "bell" in html
@@ -775,7 +778,7 @@ def test_pipeline_and_transformed_target():
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_cross_val_score_scores_every_fold():
-    model = ANFISRegressor(n_mfs=2)
+    model = ANFISRegressor(**SHORT | {"agreement": 1e-3})
     scores = cross_val_score(model, X, Y, cv=3)
     assert scores.shape == (3,)
     assert scores.min() > 0.99
@@ -788,7 +791,7 @@ def test_grid_search_over_runs_left_out():
     data = rng.uniform(size=(200, 2))
     target = np.sin(14.0 * data[:, 0]) + data[:, 1] + 0.1 * rng.normal(size=200)
     run = np.arange(200) % 4
-    estimator = ANFISRegressor(alpha=1e-6, solver=VariableProjection(tol=0.01))
+    estimator = ANFISRegressor(**SHORT)
     search = GridSearchCV(
         make_pipeline(StandardScaler(), estimator),
         {"anfisregressor__n_mfs": [2, 3, [4, 1]]},

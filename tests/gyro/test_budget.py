@@ -14,6 +14,8 @@ from skanfis.gyro._results import rules_of
 from skanfis.gyro._split import Split, choose_split
 from skanfis.gyro.command import main
 
+pytestmark = pytest.mark.usefixtures("few_rivals")
+
 N_RUNS, N_ROWS = 24, 40
 NOISE, SCATTER = 2e-4, 5e-4
 

@@ -1,6 +1,7 @@
 """Law and rules as C, compiled and run, answer what ResidualRegressor answers."""
 
 from copy import deepcopy
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -25,6 +26,7 @@ from ..export.c_compiler import (
     needs_compiler,
     run,
 )
+from ..quick import quick
 
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 
@@ -32,21 +34,34 @@ COUNTS = -27_000.0  # per deg/s
 MIN_COVERAGE = 0.2
 
 
-@pytest.fixture(scope="module")
-def log():
+@cache
+def simulated():
     log = make_ofog(n_devices=1, n_runs=4, duration=1800, sampling_interval=20, random_state=0)
     rate = np.gradient(log["temperature"]) / 20.0
-    return log.assign(output=COUNTS * log["output"] + 3e4, thermal_rate=rate)
+    return log.assign(
+        output=COUNTS * log["output"] + 3e4, thermal_rate=rate, unused=np.ones(len(log))
+    )
 
 
-def whole(log):
-    """Both parts on all columns, by name."""
+@pytest.fixture(name="log")
+def simulated_log():
+    return simulated()
+
+
+@cache
+def fitted_whole():
     law = OpenLoopArcsineRegressor("output", "temperature")
-    X = log[["time", "output", "temperature"]]
-    return ResidualRegressor(law, ANFISRegressor(n_mfs=2)).fit(X, log["rate"]), X
+    X = simulated()[["time", "output", "temperature"]]
+    return ResidualRegressor(law, quick(n_mfs=2)).fit(X, simulated()["rate"]), X
 
 
-def everything(log):
+def whole():
+    """Both parts on all columns, by name."""
+    return deepcopy(fitted_whole())
+
+
+@cache
+def everything():
     """A lag, an offset, high degrees, rules on chosen and scaled columns, three rounds, linear."""
     law = OpenLoopArcsineRegressor(
         "output",
@@ -60,29 +75,31 @@ def everything(log):
         max_phase=0.9,
         out_of_bounds="linear",
     )
+    log = simulated()
     chosen = make_column_transformer((StandardScaler(), ["time", "thermal_rate"]))
-    rules = make_pipeline(chosen, ANFISRegressor([2, 1], out_of_bounds="linear"))
+    rules = make_pipeline(chosen, quick([2, 1], out_of_bounds="linear"))
     X = log[["unused", "thermal_rate", "temperature", "output", "time"]]
     return ResidualRegressor(law, rules, n_rounds=3).fit(X, log["rate"]), X
 
 
-def silent(log):
-    model, X = whole(log)
+def silent():
+    model, X = whole()
     model.base_.set_params(out_of_bounds="nan")
     model.residual_.set_params(out_of_bounds="nan")
     return model, X
 
 
-def law_raises(log):
-    model, X = whole(log)
+def law_raises():
+    model, X = whole()
     model.base_.set_params(out_of_bounds="raise", max_phase=0.3)
     return model, X
 
 
-def rules_raise(log):
+def rules_raise():
     """Columns by position, no temperature in the law."""
+    log = simulated()
     law = OpenLoopArcsineRegressor(-1, None)
-    rules = make_pipeline(StandardScaler(), ANFISRegressor([1, 2, 1], out_of_bounds="raise"))
+    rules = make_pipeline(StandardScaler(), quick([1, 2, 1], out_of_bounds="raise"))
     X = log[["temperature", "time", "output"]]
     model = ResidualRegressor(law, rules).fit(X.to_numpy(), log["rate"])
     return model, X
@@ -136,9 +153,9 @@ def as_given(model, rows, columns):
 
 
 @pytest.fixture(scope="module", params=CASES)
-def case(request, log):
+def case(request):
     """What it is called, a fitted model and its table."""
-    return request.param.__name__, *request.param(log.assign(unused=1.0))
+    return request.param.__name__, *request.param()
 
 
 # One type under the sanitizers, the other not: the text is the same but for the names of types.
@@ -180,8 +197,8 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, flags, tmp_path):
 
 
 @needs_compiler
-def test_what_rules_add_is_held(log, tmp_path):
-    model, X = whole(log)
+def test_what_rules_add_is_held(tmp_path):
+    model, X = whole()
     limits = np.quantile(model.residual_.predict(X), [0.3, 0.7])
     code = export_c_physics(model, name="gyro", saturate=limits[None])
     rows = np.ascontiguousarray(X.to_numpy()[::50])
@@ -191,8 +208,8 @@ def test_what_rules_add_is_held(log, tmp_path):
 
 
 @needs_compiler
-def test_no_answer_to_what_is_not_finite_or_has_no_rate(log, tmp_path):
-    model, X = whole(log)
+def test_no_answer_to_what_is_not_finite_or_has_no_rate(tmp_path):
+    model, X = whole()
     rows = np.repeat(X.to_numpy()[:1], 5, axis=0)
     for row, (column, value) in zip(rows, [(0, np.nan), (1, np.inf), (2, -np.inf)], strict=False):
         row[column] = value
@@ -210,7 +227,7 @@ def test_no_answer_to_what_is_not_finite_or_has_no_rate(log, tmp_path):
 
 @needs_compiler
 def test_files_make_a_program_that_tests_itself(log, tmp_path):
-    model, X = whole(log)
+    model, X = whole()
     search = GridSearchCV(
         model, {"residual__n_mfs": [1, 2]}, cv=KFold(2, shuffle=True, random_state=0)
     )
@@ -228,8 +245,8 @@ def test_files_make_a_program_that_tests_itself(log, tmp_path):
     assert run(["./test"], tmp_path).returncode == 1
 
 
-def test_header_says_what_goes_in(log):
-    model, _ = everything(log.assign(unused=1.0))
+def test_header_says_what_goes_in():
+    model, _ = everything()
     header = export_c_physics(model, name="gyro").header
     for text in ("[0] thermal_rate: ", "[1] temperature: ", "[2] output: ", "[3] time: "):
         assert text in header
@@ -240,7 +257,7 @@ def test_header_says_what_goes_in(log):
 
 def refused(log, base=None, residual=None):
     base = OpenLoopArcsineRegressor("output", "temperature") if base is None else base
-    residual = ANFISRegressor(n_mfs=1) if residual is None else residual
+    residual = quick(n_mfs=1) if residual is None else residual
     return ResidualRegressor(base, residual).fit(log[["output", "temperature"]], log["rate"])
 
 
@@ -250,14 +267,14 @@ def refused(log, base=None, residual=None):
         ({"base": LinearRegression()}, TypeError, "base must be an OpenLoopArcsineRegressor"),
         ({"residual": LinearRegression()}, TypeError, "LinearRegression has no rules"),
         (
-            {"residual": make_pipeline(PolynomialFeatures(), ANFISRegressor(n_mfs=1))},
+            {"residual": make_pipeline(PolynomialFeatures(), quick(n_mfs=1))},
             ValueError,
             "PolynomialFeatures",
         ),
         (
             {
                 "base": OpenLoopArcsineRegressor("output", "temperature", out_of_bounds="nan"),
-                "residual": ANFISRegressor(n_mfs=1, out_of_bounds="raise"),
+                "residual": quick(n_mfs=1, out_of_bounds="raise"),
             },
             ValueError,
             "Set both to one of the two",

@@ -100,6 +100,7 @@ def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended():
     np.testing.assert_allclose(names["line"], added, atol=1e-8)
 
 
+@pytest.mark.usefixtures("few_rivals")
 def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     log = log_of(PLANTED["constant"][0])
     # A run at a temperature of its own is out of range, and 30 times worse.

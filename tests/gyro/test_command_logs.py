@@ -15,6 +15,8 @@ from skanfis.gyro.command import main
 
 from .test_command import no_report  # noqa: F401
 
+pytestmark = pytest.mark.usefixtures("given_weights")
+
 
 def thermal_cycle(*turns, n_rows=300, lag=0.05):
     """A MEMS log: a bias that is a parabola of the temperature, and lags behind by its rate."""

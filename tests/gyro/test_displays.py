@@ -9,7 +9,6 @@ from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor
 from skanfis.gyro import (
     AllanDisplay,
     CoverageDisplay,
@@ -19,6 +18,8 @@ from skanfis.gyro import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
+
+from ..quick import quick
 
 mpl = pytest.importorskip("matplotlib")
 mpl.use("Agg")
@@ -330,7 +331,7 @@ def test_a_group_without_an_answer_stands_at_the_top():
 def compensator(rng):
     X = pd.DataFrame({"temperature": rng.uniform(0, 50, 500), "output": rng.uniform(-9, 9, 500)})
     y = X["output"] ** 2
-    return make_pipeline(StandardScaler(), ANFISRegressor(2)).fit(X, y), X
+    return make_pipeline(StandardScaler(), quick(2)).fit(X, y), X
 
 
 def test_coverage_mask_is_that_of_the_estimator(compensator):
@@ -355,7 +356,7 @@ def test_cells_without_rows_are_empty_on_the_map(rng):
     x, y = rng.uniform(0.0, 10.0, (2, 4000))
     x[:3], y[:3] = [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]
     X = pd.DataFrame({"temperature": x, "output": y})[(x < 5.0) | (y < 5.0)]
-    model = ANFISRegressor(1).fit(X, X["output"])
+    model = quick(1).fit(X, X["output"])
     display = CoverageDisplay.from_estimator(model, X, n_cells=10, n_points=41, margin=0.2)
     corner = (display.x[None, :] > 5.0) & (display.y[:, None] > 5.0)
     beyond = (display.x[None, :] > 10.0) | (display.y[:, None] > 10.0)
@@ -374,7 +375,7 @@ def test_cells_without_rows_are_empty_on_the_map(rng):
 
 def test_coverage_holds_other_inputs(rng):
     X = pd.DataFrame(rng.uniform(size=(200, 3)), columns=["time", "temperature", "output"])
-    model = ANFISRegressor(1).fit(X, X["time"])
+    model = quick(1).fit(X, X["time"])
     within = CoverageDisplay.from_estimator(model, X)
     beyond = CoverageDisplay.from_estimator(model, X, others={"time": 9.0})
     assert within.inside.any()

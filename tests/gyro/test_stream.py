@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, _table
 from skanfis.gyro.command import main
 from skanfis.gyro.log import read_log
+
+from ..quick import quick
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 COLUMNS = ["time", "temperature", "output", "rate"]
@@ -27,7 +28,7 @@ def model(log, tmp_path_factory):
     compensator = GyroCompensator(None, INPUTS)
     X = compensator.features(log.assign(run=log["device"].astype(str) + log["run"].astype(str)))
     error = log["output"] - log["rate"]
-    estimator = ANFISRegressor([2, 2, 2, 1]).fit(X, error)
+    estimator = quick([2, 2, 2, 1]).fit(X, error)
     path = tmp_path_factory.mktemp("model") / "compensator.json"
     GyroCompensator(estimator, INPUTS).write_json(path)
     return path

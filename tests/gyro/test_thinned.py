@@ -103,6 +103,7 @@ def _assert_even(whole, kept):
         assert (values[kept].min(), values[kept].max()) == (values.min(), values.max())
 
 
+@pytest.mark.usefixtures("given_weights", "few_rivals")
 def test_the_command_on_some_rows_finds_what_it_finds_on_all(tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
     found = []

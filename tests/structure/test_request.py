@@ -19,6 +19,8 @@ from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.membership import Gaussian
 from skanfis.solvers import VariableProjection
 
+from ..quick import quick
+
 # Its default changes: to be quiet, newer versions have to be told.
 HDBSCAN_TAKES_COPY = "copy" in signature(HDBSCAN).parameters
 
@@ -43,7 +45,7 @@ def measured():
 
 @pytest.fixture(scope="module", params=[{"n_mfs": [2, 3, 1]}, {"partition": "fcm"}])
 def known(request, data):
-    return ANFISRegressor(solver=VariableProjection(tol=1e-2), **request.param).fit(*data)
+    return quick(**request.param).fit(*data)
 
 
 class TestImported:
@@ -188,7 +190,7 @@ def test_families_may_differ_from_input_to_input(data):
     X, y = (part[:150] for part in data)
     mixed = ["bell", "gaussian", "triangular"]
     for settings in ({"n_mfs": 2}, {"partition": KMeans(3, random_state=0)}, {}):
-        model = ANFISRegressor(mf=mixed, solver=VariableProjection(tol=1e-2), **settings).fit(X, y)
+        model = quick(**{"n_mfs": "auto", "mf": mixed} | settings).fit(X, y)
         found = {term["input"]: term["function"] for term in model.memberships_}
         expected = dict(zip(X.columns, mixed, strict=True))
         assert found.items() <= expected.items()
@@ -196,7 +198,7 @@ def test_families_may_differ_from_input_to_input(data):
 
 
 def test_a_family_of_ones_own_by_its_class(data):
-    one, other = (ANFISRegressor(n_mfs=2, mf=mf).fit(*data) for mf in (Gaussian, "gaussian"))
+    one, other = (quick(n_mfs=2, mf=mf).fit(*data) for mf in (Gaussian, "gaussian"))
     assert_array_equal(one.predict(data[0]), other.predict(data[0]))
 
 
@@ -216,14 +218,16 @@ def test_families_that_are_none_are_refused(data, mf, message):
 class TestFeatures:
     @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
     def test_rules_are_on_the_premise_features_alone(self, data, settings):
-        model = ANFISRegressor(premise_features=["time", "temperature"], **settings).fit(*data)
+        settings = {"n_mfs": "auto", "premise_features": ["time", "temperature"]} | settings
+        model = quick(**settings).fit(*data)
         assert {term["input"] for term in model.memberships_} <= {"time", "temperature"}
         assert model.n_rules_ > 1
 
     @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
     def test_consequents_are_in_the_consequent_features_alone(self, data, settings):
         X, y = data
-        model = ANFISRegressor(consequent_features=["rate"], **settings).fit(X, y)
+        settings = {"n_mfs": "auto", "consequent_features": ["rate"]} | settings
+        model = quick(**settings).fit(X, y)
         assert_array_equal(model.consequents_[:, 1:3], 0.0)
         assert (model.consequents_[:, 3] != 0.0).all()
         assert_allclose(
@@ -243,7 +247,7 @@ class TestFeatures:
     def test_they_may_be_masks_positions_or_names(self, data):
         given = (["rate", "time"], [0, 2], [-1, 0], [True, False, True], np.array([0, 2]))
         found = [
-            ANFISRegressor(n_mfs=2, max_iter=0, consequent_features=f).fit(*data).predict(data[0])
+            quick(n_mfs=2, max_iter=0, consequent_features=f).fit(*data).predict(data[0])
             for f in given
         ]
         for one, other in pairwise(found):
@@ -349,6 +353,6 @@ def test_groups_may_have_names(data):
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_parameters_of_a_clusterer_can_be_searched(data):
-    model = ANFISRegressor(partition=KMeans(random_state=0), solver=VariableProjection(tol=1e-2))
+    model = quick(partition=KMeans(random_state=0))
     search = GridSearchCV(model, {"partition__n_clusters": [1, 4]}, cv=3).fit(*data)
     assert search.best_estimator_.n_rules_ == search.best_params_["partition__n_clusters"] == 4

@@ -18,7 +18,7 @@ N_RUNS, N_LEVELS = 5, 10
 def campaign(by_level, seed=0):
     """Runs at rates on a few levels; ``by_level`` is an error that each level has by chance."""
     rng = np.random.default_rng(seed)
-    run = np.repeat(np.arange(N_RUNS), 120)
+    run = np.repeat(np.arange(N_RUNS), 60)
     level = rng.integers(N_LEVELS, size=run.size)
     temperature = rng.uniform(-40.0, 60.0, run.size)
     rate = 20.0 * level + rng.normal(size=run.size)
