@@ -4,6 +4,7 @@ import sys
 import warnings
 from collections import Counter
 from contextlib import contextmanager
+from contextvars import ContextVar
 from numbers import Integral
 
 import numpy as np
@@ -18,6 +19,7 @@ __all__ = [
     "check_count",
     "check_finite",
     "check_not_negative",
+    "collected_warnings",
     "feature_indices",
     "group_numbers",
     "named_refusals",
@@ -280,11 +282,30 @@ def bearable_weights(sample_weight):
     return np.ldexp(sample_weight, -exponent) if abs(exponent) > _FAR else sample_weight
 
 
+# Of the thread that collects alone: the filters of ``warnings`` are the whole process's.
+_collected: ContextVar[list | None] = ContextVar("collected", default=None)
+
+
+@contextmanager
+def collected_warnings():
+    """What ``warn_user`` is told in here, as a list of (message, category), and nobody else."""
+    told: list = []
+    before = _collected.set(told)
+    try:
+        yield told
+    finally:
+        _collected.reset(before)
+
+
 def warn_user(message, category):
     """Warn at the line that called this package, or scikit-learn, whatever lies between.
 
     Not from within scikit-learn's cross-validation, where the category is this package's own.
     """
+    told = _collected.get()
+    if told is not None:
+        told.append((message, category))
+        return
     if is_silent(category):
         return
     frame, level = sys._getframe(1), 2

@@ -1,9 +1,10 @@
-"""Warnings of skanfis. Errors are ValueError, TypeError and scikit-learn's NotFittedError."""
+"""Warnings of skanfis, and one error; others are ValueError, TypeError and NotFittedError."""
 
 __all__ = [
     "ConstantInputWarning",
     "ConstraintWarning",
     "ForgottenRowsWarning",
+    "InfeasibleConstraintsError",
     "OutOfBoundsWarning",
     "ReadabilityWarning",
     "SplitLeakWarning",
@@ -21,6 +22,10 @@ class ConstraintWarning(UserWarning):
 
 class ForgottenRowsWarning(UserWarning):
     """``partial_fit`` follows ``fit``, whose rows do not count any more."""
+
+
+class InfeasibleConstraintsError(ValueError):
+    """No consequents of a rule base keep what a fit was constrained to, all at once."""
 
 
 class OutOfBoundsWarning(UserWarning):

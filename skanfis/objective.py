@@ -380,27 +380,39 @@ class SeparableProblem:
             total_weight += residual.shape[1] if weight is None else weight.sum()
         return total / total_weight
 
-    def leave_one_out_error(self, evaluation, n_rows):
+    def leave_one_out_error(self, evaluation, n_rows, held=None):
         """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
 
         The mean of (r_i / (1 - h_i))^2. The weights are those of so many rows: of a row that stands
         for several, one is left out.
+
+        Coefficients that keep linear constraints are taken as they are, with ``held`` of every
+        output, orthonormal columns (n_columns, n_held) that span L^-1 A', where A has a row for
+        each constraint met with equality. Exact as long as these stay so: what moves without a row
+        is orthogonal to them, and h_i that of this smaller problem.
         """
-        solved = self.solved_again(evaluation)
+        solved = self.solved_again(evaluation) if held is None else evaluation
         total, unit = 0.0, self._weight / n_rows
         for part, residual, weight in self.residuals(solved):
-            kept = np.maximum(1.0 - unit * self.leverage(solved, part), _SMALLEST_FREEDOM)
+            leverage = self.leverage(solved, part, held)
+            kept = np.maximum(1.0 - unit * leverage, _SMALLEST_FREEDOM)
             squares = np.sum((residual / kept) ** 2, axis=0)
             total += squares.sum() if weight is None else weight @ squares
         return float(total / self._weight)
 
-    def leverage(self, evaluation, part):
-        """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,)."""
+    def leverage(self, evaluation, part, held=None):
+        """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,).
+
+        Where something is ``held``, of every output, (n_outputs, n_rows).
+        """
         Z, _, _ = self.rows.read(part)
         strengths = evaluation.antecedent.strengths(Z)
         design = (strengths[:, None, :] * self._design.basis(Z)).reshape(self.n_columns, -1)
         half = evaluation.normal.factor.half_solve(self.local.transform_rows(design))
-        return np.sum(half**2, axis=0) / self._weight
+        found = np.sum(half**2, axis=0)
+        if held is not None:
+            found = np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])
+        return found / self._weight
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""

@@ -44,7 +44,7 @@ from .faces import Face, faces_of, products_off_faces, products_on_face
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-__all__ = ["MOST_PARAMETERS", "Posterior"]
+__all__ = ["MOST_PARAMETERS", "Posterior", "effective_premises"]
 
 # A model of more parameters keeps no posterior: its factor would take more than 32 MB.
 MOST_PARAMETERS = 2000
@@ -349,6 +349,11 @@ def _orthonormal(columns):
     columns = columns[:, lengths > 0.0] / lengths[lengths > 0.0]
     left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     return left[:, sizes > _DEPENDENT * sizes.max(initial=0.0)].T
+
+
+def effective_premises(problem: SeparableProblem, premise: Premise, evaluation: Evaluation):
+    """How many displacements of the premises the data determine, tr H (H + kappa)^-1."""
+    return _premises(problem, premise, evaluation)[2] if premise.size else 0.0
 
 
 def _mean_squares(problem, evaluation, robust):

@@ -28,7 +28,7 @@ from .._validation import warn_user
 from ..bounds.enclosure import Enclosure
 from ..bounds.search import largest
 from ..bounds.terms import is_known
-from ..exceptions import ConstraintWarning
+from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..model import TSKModel
 from .held import Held
 from .program import InfeasibleError
@@ -73,12 +73,12 @@ def constrained(model: TSKModel, evaluation, problem, wishes, in_user_units, is_
     evaluation : Evaluation
         Its coefficients keep the wishes.
     report : dict
-    known : tuple
-        Of every output what is met with equality, as :class:`Posterior.given` takes it.
+    solved : Solved
+        What is met with equality.
 
     Raises
     ------
-    ValueError
+    InfeasibleConstraintsError
         If no consequents keep the wishes; it says which.
     """
     exchange = _Exchange(model, problem, wishes, in_user_units)
@@ -121,7 +121,7 @@ class _Exchange:
             "loss_before": float(evaluation.mean_squared_error),
             "loss_after": float(ended.mean_squared_error),
         }
-        return ended, report, solved.known
+        return ended, report, solved
 
     @property
     def wishes(self):
@@ -170,7 +170,7 @@ class _Exchange:
         """Say which wishes cannot be kept."""
         name, n_points = self.model.output_names[failure.output], len(self.wishes.points)
         if failure.by_equalities:
-            raise ValueError(
+            raise InfeasibleConstraintsError(
                 f"constraints fixes {name!r} at {n_points} points, which {self.model.n_rules} "
                 "rules cannot all meet: two are the same, or there are more than consequents. "
                 "Give fewer points, or use more rules."
@@ -185,14 +185,14 @@ class _Exchange:
         self._give_up([p in (guilty or own) for p in range(len(self.held.demands))])
 
     def _give_up(self, is_guilty):
-        """Raise ValueError; ``is_guilty`` has, of every demand, whether it is not kept."""
+        """Raise an error; ``is_guilty`` has, of every demand, whether it is not kept."""
         pairs = zip(self.held.demands, is_guilty, strict=True)
         names = " and ".join(
             demand.name for demand, guilty in pairs if np.size(guilty) and np.any(guilty)
         )
         n_points = len(self.wishes.points)
         with_points = f", with the {n_points} fixed points of constraints," if n_points else ""
-        raise ValueError(
+        raise InfeasibleConstraintsError(
             f"No consequents of these {self.model.n_rules} rules keep {names}{with_points} all at "
             "once. Drop one of them, or use order=1 or more rules."
         ) from None

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..consequent import NormalFactor
 from ..model import TSKModel
 from .program import InfeasibleError, nearest
 from .wishes import Wishes
@@ -12,6 +13,8 @@ __all__ = ["Demand", "Held", "Solved", "demands"]
 
 # The step of a slope, in standard deviations of the input.
 _STEP = 1e-5
+# Of what is met with equality, what follows from the rest.
+_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,8 @@ class Solved:
     ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
     how much of it each output pays for what is held. ``known`` has for every output what is met
     with equality: points in the user's units, and those that a slope begins at, or None. ``active``
-    is how many points of each demand are.
+    is how many points of each demand are, ``rows`` what is met of every output as rows (n_met,
+    n_columns) of constraints on its local coefficients.
     """
 
     local: np.ndarray
@@ -57,6 +61,14 @@ class Solved:
     paid: np.ndarray
     known: tuple
     active: np.ndarray
+    rows: tuple
+
+    def held(self, factor: NormalFactor):
+        """Of every output an orthonormal basis (n_columns, n_held) of what is met, in L'u.
+
+        ``factor`` is L. At these constraints, met with equality, u moves across it alone.
+        """
+        return tuple(_orthonormal(factor.half_solve(rows.T)) for rows in self.rows)
 
 
 class Held:
@@ -122,7 +134,7 @@ class Held:
         equal = self._in_local(self._at(columns, self.standardised(self.wishes.points)))
         values = (self.wishes.values - targets.offset) / targets.scale
         places = range(len(self.demands)) if chosen is None else chosen
-        known, active = [], np.zeros(len(self.demands), dtype=int)
+        known, met, active = [], [], np.zeros(len(self.demands), dtype=int)
         for k in range(problem.n_outputs):
             own = [p for p in places if self.demands[p].output == k]
             rows, least = self._rows(columns, own)
@@ -134,9 +146,11 @@ class Held:
                 failure.output = k
                 raise
             known.append(self._known(own, is_active, active))
+            met.append(np.vstack([equal, rows[is_active]]))
         change = local - normal.coefficients
         paid = 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
-        return Solved(local, evaluation.cost + float(paid.sum()), paid, tuple(known), active)
+        cost = evaluation.cost + float(paid.sum())
+        return Solved(local, cost, paid, tuple(known), active, tuple(met))
 
     def _known(self, places, is_active, active):
         """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
@@ -208,3 +222,11 @@ class Held:
             return rows
         # In place, on a copy.
         return self.problem.local.transform_rows(np.array(rows.T, order="C")).T
+
+
+def _orthonormal(columns):
+    """Orthonormal columns that span some others."""
+    lengths = np.sqrt(np.sum(columns**2, axis=0))
+    columns = columns[:, lengths > 0.0] / lengths[lengths > 0.0]
+    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return left[:, sizes > _DEPENDENT * sizes.max(initial=0.0)]

@@ -9,7 +9,7 @@ from .sample import SampleSize, effective_weight, representative_rows
 from .size import GridSize, term_counts
 from .start import Start
 from .terms import TermsFound, search_terms
-from .tuning import is_affordable, more_agreement
+from .tuning import is_affordable, more_agreement, with_premises
 
 __all__ = [
     "GridSize",
@@ -30,4 +30,5 @@ __all__ = [
     "representative_rows",
     "search_terms",
     "term_counts",
+    "with_premises",
 ]

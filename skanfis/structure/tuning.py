@@ -41,6 +41,7 @@ __all__ = [
     "settled",
     "tune",
     "tuned_start",
+    "with_premises",
 ]
 
 # The weights are found on at most so many representative rows.
@@ -124,15 +125,20 @@ class Tuned:
         """
         n_rows = self.posterior.n_rows
         share = self.posterior.n_effective_premises / n_rows
-        if share > _MOST_EFFECTIVE:
+        if share > _MOST_EFFECTIVE:  # and nothing need be left out
             return np.inf
         left_out = self.problem.leave_one_out_error(self.evaluation, n_rows)
-        return left_out * (1.0 + share) / (1.0 - share)
+        return with_premises(left_out, share)
 
     def is_beaten_loosely(self, loose, part=_LESS_NOISE):
         """Whether a loose training has found what this one took for noise, down to a part of it."""
         noise, other = self.posterior.noise_variance, loose.posterior.noise_variance
         return other < part * noise and loose.score < self.score - WORTHWHILE
+
+
+def with_premises(left_out, share):
+    """The error of rows left out at fixed premises, with what these take: a share of the rows."""
+    return np.inf if share > _MOST_EFFECTIVE else left_out * (1.0 + share) / (1.0 - share)
 
 
 class _Weights:

@@ -11,6 +11,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from ..data import StandardisedData
 from ..model import TSKModel
 from ..objective import SeparableProblem
 from ..options import EarlyStopping, Huber
-from ..posterior import Posterior
+from ..posterior import Posterior, effective_premises
 from ..premise import Premise
 from ..sampling import is_many, with_sample
 from ..solvers import SOLVERS, LeastSquares, Solver, VariableProjection
@@ -37,6 +38,7 @@ from ..structure import (
     is_affordable,
     more_agreement,
     report_constant,
+    with_premises,
 )
 from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
@@ -93,15 +95,16 @@ def fit_rules(
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
 
-    def fit(counts=None, is_trial=False):
-        if counts is None:
-            return _fitted(estimator, data, request, callbacks)
-        grid = replace(request, n_mfs=counts, partition="grid")
-        return _fitted(estimator, data, grid, None, is_trial)
-
     may_grow = request.is_searched and request.partition in ("auto", "grid")
     if data.wishes is None or not may_grow:
-        return fit()
+        return _fitted(estimator, data, request, callbacks)
+
+    def fit(counts=None):
+        if counts is None:
+            return _fitted(estimator, data, request, callbacks, is_trial=True)
+        grid = replace(request, n_mfs=counts, partition="grid")
+        return _fitted(estimator, data, grid, None, is_trial=True)
+
     return grown(data.wishes, request.premise_inputs, fit)
 
 
@@ -115,25 +118,12 @@ def _fitted(estimator, data, request, callbacks, is_trial=False) -> Fitted:
         run, row_weights = fit.robust_run(fit.huber.epsilon)
         weights = data.spread_over_rows(row_weights, fit.trained_on)
     fit.warn_unless_converged(run)
-    firing = fit.builder.firing(run.evaluation)
-    model, result, kept = fit.builder.model(run.start, run.evaluation, firing), run.result, None
-    share = np.nan
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
-    model = replace(model, posterior=fit.posterior(run, robust))
-    if data.wishes is not None:
-        model, result, kept = fit.constrained(model, run, is_trial)
-        share = fit.effective_share(run)
-    return Fitted(
-        model,
-        result,
-        run.start,
-        redundant_rules(rule_statistics(fit.rows, firing)),
-        weights,
-        run.validation_losses,
-        kept,
-        share,
-        fit.n_units,
-    )
+    fitted = fit.frozen(run, weights)
+    if is_trial:
+        trial = fit.constrained(fitted, run, is_trial)
+        return replace(trial, proven=partial(fit.sure, fitted, run, robust))
+    return fit.sure(fitted, run, robust)
 
 
 class _Fit:
@@ -390,31 +380,62 @@ class _Fit:
         groups = (self.rows.sample or self.rows).groups
         return self.rows.n_rows if groups is None else np.unique(groups).size
 
-    def effective_share(self, run):
-        """Effective number of parameters over rows; NaN of too many for a posterior."""
-        posterior = self.posterior(run, None)
-        if posterior is None:
-            return np.nan
-        # noise^2 = MSE / (1 - k / n) of every output.
-        noise = np.sum((posterior.noise / run.problem.rows.targets.scale) ** 2)
-        return 1.0 - run.evaluation.mean_squared_error / noise if noise > 0.0 else 0.0
+    def frozen(self, run, weights) -> Fitted:
+        """What the run leaves, of which no deviations are known yet."""
+        firing = self.builder.firing(run.evaluation)
+        return Fitted(
+            self.builder.model(run.start, run.evaluation, firing),
+            run.result,
+            run.start,
+            redundant_rules(rule_statistics(self.rows, firing)),
+            weights,
+            run.validation_losses,
+            n_units=self.n_units,
+        )
 
-    def constrained(self, model, run, is_trial):
+    def sure(self, fitted, run, robust) -> Fitted:
+        """The same with a posterior, and with what is known kept, and proven to be."""
+        model = replace(fitted.model, posterior=self.posterior(run, robust))
+        fitted = replace(fitted, model=model)
+        return fitted if self.data.wishes is None else self.constrained(fitted, run)
+
+    def constrained(self, fitted, run, is_trial=False) -> Fitted:
         """The nearest model that keeps what is known, its result, and a report."""
-        evaluation = run.evaluation
+        evaluation, model, wishes = run.evaluation, fitted.model, self.data.wishes
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
-        evaluation, report, known = constrained(
-            model, evaluation, run.problem, self.data.wishes, self.builder.in_user_units, is_trial
+        in_user_units = self.builder.in_user_units
+        evaluation, report, solved = constrained(
+            model, evaluation, run.problem, wishes, in_user_units, is_trial
         )
-        model = replace(model, coefficients=self.builder.in_user_units(evaluation.coefficients))
-        if not self.data.wishes.are_kept_within(model.output_limits):
+        model = replace(model, coefficients=in_user_units(evaluation.coefficients))
+        if not wishes.are_kept_within(model.output_limits):
             # What is asked for lies beyond what was seen: it goes before.
             model = replace(model, target=None)
         if model.posterior is not None:
-            model = replace(model, posterior=model.posterior.given(model, known))
-        return model, replace(run.result, evaluation=evaluation), report
+            model = replace(model, posterior=model.posterior.given(model, solved.known))
+        return replace(
+            fitted,
+            model=model,
+            result=replace(run.result, evaluation=evaluation),
+            constraints=report,
+            expected_error=partial(self.expected_error, run, evaluation, solved),
+        )
+
+    def expected_error(self, run, evaluation, solved):
+        """Mean squared error on new rows of consequents that keep what is known.
+
+        That of rows left out one by one, with what holds the consequents back still held.
+        """
+        rows, problem = run.problem.rows, run.problem.on_sample or run.problem
+        n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
+        held = solved.held(evaluation.normal.factor)
+        left_out = problem.leave_one_out_error(evaluation, n_rows, held)
+        n_premises = 0.0
+        if self.solver.moves_premises:
+            n_premises = effective_premises(run.problem, run.premise, evaluation)
+        return with_premises(left_out, n_premises / n_rows)
 
 
 def _object_for(given, by_word):

@@ -5,25 +5,25 @@ the steps of a staircase are two lines that fall away from the step. What is kno
 more than it would cost more rules. Where it costs anything to speak of, the grid that was found
 grows on, one term at a time, by what is expected on new rows of the fits that keep what is known,
 
-    n log ( MSE (n + k) / (n - k) ) ,
+    n log E ,
 
-Akaike's final prediction error, with MSE after the constraints and the effective number of
-parameters k without them, which is on the safe side. A term is taken for a gain of two, "positive"
-in the words of Kass and Raftery (1995), where the search without constraints asks for ten: few
-candidates are compared here, and what is known speaks for them too. Of rows that come in groups n
-is the number of groups.
+with E the mean square of rows left out one by one, at fixed premises and with whatever constraints
+hold the consequents back held on (``Tuned.expected_error`` without any): exact while these stay the
+same. A term is taken for a gain of two, "positive" in the words of Kass and Raftery (1995), where
+the search without constraints asks for ten: few candidates are compared here, and what is known
+speaks for them too. Of rows that come in groups n is the number of groups.
 """
 
-import warnings
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
 
-from .._validation import warn_user
+from .._validation import collected_warnings, warn_user
 from ..antecedent import GridAntecedent
 from ..constraints.wishes import Wishes
+from ..exceptions import InfeasibleConstraintsError
 from .result import Fitted
 
 __all__ = ["grown"]
@@ -31,12 +31,15 @@ __all__ = ["grown"]
 # What a term must gain, and what is known must cost before any is tried, in n log(error).
 _WORTHWHILE = 2.0
 _MOST_TERMS, _MOST_RULES = 6, 36
+# Of many inputs fewer rules: so many coefficients, or a few rules.
+_MOST_COEFFICIENTS, _FEW_RULES = 256, 3
 # Of more inputs only those are tried that have terms, or that something is known of.
 _FEW_INPUTS = 4
+_LEAST = np.finfo(float).eps
 
 
 def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
-    """The fit of a structure found, or of the same with more terms, if what is known asks for it.
+    """The fit of the structure found, or of that with more terms if what is known asks for them.
 
     Parameters
     ----------
@@ -45,31 +48,39 @@ def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
     inputs : ndarray of int
         Those that may have terms.
     fit : callable
-        A fit of the structure that the data ask for; or, given them, of so many terms per input, as
-        a trial, of which nothing need be proven, or for good.
+        A fit of the structure that the data ask for; or, given them, of so many terms per input.
+        Both are trials: what is known is kept on a sample; the one that is taken gets a proof.
     """
-    best, told = _quiet(fit)
-    found, counts, n_units = best, _counts(best), best.n_units
-    if n_units * _cost(best) > _WORTHWHILE:
-        model = best.model
+    found, told = _heard(fit)
+    best, counts, n_units = found, _counts(found), found.n_units
+    if n_units * _cost(found) > _WORTHWHILE:
+        error, model = _log_error(found), found.model
         most = np.where(model.minimum < model.maximum, _MOST_TERMS, 1)
         while trials := [*_fits(_next(wishes, inputs, counts, found), most, fit)]:
-            trial, more = min(trials, key=lambda one: _log_error(one[0]))
-            gain = n_units * (_log_error(best) - _log_error(trial))
-            if not gain > _WORTHWHILE:
+            trial = min(trials, key=lambda one: one.log_error)
+            if not n_units * (error - trial.log_error) > _WORTHWHILE:
                 break
-            best, counts = trial, more
-    if best is not found:
-        best, told = _quiet(fit, counts.tolist())
-    for message in told:
-        warn_user(str(message.message), message.category)
+            best, counts, error, told = trial.fitted, trial.counts, trial.log_error, trial.told
+    assert best.proven is not None
+    best, more = _heard(best.proven)
+    for message, category in told + more:
+        warn_user(message, category)
     return replace(best, start=replace(best.start, candidates=found.start.candidates))
 
 
-def _quiet(fit, *args):
+@dataclass(frozen=True)
+class _Trial:
+    """A fit of so many terms per input, what is to be expected of it, what it warned of."""
+
+    fitted: Fitted
+    counts: np.ndarray
+    log_error: float
+    told: list
+
+
+def _heard(fit, *args):
     """A fit, and what it would have warned of."""
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
+    with collected_warnings() as told:
         return fit(*args), told
 
 
@@ -94,28 +105,28 @@ def _next(wishes, inputs, counts, found):
 
 
 def _fits(every, most, fit):
-    """Fits of grids that are not too large, and their terms."""
+    """Trials of grids that are not too large."""
     for counts in every:
-        if (counts > most).any() or prod(counts.tolist()) > _MOST_RULES:
+        if (counts > most).any() or prod(counts.tolist()) > _most_rules(counts.size):
             continue
         try:
-            yield _quiet(fit, counts.tolist(), True)[0], counts
-        except ValueError:
+            fitted, told = _heard(fit, counts.tolist())
+        except InfeasibleConstraintsError:
             # These rules cannot keep what is known at all, and are none of the candidates.
             continue
+        yield _Trial(fitted, counts, _log_error(fitted), told)
+
+
+def _most_rules(n_inputs):
+    return min(_MOST_RULES, max(_MOST_COEFFICIENTS // (1 + n_inputs), _FEW_RULES))
 
 
 def _cost(fitted):
     """How much what is known raises the logarithm of the error of training."""
     known = fitted.constraints
-    least = np.finfo(float).eps
-    return np.log((known["loss_after"] + least) / (known["loss_before"] + least))
+    return np.log((known["loss_after"] + _LEAST) / (known["loss_before"] + _LEAST))
 
 
 def _log_error(fitted):
-    """The logarithm of the error to be expected on new rows; infinite of too many parameters."""
-    share = fitted.effective_share
-    if not share < 0.5:
-        return np.inf
-    error = fitted.constraints["loss_after"] + np.finfo(float).eps
-    return np.log(error * (1.0 + share) / (1.0 - share))
+    """The logarithm of the error to be expected on new rows."""
+    return float(np.log(fitted.expected_error() + _LEAST))

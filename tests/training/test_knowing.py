@@ -1,13 +1,15 @@
 """Structures grown under constraints: what is tried, what is taken, what is told of it."""
 
-import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from skanfis._validation import warn_user
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.constraints.wishes import Wishes
+from skanfis.exceptions import InfeasibleConstraintsError
 from skanfis.membership import Gaussian
 from skanfis.structure import Start
 from skanfis.training.knowing import grown
@@ -32,27 +34,33 @@ def grow(errors, found, n_units=N_ROWS, candidates=(), varies=1.0):
     """
     tried = []
 
-    def fit(counts=None, is_trial=False):
-        if is_trial or counts is None:
-            tried.append(found if counts is None else tuple(counts))
+    def fit(counts=None):
         counts = found if counts is None else tuple(counts)
+        tried.append(counts)
         if counts not in errors:
-            raise ValueError("cannot keep it")
-        warnings.warn(f"{counts} told", UserWarning, stacklevel=2)
+            raise InfeasibleConstraintsError("cannot keep it")
+        warn_user(f"{counts} told", UserWarning)
         known = {"loss_before": 0.9, "loss_after": np.exp(errors[counts] / N_ROWS)}
         start = Start(rules(counts), None, candidates=list(candidates))
         box = {"minimum": np.zeros(2), "maximum": np.array([1.0, varies])}
-        model = SimpleNamespace(antecedent=rules(counts), n_inputs=2, **box)
-        kept = {"constraints": known, "effective_share": 0.0, "n_units": n_units}
-        return Fitted(model, None, start, [], **kept)
+        shape = {"coefficients": np.zeros((len(start.antecedent.rule_terms), 3, 1))}
+        model = SimpleNamespace(antecedent=rules(counts), n_inputs=2, **box, **shape)
+        fitted = Fitted(model, None, start, [], constraints=known, n_units=n_units)
+
+        def proven():
+            warn_user(f"{counts} proven", UserWarning)
+            return fitted
+
+        # Rows left out tell more than the rows of training do: of the same order here.
+        return replace(fitted, proven=proven, expected_error=lambda: 1.1 * known["loss_after"])
 
     wishes = Wishes(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
-    with pytest.warns(UserWarning, match="told") as told:
+    with pytest.warns(UserWarning, match="told|proven") as told:
         best = grown(wishes, np.arange(2), fit)
     assert best.start.candidates == list(candidates)
     chosen = best.model.antecedent
-    text = str(told[0].message)
-    assert len(told) == 1
+    text, proof = (str(one.message) for one in told)
+    assert proof == text.replace("told", "proven")
     return text.removesuffix(" told"), chosen, tried
 
 
