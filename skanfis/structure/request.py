@@ -56,6 +56,8 @@ class StructureRequest:
         Of the inputs.
     other_families : sequence of type of Membership
         For all inputs in place of ``families``, where they promise a smaller error.
+    is_noisy : bool
+        Whether it is known already that what rules that are given leave of the target is noise.
     """
 
     n_mfs: Any
@@ -69,6 +71,7 @@ class StructureRequest:
     seed: int
     names: Sequence[str]
     other_families: Sequence[type[Membership]] = ()
+    is_noisy: bool = False
 
     @property
     def is_searched(self):
@@ -125,6 +128,7 @@ class StructureRequest:
             self.weights,
             self.premises_move,
             is_compared,
+            self.is_noisy,
         )
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:

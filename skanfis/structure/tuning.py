@@ -312,11 +312,13 @@ def tuned_start(
     weights,
     premises_move,
     is_compared=False,
+    is_noisy=False,
 ) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows.
 
     ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``;
-    ``is_compared`` says that the error to be expected is wanted even where all of them are given.
+    ``is_compared`` says that the error to be expected is wanted even where all of them are given,
+    ``is_noisy`` that what remains of the target is noise, and loose trainings would look in vain.
     """
     free = [key for key in FREE if key not in weights]
     penalty = replace(FIRST_PENALTY, **weights)
@@ -348,7 +350,7 @@ def tuned_start(
 
     best, is_free = tuned(False), False
     # Where there are hardly more rows than consequents, any freedom passes through all.
-    is_determined = sample.n_rows >= _ROWS_EACH * problem.n_columns
+    is_determined = sample.n_rows >= _ROWS_EACH * problem.n_columns and not is_noisy
     if (
         premises_move
         and is_determined

@@ -99,10 +99,10 @@ def fit_rules(
     if data.wishes is None or not may_grow:
         return _fitted(estimator, data, request, callbacks)
 
-    def fit(counts=None):
+    def fit(counts=None, is_noisy=False):
         if counts is None:
             return _fitted(estimator, data, request, callbacks, is_trial=True)
-        grid = replace(request, n_mfs=counts, partition="grid")
+        grid = replace(request, n_mfs=counts, partition="grid", is_noisy=is_noisy)
         return _fitted(estimator, data, grid, None, is_trial=True)
 
     return grown(data.wishes, request.premise_inputs, fit)

@@ -35,6 +35,8 @@ _MOST_TERMS, _MOST_RULES = 6, 36
 _MOST_COEFFICIENTS, _FEW_RULES = 256, 3
 # Of more inputs only those are tried that have terms, or that something is known of.
 _FEW_INPUTS = 4
+# Where the structure found leaves more of the target's variance than this, the rest is noise.
+_NEARLY_EXACT = 0.01
 _LEAST = np.finfo(float).eps
 
 
@@ -48,15 +50,17 @@ def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
     inputs : ndarray of int
         Those that may have terms.
     fit : callable
-        A fit of the structure that the data ask for; or, given them, of so many terms per input.
-        Both are trials: what is known is kept on a sample; the one that is taken gets a proof.
+        A fit of the structure that the data ask for; or, given them, of so many terms per input,
+        and whether what the former leaves is noise. Both are trials: what is known is kept on a
+        sample; the one that is taken gets a proof.
     """
     found, told = _heard(fit)
     best, counts, n_units = found, _counts(found), found.n_units
     if n_units * _cost(found) > _WORTHWHILE:
         error, model = _log_error(found), found.model
         most = np.where(model.minimum < model.maximum, _MOST_TERMS, 1)
-        while trials := [*_fits(_next(wishes, inputs, counts, found), most, fit)]:
+        is_noisy = found.constraints["loss_before"] > _NEARLY_EXACT
+        while trials := [*_fits(_next(wishes, inputs, counts, found), most, fit, is_noisy)]:
             trial = min(trials, key=lambda one: one.log_error)
             if not n_units * (error - trial.log_error) > _WORTHWHILE:
                 break
@@ -104,13 +108,13 @@ def _next(wishes, inputs, counts, found):
     return [counts + (np.arange(counts.size) == j) for j in inputs]
 
 
-def _fits(every, most, fit):
+def _fits(every, most, fit, is_noisy):
     """Trials of grids that are not too large."""
     for counts in every:
         if (counts > most).any() or prod(counts.tolist()) > _most_rules(counts.size):
             continue
         try:
-            fitted, told = _heard(fit, counts.tolist())
+            fitted, told = _heard(fit, counts.tolist(), is_noisy)
         except InfeasibleConstraintsError:
             # These rules cannot keep what is known at all, and are none of the candidates.
             continue

@@ -34,7 +34,8 @@ def grow(errors, found, n_units=N_ROWS, candidates=(), varies=1.0):
     """
     tried = []
 
-    def fit(counts=None):
+    def fit(counts=None, is_noisy=True):
+        assert is_noisy
         counts = found if counts is None else tuple(counts)
         tried.append(counts)
         if counts not in errors:
