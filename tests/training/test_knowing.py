@@ -1,13 +1,16 @@
 """Structures grown under constraints: what is tried, what is taken, what is told of it."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from skanfis import ANFISRegressor
 from skanfis._validation import warn_user
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.bounds import gradient_bounds, monotonicity
 from skanfis.constraints.wishes import Wishes
 from skanfis.exceptions import InfeasibleConstraintsError
 from skanfis.membership import Gaussian
@@ -85,3 +88,61 @@ def test_scattered_rules_beside_their_best_grid_and_no_terms_where_nothing_varie
 
 def test_what_costs_nothing_is_left_alone():
     assert grow({(2, 2): N_ROWS * np.log(0.9) + 1.9}, (2, 2))[2] == [(2, 2)]
+
+
+def flat_rising_flat(x, width):
+    """Three rules that rise together: low, a line of slope one, high."""
+    shares = np.exp(-0.5 * ((x[:, None] - [-0.75, 0.0, 0.75]) / width) ** 2)
+    shares /= shares.sum(axis=1, keepdims=True)
+    return np.sum(shares * np.column_stack([-np.ones(x.size), x, np.ones(x.size)]), axis=1)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+@pytest.mark.parametrize(
+    ("seed", "width", "noise", "n_rules"), [(3, 0.3, 0.4, 3), (1, 0.15, 0.3, 6)]
+)
+def test_rules_that_a_rising_truth_needs_are_found_and_proven_to_rise(seed, width, noise, n_rules):
+    """Too few free rules compensate one another by slopes that fall: what is known adds rules.
+
+    Of gentle steps three, as planted; of steep ones, to which no three terms reach down, more.
+    """
+    rng = np.random.default_rng(seed)
+    X = rng.uniform(-1.0, 1.0, (100, 1))
+    X[:2, 0] = -1.0, 1.0
+    truth = flat_rising_flat(X[:, 0], width)
+    y = truth + noise * truth.std() * rng.normal(size=100)
+    new = np.linspace(-1.0, 1.0, 401)[:, None]
+    exact = flat_rising_flat(new[:, 0], width)
+    free = ANFISRegressor(partition="grid").fit(X, y)
+    held = ANFISRegressor(partition="grid", monotonic_cst=[1]).fit(X, y)
+    few = ANFISRegressor(n_mfs=free.n_rules_, monotonic_cst=[1]).fit(X, y)
+    assert gradient_bounds(free, 0).lowest[0] < 0.0
+    assert free.n_rules_ < held.n_rules_
+    assert held.n_rules_ == n_rules
+    assert held.constraints_["certified"]
+    assert monotonicity(held, 0)[0] == 1
+    assert held.structures_ == free.structures_
+    errors = [np.mean((model.predict(new) - exact) ** 2) for model in (held, few)]
+    assert errors[0] < 0.75 * errors[1]
+
+
+def test_what_fails_for_another_reason_is_not_passed_over():
+    """Nor are the filters of warnings, which all threads share, touched meanwhile."""
+
+    def fit(counts=None, is_noisy=True):
+        if counts is not None:
+            raise ValueError("of another kind")
+        before = warnings.filters, warnings.showwarning
+        assert before == shared
+        known = {"loss_before": 0.5, "loss_after": 1.0}
+        start = Start(rules((2, 1)), None)
+        box = {"minimum": np.zeros(2), "maximum": np.ones(2), "coefficients": np.zeros((2, 3, 1))}
+        model = SimpleNamespace(antecedent=rules((2, 1)), n_inputs=2, **box)
+        return Fitted(
+            model, None, start, [], constraints=known, n_units=9, expected_error=lambda: 1.0
+        )
+
+    shared = warnings.filters, warnings.showwarning
+    wishes = Wishes(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
+    with pytest.raises(ValueError, match="of another kind"):
+        grown(wishes, np.arange(2), fit)
