@@ -147,6 +147,14 @@ class DerivativeRows:
         basis_rows[1:] /= model.spread[inputs, None]
         return cls(strengths, shares, basis_rows, np.stack(outputs), by_term, gradients)
 
+    @classmethod
+    def of_parts(cls, model, inputs, is_learnt, outputs, parts):
+        """Rows whose parts are at hand: strengths, shares, basis, derivatives by terms."""
+        strengths, shares, basis_rows, by_term, gradients = parts
+        scaled = basis_rows / np.concatenate([[1.0], model.spread[inputs]])[:, None]
+        by_term = by_term if is_learnt else []
+        return cls(strengths, shares, scaled, outputs, by_term, gradients)
+
     def design(self, out):
         """Strengths times the basis, rule by rule, into (n_columns, n_rows)."""
         by_rule = out.reshape(-1, *self.basis.shape)

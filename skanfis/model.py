@@ -247,11 +247,14 @@ class TSKModel:
         def beyond(Z):
             nearest = self._clip(Z)
             way = Z - nearest
-            values, slopes = self._values_and_gradient(nearest)
+            values, slopes, parts = self._linearised(nearest)
             followed = self._held(way) if self.out_of_bounds == "linear" else np.zeros_like(way)
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
             unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
-            return np.vstack([outputs, posterior.beyond(self, nearest, way, unfollowed, exact)])
+            row = posterior.row_of(self, nearest, values, parts)
+            return np.vstack(
+                [outputs, posterior.beyond(self, row, nearest, way, unfollowed, exact)]
+            )
 
         if inside.all():
             found = self._by_block(X, within, 2 * n_outputs)
@@ -423,7 +426,11 @@ class TSKModel:
         return self._hold(values + np.einsum("ji,joi->oi", self._held(Z - inside), gradient))
 
     def _values_and_gradient(self, Z):
-        """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).
+        """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows)."""
+        return self._linearised(Z)[:2]
+
+    def _linearised(self, Z):
+        """The same, and what they are made of: strengths, shares, basis and derivatives by terms.
 
         Memberships depend on x and their location through the difference alone: the derivative of
         log mu by x is minus that by the location.
@@ -431,7 +438,7 @@ class TSKModel:
         log_mu, gradients = self.antecedent.log_memberships_and_gradient(Z)
         strengths, shares = self.antecedent.normalise(log_mu)
         basis_rows = self._basis(Z)
-        values, slopes = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1]))
+        values, slopes, by_terms = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1])), []
         for k, one in enumerate(self.coefficients.transpose(2, 0, 1)):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
             by_term = self.antecedent.term_sensitivity(by_rule, output, shares)
@@ -442,7 +449,8 @@ class TSKModel:
                 start += group.n_terms
             slopes[: one.shape[1] - 1, k] += one[:, 1:].T @ strengths
             values.append(output)
-        return np.stack(values), slopes
+            by_terms.append(by_term)
+        return np.stack(values), slopes, (strengths, shares, basis_rows, by_terms, gradients)
 
     def _basis(self, Z):
         basis_rows = np.ones((self.coefficients.shape[1], Z.shape[1]))

@@ -40,7 +40,7 @@ from scipy.special import ndtr
 from .antecedent import Antecedent
 from .consequent import NormalFactor
 from .deviation import DerivativeRows, DeviationTables, points_of_range
-from .faces import Face, faces_of, products_off_faces, products_on_face
+from .faces import STEP, Face, on_faces, products_off_faces, products_on_line
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
@@ -50,14 +50,13 @@ __all__ = ["MOST_PARAMETERS", "Posterior", "effective_premises"]
 MOST_PARAMETERS = 2000
 # Where rows leave no freedom, the noise is that of so many.
 _LEAST_FREEDOM = 1.0
-# Derivatives along a way out of the box, by differences over this part of a standard deviation.
-# They are taken inside: terms may have a corner on the edge.
-_STEP = 2.0**-14
 # Of what is known at points that lie close together, what says nothing new.
 _DEPENDENT = 1e-7
 # Single precision takes half the time. It is used where it gives this part of a deviation, at so
 # many points of the range; of a deviation nobody knows as much.
 _DIGITS, _N_COMPARED = 1e-5, 512
+# Standard deviations beyond an edge at which they are compared.
+_LENGTHS = (0.0, 0.3, 3.0, 100.0)
 # Points of the range at which products are found that others make up for.
 _N_EVEN = 512
 
@@ -263,38 +262,42 @@ class Posterior:
         np.maximum(found, (self.noise[:, None] / unit) ** 2, out=found)
         return row.outputs, np.sqrt(found) * unit
 
-    def beyond(self, model, Z, way, unfollowed, exact=False):
+    def row_of(self, model, Z, outputs, parts):
+        """What is known of rows Z (n_inputs, n_rows) already, as ``beyond`` takes it."""
+        if self.inputs.size < model.coefficients.shape[1] - 1:
+            return self._row(model, Z)
+        return DerivativeRows.of_parts(
+            model, self.inputs, self.premises.shape[0] > 0, outputs, parts
+        )
+
+    def beyond(self, model, row, Z, way, unfollowed, exact=False):
         """Deviation of every output, (n_outputs, n_rows), of rows out of the box.
 
-        Z is the nearest point in it, ``way`` the way from there, (n_inputs, n_rows), and
-        ``unfollowed`` (n_outputs, n_rows) what the prediction leaves out of the tangent.
-
-        With h at one step inside and e what it changes by from two steps to one, h + e is the half
-        at the edge, e times steps the slope.
+        Z is the nearest point in it, and ``row`` what ``row_of`` says of that; ``way`` the way from
+        there, (n_inputs, n_rows), and ``unfollowed`` (n_outputs, n_rows) what the prediction leaves
+        out of the tangent.
         """
         length = np.sqrt(np.sum((way / model.spread[:, None]) ** 2, axis=0))
-        step = way * (_STEP / np.maximum(length, np.finfo(float).tiny))
-        once, twice = (self._row(model, Z - k * step) for k in (1, 2))
-        tables, n_rows = self._tables(model, exact), Z.shape[1]
-        found = np.empty((3, self.noise.size, n_rows))
-        left = np.full(n_rows, True)
-        for j, side, rows in faces_of(way, model.antecedent, self.consequents.shape[0]):
-            face = self._face(model, tables, j, side)
-            part = slice(None) if rows.size == n_rows else rows
-            found[:, :, part] = products_on_face(
-                self.noise, tables, face, once.part(part), twice.part(part)
-            )
+        tables = self._tables(model, exact)
+        found = np.empty((3, self.noise.size, Z.shape[1]))
+        left = np.full(Z.shape[1], True)
+        for j, side, rows in on_faces(way, model.antecedent, self.consequents.shape[0]):
+            part = slice(None) if rows.size == left.size else rows
+            some = row.part(part)
+            if j is None:
+                ways = way[:, part] / (length[part] * model.spread[:, None])
+                found[:, :, part] = products_on_line(self, model, tables, some, ways)
+            else:
+                face = self._face(model, tables, j, side)
+                found[:, :, part] = face.products(self.noise, some)
             left[rows] = False
         if left.any():
             part = slice(None) if left.all() else left
-            found[:, :, part] = products_off_faces(
-                self.noise, tables, once.part(part), twice.part(part)
-            )
-        near, both, change = found
-        unit, steps = tables.unit, length / _STEP
-        square = (self.noise[:, None] / unit) ** 2 + near + 2.0 * both + change
-        square += 2.0 * np.maximum((both + change) * steps, 0.0) + change * steps**2
-        np.maximum(square, (self.noise[:, None] / unit) ** 2, out=square)
+            step = way[:, part] * (STEP / np.maximum(length[part], np.finfo(float).tiny))
+            once, twice = (self._row(model, Z[:, part] - k * step) for k in (1, 2))
+            found[:, :, part] = products_off_faces(self.noise, tables, once, twice)
+        unit = tables.unit
+        square = self._square(found, length, unit)
         return np.sqrt(square + (unfollowed / unit) ** 2) * unit
 
     def _face(self, model, tables, j, side):
@@ -304,12 +307,31 @@ class Posterior:
         if key not in known:
             at = np.tile(model.minimum[:, None], 2)
             at[j] = edge
-            at[j] -= side * _STEP * model.spread[j] * np.array([1.0, 2.0])
+            at[j] -= side * STEP * model.spread[j] * np.array([1.0, 2.0])
             rows = [self._row(model, np.ascontiguousarray(one[:, None])) for one in at.T]
             double = self._tables(model, exact=True)
-            face = Face.of(model.antecedent, double, self.inputs, j, *rows)
-            known[key] = face.astype(tables.dtype)
+            face = Face.of(model, double, self.inputs, j, *rows)
+            known[key] = face if tables is double else self._quickest_face(model, face, j, edge)
         return known[key]
+
+    def _quickest_face(self, model, face, j, edge):
+        """The same in single precision where deviations are right to ``_DIGITS`` by it."""
+        Z = points_of_range(model, _N_COMPARED, np.random.default_rng(0))
+        Z[j] = edge
+        row, single = self._row(model, Z), face.astype(np.float32)
+        right, found = (one.products(self.noise, row) for one in (face, single))
+        for length in _LENGTHS:
+            squares = [self._square(one, length, face.unit) for one in (right, found)]
+            # A part of a square is twice that of its root.
+            if not (np.abs(squares[1] - squares[0]) <= 2.0 * _DIGITS * squares[0]).all():
+                return face
+        return single
+
+    def _square(self, products, length, unit):
+        """The tangent's variance, with the noise, so many standard deviations on the way."""
+        (near, both, change), noise = products, (self.noise[:, None] / unit) ** 2
+        square = noise + near + 2.0 * np.maximum(both * length, 0.0) + change * length**2
+        return np.maximum(square, noise, out=square)
 
     def _tables(self, model, exact):
         """What rows are multiplied with, found once; in fewer digits where they will do."""

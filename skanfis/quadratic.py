@@ -35,7 +35,8 @@ class QuadraticForm:
     """Phi' A phi by a table over kept pairs of every factor, the basis the last of them.
 
     ``pairs`` holds for every factor the two columns of each pair, (2, n_kept); ``table`` has those
-    of the first ``split`` factors along its rows, of the others along its columns.
+    of the first ``split`` factors along its rows, of the others along its columns; of several forms
+    a table each.
     """
 
     pairs: tuple[np.ndarray, ...]
@@ -64,20 +65,42 @@ class QuadraticForm:
         table = np.ascontiguousarray(table).reshape(prod(sizes[:split]), -1)
         return cls(tuple(pairs), table, split)
 
+    @classmethod
+    def stack(cls, forms):
+        """Several, of the same shares and basis functions, whose values are found together."""
+        return replace(forms[0], table=np.stack([form.table for form in forms]))
+
     def astype(self, dtype):
         """The same in another precision."""
         with np.errstate(over="ignore", under="ignore"):
             return replace(self, table=self.table.astype(dtype))
 
     def values(self, shares, basis_rows):
-        """Phi' A phi of every row, (n_rows,); shares (n_shares, n_rows)."""
+        """Phi' A phi of every row, (n_rows,) or (n_forms, n_rows); shares (n_shares, n_rows)."""
         groups = self._groups(shares, basis_rows)
         left = _products(groups[: self.split], basis_rows)
         right = _products(groups[self.split :], basis_rows)
         # The smaller side is what the product leaves to be read again.
         if len(left) > len(right):
-            return np.einsum("in,in->n", right, self.table.T @ left)
-        return np.einsum("in,in->n", left, self.table @ right)
+            return np.einsum("in,...in->...n", right, np.swapaxes(self.table, -1, -2) @ left)
+        return np.einsum("in,...in->...n", left, self.table @ right)
+
+    def products(self, shares, basis_rows, others):
+        """Phi' A phi, phi' A psi and psi' A psi of every row, (3, n_rows).
+
+        Psi has the same shares and other basis functions; the basis is never along the rows.
+        """
+        *groups, _ = self._groups(shares, basis_rows)
+        along = self.table.T @ _products(groups[: self.split], basis_rows)
+        if self.split < len(groups):
+            middle = _products(groups[self.split :], basis_rows)
+            n_last = len(along) // len(middle)
+            along = np.einsum("mbn,mn->bn", along.reshape(len(middle), n_last, -1), middle)
+        i, j = self.pairs[-1]
+        own, other = (basis_rows[i], basis_rows[j]), (others[i], others[j])
+        both = 0.5 * (own[0] * other[1] + own[1] * other[0])
+        rights = own[0] * own[1], both, other[0] * other[1]
+        return np.stack([np.einsum("bn,bn->n", right, along) for right in rights])
 
     def shortened(self, shares, basis_rows, tol):
         """The same up to ``tol`` for every factor, root mean square at given rows, in fewer pairs.
