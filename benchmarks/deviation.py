@@ -31,21 +31,28 @@ def _measured(n_rows, n_mfs):
     new = np.clip(rng.uniform(-1.0, 1.0, (n_rows, len(n_mfs))), X.min(axis=0), X.max(axis=0))
     beyond = new.copy()
     beyond[:, 0] = 1.3
+    # Along two inputs with terms.
+    several = new.copy()
+    several[:, 1:3] = 1.3
     seconds = side_by_side(
         {
             "plain": lambda: model.predict(new),
             "std": lambda: model.predict(new, return_std=True),
             "plain beyond": lambda: model.predict(beyond),
             "std beyond": lambda: model.predict(beyond, return_std=True),
+            "plain several": lambda: model.predict(several),
+            "std several": lambda: model.predict(several, return_std=True),
         },
         _ROUNDS,
     )
     inside = seconds["std"] / seconds["plain"]
     outside = seconds["std beyond"] / seconds["plain beyond"]
+    corner = seconds["std several"] / seconds["plain several"]
     work = f"deviation of {n_rows:,} rows, {len(n_mfs)} inputs, {model.n_rules_} rules"
     measures = [
         Measure("in range, over plain", inside, "x", 4.0),
         Measure("a row", seconds["std"] / n_rows * 1e6, "µs"),
-        Measure("out of range, over plain", outside, "x"),
+        Measure("out of range along one input, over plain", outside, "x", 4.0),
+        Measure("along two", corner, "x"),
     ]
     return Row(f"{work} ({' x '.join(str(n) for n in n_mfs if n > 1)})", measures)

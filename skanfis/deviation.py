@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .consequent import basis, rule_outputs
+from .consequent import rule_outputs
 from .quadratic import QuadraticForm
 
 __all__ = ["DerivativeRows", "DeviationTables", "inner_products", "points_of_range"]
@@ -136,7 +136,9 @@ class DerivativeRows:
         antecedent = model.antecedent
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
-        basis_rows = basis(Z[inputs] - model.reference[inputs, None])
+        own = Z if _is_every(inputs, len(Z)) else Z[inputs]
+        basis_rows = np.ones((1 + inputs.size, Z.shape[1]))
+        np.subtract(own, model.reference[inputs, None], out=basis_rows[1:])
         columns = np.concatenate([[0], 1 + inputs]) if model.order == 1 else [0]
         outputs, by_term = [], []
         for one in model.coefficients[:, columns].transpose(2, 0, 1):
@@ -151,6 +153,8 @@ class DerivativeRows:
     def of_parts(cls, model, inputs, is_learnt, outputs, parts):
         """Rows whose parts are at hand: strengths, shares, basis, derivatives by terms."""
         strengths, shares, basis_rows, by_term, gradients = parts
+        if not _is_every(inputs, len(basis_rows) - 1):
+            basis_rows = basis_rows[np.append(0, 1 + inputs)]
         scaled = basis_rows / np.concatenate([[1.0], model.spread[inputs]])[:, None]
         by_term = by_term if is_learnt else []
         return cls(strengths, shares, scaled, outputs, by_term, gradients)
@@ -208,6 +212,11 @@ class DerivativeRows:
             parts.append((gradient * own).reshape(-1, own.shape[1]))
             term += own.shape[0]
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def _is_every(inputs, n_inputs):
+    """Whether these are all inputs, in order; another model's columns may be in another."""
+    return inputs.size == n_inputs and bool((inputs == np.arange(n_inputs)).all())
 
 
 def _inner(one, other):

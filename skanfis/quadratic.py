@@ -17,6 +17,8 @@ is left out is measured in units of the form itself, at points spread evenly ove
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 from math import prod
 
 import numpy as np
@@ -34,11 +36,12 @@ _POINTS_PER_PAIR = 2
 class QuadraticForm:
     """Phi' A phi by a table over kept pairs of every factor, the basis the last of them.
 
-    ``pairs`` holds for every factor the two columns of each pair, (2, n_kept); ``table`` has those
-    of the first ``split`` factors along its rows, of the others along its columns; of several forms
-    a table each.
+    ``counts`` are the functions of every factor; ``pairs`` holds for each factor the two columns of
+    each pair, (2, n_kept); ``table`` has those of the first ``split`` factors along its rows, of the others
+    along its columns; of several forms a table each.
     """
 
+    counts: tuple[int, ...]
     pairs: tuple[np.ndarray, ...]
     table: np.ndarray
     split: int
@@ -55,15 +58,16 @@ class QuadraticForm:
             summed = np.zeros((length * (length + 1) // 2, *np.delete(table.shape, k)))
             np.add.at(summed, pair_index(length).ravel(), np.moveaxis(table, k, 0))
             table = np.moveaxis(summed, 0, k)
-        return cls._of_table([np.stack(np.triu_indices(length)) for length in lengths], table)
+        pairs = [np.stack(np.triu_indices(length)) for length in lengths]
+        return cls._of_table(lengths, pairs, table)
 
     @classmethod
-    def _of_table(cls, pairs, table):
+    def _of_table(cls, counts, pairs, table):
         """With rows and columns shared out so that fewest products are formed."""
         sizes = table.shape
         split = min(range(len(sizes)), key=lambda k: prod(sizes[:k]) + prod(sizes[k:]))
         table = np.ascontiguousarray(table).reshape(prod(sizes[:split]), -1)
-        return cls(tuple(pairs), table, split)
+        return cls(counts, tuple(pairs), table, split)
 
     @classmethod
     def stack(cls, forms):
@@ -118,17 +122,37 @@ class QuadraticForm:
             kept, combined = _spanning(group, weights, tol)
             table = np.moveaxis(np.tensordot(combined, first, axes=(0, 0)), 0, k)
             groups[k], pairs[k] = group[kept], pairs[k][:, kept]
-        return self._of_table(pairs, table)
+        return self._of_table(self.counts, pairs, table)
 
     def _groups(self, shares, basis_rows):
         groups, start = [], 0
-        for i, j in self.pairs[:-1]:
-            own = shares[start : start + j.max() + 1]
-            groups.append(own[i] * own[j])
-            start += len(own)
-        i, j = self.pairs[-1]
-        groups.append(basis_rows[i] * basis_rows[j])
-        return groups
+        for count, runs in zip(self.counts[:-1], self._runs[:-1], strict=True):
+            groups.append(_pair_products(shares[start : start + count], runs))
+            start += count
+        return [*groups, _pair_products(basis_rows, self._runs[-1])]
+
+    @cached_property
+    def _runs(self):
+        """Pairs of every factor, those of one function with consecutive others together."""
+        return [_runs_of(*own) for own in self.pairs]
+
+
+def _runs_of(first, second):
+    """Runs of pairs with the same first function: this, slices of the second ones and of places."""
+    starts = np.flatnonzero((np.diff(first) != 0) | (np.diff(second) != 1)) + 1
+    ends = [0, *starts.tolist(), len(first)]
+    return [
+        (int(first[a]), slice(int(second[a]), int(second[b - 1]) + 1), slice(a, b))
+        for a, b in pairwise(ends)
+    ]
+
+
+def _pair_products(functions, runs):
+    """Products of pairs of functions (n, n_rows): no copy of these is made."""
+    products = np.empty((runs[-1][2].stop, functions.shape[1]), functions.dtype)
+    for first, second, place in runs:
+        np.multiply(functions[first], functions[second], out=products[place])
+    return products
 
 
 def _products(groups, like):

@@ -33,6 +33,23 @@ def test_form_is_that_of_the_dense_design_and_stays_it_in_fewer_pairs(family, at
     assert_allclose(short.values(shares, basis), expected, atol=3e-5)
 
 
+@pytest.mark.parametrize("counts", [(6, 2), (2, 5)])
+def test_products_with_another_basis_and_of_several_forms(counts):
+    rng, size = np.random.default_rng(2), 3 * counts[0] * counts[1]
+    halves = rng.standard_normal((2, size, size))
+    forms = [QuadraticForm.of(half.T @ half, counts, 3) for half in halves]
+    shares, basis, design = rows_of_grid(Gaussian, counts, rng.uniform(-1, 1, (2, 50)))
+    psi = rng.standard_normal((3, 50))
+    other = (design.reshape(-1, 3, 50)[:, :1] * psi).reshape(size, 50)
+    expected = [
+        np.sum((halves[0] @ a) * (halves[0] @ b), axis=0)
+        for a, b in ((design, design), (design, other), (other, other))
+    ]
+    assert_allclose(forms[0].products(shares, basis, psi), expected, rtol=1e-9, atol=1e-9)
+    both = QuadraticForm.stack(forms).values(shares, basis)
+    assert_allclose(both, [np.sum((half @ design) ** 2, axis=0) for half in halves], rtol=1e-11)
+
+
 def test_of_scattered_rules_with_more_pairs_than_points_all_are_kept():
     rng = np.random.default_rng(1)
     shares = rng.dirichlet(np.ones(5), 20).T
