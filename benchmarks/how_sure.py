@@ -38,6 +38,19 @@ _SEEDS = tuple(range(20, 32))
 _N_RUNS, _EVERY_ROW = 60, 12
 _N_TERMS = (2, 2, 2)
 _STARTS = ["time", "temperature", "thermal_rate"]
+# Of a run's rows, with what probability: what can be asked of thirty runs.
+_REQUESTS = (
+    (0.9, None),
+    (0.8, 0.8),
+    (0.8, 0.9),
+    (0.85, 0.9),
+    (0.9, 0.8),
+    (0.9, 0.85),
+    (0.9, 0.9),
+    (0.8, 0.967),
+    (0.95, 0.9),
+    (0.9, 0.95),
+)
 METHODS = (
     "std",
     "folds",
@@ -95,8 +108,8 @@ def parts(case):
 
 
 def intervals(X, y, groups, new):
-    """Lower and upper bound by each method, and seconds."""
-    found, seconds = {}, {}
+    """Lower and upper bound by each method, seconds, and bounds by each request of whole runs."""
+    found, seconds, asked = {}, {}, {}
 
     def add(name, bounds):
         start = process_time()
@@ -131,6 +144,7 @@ def intervals(X, y, groups, new):
     add("folds", lambda: conformal("folds"))
     if groups is not None:
         add("run", lambda: kept[0].predict_interval(new, COVERAGE))
+        asked = {request: kept[0].predict_interval(new, *request) for request in _REQUESTS}
     # Of the same fits.
     add("cross", lambda: kept[0].set_params(method="cross").predict_interval(new, COVERAGE, None))
     add("split", lambda: conformal("split"))
@@ -138,7 +152,7 @@ def intervals(X, y, groups, new):
         add("loo", lambda: conformal("loo"))
     add("Gaussian process", gaussian_process)
     add("quantile boosting", lambda: quantile_boosting(X, y, groups, new))
-    return found, seconds
+    return found, seconds, asked
 
 
 def quantile_boosting(X, y, groups, new):
@@ -170,7 +184,11 @@ def measure(case, options):
     for X, y, groups, new, truth, test_groups in parts(case):
         n_rows, n_inputs = X.shape
         spreads.append(np.std(truth))
-        found, seconds = intervals(X, y, groups, new)
+        found, seconds, asked = intervals(X, y, groups, new)
+        requests = [
+            (*request, *_of_runs(low, high, truth, test_groups))
+            for request, (low, high) in asked.items()
+        ]
         for name, (low, high) in found.items():
             inside = (low <= truth) & (truth <= high)
             covered[name].append(inside)
@@ -185,6 +203,7 @@ def measure(case, options):
                 ]
     by_run = {name: values for name, values in runs.items() if values}
     result = {"case": str(case), "rows": n_rows, "inputs": n_inputs, "by run": by_run}
+    result["requests"] = requests
     result["kind"] = (
         "cold starts"
         if isinstance(case, Start)
@@ -205,6 +224,28 @@ def measure(case, options):
     return result
 
 
+def _of_runs(low, high, truth, groups):
+    """Part of the rows covered, runs covered by less than 90 and 80 %, and the mean width."""
+    inside = (low <= truth) & (truth <= high)
+    of_run = np.array([np.mean(inside[groups == r]) for r in np.unique(groups)])
+    width = float(np.mean(high - low))
+    return float(np.mean(inside)), int(sum(of_run < COVERAGE)), int(sum(of_run < 0.8)), width
+
+
+def requested(found):
+    """What each request of whole runs gives, over all cold starts."""
+    by_request = zip(*[one["requests"] for one in found if one["requests"]], strict=True)
+    lines = []
+    for own in by_request:
+        coverage, confidence = own[0][:2]
+        _, _, covered, short, far, widths = zip(*own, strict=True)
+        lines.append([coverage, confidence or "", np.mean(covered), sum(short), sum(far), widths])
+    for line in lines[::-1]:
+        line[-1] = geometric_mean(np.divide(line[-1], lines[0][-1]))
+    head = ["of a run's rows", "with probability", "covered", "below 90 %", "below 80 %", "width"]
+    return Table("How sure: requests of whole runs, by folds", head, lines)
+
+
 def run(options):
     found, failed = evaluate("how_sure", measure, cases(), options)
     rows = []
@@ -213,7 +254,7 @@ def run(options):
         if own:
             rows += [row(kind, own, method) for method in METHODS if method in own[0]["coverage"]]
     rows[-1:] = [Row(rows[-1].work, [*rows[-1].measures, failed])]
-    return Results(rows, [table(found), table(found, "equal"), by_run(found)])
+    return Results(rows, [table(found), table(found, "equal"), by_run(found), requested(found)])
 
 
 def row(kind, found, method):

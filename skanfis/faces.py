@@ -161,8 +161,8 @@ class Face:
                 sides = self.joint[k] @ chi
                 if self.own.shape[2]:
                     self._add_own(k, row, chi, sides)
-                half, change_of = np.split(sides, 2)
-                found[:, k] += signed_products(half, change_of, self.n_added)
+                half, change = np.split(sides, 2)
+                found[:, k] += signed_products(half, change, self.n_added)
         near, both, change = found
         return np.stack([near + 2.0 * both + change, (both + change) / STEP, change / STEP**2])
 
@@ -303,8 +303,8 @@ def products_off_faces(noise, tables, once, twice):
         for k, joint in enumerate(tables.joint):
             if n_premises:
                 sides[:, :n_premises] = _changes(tables, once, twice, k)
-            half, change_of = (joint @ one for one in sides)
-            found[:, k] += signed_products(half, change_of, tables.n_added)
+            half, change = (joint @ one for one in sides)
+            found[:, k] += signed_products(half, change, tables.n_added)
     near, both, change = found
     return np.stack([near + 2.0 * both + change, (both + change) / STEP, change / STEP**2])
 

@@ -330,7 +330,8 @@ class Posterior:
     def _square(self, products, length, unit):
         """The tangent's variance, with the noise, so many standard deviations on the way."""
         (near, both, change), noise = products, (self.noise[:, None] / unit) ** 2
-        square = noise + near + 2.0 * np.maximum(both * length, 0.0) + change * length**2
+        square = noise + near + 2.0 * np.maximum(both * length, 0.0)
+        square += np.maximum(change, 0.0) * length**2
         return np.maximum(square, noise, out=square)
 
     def _tables(self, model, exact):

@@ -37,8 +37,8 @@ class QuadraticForm:
     """Phi' A phi by a table over kept pairs of every factor, the basis the last of them.
 
     ``counts`` are the functions of every factor; ``pairs`` holds for each factor the two columns of
-    each pair, (2, n_kept); ``table`` has those of the first ``split`` factors along its rows, of the others
-    along its columns; of several forms a table each.
+    each pair, (2, n_kept); ``table`` has those of the first ``split`` factors along its rows, of
+    the others along its columns; of several forms a table each.
     """
 
     counts: tuple[int, ...]
