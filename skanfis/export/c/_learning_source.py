@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import qmc
 
+from ._self_test import ROWS
 from ._source import Source
 from ._text import literals
 
 __all__ = ["LearningSource", "learning_test"]
 
-# Rows of the test: a few for each consequent of a small model, and a table of some kB.
-_ROWS = 32
 # The size of made-up innovations, in parts of what is summed; and how far off what they teach may
 # be, in parts of that size.
 _SURPRISE = 0.01
@@ -293,18 +292,18 @@ def learning_test(model, source):
     """The test that the learner learns what matrices in full learn; ``model`` as it is held."""
     numbers, learner = source.numbers, source.learning
     low, width = numbers.low.astype(float), (numbers.high - numbers.low).astype(float)
-    points = qmc.Halton(model.n_inputs, scramble=False).random(_ROWS + 1)[1:]
+    points = qmc.Halton(model.n_inputs, scramble=False).random(ROWS + 1)[1:]
     X = (low + width * points).astype(numbers.dtype)
     X = np.clip(X, numbers.low, numbers.high)
     Z = X.astype(float)
     own = numbers.slope_inputs
-    basis = np.ones((_ROWS, 1 + own.size))
+    basis = np.ones((ROWS, 1 + own.size))
     basis[:, 1:] = (Z[:, own] - numbers.reference[own]) * numbers.inverse_spread[own]
-    design = (model.strengths(Z)[:, :, None] * basis[:, None, :]).reshape(_ROWS, -1)
+    design = (model.strengths(Z)[:, :, None] * basis[:, None, :]).reshape(ROWS, -1)
     y = model.with_out_of_bounds("clip").predict(Z)
     sizes = np.maximum(np.ptp(y, axis=0), 1e-3 * np.abs(y).max(axis=0))
     sizes = np.where(sizes > 0.0, sizes, 1.0)
-    waves = np.cos(np.arange(1.0, _ROWS + 1)[:, None] * (1.0 + np.arange(y.shape[1])))
+    waves = np.cos(np.arange(1.0, ROWS + 1)[:, None] * (1.0 + np.arange(y.shape[1])))
     targets = (y + _SURPRISE * sizes * waves).astype(numbers.dtype)
     errors = targets.astype(float) - y
     learnt = y + design @ learner.follow(design, errors)
@@ -314,7 +313,7 @@ def learning_test(model, source):
     factor = " * $NAME_TEST_FACTOR" if source.dialect.real == "double" else ""
     return source.fill(
         _TEST.replace("$factor", factor),
-        n_test=_ROWS,
+        n_test=ROWS,
         x=literals(X),
         t=literals(targets),
         y=literals(learnt.astype(dtype)),

@@ -8,6 +8,7 @@ from ._text import literals
 
 __all__ = ["ROWS", "TOLERANCE", "known_answers", "self_test", "size_of_sum"]
 
+# Of a test: in the box, out of it and on its edges, in a table of a few kB.
 ROWS = 32
 # As part of the size of what is summed: what the algorithm loses, and no more.
 TOLERANCE = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}
