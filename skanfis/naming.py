@@ -4,8 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .antecedent import GridAntecedent
-
 __all__ = ["LINGUISTIC", "default_term_names", "given_term_names"]
 
 # Six as in the founding paper, negative large to positive large; seven with zero between them.
@@ -32,7 +30,7 @@ def default_term_names(antecedent):
     names = np.empty(inputs.size, dtype=object)
     for j in np.unique(inputs):
         own = np.flatnonzero(inputs == j)
-        if isinstance(antecedent, GridAntecedent):
+        if antecedent.grid_counts is not None:
             numbered = [f"level {k + 1}" for k in range(own.size)]
             names[own] = LINGUISTIC.get(own.size, numbered)
         else:

@@ -29,7 +29,7 @@ from itertools import product
 
 import numpy as np
 
-from .antecedent import Antecedent, ScatteredAntecedent
+from .antecedent import Antecedent
 from .membership import LEAST_TRUTH
 
 __all__ = ["Premise"]
@@ -253,7 +253,7 @@ class Premise:
         lower, upper = np.full(raw.size, -_LOG_FACTOR), np.full(raw.size, _LOG_FACTOR)
         unit, ordered = np.ones(raw.size), []
         terms = _terms(antecedent)
-        is_ordered = not isinstance(antecedent, ScatteredAntecedent)
+        is_ordered = antecedent.is_ordered
         for j in sorted({term.input for term in terms}):
             own = sorted((t for t in terms if t.input == j), key=lambda t: raw[t.location])
             locations = np.array([term.location for term in own])

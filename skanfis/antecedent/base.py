@@ -88,6 +88,51 @@ class Antecedent(ABC):
         """Indices of the terms of each rule, shape (n_rules, n_terms_per_rule)."""
 
     @property
+    def grid_counts(self) -> tuple[int, ...] | None:
+        """Terms of each input that has some, where rules are all combinations; else None."""
+        return None
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether rules share the terms of an input, which then can be kept in order."""
+        return True
+
+    def factor_terms(self) -> list[dict[int, np.ndarray]]:
+        """For each factor of the strengths, by input, the terms of each of its shares.
+
+        Arrays (n_shares, most terms of a share on the input) of positions; ``n_terms`` is none.
+        """
+        table, inputs = self.rule_terms, self.term_inputs
+        of = np.append(inputs, -1)[table]
+        used = np.unique(of[table >= 0])
+        found = {int(j): np.where((of == j) & (table >= 0), table, inputs.size) for j in used}
+        # Most rules have one term of an input: columns that hold none of it go.
+        return [{j: where[:, (where < inputs.size).any(axis=0)] for j, where in found.items()}]
+
+    def without_rules(self, rules) -> tuple["Antecedent", np.ndarray]:
+        """The rule base without some rules, and the terms that are left, by position.
+
+        Those that are left are listed one by one. Terms that no rule uses go too.
+        """
+        from .rule_table import RuleTableAntecedent  # which is built on this module
+
+        table = np.delete(self.rule_terms, rules, axis=0)
+        terms = np.unique(table[table >= 0])
+        place = np.full(self.n_terms + 1, -1)
+        place[terms] = np.arange(terms.size)
+        return RuleTableAntecedent(self._groups_with(terms), place[table]), terms
+
+    def _groups_with(self, terms):
+        """The groups with these terms alone."""
+        left, start = [], 0
+        for group in self.groups:
+            own = terms[(terms >= start) & (terms < start + group.n_terms)] - start
+            if own.size:
+                left.append(TermGroup(group.family, group.inputs[own], group.theta[:, own]))
+            start += group.n_terms
+        return tuple(left)
+
+    @property
     def parameters(self):
         """All theta as one vector, group after group, parameter after parameter."""
         return np.concatenate([group.theta.ravel() for group in self.groups] or [np.empty(0)])

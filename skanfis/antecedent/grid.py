@@ -1,6 +1,6 @@
 """Grid partition: a rule for every combination of terms."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import accumulate, groupby, pairwise
 from math import prod
@@ -60,6 +60,31 @@ class GridAntecedent(Antecedent):
     @property
     def share_counts(self):
         return self.counts
+
+    @property
+    def grid_counts(self):
+        return self.counts
+
+    def factor_terms(self):
+        edges = accumulate((0, *self.counts))
+        spans = [np.arange(*edge) for edge in pairwise(edges)]
+        inputs = self.term_inputs
+        return [{int(inputs[span[0]]): span[:, None]} for span in spans]
+
+    def without_rules(self, rules):
+        """As of every rule base; a grid stays a grid where whole terms go.
+
+        An input with one term left has no say any more.
+        """
+        table = np.delete(self.rule_terms, rules, axis=0)
+        if prod(np.unique(column).size for column in table.T) != table.shape[0]:
+            return super().without_rules(rules)
+        terms, inputs = np.unique(table), self.term_inputs
+        left, numbers = np.unique(inputs[terms], return_counts=True)
+        terms = terms[np.isin(inputs[terms], left[numbers > 1])]
+        own = inputs[terms].tolist()
+        counts = tuple(own.count(j) for j in dict.fromkeys(own))
+        return replace(self, groups=self._groups_with(terms), counts=counts), terms
 
     @property
     def share_inputs(self):

@@ -34,6 +34,10 @@ class ScatteredAntecedent(Antecedent):
         return (self.n_rules,)
 
     @property
+    def is_ordered(self):
+        return False
+
+    @property
     def rule_terms(self):
         return np.arange(self.n_terms).reshape(self.n_rules, self.n_premise_inputs)
 

@@ -22,12 +22,11 @@ linear programme, and t = sum_k nu_k(m) V_k, which is taken, is next to it. Of a
 averaged over one after the other.
 """
 
-import itertools
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..antecedent import Antecedent, GridAntecedent
+from ..antecedent import Antecedent
 from .terms import EPS, TermRanges, ranges
 
 __all__ = ["Factor", "Shares", "factors", "largest_mean", "smallest_mean", "term_ranges"]
@@ -71,18 +70,7 @@ class Shares:
 
 def factors(antecedent: Antecedent):
     """The factors of a rule base, in the order of its rules."""
-    inputs = antecedent.term_inputs
-    if isinstance(antecedent, GridAntecedent):
-        edges = np.cumsum([0, *antecedent.counts])
-        spans = [np.arange(i, j) for i, j in itertools.pairwise(edges)]
-        return [Factor({int(inputs[span[0]]): span[:, None]}) for span in spans]
-    table = antecedent.rule_terms
-    of = np.append(inputs, -1)[table]
-    used = np.unique(of[table >= 0])
-    found = {int(j): np.where((of == j) & (table >= 0), table, inputs.size) for j in used}
-    # Most rules have one term of an input: columns that hold none of it go.
-    terms = {j: places[:, (places < inputs.size).any(axis=0)] for j, places in found.items()}
-    return [Factor(terms)]
+    return [Factor(terms) for terms in antecedent.factor_terms()]
 
 
 def term_ranges(antecedent: Antecedent, low, high):

@@ -12,7 +12,7 @@ from math import fsum
 
 import numpy as np
 
-from ..antecedent import GridAntecedent, RuleTableAntecedent
+from ..antecedent import RuleTableAntecedent
 from ..membership import Membership
 from ._constants import CONSTANTS_OF
 
@@ -117,7 +117,6 @@ class Numbers:
                 (model.reference, "the mean"),
             ]
         )
-        is_grid = isinstance(antecedent, GridAntecedent)
         rule_terms = None
         if isinstance(antecedent, RuleTableAntecedent):
             rule_terms = np.where(antecedent.rule_terms < 0, model.antecedent.n_terms, 0)
@@ -132,7 +131,7 @@ class Numbers:
             inverse_spread=_rounded(1.0 / model.spread, dtype, "the inverse spread of an input"),
             terms=tuple(_term_tables(model, low, high)),
             term_inputs=antecedent.term_inputs,
-            counts=tuple(antecedent.counts) if is_grid else None,
+            counts=antecedent.grid_counts,
             rule_terms=rule_terms,
             terms_per_rule=antecedent.rule_terms.shape[1],
             offset=_rounded(offset, dtype, "a typical output"),

@@ -33,7 +33,6 @@ import numpy as np
 from sklearn.cluster import KMeans
 from sklearn.model_selection import GroupKFold
 
-from ..antecedent import GridAntecedent
 from ..cluster import FuzzyCMeans, SubtractiveClustering
 from ..data import StandardisedData
 from ..evidence import FREE
@@ -399,7 +398,7 @@ class StructureSearch:
 
     def _inherited(self, antecedent, premise):
         """Displacements at which a grid has its parent's terms, where it has as many of them."""
-        if self.parent is None or not isinstance(antecedent, GridAntecedent):
+        if self.parent is None or antecedent.grid_counts is None:
             return None
         before = self.parent.evaluation.antecedent
         theta = [group.theta.copy() for group in antecedent.groups]

@@ -21,7 +21,6 @@ from math import prod
 import numpy as np
 
 from .._validation import collected_warnings, warn_user
-from ..antecedent import GridAntecedent
 from ..constraints.wishes import Wishes
 from ..exceptions import InfeasibleConstraintsError
 from .result import Fitted
@@ -91,10 +90,9 @@ def _heard(fit, *args):
 def _counts(fitted):
     """Terms per input of a grid; None of other rules."""
     antecedent = fitted.model.antecedent
-    if not isinstance(antecedent, GridAntecedent):
+    if antecedent.grid_counts is None:
         return None
-    inputs = np.concatenate([group.inputs for group in antecedent.groups] or [np.empty(0, int)])
-    return np.maximum(np.bincount(inputs, minlength=fitted.model.n_inputs), 1)
+    return np.maximum(np.bincount(antecedent.term_inputs, minlength=fitted.model.n_inputs), 1)
 
 
 def _next(wishes, inputs, counts, found):

@@ -14,7 +14,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TermGroup
 from ..data import StandardisedData
 from ..model import TSKModel
 from ..support import RuleFiring, RuleSupport
@@ -24,7 +23,6 @@ __all__ = [
     "model_without_rules",
     "redundant_rules",
     "rule_statistics",
-    "without_rules",
 ]
 
 # A strength that is nowhere above this: what the rule says moves no prediction by more than a
@@ -66,44 +64,6 @@ def redundant_rules(statistics: RuleStatistics):
     return [{"rule": int(r), "reason": found[r], "weight": float(weight[r])} for r in sorted(found)]
 
 
-def without_rules(antecedent: Antecedent, rules: Sequence[int] | np.ndarray):
-    """The rule base without some rules, and the terms that are left, by position.
-
-    A grid stays a grid where whole terms go; else its rules are listed one by one. Terms that no
-    rule uses go too.
-    """
-    kept = np.setdiff1d(np.arange(antecedent.n_rules), rules)
-    table = antecedent.rule_terms[kept]
-    terms = np.unique(table[table >= 0])
-    if isinstance(antecedent, GridAntecedent):
-        counts = [np.unique(column).size for column in table.T]
-        if np.prod(counts) == kept.size:
-            return _grid_with(antecedent, terms)
-    place = np.full(antecedent.n_terms + 1, -1)
-    place[terms] = np.arange(terms.size)
-    return RuleTableAntecedent(_groups_with(antecedent.groups, terms), place[table]), terms
-
-
-def _groups_with(groups, terms):
-    """The groups with these terms alone."""
-    left, start = [], 0
-    for group in groups:
-        own = terms[(terms >= start) & (terms < start + group.n_terms)] - start
-        if own.size:
-            left.append(TermGroup(group.family, group.inputs[own], group.theta[:, own]))
-        start += group.n_terms
-    return tuple(left)
-
-
-def _grid_with(antecedent, terms):
-    """A grid of fewer terms, and which; an input with one term left has no say any more."""
-    inputs = antecedent.term_inputs
-    left, numbers = np.unique(inputs[terms], return_counts=True)
-    terms = terms[np.isin(inputs[terms], left[numbers > 1])]
-    counts = tuple(int(np.sum(inputs[terms] == j)) for j in dict.fromkeys(inputs[terms]))
-    return replace(antecedent, groups=_groups_with(antecedent.groups, terms), counts=counts), terms
-
-
 def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> TSKModel:
     """The model without some rules: those that are left fire as before, in proportion.
 
@@ -121,12 +81,12 @@ def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> T
     if numbers.size == model.n_rules:
         raise ValueError(f"rules names all {model.n_rules} rules: one at least must be left.")
     kept = np.setdiff1d(np.arange(model.n_rules), numbers)
-    antecedent, terms = without_rules(model.antecedent, numbers)
+    antecedent, terms = model.antecedent.without_rules(numbers)
     weights = model.rule_weights[kept]
     return replace(
         model,
         antecedent=antecedent,
-        initial_antecedent=without_rules(model.initial_antecedent, numbers)[0],
+        initial_antecedent=model.initial_antecedent.without_rules(numbers)[0],
         coefficients=model.coefficients[kept],
         rule_weights=weights / weights.sum(),
         rule_rows=model.rule_rows[kept],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from skanfis.membership import Bell, Gaussian
 
 from .. import oracles
@@ -229,3 +229,39 @@ def test_a_family_and_an_input_for_every_theta():
     for families, places in (([Gaussian], [0, 1]), ([Gaussian] * 2, [0])):
         with pytest.raises(ValueError, match="zip"):
             GridAntecedent.build(families, places, [theta] * 2)
+
+
+@pytest.mark.parametrize("kind", ["grid", "scattered", "table"])
+def test_the_rest_fires_as_before_in_proportion(kind, rng):
+    g, Z = np.random.default_rng(1), rng.normal(size=(3, 50))
+    antecedent = {
+        "grid": lambda: oracles.random_grid(g, [Gaussian, Bell, Gaussian], [2, 3, 2]),
+        "scattered": lambda: oracles.random_scattered(g, Gaussian, 5, [0, 1, 2]),
+        "table": lambda: oracles.random_table(g),
+    }[kind]()
+    left, terms = antecedent.without_rules([0, 3])
+    kept = np.setdiff1d(np.arange(antecedent.n_rules), [0, 3])
+    before = antecedent.strengths(Z)[kept]
+    assert isinstance(left, RuleTableAntecedent)
+    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
+    assert terms.size == left.n_terms
+
+
+def test_a_grid_without_a_whole_term_is_a_grid(rng):
+    antecedent = oracles.random_grid(np.random.default_rng(1), [Gaussian, Bell], [3, 2])
+    left, terms = antecedent.without_rules([2, 3])  # the middle term of the first input
+    assert isinstance(left, GridAntecedent)
+    assert left.counts == (2, 2)
+    assert_array_equal(terms, [0, 2, 3, 4])
+    Z = rng.normal(size=(2, 50))
+    before = antecedent.strengths(Z)[[0, 1, 4, 5]]
+    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-10)
+
+
+def test_an_input_left_with_one_term_has_none(rng):
+    antecedent = oracles.random_grid(np.random.default_rng(1), [Gaussian, Bell], [3, 2])
+    left, terms = antecedent.without_rules([1, 3, 5])
+    assert left.counts == (3,)
+    assert_array_equal(terms, [0, 1, 2])
+    Z = rng.normal(size=(2, 50))
+    assert_allclose(left.strengths(Z).sum(axis=0), 1.0)
