@@ -1,7 +1,9 @@
 """Configuration of Sphinx; every option that is not set has its default."""
 
 import os
+import re
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import skanfis
@@ -42,6 +44,27 @@ autosummary_filename_map = {
 }
 # The tables of methods come from the template of autosummary.
 numpydoc_show_class_members = False
+_LISTED = set(
+    re.findall(r"^   (\w+)$", (HERE / "api.rst").read_text(encoding="utf-8"), re.MULTILINE)
+)
+
+
+def stands_here(module, name, method):
+    """Whether a method is told of on a class's page: it is ours, and of no class with a page.
+
+    The docstrings of what comes from scikit-learn refer to pages that are not here.
+    """
+    if method == "__init__" or method.endswith("_request"):
+        return False
+    public = getattr(import_module(module), name)
+    owner = next((one for one in public.__mro__ if method in vars(one)), object)
+    is_ours = owner.__module__.partition(".")[0] == "skanfis"
+    return is_ours and (owner is public or owner.__name__ not in _LISTED)
+
+
+autosummary_context = {"stands_here": stands_here}
+# A function cannot be kept from one build to the next; every page is made anew.
+suppress_warnings = ["config.cache"]
 
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
