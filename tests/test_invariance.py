@@ -62,6 +62,7 @@ CASES = {
 GIVEN = {"agreement": 1e-3, "alpha": 1e-5, "solver": VariableProjection(stiffness=1e-3)}
 
 pytestmark = [
+    pytest.mark.theory,
     # Some of these fits are short of rows, or of iterations; both are asserted elsewhere.
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning"),
     pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning"),

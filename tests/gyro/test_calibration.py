@@ -14,6 +14,8 @@ from skanfis.gyro._sections.instead import formula_of
 from skanfis.gyro._split import Split
 from skanfis.gyro._summary import errors_and_verdict
 
+pytestmark = pytest.mark.theory
+
 N_RUNS, N_ROWS = 8, 60
 NOISE = 2e-4
 

@@ -65,6 +65,7 @@ def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
         assert_allclose(found, expected, rtol=0, atol=3e-7 * np.abs(expected).max())
 
 
+@pytest.mark.theory
 @FAMILIES
 def test_every_family_learns_a_smooth_surface(family, rng):
     def surface(X):
@@ -79,6 +80,7 @@ def test_every_family_learns_a_smooth_surface(family, rng):
     assert {term["function"] for term in model.memberships_} == {family.name}
 
 
+@pytest.mark.theory
 @FAMILIES
 def test_every_family_improves_on_its_start_on_jangs_sinc(family):
     X, y = make_jang_sinc()

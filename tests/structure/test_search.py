@@ -18,6 +18,8 @@ from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
 from skanfis.structure.candidate import Candidate
 
+pytestmark = pytest.mark.theory
+
 
 def inputs(rng, n_rows=400, n_inputs=3):
     return rng.uniform(-1.0, 1.0, (n_rows, n_inputs))

@@ -12,6 +12,8 @@ from skanfis import ANFISRegressor
 from skanfis.structure import search_terms, terms
 from skanfis.structure.candidate import Candidate
 
+pytestmark = pytest.mark.theory
+
 N_RUNS, N_LEVELS = 5, 10
 
 

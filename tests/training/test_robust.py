@@ -11,6 +11,8 @@ from skanfis.options import EarlyStopping, Huber
 from skanfis.solvers import VariableProjection
 from skanfis.training import fit, robust
 
+pytestmark = pytest.mark.theory
+
 
 def with_outliers(n_rows=600, part=0.05, seed=0):
     g = np.random.default_rng(seed)
