@@ -419,7 +419,7 @@ class OneWidth:
             paid = 2.0 * dense.cost(parameters) + penalty.stiffness * x**2
             return 0.5 * (n * paid / variance + determinants + np.log(self.antecedent.n_rules))
 
-        x = np.linspace(-2.0, 2.0, 401)
+        x = np.linspace(-1.0, 1.0, 201)
         values = np.array([minus_log(one) for one in x])
         height = values.min()
         integral = integrate.simpson(np.exp(height - values), x=x)

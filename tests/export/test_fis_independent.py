@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.export import read_fis, write_fis
 from skanfis.membership import MEMBERSHIPS
 from skanfis.solvers import VariableProjection
 
+from ..quick import quick
 from .rule_bases import EVERY_PAIR, MODELS, rows_of
 
 N_ROWS = 1000
@@ -128,7 +128,7 @@ def trained(mf):
     """A model of Jang's sinc, off centre, and rows within its box."""
     X, y = make_jang_sinc()
     model = (
-        ANFISRegressor(n_mfs=3, mf=mf, max_iter=5, solver=VariableProjection(tol=0.0))
+        quick(n_mfs=3, mf=mf, max_iter=5, solver=VariableProjection(tol=0.0, stiffness=1e-3))
         .fit(X + 3.0, y)
         .model_
     )

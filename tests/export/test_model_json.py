@@ -89,7 +89,7 @@ def test_names_of_all_kinds_come_back():
 
 def test_file_of_a_trained_model(tmp_path, rng):
     X = rng.normal(size=(100, 2)) * [1e-3, 1e5]
-    estimator = ANFISRegressor(n_mfs=2).fit(X, X[:, 0] * X[:, 1])
+    estimator = ANFISRegressor(n_mfs=2, agreement=0.1, alpha=1e-5).fit(X, X[:, 0] * X[:, 1])
     write_json(estimator, tmp_path / "model.json", posterior=True)
     read = read_json(tmp_path / "model.json")
     assert_same(read, estimator.model_)

@@ -44,7 +44,7 @@ ESTIMATORS = {
     "clusterer": ANFISRegressor(partition=KMeans(3, random_state=0)),
     "model": ANFISRegressor(partition=parse_fis(BY_HAND)),
     "pipeline": make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)),
-    "words as objects": ANFISRegressor(
+    "words as objects": quick(
         solver=Hybrid(),
         loss=Huber(),
         early_stopping=EarlyStopping(),

@@ -6,8 +6,7 @@ import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor
-from skanfis.solvers import VariableProjection
+from ..quick import quick
 
 
 @pytest.fixture(scope="session")
@@ -16,7 +15,5 @@ def fitted():
     g = np.random.default_rng(0)
     X = pd.DataFrame(g.uniform([250.0, -1e-3], [330.0, 1e-3], (150, 2)), columns=["kelvin", "rate"])
     y = 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
-    pipe = make_pipeline(
-        StandardScaler(), ANFISRegressor(n_mfs=[3, 2], solver=VariableProjection(tol=1e-2))
-    ).fit(X, y)
+    pipe = make_pipeline(StandardScaler(), quick(n_mfs=[3, 2])).fit(X, y)
     return pipe, X

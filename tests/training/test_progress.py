@@ -11,8 +11,9 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
-from skanfis.solvers import VariableProjection
 from skanfis.training import progress
+
+from ..quick import quick
 
 X, Y = make_jang_sinc()
 
@@ -84,8 +85,8 @@ class TestCallbacks:
         assert_array_equal(seen.metadata["sample_weight"], 2.0)
 
     def test_they_do_not_change_the_model(self):
-        plain = ANFISRegressor(n_mfs=3).fit(X, Y)
-        watched = ANFISRegressor(n_mfs=3).set_callbacks(Recorder()).fit(X, Y)
+        plain = quick(n_mfs=3).fit(X, Y)
+        watched = quick(n_mfs=3).set_callbacks(Recorder()).fit(X, Y)
         assert_array_equal(plain.predict(X), watched.predict(X))
 
     def test_they_are_torn_down_where_fit_fails(self):
@@ -101,7 +102,7 @@ class TestCallbacks:
 
         pytest.importorskip("rich")
         monitor = ScoringMonitor(scoring="neg_mean_squared_error")
-        inner = ANFISRegressor(solver=VariableProjection(tol=1e-2)).set_callbacks(monitor)
+        inner = quick().set_callbacks(monitor)
         search = GridSearchCV(
             make_pipeline(StandardScaler(), inner),
             {"anfisregressor__n_mfs": [2, 3]},
