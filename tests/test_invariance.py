@@ -53,8 +53,7 @@ KMEANS = KMeans(n_clusters=4, n_init=2, random_state=0)
 # Grids and clusters, lines and constants, with noise and without: each way that rounding could go.
 # More terms or other data of the same kind take longer and go the same way.
 CASES = {
-    "gyro, 8 rules": ("gyro", {"n_mfs": 2}),
-    "gyro, bells": ("gyro", {"n_mfs": [3, 2, 1], "mf": "bell"}),
+    "gyro, 4 rules": ("gyro", {"n_mfs": [2, 1, 2]}),
     "gyro, clusters": ("gyro", {"partition": KMEANS}),
     "sinc, constant rules": ("sinc", {"n_mfs": 3, "order": 0, "mf": "bell"}),
     "mackey-glass, clusters": ("mackey-glass", {"partition": KMEANS, "mf": "bell"}),
