@@ -6,6 +6,7 @@ steps, taken in double precision before anything is rounded.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -80,6 +81,28 @@ class DeviationTables:
         if len(one) > n:
             found -= np.einsum("qn,qn->n", one[n:], other[n:])
         return found
+
+    @cached_property
+    def _by_basis(self):
+        """Of ``joint`` what the design is multiplied with, one basis function after the other."""
+        n_outputs, n_halves, _ = self.joint.shape
+        n_basis = self.form.counts[-1]
+        consequents = self.joint[:, :, self.n_premises :]
+        by_rule = consequents.reshape(n_outputs, n_halves, -1, n_basis)
+        by_basis = by_rule.transpose(0, 3, 1, 2).reshape(n_outputs, n_basis * n_halves, -1)
+        return np.ascontiguousarray(by_basis)
+
+    def by_basis(self, k, row):
+        """What ``joint`` makes of strengths, for each basis function, (n_basis, n_halves, n_rows).
+
+        Summed with the basis, it is what ``joint`` makes of the design, which is not formed.
+        """
+        found = self._by_basis[k] @ row.strengths
+        return found.reshape(row.basis.shape[0], -1, found.shape[1])
+
+    def add_premises(self, k, changes, half):
+        """Add what ``joint`` makes of derivatives by the premises to a half, in place."""
+        half += self.joint[k][:, : self.n_premises] @ changes.astype(self.dtype, copy=False)
 
     @property
     def dtype(self):

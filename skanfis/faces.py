@@ -265,22 +265,19 @@ def products_on_line(posterior, model, tables, row, ways):
     found = (posterior.noise[:, None] / unit) ** 2 * squares[:, None]
     if not tables.joint.shape[1]:
         return found
-    n_premises, n_basis = tables.n_premises, row.basis.shape[0]
-    sides = np.empty((tables.joint.shape[2], row.basis.shape[1]), dtype)
-    narrow.design(sides[n_premises:])
-    change = (narrow.strengths[:, None] * turned[out]).reshape(-1, row.basis.shape[1])
-    columns = (n_basis * np.arange(model.n_rules)[:, None] + out).ravel()
-    for k, joint in enumerate(tables.joint):
-        if n_premises:
-            sides[:n_premises] = row.changes(k, unit)
-        halves = joint @ sides, joint[:, n_premises + columns] @ change
-        if n_premises and out.size:
+    for k in range(len(unit)):
+        by_basis = tables.by_basis(k, narrow)
+        half = np.einsum("bqn,bn->qn", by_basis, narrow.basis)
+        change = np.einsum("bqn,bn->qn", by_basis[out], turned[out])
+        if tables.n_premises:
+            tables.add_premises(k, row.changes(k, unit), half)
+        if tables.n_premises and out.size:
             slopes = model.coefficients[:, 1 + inputs[out - 1], k] * model.spread[inputs[out - 1]]
             by_rule = row.strengths * (slopes @ direction[out])
             by_term = model.antecedent.term_sensitivity(by_rule, by_rule.sum(axis=0), row.shares)
-            of_way = replace(row, by_term=[*[None] * k, by_term]).changes(k, unit)
-            halves[1][...] += joint[:, :n_premises] @ of_way.astype(dtype)
-        found[:, k] += signed_products(*halves, tables.n_added)
+            of_way = replace(row, by_term=[*[None] * k, by_term])
+            tables.add_premises(k, of_way.changes(k, unit), change)
+        found[:, k] += signed_products(half, change, tables.n_added)
     return found
 
 

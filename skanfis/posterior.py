@@ -243,20 +243,18 @@ class Posterior:
         return self._within(model, Z, self._tables(model, exact))
 
     def _within(self, model, Z, tables):
-        row = self._row(model, Z).astype(tables.dtype)
-        square = tables.form.values(row.shares, row.basis)
+        row = self._row(model, Z)
+        narrow = row.astype(tables.dtype)
+        square = tables.form.values(narrow.shares, narrow.basis)
         np.maximum(square, 0.0, out=square)
         square += 1.0
         unit = tables.unit
         found = (self.noise[:, None] / unit) ** 2 * square
         if tables.joint.shape[1]:
-            n_premises = tables.n_premises
-            sides = np.empty((tables.joint.shape[2], Z.shape[1]), tables.dtype)
-            row.design(sides[n_premises:])
-            for k, joint in enumerate(tables.joint):
-                if n_premises:
-                    sides[:n_premises] = row.changes(k, unit)
-                half = joint @ sides
+            for k in range(len(unit)):
+                half = np.einsum("bqn,bn->qn", tables.by_basis(k, narrow), narrow.basis)
+                if tables.n_premises:
+                    tables.add_premises(k, row.changes(k, unit), half)
                 found[k] += tables.signed(half, half)
         # Never below the noise, whatever rounding leaves of what is known.
         np.maximum(found, (self.noise[:, None] / unit) ** 2, out=found)

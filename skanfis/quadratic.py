@@ -81,13 +81,8 @@ class QuadraticForm:
 
     def values(self, shares, basis_rows):
         """Phi' A phi of every row, (n_rows,) or (n_forms, n_rows); shares (n_shares, n_rows)."""
-        groups = self._groups(shares, basis_rows)
-        left = _products(groups[: self.split], basis_rows)
-        right = _products(groups[self.split :], basis_rows)
-        # The smaller side is what the product leaves to be read again.
-        if len(left) > len(right):
-            return np.einsum("in,...in->...n", right, np.swapaxes(self.table, -1, -2) @ left)
-        return np.einsum("in,...in->...n", left, self.table @ right)
+        *groups, last = self._groups(shares, basis_rows)
+        return np.einsum("bn,...bn->...n", last, self._along(groups, basis_rows))
 
     def products(self, shares, basis_rows, others):
         """Phi' A phi, phi' A psi and psi' A psi of every row, (3, n_rows).
@@ -95,16 +90,25 @@ class QuadraticForm:
         Psi has the same shares and other basis functions; the basis is never along the rows.
         """
         *groups, _ = self._groups(shares, basis_rows)
-        along = self.table.T @ _products(groups[: self.split], basis_rows)
-        if self.split < len(groups):
-            middle = _products(groups[self.split :], basis_rows)
-            n_last = len(along) // len(middle)
-            along = np.einsum("mbn,mn->bn", along.reshape(len(middle), n_last, -1), middle)
+        along = self._along(groups, basis_rows)
         i, j = self.pairs[-1]
         own, other = (basis_rows[i], basis_rows[j]), (others[i], others[j])
         both = 0.5 * (own[0] * other[1] + own[1] * other[0])
         rights = own[0] * own[1], both, other[0] * other[1]
         return np.stack([np.einsum("bn,bn->n", right, along) for right in rights])
+
+    def _along(self, groups, like):
+        """The table summed with the groups of shares: of each pair of basis functions the factor.
+
+        First with those along its rows, then with the others: their products with the pairs of
+        basis functions need not be formed.
+        """
+        along = np.swapaxes(self.table, -1, -2) @ _products(groups[: self.split], like)
+        if self.split == len(groups):
+            return along
+        middle = _products(groups[self.split :], like)
+        along = along.reshape(*along.shape[:-2], len(middle), -1, like.shape[1])
+        return np.einsum("...mbn,mn->...bn", along, middle)
 
     def shortened(self, shares, basis_rows, tol):
         """The same up to ``tol`` for every factor, root mean square at given rows, in fewer pairs.
