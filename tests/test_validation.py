@@ -1,6 +1,7 @@
 """The checks alone, where the estimator's tests do not reach: blocks, overflow, switches."""
 
 import re
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -8,7 +9,12 @@ from numpy.testing import assert_array_equal
 from sklearn import config_context
 
 from skanfis import _validation
-from skanfis._validation import check_finite, positive_weights
+from skanfis._validation import (
+    check_finite,
+    collected_warnings,
+    positive_weights,
+    warn_user,
+)
 
 NAMES = ["a", "b"]
 
@@ -85,3 +91,25 @@ def test_first_negative_weight_is_named():
     message = re.escape("Negative values in sample_weight: -0.25 at row 1;")
     with pytest.raises(ValueError, match=message):
         positive_weights(np.array([1.0, -0.25, -7.0]), 3)
+
+
+def test_collected_are_the_warnings_of_one_thread_alone():
+    """While one thread collects, another warns as ever; what is raised ends the collecting."""
+    seen = []
+
+    def collects():
+        with pytest.raises(KeyError), collected_warnings() as told:
+            warn_user("mine", UserWarning)
+            with collected_warnings() as inner:
+                warn_user("of a trial", UserWarning)
+            other = Thread(target=warn_user, args=("another's", UserWarning))
+            with pytest.warns(UserWarning, match="another's"):
+                other.start()
+                other.join()
+            seen.extend([told, inner])
+            raise KeyError
+
+    collects()
+    assert seen == [[("mine", UserWarning)], [("of a trial", UserWarning)]]
+    with pytest.warns(UserWarning, match="at last"):
+        warn_user("at last", UserWarning)
