@@ -94,22 +94,28 @@ def test_first_negative_weight_is_named():
 
 
 def test_collected_are_the_warnings_of_one_thread_alone():
-    """While one thread collects, another warns as ever; what is raised ends the collecting."""
-    seen = []
+    """While one thread collects, another warns as ever; an error ends the collecting."""
+    told, inner = [], []
+
+    def another():
+        thread = Thread(target=warn_user, args=("another's", UserWarning))
+        thread.start()
+        thread.join()
 
     def collects():
-        with pytest.raises(KeyError), collected_warnings() as told:
+        with collected_warnings() as outermost:
             warn_user("mine", UserWarning)
-            with collected_warnings() as inner:
+            with collected_warnings() as of_trial:
                 warn_user("of a trial", UserWarning)
-            other = Thread(target=warn_user, args=("another's", UserWarning))
+            inner.extend(of_trial)
             with pytest.warns(UserWarning, match="another's"):
-                other.start()
-                other.join()
-            seen.extend([told, inner])
+                another()
+            told.extend(outermost)
             raise KeyError
 
-    collects()
-    assert seen == [[("mine", UserWarning)], [("of a trial", UserWarning)]]
+    with pytest.raises(KeyError):
+        collects()
+    assert told == [("mine", UserWarning)]
+    assert inner == [("of a trial", UserWarning)]
     with pytest.warns(UserWarning, match="at last"):
         warn_user("at last", UserWarning)
