@@ -8,6 +8,7 @@ import contextlib
 import io
 import json
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -77,11 +78,16 @@ def matplotlib_of_the_command():
 
 
 def backend_that_does_not_exist():
-    from skanfis.gyro.command import main
-
-    told = io.StringIO()
-    with contextlib.redirect_stderr(told):
-        status = main(["log.csv", "--output", "out"])
+    """By ``python -m skanfis.gyro``."""
+    told, argv = io.StringIO(), sys.argv
+    sys.argv = ["skanfis.gyro", "log.csv", "--output", "out"]
+    try:
+        with contextlib.redirect_stderr(told):
+            runpy.run_module("skanfis.gyro", run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        status = end.code
+    finally:
+        sys.argv = argv
     return {"status": status, "told": told.getvalue(), "made": os.listdir()}
 
 
