@@ -5,7 +5,7 @@ from itertools import islice
 
 import pytest
 
-from skanfis.gyro import _choice, _models, _simpler
+from skanfis.gyro import _choice, _models, _results, _simpler
 
 from ..quick import quick
 
@@ -15,6 +15,16 @@ def given_weights():
     """Rules whose weights are given: where it matters that they are fitted, and not how well."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_models, "ANFISRegressor", partial(quick, agreement=1e-8, alpha=1e-9))
+        yield
+
+
+@pytest.fixture(scope="module")
+def coarse_report():
+    """Pictures of few points, intervals of few resamples: both are looked at elsewhere."""
+    every = _results.gyro_report
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skanfis.gyro._html._DOTS_PER_INCH", 30)
+        patch.setattr(_results, "gyro_report", lambda *a, **o: every(*a, **{"n_resamples": 20} | o))
         yield
 
 

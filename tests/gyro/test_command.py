@@ -22,7 +22,7 @@ from skanfis.gyro.command import main
 
 from ..export.c_compiler import COMPILER, evaluate_all
 
-pytestmark = pytest.mark.usefixtures("given_weights")
+pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
 
 RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=table"]
 UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
@@ -57,14 +57,6 @@ def no_report(monkeypatch, few_rivals):
     )
 
 
-@pytest.fixture(autouse=True, scope="module")
-def coarse_pictures():
-    """What is drawn is looked at elsewhere."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skanfis.gyro._html._DOTS_PER_INCH", 30)
-        yield
-
-
 @pytest.fixture
 def no_pictures(monkeypatch):
     """A report of words and tables."""
@@ -72,7 +64,7 @@ def no_pictures(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory, log, given_weights):
+def calibrated(tmp_path_factory, log, given_weights, coarse_report):
     """A folder after one calibration from counts, milliseconds and kelvin."""
     folder = tmp_path_factory.mktemp("calibrated")
     raw = pd.DataFrame(

@@ -51,14 +51,7 @@ class Outline(HTMLParser):
         self.text.append(data)
 
 
-pytestmark = pytest.mark.usefixtures("given_weights", "law_of_degree_one")
-
-
-@pytest.fixture(autouse=True, scope="module")
-def coarse_pictures():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skanfis.gyro._html._DOTS_PER_INCH", 30)
-        yield
+pytestmark = pytest.mark.usefixtures("given_weights", "law_of_degree_one", "coarse_report")
 
 
 def calibration_of(log, inputs=("time", "temperature", "temperature_rate", "output"), **options):
@@ -92,7 +85,7 @@ def dossier(calibration):
 
 
 @pytest.fixture(scope="module")
-def page(calibration, dossier):
+def page(calibration, dossier, coarse_report):
     return report_page(calibration, TITLE, dossier)
 
 

@@ -14,7 +14,7 @@ from skanfis.training import fit, robust
 pytestmark = pytest.mark.theory
 
 
-def with_outliers(n_rows=600, part=0.05, seed=0):
+def with_outliers(n_rows=300, part=0.05, seed=0):
     g = np.random.default_rng(seed)
     X = g.uniform(-3, 3, (n_rows, 2))
     truth = np.sin(X[:, 0]) + 0.5 * X[:, 1]
