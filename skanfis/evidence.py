@@ -122,6 +122,12 @@ class Laplace:
         )
 
     @property
+    def n_effective(self):
+        """Effective number of all parameters: of consequents, what the penalty leaves free."""
+        held = sum(after for key, (_, _, after) in self.by_weight.items() if key != "stiffness")
+        return self.n_columns - held + self.n_effective_premises
+
+    @property
     def n_effective_premises(self):
         """Effective number of the displacements: of each, the part that the data decide on."""
         _, before, after = self.by_weight.get("stiffness", (0.0, 0.0, 0.0))

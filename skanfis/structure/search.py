@@ -46,7 +46,17 @@ from .held_out import held_out_loss
 from .idle import has_idle_term
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
-from .tuning import FIRST_PENALTY, FIRST_STEPS, HOLDING, MOST_ROWS, Tuned, scaled, settled, tune
+from .tuning import (
+    FIRST_PENALTY,
+    FIRST_STEPS,
+    HOLDING,
+    MOST_ROWS,
+    Tuned,
+    held_for_nothing,
+    scaled,
+    settled,
+    tune,
+)
 
 __all__ = ["SEARCHED", "StructureSearch"]
 
@@ -215,7 +225,7 @@ class StructureSearch:
         """Candidates by their expected error before the premises move, best first."""
         fits = [c for c in candidates if not self._is_too_many(c, self.sample.n_rows)]
         untrained = [self._train(c, self.sample, turns=0, first_steps=2) for c in fits]
-        order = np.argsort([tuned.expected_error for tuned in untrained], kind="stable")
+        order = np.argsort([self._expected(tuned) for tuned in untrained], kind="stable")
         return [fits[k] for k in order]
 
     @staticmethod
@@ -277,8 +287,8 @@ class StructureSearch:
             for candidate in candidates:
                 if candidate not in self.found:
                     self.begun[candidate] = self._train(candidate, self.sample, _FIRST_TURNS)
-            errors = [{**self.begun, **self.found}[c].expected_error for c in candidates]
-            least = min(*errors, self._tuned(before).expected_error)
+            errors = [self._expected({**self.begun, **self.found}[c]) for c in candidates]
+            least = min(*errors, self._expected(self._tuned(before)))
             for candidate, error in zip(candidates, errors, strict=True):
                 is_behind = error > _BEHIND * least > _NEARLY_EXACT
                 if is_behind and candidate in self.begun:
@@ -324,15 +334,26 @@ class StructureSearch:
         if has_idle_term(self.sample, tuned.evaluation.antecedent):
             return np.inf
         # What it would have cost is the least that rules which hold are worth.
-        error = (HOLDING if tuned.is_apart else 1.0) * tuned.expected_error
+        error = (HOLDING if tuned.is_apart else 1.0) * self._expected(tuned)
         # As the evidence, in units of twice the logarithm of a probability.
         with np.errstate(divide="ignore"):
             return self.n_sample * tuned.posterior.n_outputs * np.log(error)
 
+    def _expected(self, tuned):
+        """Mean squared error expected on new rows, of a training on all rows and not the sample.
+
+        What the parameters cost, k / n of the noise's variance, falls as the rows rise.
+        """
+        share = tuned.posterior.n_effective / self.n_sample
+        on_all = share * self.n_sample / max(effective_weight(self.rows), self.n_sample)
+        return tuned.expected_error * (1.0 + on_all) / (1.0 + share)
+
     def error(self, candidate):
         """RMS on the rows left out, or what is expected on new ones; of the standardised target."""
         return (
-            self._score(candidate) if self.folds else np.sqrt(self._tuned(candidate).expected_error)
+            self._score(candidate)
+            if self.folds
+            else np.sqrt(self._expected(self._tuned(candidate)))
         )
 
     def _tuned(self, candidate):
@@ -414,6 +435,9 @@ class StructureSearch:
 
     def _start(self, best):
         tuned = self._tuned(best)
+        low, high = self.sample.inputs.minimum, self.sample.inputs.maximum
+        premise = Premise.of(tuned.problem.antecedent, low, high)
+        tuned = held_for_nothing(tuned, premise, self.free, self.n_sample)
         n_rows = effective_weight(self.rows)
         penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows, tuned.is_held)
         return Start(
@@ -433,7 +457,7 @@ class StructureSearch:
             line: dict = {"structure": candidate.describe(), "n_mfs": counts}
             if candidate in self.found:
                 found = self.found[candidate]
-                line["expected_error"] = float(np.sqrt(found.expected_error))
+                line["expected_error"] = float(np.sqrt(self._expected(found)))
                 line["log_evidence"] = float(-0.5 * found.score)
                 for key in ("agreement", "alpha", "stiffness"):
                     line[key] = float(getattr(found.penalty, key))

@@ -467,6 +467,29 @@ def test_only_candidates_that_may_still_lead_are_trained_out(rng):
     assert alone.found[other].score == turned_once
 
 
+def test_without_terms_there_is_nothing_to_train_out(rng):
+    X = inputs(rng, 50, 2)
+    found, linear = search_of(X, X[:, 0] + 0.1 * rng.standard_normal(50)), Candidate((1, 1))
+    # So are scattered rules whose terms could not be told apart.
+    found.begun[linear] = begun = found._train(linear, found.sample, turns=1)
+    assert found._tuned(linear) is begun
+
+
+def test_what_parameters_cost_falls_as_the_rows_rise(rng):
+    # A plane through 4,000 rows of noise alone: the mean square on new rows is the noise's times
+    # 1 + k / n, and k is 3 for all but the pull on the slopes.
+    X = inputs(rng, 4000, 2)
+    y = X @ [3.0, 2.0] + rng.standard_normal(4000)
+    found, linear = search_of(X, y), Candidate((1, 1))
+    tuned, n = found._tuned(linear), found.n_sample
+    assert n < 1100.0
+    assert_allclose(tuned.posterior.n_effective, 3.0, atol=0.05)
+    noise = tuned.evaluation.mean_squared_error / (1.0 - 3.0 / n)
+    assert_allclose(tuned.expected_error, noise * (1.0 + 3.0 / n), rtol=1e-3)
+    on_all = tuned.expected_error * (1.0 + 3.0 / 4000.0) / (1.0 + 3.0 / n)
+    assert_allclose(found.error(linear) ** 2, on_all, rtol=1e-4)
+
+
 def test_next_to_exact_data_all_candidates_are_trained_out(rng):
     X = inputs(rng, 300, 2)
     y = X[:, 1] + 0.03 * np.sin(3.0 * X[:, 0])

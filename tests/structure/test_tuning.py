@@ -8,6 +8,7 @@ from skanfis.data import StandardisedData
 from skanfis.evidence import FREE, PRIOR_DISPLACEMENT
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 from skanfis.structure import Spacing, grid_antecedent, tuning
 
@@ -98,6 +99,33 @@ def test_agreement_rises_until_the_strongest_rule_holds_or_the_price_is_too_high
         # What is given is not changed.
         fixed = tuning.tune(*two_rules, FREE[1:], 100.0)
         assert fixed.penalty.agreement == tuning.FIRST_PENALTY.agreement
+
+
+def test_agreement_that_costs_next_to_nothing_is_had(monkeypatch, two_rules):
+    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
+    apart = tuning.tune(*two_rules, FREE, 100.0)
+    alone = apart.problem.strongest_alone(apart.evaluation)
+    for wanted, price in ((0.9, 1.1), (0.5, 5.0)):
+        monkeypatch.setattr(tuning, "_HOLDS_WELL", wanted * alone)
+        monkeypatch.setattr(tuning, "_NEXT_TO_NOTHING", price)
+        held = tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0)
+        assert held.is_held
+        assert held.expected_error <= price * apart.expected_error
+        assert held.problem.strongest_alone(held.evaluation) <= wanted * alone
+    # The first step of it takes 5 % of the error, and no more than 2 % is next to nothing.
+    monkeypatch.undo()
+    monkeypatch.setattr(tuning, "_HOLDS_WELL", 0.9 * alone)
+    assert tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0) is apart
+    # Nor is anything had where agreement was given.
+    assert tuning.held_for_nothing(apart, two_rules[1], FREE[1:], 100.0) is apart
+
+
+def test_agreement_that_holds_rules_does_not_fall_as_rows_rise():
+    penalty = Penalty(agreement=1e-2, alpha=1e-3, slope=1e-4, stiffness=1e-5)
+    for is_held, agreement in ((False, 1e-3), (True, 1e-2)):
+        expected = Penalty(agreement=agreement, alpha=1e-4, slope=1e-4, stiffness=1e-6)
+        free = ("agreement", "alpha", "stiffness")
+        assert tuning.scaled(penalty, free, 0.1, is_held) == expected
 
 
 def test_turns_go_on_from_where_they_were_left(two_rules):
