@@ -31,7 +31,7 @@ from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import MAX_EXTRAPOLATION
-from skanfis.solvers import VariableProjection
+from skanfis.solvers import Hybrid, VariableProjection
 
 from . import oracles
 
@@ -562,7 +562,7 @@ def test_nothing_depends_on_chance_or_changes_the_global_seed(settings):
     # Every solver takes the same passes over the rows: one that asks for all of them, and Jang's.
     [
         {"partition": KMEANS, "mf": "bell", "solver": VariableProjection(stiffness=1e-3)},
-        {"n_mfs": 2, "solver": "hybrid"},
+        {"n_mfs": 2, "solver": Hybrid(stiffness=1e-3)},
     ],
     ids=["clusters", "hybrid"],
 )
@@ -577,12 +577,14 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
         return read(self, part)
 
     monkeypatch.setattr(StandardisedData, "read", read_and_remember)
-    weight = np.random.default_rng(0).uniform(0.5, 2.0, len(X))
+    # Eight blocks in three chunks.
+    data, target = X[:128], Y[:128]
+    weight = np.random.default_rng(0).uniform(0.5, 2.0, len(data))
     models = {}
     for n_jobs in (None, 2):
         threads.clear()
         model = ANFISRegressor(n_jobs=n_jobs, agreement=0.1, alpha=0.01, max_iter=3, **settings)
-        models[n_jobs] = model.fit(X, Y, weight)
+        models[n_jobs] = model.fit(data, target, weight)
         # Else this test compares nothing.
         assert (len(threads) > 1) == (n_jobs == 2)
     same_bits(models[2], models[None])
