@@ -120,8 +120,9 @@ def test_planted_model_is_found_under_noise():
     train, check = rng.uniform(-2, 2, (2000, 2)), rng.uniform(-1.9, 1.9, (1000, 2))
     model = ANFISRegressor(n_mfs=2).fit(train, planted(train) + 0.1 * rng.normal(size=2000))
     error = np.sqrt(np.mean((model.predict(check) - planted(check)) ** 2))
-    # 12 + 6 free parameters: the noise leaves 0.1 (18 / 2000)^(1/2) = 0.0095 on average.
-    assert error < 0.014
+    # 12 + 6 free parameters: the noise leaves 0.1 (18 / 2000)^(1/2) = 0.0095 on average, and rules
+    # that agree more than those that were planted cost about as much again.
+    assert error < 0.019
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

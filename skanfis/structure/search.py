@@ -437,8 +437,8 @@ class StructureSearch:
         tuned = self._tuned(best)
         low, high = self.sample.inputs.minimum, self.sample.inputs.maximum
         premise = Premise.of(tuned.problem.antecedent, low, high)
-        tuned = held_for_nothing(tuned, premise, self.free, self.n_sample)
         n_rows = effective_weight(self.rows)
+        tuned = held_for_nothing(tuned, premise, self.free, self.n_sample, n_rows)
         penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows, tuned.is_held)
         return Start(
             tuned.problem.antecedent,

@@ -105,19 +105,23 @@ def test_agreement_that_costs_next_to_nothing_is_had(monkeypatch, two_rules):
     monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
     apart = tuning.tune(*two_rules, FREE, 100.0)
     alone = apart.problem.strongest_alone(apart.evaluation)
-    for wanted, price in ((0.9, 1.1), (0.5, 5.0)):
+    # Half of six parameters over 30 rows, and over two.
+    for wanted, n_all, price in ((0.9, 30.0, 0.1), (0.5, 2.0, 2.0)):
         monkeypatch.setattr(tuning, "_HOLDS_WELL", wanted * alone)
-        monkeypatch.setattr(tuning, "_NEXT_TO_NOTHING", price)
-        held = tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0)
+        monkeypatch.setattr(tuning, "_NEXT_TO_NOTHING", np.inf)
+        held = tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0, n_all)
         assert held.is_held
-        assert held.expected_error <= price * apart.expected_error
+        assert held.expected_error <= (1.0 + price) * apart.expected_error
         assert held.problem.strongest_alone(held.evaluation) <= wanted * alone
-    # The first step of it takes 5 % of the error, and no more than 2 % is next to nothing.
+    # The first step of it takes 5 % of the error: more than half of the parameters over 100 rows,
+    # and however few there are, no more than 2 % is next to nothing.
+    monkeypatch.setattr(tuning, "_HOLDS_WELL", 0.9 * alone)
+    assert tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0, 100.0) is apart
     monkeypatch.undo()
     monkeypatch.setattr(tuning, "_HOLDS_WELL", 0.9 * alone)
-    assert tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0) is apart
+    assert tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0, 2.0) is apart
     # Nor is anything had where agreement was given.
-    assert tuning.held_for_nothing(apart, two_rules[1], FREE[1:], 100.0) is apart
+    assert tuning.held_for_nothing(apart, two_rules[1], FREE[1:], 100.0, 2.0) is apart
 
 
 def test_agreement_that_holds_rules_does_not_fall_as_rows_rise():
