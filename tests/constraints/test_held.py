@@ -46,7 +46,7 @@ def test_rows_left_out_under_what_is_held(points, rng, monkeypatch):
             right = [local.T @ (left * targets[:, k]) / total, held @ solved.local[:, k]]
             # Karush, Kuhn and Tucker; of rows that say the same, the least multipliers.
             whole = np.block([[matrix, held.T], [held, corner]])
-            u = np.linalg.lstsq(whole, np.concatenate(right))[0][: len(matrix)]
+            u = np.linalg.lstsq(whole, np.concatenate(right), rcond=None)[0][: len(matrix)]
             expected += weight[i] / total * (targets[i, k] - local[i] @ u) ** 2
     found = problem.leave_one_out_error(ended, total, solved.held(normal.factor))
     assert_allclose(found, expected, rtol=1e-7)
