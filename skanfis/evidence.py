@@ -162,16 +162,9 @@ def laplace(
         matrix += weights[key] * part
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
-    factor = NormalFactor(normal.gram + matrix)
-    matrix.flat[:: matrix.shape[0] + 1] += factor.shift
-    # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 those of the evaluation.
-    slope = normal.penalty @ normal.coefficients
-    change = factor.solve(slope - matrix @ normal.coefficients)
-    solved = normal.coefficients + change
-    error = (
-        mean_squared_error - 2.0 * np.sum(change * slope) + np.sum(change * (normal.gram @ change))
-    )
-    error = max(error, 0.0)
+    # ``matrix`` takes on the factor's shift.
+    own, _, error = normal.with_penalty(matrix, mean_squared_error)
+    factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
     by_weight = {

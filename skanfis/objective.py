@@ -92,6 +92,21 @@ class NormalEquations:
     factor: NormalFactor  # of Phi' S Phi / W + P
     coefficients: np.ndarray  # local, (n_columns, n_outputs)
 
+    def with_penalty(self, penalty, error):
+        """The same with another penalty, which takes on the factor's shift; no pass over the rows.
+
+        And the change of the coefficients, and the mean squared error, which is ``error`` here.
+        """
+        factor = NormalFactor(self.gram + penalty)
+        penalty.flat[:: penalty.shape[0] + 1] += factor.shift
+        # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 and u_0 those of here.
+        slope = self.penalty @ self.coefficients
+        change = factor.solve(slope - penalty @ self.coefficients)
+        error = error - 2.0 * np.sum(change * slope) + np.sum(change * (self.gram @ change))
+        solved = self.coefficients + change
+        normal = replace(self, penalty=penalty, factor=factor, coefficients=solved)
+        return normal, change, max(float(error), 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
@@ -264,23 +279,17 @@ class SeparableProblem:
 
     def solved_again(self, evaluation):
         """An evaluation of the same rows under this penalty; no pass over them."""
-        normal = evaluation.normal
-        penalty = self.penalty_matrix(normal.disagreement)
-        factor = NormalFactor(normal.gram + penalty)
-        penalty.flat[:: self.n_columns + 1] += factor.shift
-        # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 those of the evaluation.
-        slope = normal.penalty @ normal.coefficients
-        change = factor.solve(slope - penalty @ normal.coefficients)
-        solved = normal.coefficients + change
-        error = evaluation.mean_squared_error
-        error += np.sum(change * (normal.gram @ change - 2.0 * slope))
-        error = max(float(error), 0.0)
+        before = evaluation.normal
+        normal, change, error = before.with_penalty(
+            self.penalty_matrix(before.disagreement), evaluation.mean_squared_error
+        )
+        paid = float(np.sum(normal.coefficients * (normal.penalty @ normal.coefficients)))
         return replace(
             evaluation,
-            cost=0.5 * (error + float(np.sum(solved * (penalty @ solved)))),
+            cost=0.5 * (error + paid),
             coefficients=evaluation.coefficients + self.local.to_global(change),
             mean_squared_error=error,
-            normal=replace(normal, penalty=penalty, factor=factor, coefficients=solved),
+            normal=normal,
         )
 
     def linearise(self, evaluation):
