@@ -28,11 +28,11 @@ def reduce_blocks(blocks: Blocks, of_loaded: Callable, merge: Callable):
 
     # One key for all tasks: what they have in common is sent to a worker once.
     common = delayed((blocks.without_pieces(), of_loaded, merge), traverse=False)
-    apply, add = delayed(_apply, pure=False), delayed(_merge_all, pure=False)
+    apply, add = delayed(_apply, pure=False), delayed(reduce, pure=False)
     level = [apply(common, number, *parts) for number, parts in enumerate(blocks.pieces)]
     while len(level) > 1:
         groups = [level[start : start + _FAN_IN] for start in range(0, len(level), _FAN_IN)]
-        level = [add(group, merge) for group in groups]
+        level = [add(merge, group) for group in groups]
     return _computed(level[0])
 
 
@@ -44,10 +44,6 @@ def _apply(common, number, *parts):
             return reduce(merge, map(of_loaded, loaded))
     except ValueError as error:
         raise ValueError(f"Partition {number}: {error}") from error
-
-
-def _merge_all(results, merge):
-    return reduce(merge, results)
 
 
 def _computed(lazy):

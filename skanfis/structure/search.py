@@ -151,6 +151,7 @@ class StructureSearch:
         self.sample = search_sample(rows, MOST_ROWS)
         self.spacing = Spacing(self.sample)
         self.n_sample = effective_weight(self.sample)
+        self.n_all = effective_weight(rows)
         self.parent: Tuned | None = None  # of the grids that are tried
         self.found: dict[Candidate, Tuned] = {}
         self.begun: dict[Candidate, Tuned] = {}
@@ -344,9 +345,9 @@ class StructureSearch:
 
         What the parameters cost, k / n of the noise's variance, falls as the rows rise.
         """
-        share = tuned.posterior.n_effective / self.n_sample
-        on_all = share * self.n_sample / max(effective_weight(self.rows), self.n_sample)
-        return tuned.expected_error * (1.0 + on_all) / (1.0 + share)
+        n_effective = tuned.posterior.n_effective
+        on_sample, on_all = n_effective / self.n_sample, n_effective / self.n_all
+        return tuned.expected_error * (1.0 + on_all) / (1.0 + on_sample)
 
     def error(self, candidate):
         """RMS on the rows left out, or what is expected on new ones; of the standardised target."""
@@ -437,9 +438,8 @@ class StructureSearch:
         tuned = self._tuned(best)
         low, high = self.sample.inputs.minimum, self.sample.inputs.maximum
         premise = Premise.of(tuned.problem.antecedent, low, high)
-        n_rows = effective_weight(self.rows)
-        tuned = held_for_nothing(tuned, premise, self.free, self.n_sample, n_rows)
-        penalty = scaled(tuned.penalty, self.free, self.n_sample / n_rows, tuned.is_held)
+        tuned = held_for_nothing(tuned, premise, self.free, self.n_sample, self.n_all)
+        penalty = scaled(tuned.penalty, self.free, self.n_sample / self.n_all, tuned.is_held)
         return Start(
             tuned.problem.antecedent,
             penalty,
