@@ -147,6 +147,9 @@ def _distance(one, other):
 
 
 def _crossing(family, distance):
-    """Where two terms at this distance cross: as many of its own widths away from either."""
+    """Where two terms at this distance cross: as many of its own widths away from either.
+
+    Of terms that rise or fall for good, how true the one is there that is the less true.
+    """
     theta = family.from_center_and_width(np.zeros(1), np.ones(1))
     return min(family.value(np.array([[side]]), theta)[0, 0] for side in (-distance, distance))

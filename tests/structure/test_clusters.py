@@ -11,7 +11,7 @@ from skanfis.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.solvers import VariableProjection
 from skanfis.structure import SampleSize, clustered_antecedent, representative_rows
-from skanfis.structure.clusters import _HIGHEST_CROSSING
+from skanfis.structure.clusters import _HIGHEST_CROSSING, _crossing, _distance
 from skanfis.structure.sample import effective_weight, search_sample
 
 from .. import oracles
@@ -423,3 +423,18 @@ class TestSampleSize:
         sample = search_sample(rows, 60)
         assert sample.n_rows == 60
         assert_array_equal(np.hstack([sample.X, sample.y]), rows.table(sample.groups))
+
+
+# The others rise or fall for good.
+TWO_SIDED = [family for name, family in MEMBERSHIPS.items() if name not in ("s_shaped", "z_shaped")]
+
+
+@pytest.mark.parametrize("family", TWO_SIDED, ids=lambda family: family.name)
+def test_two_terms_cross_where_both_are_truest(family):
+    # By looking everywhere between them; of widths that differ, too.
+    for distance, width in ((0.5, 1.0), (1.5, 0.4), (0.1, 3.0), (4.0, 1.0)):
+        theta = family.from_center_and_width(np.array([0.0, distance]), np.array([1.0, width]))
+        between = np.linspace(0.0, distance, 20_001)[:, None]
+        truths = [family.value(between, theta[:, [side]]) for side in (0, 1)]
+        apart = _distance((0.0, 1.0), (distance, width**2))
+        assert_allclose(_crossing(family, apart), np.minimum(*truths).max(), atol=1e-3)
