@@ -38,7 +38,16 @@ from .consequent import NormalFactor
 from .objective import NormalEquations
 from .penalty import CommonLine, Penalty
 
-__all__ = ["FREE", "PRIOR_DISPLACEMENT", "Laplace", "laplace", "least_weights", "reestimated"]
+__all__ = [
+    "FREE",
+    "PRIOR_DISPLACEMENT",
+    "Laplace",
+    "extrapolated",
+    "is_settled",
+    "laplace",
+    "least_weights",
+    "reestimated",
+]
 
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
@@ -55,6 +64,10 @@ _UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LARGEST_STEP = 100.0
+# Successive steps of a weight are alike from this ratio on; next to one, all the way is open.
+_ALIKE, _MOST_ALIKE = 0.5, 0.99
+# What changes a weight by less leaves its second digit as it is.
+_SETTLED = 5e-3
 # The target of a fit that is exact to rounding has no more digits than this, squared.
 _LEAST_ERROR = 1e-22
 
@@ -136,6 +149,10 @@ class Laplace:
 
 def _weighted(penalty):
     return {"agreement": penalty.agreement, "alpha": penalty.alpha, "slope": penalty.rho}
+
+
+def _all_weights(penalty):
+    return {**_weighted(penalty), "stiffness": penalty.stiffness}
 
 
 def laplace(
@@ -223,7 +240,7 @@ def least_weights(posterior: Laplace, n_rules, n_distinct):
 
 def reestimated(posterior: Laplace, free, least=None):
     """The penalty after one step of every free weight, none below ``least``."""
-    weights = {**_weighted(posterior.penalty), "stiffness": posterior.penalty.stiffness}
+    weights = _all_weights(posterior.penalty)
     for key, (paid, before, after) in posterior.by_weight.items():
         if key not in free or before <= 0.0:
             continue
@@ -238,3 +255,33 @@ def reestimated(posterior: Laplace, free, least=None):
         smallest = max(_SMALLEST[key], 0.0 if least is None else least.get(key, 0.0))
         weights[key] = min(max(weights[key] * ratio, smallest), _LARGEST[key])
     return replace(posterior.penalty, **weights)
+
+
+def extrapolated(before, now, after, free, least):
+    """Where steps that follow one another lead: ``after``, and beyond it where they are alike.
+
+    Where data hardly decide on a weight, as with more columns than rows, every step is a small part
+    of the way. By Aitken's rule, the logarithms being a geometric sequence, the rest of the way is
+    1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step.
+    ``before`` is None where there is no such step.
+    """
+    if before is None:
+        return after
+    weights = [_all_weights(penalty) for penalty in (before, now, after)]
+    found = {}
+    for key in free:
+        first, second, third = (np.log(max(w[key], _SMALLEST[key])) for w in weights)
+        step, last = third - second, second - first
+        if step * last <= 0.0 or step / last < _ALIKE:
+            continue
+        ratio = min(step / last, _MOST_ALIKE)
+        jump = np.clip(step / (1.0 - ratio), -np.log(_LARGEST_STEP), np.log(_LARGEST_STEP))
+        smallest = max(_SMALLEST[key], least.get(key, 0.0))
+        found[key] = min(max(float(np.exp(second + jump)), smallest), _LARGEST[key])
+    return replace(after, **found)
+
+
+def is_settled(penalty, after):
+    """Whether no weight changes in its second digit."""
+    now, then = _all_weights(penalty), _all_weights(after)
+    return all(abs(then[key] - now[key]) <= _SETTLED * now[key] for key in FREE)

@@ -11,7 +11,7 @@ from scipy import integrate, optimize, special, stats
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.data import StandardisedData
-from skanfis.evidence import PRIOR_DISPLACEMENT, laplace, reestimated
+from skanfis.evidence import PRIOR_DISPLACEMENT, extrapolated, is_settled, laplace, reestimated
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
@@ -364,6 +364,40 @@ class TestReestimated:
 
 
 STEPS = np.array([-0.01, 0.0, 0.01])
+
+
+class TestExtrapolated:
+    """Logarithms of a weight that come nearer to their limit by the same factor every step."""
+
+    @staticmethod
+    def steps(ratio, first=1e-3, limit=2.0):
+        """Three penalties on the way to a limit, of the agreement."""
+        logs = np.log(limit) + np.log(first / limit) * ratio ** np.arange(3)
+        return [Penalty(agreement=float(np.exp(one)), alpha=1.0, slope=1.0) for one in logs]
+
+    @pytest.mark.parametrize("ratio", [0.55, 0.7])
+    def test_a_geometric_sequence_is_taken_to_its_limit(self, ratio):
+        found = extrapolated(*self.steps(ratio, limit=0.05), ("agreement", "alpha"), {})
+        assert_allclose(found.agreement, 0.05, rtol=1e-12)
+        assert found.alpha == 1.0
+
+    @pytest.mark.parametrize("ratio", [0.45, -0.9])
+    def test_steps_that_are_not_alike_are_left(self, ratio):
+        before, now, after = self.steps(ratio)
+        assert extrapolated(before, now, after, ("agreement",), {}) == after
+        assert extrapolated(None, now, after, ("agreement",), {}) == after
+
+    def test_a_long_way_is_a_hundredfold_and_within_limits(self):
+        before, now, after = (Penalty(agreement=a, alpha=1.0) for a in (1e-4, 2e-4, 4e-4))
+        assert_allclose(extrapolated(before, now, after, ("agreement",), {}).agreement, 2e-2)
+        downward = extrapolated(after, now, before, ("agreement",), {"agreement": 1e-5})
+        assert downward.agreement == 1e-5
+        assert extrapolated(before, now, after, (), {}) == after
+
+    def test_settled_is_what_changes_by_less_than_half_a_hundredth(self):
+        penalty = Penalty(agreement=1.0, alpha=2.0, slope=3.0, stiffness=4.0)
+        assert is_settled(penalty, replace(penalty, stiffness=4.0 * 1.004))
+        assert not is_settled(penalty, replace(penalty, slope=3.0 * 0.994))
 
 
 class OneWidth:

@@ -16,7 +16,7 @@ from ..objective import SeparableProblem
 from ..penalty import Penalty
 from ..posterior import Posterior
 from ..premise import Premise
-from ..structure.tuning import FIRST_PENALTY, scaled, tune
+from ..structure.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
 from ..training import RuleStatistics, redundant_rules
 from .farthest import Farthest
 from .firing import Distinct, RuleFiring, row_keys
@@ -192,7 +192,15 @@ class Stream:
             held = Premise(antecedent, none, none, none, ())
             # It is one in all that matters at premises that stay.
             like_rows = cast("SeparableProblem", problem)
-            tuned = tune(like_rows, held, free, rows, turns=0, is_free=self.is_free)
+            tuned = tune(
+                like_rows,
+                held,
+                free,
+                rows,
+                turns=0,
+                first_steps=ARRIVING,
+                has_least=not self.is_free,
+            )
             penalty = scaled(tuned.penalty, free, 1.0)
         problem = problem.with_penalty(penalty)
         return problem, problem.evaluate(), penalty

@@ -2,8 +2,8 @@
 
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
-from .idle import has_idle_term
 from .imported import check_inputs, imported_antecedent
+from .readable_terms import has_idle_term
 from .request import StructureRequest, report_constant
 from .sample import SampleSize, effective_weight, representative_rows
 from .size import GridSize, term_counts

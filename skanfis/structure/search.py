@@ -43,7 +43,7 @@ from .candidate import Candidate
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .held_out import held_out_loss
-from .idle import has_idle_term
+from .readable_terms import has_idle_term
 from .sample import effective_weight, search_sample, unit_scale
 from .start import Start
 from .tuning import (
@@ -51,6 +51,7 @@ from .tuning import (
     FIRST_STEPS,
     HOLDING,
     MOST_ROWS,
+    ROWS_EACH,
     Tuned,
     held_for_nothing,
     scaled,
@@ -192,7 +193,7 @@ class StructureSearch:
                 return best
             inputs = [grown[candidate] for candidate in small[:_MOST_GROWING]]
             grown_best = self._leading(small[: self._n_trained(small[0])], best)
-            if not self._is_better(grown_best, best):
+            if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best
             best = grown_best
             self.first = replace(self.first, slope=self._tuned(best).penalty.slope)
@@ -273,11 +274,27 @@ class StructureSearch:
     def _better(self, smaller, larger):
         return larger if self._is_better(larger, smaller) else smaller
 
-    def _is_better(self, candidate, than):
+    def _is_better(self, candidate, than, of=1):
+        """Whether a larger candidate, the best of so many, gains more than luck gives."""
         if not self.folds:
-            return self._score(candidate) < self._score(than) - _DECISIVE
+            return self._gain(candidate, than, of) > _DECISIVE
         worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(self.n_sample))
         return self._score(candidate) < (1.0 - worthwhile) * self._score(than)
+
+    def _gain(self, candidate, than, of):
+        """By how much n log of the expected error falls.
+
+        Where there are hardly more rows than consequents, what one row's leaving out says is said
+        by few others: then that and the evidence, two readings of the same, count for half each,
+        and the best of so many has to make good for having been chosen.
+        """
+        gain = self._score(than) - self._score(candidate)
+        if not np.isfinite(gain):
+            return gain
+        tuned, before = self._tuned(candidate), self._tuned(than)
+        if self.sample.n_rows >= ROWS_EACH * tuned.problem.n_columns:
+            return gain
+        return 0.5 * (gain + before.score - tuned.score) - 2.0 * np.log(of)
 
     def _leading(self, candidates, before):
         """The best of some candidates, of which only those are trained out that may still lead.
@@ -436,8 +453,7 @@ class StructureSearch:
 
     def _start(self, best):
         tuned = self._tuned(best)
-        low, high = self.sample.inputs.minimum, self.sample.inputs.maximum
-        premise = Premise.of(tuned.problem.antecedent, low, high)
+        premise = Premise.of(tuned.problem.antecedent, *self.sample.inputs.box)
         tuned = held_for_nothing(tuned, premise, self.free, self.n_sample, self.n_all)
         penalty = scaled(tuned.penalty, self.free, self.n_sample / self.n_all, tuned.is_held)
         return Start(

@@ -20,19 +20,31 @@ import numpy as np
 
 from ..antecedent import Antecedent
 from ..data import StandardisedData
-from ..evidence import FREE, PRIOR_DISPLACEMENT, Laplace, laplace, least_weights, reestimated
+from ..evidence import (
+    FREE,
+    PRIOR_DISPLACEMENT,
+    Laplace,
+    extrapolated,
+    is_settled,
+    laplace,
+    least_weights,
+    reestimated,
+)
 from ..objective import Evaluation, SeparableProblem
 from ..penalty import GREATEST_ALONE, Penalty
 from ..premise import Premise
 from ..solvers.varpro import varpro
+from .readable_terms import has_idle_term, has_twin_terms
 from .sample import effective_weight, search_sample
 from .start import Start
 
 __all__ = [
+    "ARRIVING",
     "FIRST_PENALTY",
     "FIRST_STEPS",
     "HOLDING",
     "MOST_ROWS",
+    "ROWS_EACH",
     "WORTHWHILE",
     "Tuned",
     "held_for_nothing",
@@ -56,16 +68,20 @@ _LOOSE_ITERATIONS = 25
 # Of the noise's variance, what a loose training must bring it down to: rules that compensate one
 # another are the price, and not to be paid for less.
 _LESS_NOISE = 0.5
-# The same where terms are freed too, beyond all reading: only for data that are next to exact.
+# The same where terms are freed beyond all reading: only for data that are next to exact. And of
+# the error, where they are freed, and can be read nevertheless.
 _LEAST_NOISE = 0.01
+_LESS_ERROR = 0.5
 # Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
 # lead from the start to any end.
 FIRST_STEPS = 5
+# Where no premises follow, the weights arrive: most of them within ten.
+ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 _MOST_COLUMNS = 512
 _FEW_STEPS, _FEW_TURNS = 3, 2
-# Distinct rows per consequent from which on the classic freedom is tried.
-_ROWS_EACH = 2.0
+# Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone.
+ROWS_EACH = 2.0
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
 # A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
@@ -140,6 +156,44 @@ class Tuned:
         return other < part * noise and loose.score < self.score - WORTHWHILE
 
 
+def _priced(tuned):
+    """The error to be expected, and what rules are worth that hold where these do not."""
+    return (HOLDING if tuned.is_apart else 1.0) * tuned.expected_error
+
+
+def _may_be_free(problem: SeparableProblem) -> bool:
+    """Whether there are premises, and rows enough: any freedom passes through hardly more rows."""
+    n_columns, n_rows = problem.n_columns, problem.rows.n_rows
+    return (
+        problem.antecedent.parameters.size > 0
+        and n_columns <= _MOST_COLUMNS
+        and n_rows >= ROWS_EACH * n_columns
+    )
+
+
+def _freed_if_worth_it(bounded: Tuned, free, n_rows: float) -> tuple[Tuned, Premise, bool]:
+    """The better of terms within bounds and without, the premise of these, and whether without.
+
+    Freedom is worth half of the error if the terms can still be told apart, and next to all of the
+    noise if not.
+    """
+    problem = bounded.problem
+    premise = _premise(problem, is_free=True)
+    freed = tune(problem, premise, free, n_rows, is_loose=True, has_least=False)
+    rows, antecedent = problem.rows, freed.evaluation.antecedent
+    is_read = not has_idle_term(rows, antecedent) and not has_twin_terms(rows, antecedent)
+    is_better = is_read and _priced(freed) < _LESS_ERROR * _priced(bounded)
+    if is_better or bounded.is_beaten_loosely(freed, _LEAST_NOISE):
+        return freed, premise, True
+    return bounded, _premise(problem), False
+
+
+def _premise(problem, is_free=False):
+    """What moves of a problem's rules, within the box of its rows."""
+    low, high = problem.rows.inputs.minimum, problem.rows.inputs.maximum
+    return Premise.of(problem.antecedent, low, high, is_free)
+
+
 def with_premises(left_out, share):
     """The error of rows left out at fixed premises, with what these take: a share of the rows."""
     return np.inf if share > _MOST_EFFECTIVE else left_out * (1.0 + share) / (1.0 - share)
@@ -148,19 +202,34 @@ def with_premises(left_out, share):
 class _Weights:
     """Steps of the penalty's weights up the evidence, at fixed premises."""
 
-    def __init__(self, problem: SeparableProblem, n_rows: float, is_free: bool):
-        self.problem, self.n_rows, self.is_free = problem, n_rows, is_free
+    def __init__(self, problem: SeparableProblem, n_rows: float, has_least: bool = True):
+        self.problem, self.n_rows, self.has_least = problem, n_rows, has_least
         self.n_rules = problem.antecedent.n_rules
         self.n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
         self.n_distinct = problem.rows.n_rows  # a search sample has no row twice
 
     def improved(self, evaluation, x, penalty, steps, free, curvature=None) -> Laplace:
-        """The posterior after so many steps of the free weights."""
-        for _ in range(steps):
-            posterior = self._posterior(evaluation, x, penalty, curvature)
-            least = least_weights(posterior, self.n_rules, self.n_distinct)
-            penalty = reestimated(posterior, free, {} if self.is_free else least)
-        return self._posterior(evaluation, x, penalty, curvature)
+        """The posterior after so many steps of the free weights, or when they stand still.
+
+        Steps that are alike are taken on to where they lead, if the evidence rises there; the last
+        is always a plain one.
+        """
+        posterior, before = self._posterior(evaluation, x, penalty, curvature), None
+        for left in reversed(range(steps)):
+            least = {}
+            if self.has_least:
+                least = least_weights(posterior, self.n_rules, self.n_distinct)
+            plain = reestimated(posterior, free, least)
+            far = extrapolated(before, posterior.penalty, plain, free, least)
+            if before is not None and is_settled(posterior.penalty, far):
+                break
+            now, before = posterior, None
+            if left and far != plain:
+                posterior = self._posterior(evaluation, x, far, curvature)
+            if posterior is now or posterior.minus_twice_log > now.minus_twice_log:
+                posterior = self._posterior(evaluation, x, plain, curvature)
+                before = now.penalty
+        return posterior
 
     def _posterior(self, evaluation, x, penalty, curvature):
         return laplace(
@@ -185,7 +254,7 @@ def tune(
     first_steps=FIRST_STEPS,
     displacement=None,
     is_loose=False,
-    is_free=False,
+    has_least=True,
     begun: Tuned | None = None,
     is_last=True,
 ) -> Tuned:
@@ -208,8 +277,8 @@ def tune(
         Where the premises start; zero if not given.
     is_loose : bool
         Whether the premises come before the weights.
-    is_free : bool
-        Whether rules may compensate one another beyond all reading.
+    has_least : bool
+        Whether rules may not compensate one another beyond all reading (``least_weights``).
     begun : Tuned, optional
         What earlier turns of the same have found: these go on from there.
     is_last : bool
@@ -218,7 +287,9 @@ def tune(
     steps_a_turn = _STEPS
     if problem.n_columns > _MOST_COLUMNS:
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
-    weights, best = _Weights(problem, n_rows, is_free), begun
+    elif premise.size == 0 and turns > 0:
+        first_steps = ARRIVING
+    weights, best = _Weights(problem, n_rows, has_least), begun
     if begun is None:
         x = np.zeros(premise.size) if displacement is None else displacement
         penalty = problem.penalty
@@ -250,7 +321,7 @@ def tune(
         if without_rise == _PATIENCE:
             break
     assert best is not None
-    if "agreement" in free and not is_free and is_last:
+    if "agreement" in free and is_last:
         best = _together(best, weights, premise, free)
     return best
 
@@ -302,7 +373,7 @@ def held_for_nothing(tuned: Tuned, premise: Premise, free, n_rows: float, n_all:
     """
     if "agreement" not in free or tuned.is_apart or not tuned.displacement.size:
         return tuned
-    weights = _Weights(tuned.problem, n_rows, is_free=False)
+    weights = _Weights(tuned.problem, n_rows)
     others = [key for key in free if key != "agreement"]
     price = min(0.5 * tuned.posterior.n_effective / n_all, _NEXT_TO_NOTHING)
     best = tuned
@@ -360,39 +431,16 @@ def tuned_start(
         sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
     )
     n_sample = effective_weight(sample)
-
-    def tuned(is_loose, is_free=False):
-        low, high = sample.inputs.minimum, sample.inputs.maximum
-        premise = Premise.of(antecedent, low, high, is_free)
-        turns = _MOST_TURNS if premises_move else 0
-        return tune(
-            problem,
-            premise,
-            free,
-            n_sample,
-            turns,
-            is_loose=is_loose,
-            is_free=is_free,
-            is_last=False,
-        )
-
-    best, is_free = tuned(False), False
-    # Where there are hardly more rows than consequents, any freedom passes through all.
-    is_determined = sample.n_rows >= _ROWS_EACH * problem.n_columns and not is_noisy
-    if (
-        premises_move
-        and is_determined
-        and problem.n_columns <= _MOST_COLUMNS
-        and best.displacement.size
-    ):
-        loose, free_terms = tuned(True), tuned(True, is_free=True)
-        if best.is_beaten_loosely(loose):
+    premise, is_free = _premise(problem), False
+    turns = _MOST_TURNS if premises_move else 0
+    first_steps = FIRST_STEPS if premises_move else ARRIVING
+    best = tune(problem, premise, free, n_sample, turns, first_steps)
+    if premises_move and _may_be_free(problem) and not is_noisy:
+        loose = tune(problem, premise, free, n_sample, turns, is_loose=True, has_least=False)
+        if HOLDING * _priced(loose) < _priced(best):
             best = loose
-        if best.is_beaten_loosely(free_terms, _LEAST_NOISE):
-            best, is_free = free_terms, True
-    if "agreement" in free and best.displacement.size and premises_move and not is_free:
-        premise = Premise.of(antecedent, sample.inputs.minimum, sample.inputs.maximum)
-        best = _together(best, _Weights(problem, n_sample, is_free), premise, free)
+        best, premise, is_free = _freed_if_worth_it(best, free, n_sample)
+    if premises_move:
         best = held_for_nothing(best, premise, free, n_sample, effective_weight(rows))
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held)
     return Start(

@@ -212,7 +212,7 @@ class _Fit:
         given = self.request.weights
         if "stiffness" not in given and not has_idle_term(rows, start.antecedent):
             run = self.without_idle_terms(rows, run)
-        if "agreement" not in given and not start.is_free and not start.is_apart:
+        if "agreement" not in given and not start.is_apart:
             run = self.with_rules_that_hold(rows, run)
         return run
 

@@ -50,6 +50,15 @@ def test_noise_alone_gets_a_single_rule(rng):
     assert ANFISRegressor().fit(inputs(rng), rng.standard_normal(400)).n_rules_ == 1
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_of_a_plane_in_as_many_inputs_as_rows_no_term_is_learnt(seed):
+    """Of fifty inputs, one has luck with two terms on sixty rows."""
+    rng = np.random.default_rng(seed)
+    X = rng.standard_normal((60, 50))
+    y = X[:, :3].sum(axis=1) + 1.7 * rng.standard_normal(60)
+    assert ANFISRegressor().fit(X, y).n_rules_ == 1
+
+
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_only_the_input_that_bends_the_surface_gets_terms(which, rng):
     X = inputs(rng)

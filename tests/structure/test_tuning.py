@@ -1,5 +1,7 @@
 """Weights and premises in turns: what is taken for noise, and what is found instead."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -68,19 +70,70 @@ def test_a_kink_that_was_taken_for_noise_is_found_with_the_premises_first(monkey
         return tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
 
     start = found()
-    # Now nothing beats the way in that finds the weights first.
-    monkeypatch.setattr(tuning, "WORTHWHILE", np.inf)
+    # Now there is nothing but the way in that finds the weights first.
+    monkeypatch.setattr(tuning, "ROWS_EACH", np.inf)
     assert start.expected_error < 0.3 * found().expected_error
 
 
-def test_where_terms_are_freed_for_exact_data_nothing_holds_the_rules_together(rng):
+def test_where_data_are_exact_nothing_holds_the_rules_together(rng):
     x = rng.uniform(-1.0, 1.0, (120, 1))
     rows = StandardisedData.of(x, np.sin(6.0 * x))
     antecedent = grid_antecedent([Gaussian], [4], Spacing(rows), 0.6)
     start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
-    assert start.is_free
     # The least that rules would pay which are to be read: n_columns sigma^2 / n over two squared.
     assert start.penalty.agreement < 0.1 * 8 * start.expected_error / 120 / 2.0**2
+
+
+def test_terms_are_freed_for_a_step_and_can_be_read(rng):
+    x = rng.uniform(-1.0, 1.0, (300, 1))
+    rows = StandardisedData.of(x, (x > 0.2) + 0.01 * rng.normal(size=x.shape))
+    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
+    start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
+    assert start.is_free
+    assert not start.is_apart
+    premise = Premise.of(antecedent, *rows.inputs.box, is_free=True)
+    low, high = antecedent.with_parameters(premise.parameters(start.displacement)).groups[0].theta.T
+    # They cross where the step is, and the one gives way to the other within a twentieth.
+    z = rows.inputs.apply(np.array([[0.15, 0.25]]), np.empty((1, 2)))[0]
+    difference = [-0.5 * ((z - c) / np.exp(w)) ** 2 for c, w in (low, high)]
+    assert (np.sign(difference[0] - difference[1]) == [1.0, -1.0]).all()
+    # No more than what two rows next to the step come to, which may be taken for the other side's.
+    assert start.expected_error < 2.0 / 300 / np.var(x > 0.2)
+
+
+def test_rules_that_compensate_are_worth_a_fifth_of_the_error(monkeypatch, rng):
+    """A product, of which the rules of a grid are hyperbolic: none holds without the others."""
+    X = rng.uniform(-1.0, 1.0, (300, 2))
+    rows = StandardisedData.of(X, X.prod(axis=1, keepdims=True) + 1e-4 * rng.normal(size=(300, 1)))
+    antecedent = grid_antecedent(2 * [Gaussian], [2, 2], Spacing(rows), 0.6)
+
+    def found():
+        return tuning.tuned_start(antecedent, rows, 1, np.arange(2), {}, premises_move=True)
+
+    start = found()
+    # Without the way in that nothing holds together.
+    monkeypatch.setattr(tuning, "ROWS_EACH", np.inf)
+    held = found()
+    assert start.is_apart
+    assert start.expected_error < held.expected_error / tuning.HOLDING
+
+
+def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
+    """Of noise on 150 inputs, nothing is learnt from 100 rows."""
+    X, y = rng.normal(size=(100, 150)), rng.normal(size=(100, 1))
+    rows = StandardisedData.of(X, y)
+    antecedent = grid_antecedent(150 * [Gaussian], 150 * [1], Spacing(rows), 0.6)
+    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    found = tuning.tune(problem, premise, FREE, 100.0)
+    scanned = [
+        tuning.tune(
+            problem.with_penalty(replace(tuning.FIRST_PENALTY, slope=slope)), premise, [], 100.0
+        ).score
+        for slope in np.logspace(-4, 4, 81)
+    ]
+    assert found.score < min(scanned) + 0.01
+    assert found.posterior.n_effective < 25.0
 
 
 def test_agreement_rises_until_the_strongest_rule_holds_or_the_price_is_too_high(

@@ -1,4 +1,4 @@
-"""Terms that are hardly true on any row, by the memberships themselves."""
+"""Terms that are hardly true on any row, or wherever another is, by the memberships themselves."""
 
 from dataclasses import replace
 
@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent, TermGroup
 from skanfis.data import StandardisedData
 from skanfis.membership import Gaussian
 from skanfis.structure import Spacing, grid_antecedent, has_idle_term
+from skanfis.structure.readable_terms import has_twin_terms
 
 
 @pytest.mark.parametrize(("truth", "is_idle"), [(0.501, False), (0.499, True)])
@@ -33,3 +35,16 @@ def test_a_search_leaves_no_term_in_a_gap():
     y += 0.01 * rng.normal(size=x.size)
     terms = ANFISRegressor().fit(x[:, None], y).memberships_
     assert all(np.abs((x - t["center"]) / t["width"]).min() < np.sqrt(2 * np.log(2)) for t in terms)
+
+
+@pytest.mark.parametrize(("crossing", "are_twins"), [(0.899, False), (0.901, True)])
+def test_terms_are_twins_where_they_cross_above_nine_tenths(crossing, are_twins):
+    rows = StandardisedData.of(
+        np.linspace(-1.0, 1.0, 50)[:, None], np.linspace(0.0, 1.0, 50)[:, None]
+    )
+    # Two Gaussians of one width cross halfway: exp(-(distance / width)^2 / 8).
+    distance = np.sqrt(-8.0 * np.log(crossing))
+    # The terms of an input may stand in any order.
+    theta = np.array([[distance / 2, 3.0, -distance / 2], [0.0, -1.0, 0.0]])
+    antecedent = GridAntecedent((TermGroup(Gaussian, np.zeros(3, dtype=int), theta),), counts=(3,))
+    assert has_twin_terms(rows, antecedent) is are_twins
