@@ -42,7 +42,8 @@ GROUPS = {
     ),
     "premise": "test_premise.py",
     "evidence": "test_evidence.py",
-    "posterior": "test_posterior.py",
+    "faces posterior": "test_posterior.py",
+    "dask/keeping": "dask/test_keeping.py",
     "structure/clusters structure/grid structure/sample structure/size": (
         "structure/test_clusters.py structure/test_grid.py structure/test_size.py"
     ),
