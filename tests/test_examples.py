@@ -2,10 +2,13 @@
 
 import runpy
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from sklearn import gaussian_process
 
 from skanfis import datasets
 
@@ -28,6 +31,9 @@ def ran(tmp_path_factory):
             "make_ofog",
             lambda **options: every(**(options | {"sampling_interval": 45.0, "n_runs": 9})),
         )
+        # Its kernel as it is given: what the process leaves is not asked for below.
+        process = partial(gaussian_process.GaussianProcessRegressor, optimizer=None)
+        patch.setattr(gaussian_process, "GaussianProcessRegressor", process)
         patch.setattr(sys, "argv", [str(SCRIPT), str(folder)])
         patch.setattr(plt, "show", lambda: None)
         yield runpy.run_path(str(SCRIPT), run_name="__main__"), folder

@@ -48,7 +48,7 @@ DATA = {
     "gyro": gyro,
     "sinc": make_jang_sinc,
     "mackey-glass": lambda: tuple(part[:200] for part in make_mackey_glass()),
-    "friedman": lambda: make_friedman1(200, n_features=6, noise=1.0, random_state=0),
+    "friedman": lambda: make_friedman1(120, n_features=5, noise=1.0, random_state=0),
 }
 KMEANS = KMeans(n_clusters=4, n_init=2, random_state=0)
 # The points of the sinc lie on a symmetric grid: there rounding would decide ties of a clustering.

@@ -16,7 +16,7 @@ from skanfis.gyro._summary import errors_and_verdict
 
 pytestmark = pytest.mark.theory
 
-N_RUNS, N_ROWS = 8, 60
+N_RUNS, N_ROWS = 8, 40
 NOISE = 2e-4
 
 
@@ -71,7 +71,7 @@ def test_the_planted_truth_is_recommended(truth, tmp_path):
         return
     assert title.startswith("Use ")
     assert title.endswith(f"{truth} instead of the fuzzy rules")
-    assert "more than the scatter over the 8 held-out runs" in sentence
+    assert f"more than the scatter over the {N_RUNS} held-out runs" in sentence
 
 
 def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended():

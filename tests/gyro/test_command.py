@@ -65,7 +65,7 @@ def no_pictures(monkeypatch):
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory, log, given_weights, coarse_report):
-    """A folder after one calibration from counts, milliseconds and kelvin."""
+    """A folder after one calibration from counts, milliseconds and kelvin; without pictures."""
     folder = tmp_path_factory.mktemp("calibrated")
     raw = pd.DataFrame(
         {
@@ -78,7 +78,9 @@ def calibrated(tmp_path_factory, log, given_weights, coarse_report):
     )
     path = write_log(folder / "raw.csv", raw, raw.columns)
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
-    assert main([*arguments, "--c", "c99", "--deviation", "--saturate"]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skanfis.gyro.html_report.PICTURES", ())
+        assert main([*arguments, "--c", "c99", "--deviation", "--saturate"]) == 0
     return folder
 
 

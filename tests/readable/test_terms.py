@@ -49,10 +49,10 @@ def test_crossings_of_uneven_terms_are_those_of_a_dense_grid(family):
     for j, own in distinct_terms(antecedent).items():
         places = [antecedent.groups[0].theta[0, t] for t in own]
         for (t, following), (low, high) in zip(pairwise(own), pairwise(places), strict=True):
-            Z = np.zeros((3, DENSE))
-            Z[j] = np.linspace(low, high, DENSE)
+            Z = np.zeros((3, DENSE // 10))
+            Z[j] = np.linspace(low, high, DENSE // 10)
             mu = np.exp(antecedent.log_memberships(Z))
-            assert found[t] == pytest.approx(np.minimum(mu[t], mu[following]).max(), abs=1e-4)
+            assert found[t] == pytest.approx(np.minimum(mu[t], mu[following]).max(), abs=1e-3)
             assert found[t] >= np.minimum(mu[t], mu[following]).max() * (1.0 - 1e-12)
 
 
