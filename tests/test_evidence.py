@@ -158,6 +158,7 @@ class TestAtGivenPremises:
             assert_allclose(in_full(found), expected, atol=1e-7)
             assert_allclose(found.noise_variance, variance, rtol=1e-5)
 
+    @pytest.mark.theory
     @pytest.mark.parametrize(
         ("n_rules", "order", "n_rows"), [(1, 0, 9), (1, 1, 8), (2, 0, 12), (3, 0, 20), (2, 1, 10)]
     )
@@ -468,6 +469,7 @@ class TestPremises:
         expected *= PRIOR_DISPLACEMENT**2
         return 100.0 * (expected - np.log(expected) - 1.0)
 
+    @pytest.mark.theory
     def test_a_displacement_is_integrated_over(self):
         case, errors, sizes = OneWidth(1500), [], []
         for stiffness in (1e-4, 1.0):
@@ -530,6 +532,7 @@ def effective_parameters(model, X, y):
 
 
 class TestWholeFits:
+    @pytest.mark.theory
     def test_the_noisier_the_fewer_parameters(self):
         counts = []
         for noise in (0.03, 0.3, 3.0):
@@ -537,6 +540,7 @@ class TestWholeFits:
             counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
         assert (np.diff(counts) < -1.0).all()
 
+    @pytest.mark.theory
     def test_the_more_rows_the_more_parameters(self):
         counts = []
         for n_rows in (50, 200, 1000):
@@ -544,6 +548,7 @@ class TestWholeFits:
             counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
         assert (np.diff(counts) > 0.5).all()
 
+    @pytest.mark.theory
     @pytest.mark.parametrize("seed", range(3))
     def test_the_noisier_the_simpler_the_structure(self, seed):
         rules, parameters = [], []

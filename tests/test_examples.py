@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from sklearn import gaussian_process
 
 from skanfis import datasets

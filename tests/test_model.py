@@ -310,6 +310,7 @@ def test_gradient_is_that_of_the_textbook_formula(frozen, rng):
         assert_allclose(found[:, j], numeric, rtol=1e-6, atol=1e-8)
 
 
+@pytest.mark.theory
 @ALL
 @pytest.mark.parametrize("limit", [0.0, 0.3, 2.0, np.inf])
 def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rng, limit):

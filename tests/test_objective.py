@@ -159,6 +159,7 @@ def test_gradient_is_exact_far_from_the_optimum(case):
     assert_all_close(linearisation.gradient, expected, 1e-10)
 
 
+@pytest.mark.theory
 def test_gradient_is_that_of_its_own_cost(case):
     _, linearisation = case.at_point()
     numeric = oracles.central_difference(lambda p: case.problem.evaluate(p).cost, case.point, 1e-3)
@@ -173,6 +174,7 @@ def test_gauss_newton_is_the_schur_complement(case):
     assert_all_close(linearisation.gauss_newton, linearisation.gauss_newton.T, 1e-14)
 
 
+@pytest.mark.theory
 def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
     # Without residuals the second derivatives of the model drop out: H is the Hessian itself.
     antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])

@@ -226,6 +226,7 @@ SOLVERS = {
 }
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_planted_truth_lies_within_the_deviations(solver):
     """Data of a known model: errors of new rows over their deviations have variance one."""

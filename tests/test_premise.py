@@ -242,6 +242,7 @@ PLACES = {
 }
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
 @pytest.mark.parametrize("places", PLACES.values(), ids=list(PLACES))
 @pytest.mark.parametrize("overlap", [0.4, 0.6])
@@ -376,6 +377,7 @@ def test_parameters_out_of_order_have_a_displacement_too():
     assert found[1] > found[0]
 
 
+@pytest.mark.theory
 @ALL
 @FREE_OR_NOT
 def test_pull_back_is_the_chain_rule(antecedent, is_free, rng):

@@ -125,6 +125,7 @@ def test_planted_model_is_found_under_noise():
     assert error < 0.019
 
 
+@pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
     ("settings", "most"),
@@ -219,6 +220,7 @@ SETTINGS = {
 }
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize(("place", "settings"), list(enumerate(SETTINGS.values())), ids=SETTINGS)
 def test_attributes_reproduce_the_predictions(place, settings):
     n_outputs = 1 + place % 2
@@ -359,6 +361,7 @@ def test_same_target_twice():
     assert_allclose(found[:, 0], alone.predict(X), rtol=0, atol=1e-7 * np.ptp(Y))
 
 
+@pytest.mark.theory
 def test_same_target_twice_is_twice_the_evidence_and_nearly_the_same_fit():
     data, target = surface(noise=0.01)
     alone = ANFISRegressor(n_mfs=2).fit(data, target)

@@ -52,13 +52,14 @@ def digest(name, n_rows=150, **more):
     return hashlib.sha256(b"".join(np.ascontiguousarray(part) for part in parts)).hexdigest()
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_fitted_before_matters(name, fresh_process):
     # There every digest comes of a process that has fitted none, in reverse order.
     assert digest(name) == fresh_process["digests"][name]
 
 
-@pytest.mark.parametrize("name", ["default", "huber"])
+@pytest.mark.parametrize("name", ["default", pytest.param("huber", marks=pytest.mark.theory)])
 def test_number_of_workers_does_not_matter(name):
     settings = {"max_iter": 3}
     assert digest(name, N_ROWS, n_jobs=2, **settings) == digest(name, N_ROWS, **settings)

@@ -146,6 +146,7 @@ def test_the_box_is_held_where_the_policy_holds(rng):
         bounds(estimator, without_end)
 
 
+@pytest.mark.theory
 def test_slopes_beyond_the_range_are_those_of_the_policy(rng):
     X, y, estimator = a_fit(rng)
     estimator.fit(X, y)

@@ -28,6 +28,7 @@ def by_corners(model, sign, low, high, j):
         return slope_by_corners(enclosure, enclosure._parts(low, high), low, high, j)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("case", GRIDS, ids=lambda case: case.label)
 def test_no_slope_in_a_box_is_beyond(case, rng):
     model = case.model.with_out_of_bounds("clip")

@@ -68,14 +68,13 @@ def expected_outputs(model, X, status, std):
 @pytest.mark.parametrize(
     ("dtype", "std", "every", "flags"),
     [
-        ("double", "c99", 1, []),
-        ("float", "c99", 1, []),
-        ("double", "c99", 2, SANITIZE),
+        pytest.param("double", "c99", 1, [], id="double"),
+        pytest.param("float", "c99", 1, [], id="float", marks=pytest.mark.theory),
+        pytest.param("double", "c99", 2, SANITIZE, id="double sane", marks=pytest.mark.theory),
         # Differs by its exp and log alone.
-        ("double", "c89", 4, SANITIZE),
-        ("float", "c89", 4, SANITIZE),
+        pytest.param("double", "c89", 4, SANITIZE, id="double c89", marks=pytest.mark.theory),
+        pytest.param("float", "c89", 4, SANITIZE, id="float c89", marks=pytest.mark.theory),
     ],
-    ids=["double", "float", "double sane", "double c89", "float c89"],
 )
 def test_every_model_answers_as_predict(dtype, std, every, flags, tmp_path, capsys):
     tolerance = 1e-5 if dtype == "float" else 1e-12
@@ -153,6 +152,7 @@ def trained():
     }
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
@@ -174,6 +174,7 @@ def test_trained_models_answer_as_predict(dtype, tolerance, flags, tmp_path):
         assert set(status) == {STATUS["IN_RANGE"], STATUS["OUT_OF_RANGE"]}, kind
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
@@ -274,6 +275,7 @@ def test_constant_and_lone_columns(tmp_path):
     np.testing.assert_allclose(found[:, 0], estimator.predict(X), rtol=1e-11, atol=1e-11)
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("scale", [1e-12, 1e12])
 def test_units_do_not_matter_to_single_precision(scale, tmp_path):
@@ -333,6 +335,7 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
     assert sum(tables.values()) <= code.cost.table_bytes < sum(tables.values()) + 64
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("case", FEWEST[::5], ids=lambda case: case.label)
 def test_functions_of_the_library_are_called_as_often_as_reported(case, tmp_path):
@@ -394,6 +397,7 @@ int main(void)
     return [int(word) for word in run(["./count"], folder).stdout.split()]
 
 
+@pytest.mark.theory
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
 @pytest.mark.parametrize("dtype", ["float", "double"])
 def test_files_are_cpp_too(dtype, tmp_path):
@@ -422,6 +426,7 @@ def test_grid_takes_an_exponential_per_term():
     assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     X, y = surface()
@@ -447,6 +452,7 @@ def far_off(mf, seed, offset=1e4):
     return model.fit(X + offset, y), X + offset
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 def test_float_self_test_bears_inputs_far_from_zero(tmp_path):

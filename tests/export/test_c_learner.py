@@ -117,6 +117,7 @@ def difference(found, expected):
     return np.max(np.abs(found - expected) / expected.std(axis=0))
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("forgetting", [1.0, 0.99])
 def test_double_learns_what_partial_fit_learns(model, forgetting, tmp_path):
@@ -135,6 +136,7 @@ def drifting(n_rows):
     return X, t + np.sin(np.arange(n_rows) / 3e4)[:, None] * t.std(axis=0)
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("forgetting", [1.0, 0.999])
 def test_float_stays_with_partial_fit_for_a_hundred_thousand_rows(forgetting, tmp_path):
@@ -148,6 +150,7 @@ def test_float_stays_with_partial_fit_for_a_hundred_thousand_rows(forgetting, tm
     assert (found.diagonal > 0.0).all()
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_float_stays_with_double_where_rules_are_lines(tmp_path):
     """With a penalty, as models mostly have."""
@@ -161,6 +164,7 @@ def test_float_stays_with_double_where_rules_are_lines(tmp_path):
     assert difference(*found) < 1e-3
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("dtype", ["double", "float"])
 def test_covariance_is_bounded_where_nothing_comes(model, dtype, tmp_path):
@@ -182,6 +186,7 @@ def code_dtype(dtype):
     return np.float32 if dtype == "float" else np.float64
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize(
     ("dtype", "std", "settings"),

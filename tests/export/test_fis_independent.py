@@ -139,6 +139,7 @@ def trained(mf):
 pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("mf", MEMBERSHIPS)
 def test_fuzzylite_agrees_on_every_family(mf, fuzzylite, tmp_path):
     model, rows = trained(mf)
@@ -147,6 +148,7 @@ def test_fuzzylite_agrees_on_every_family(mf, fuzzylite, tmp_path):
     assert difference(outputs, model, rows) < TOLERANCE[mf]
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("kind", EVERY_PAIR)
 def test_fuzzylite_agrees_on_every_rule_base(kind, fuzzylite, tmp_path):
     model = MODELS[kind]

@@ -281,6 +281,7 @@ def test_refuses_to_write_a_membership_of_the_users_own(rng):
         export_json(build(oracles.random_grid(rng, [Own], [2], [0])))
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize(("part", "kind"), [(0, "grid"), (1, "scattered"), (2, "rule table")])
 def test_no_number_that_is_read_makes_one_that_is_not_finite(part, kind):
     model = MODELS[f"{kind}, order 1, 2 outputs"]

@@ -218,6 +218,7 @@ def test_a_model_without_data_has_no_weights_to_tell():
     assert "\n10 rules left out.\n" in text
 
 
+@pytest.mark.theory
 def test_time_grows_with_the_number_of_rules_and_no_faster(rng):
     def seconds(n_rules):
         model = build(oracles.random_scattered(rng, Gaussian, n_rules, (0, 1, 2)))

@@ -225,6 +225,7 @@ def test_no_answer_to_what_is_not_finite_or_has_no_rate(tmp_path):
     assert np.isfinite(y).all()
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_files_make_a_program_that_tests_itself(log, tmp_path):
     model, X = whole()

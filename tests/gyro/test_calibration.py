@@ -74,6 +74,7 @@ def test_the_planted_truth_is_recommended(truth, tmp_path):
     assert f"more than the scatter over the {N_RUNS} held-out runs" in sentence
 
 
+@pytest.mark.floors
 def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended():
     log = log_of(law)
     log["time"] = np.tile(np.arange(N_ROWS) * 60.0, N_RUNS)
@@ -124,6 +125,7 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     assert f"{verdict.rms['no compensation']:.4g} deg/s RMS, on {rows.sum():,} held" in shown
 
 
+@pytest.mark.floors
 def test_a_gyro_at_rest_has_no_law():
     log = log_of(PLANTED["constant"][0]).assign(rate=0.0)
     log["output"] = 0.01 + 1e-4 * log["temperature"]
@@ -151,6 +153,7 @@ def test_what_a_fold_holds_out_has_no_say_in_its_structure():
     assert choose_in_folds(X, y, folds, Recipe(("temperature",), terms=(2,)), print) is None
 
 
+@pytest.mark.floors
 def test_terms_are_for_what_the_law_leaves():
     log, told = log_of(law), []
     X, rate = log[["temperature", "output"]], log["rate"].to_numpy()

@@ -287,6 +287,7 @@ def test_other_files_are_refused(compensator, tmp_path, change, message):
         GyroCompensator.read_json(path)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("with_law", [False, True])
 def test_no_number_that_is_read_makes_a_rate_that_is_not_finite(
     log, compensator, physics_json, tmp_path, with_law

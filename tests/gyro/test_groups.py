@@ -229,6 +229,7 @@ def test_splits_may_be_given_as_scikit_learn_takes_them(table_data):
         check_split(5, rate, run=[1, 2])
 
 
+@pytest.mark.theory
 def test_the_trap_is_real():
     # A forest learns the list of levels by heart: runs held out, it seems hundreds of times better
     # than it is between the levels.

@@ -27,7 +27,7 @@ from skanfis.gyro.displays._style import figures
 from skanfis.gyro.html_report import report_page, rules_text
 from skanfis.inspection import readability
 
-PNG = re.compile("data:image/png;base64,([^\"]*)")
+PNG = re.compile('data:image/png;base64,([^"]*)')
 VOID = {"meta", "img", "br"}
 
 

@@ -163,6 +163,7 @@ def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
     assert table.loc["residual_peak", "note"] == "largest value: no interval"
 
 
+@pytest.mark.theory
 def test_interval_is_that_of_the_runs_not_of_the_rows(rng):
     """Each run has a bias of its own: the mean of 10 is known to 1 / sqrt(10) of their spread."""
     n_runs, biases = 10, 5.0 * rng.normal(size=10) / HOUR
@@ -225,6 +226,7 @@ def test_what_is_missing_is_said(log):
     assert "no run is as long as two averaging times" in long.loc["bias_stability_90s", "note"]
 
 
+@pytest.mark.theory
 def test_a_million_rows_in_seconds(rng):
     """Resampling works on thinned rows; the figures themselves on all."""
     rate = np.tile(np.linspace(-100, 100, 1000), 1000)

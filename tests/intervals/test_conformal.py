@@ -136,6 +136,7 @@ def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each():
     assert found == score_quantile(scores, row_masses(scores.size)[0], 0.9)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("within", [0.1, 0.7, 1.0])
 def test_rows_and_groups_are_covered_as_often_as_theory_says(within):
     """29 groups known, whatever they have in common; new groups of many rows."""
@@ -176,6 +177,7 @@ def test_leave_one_out_is_that_of_refits():
     assert np.isclose(plain.scores_, np.abs(y[3] - without), rtol=1e-7).any()
 
 
+@pytest.mark.theory
 def test_split_covers_exactly_as_often_as_theory_says():
     """19 rows held out: the 18th score is exceeded by one new row in ten, whatever the model."""
     rng = np.random.default_rng(5)

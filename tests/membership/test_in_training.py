@@ -22,6 +22,7 @@ BUILD = {
 }
 
 
+@pytest.mark.theory
 @FAMILIES
 @pytest.mark.parametrize("kind", BUILD)
 def test_gradient_of_the_cost_by_the_displacements(family, kind):
@@ -43,6 +44,7 @@ def test_gradient_of_the_cost_by_the_displacements(family, kind):
     assert_allclose(gradient, numeric, rtol=0, atol=1e-6 * np.abs(numeric).max())
 
 
+@pytest.mark.theory
 @FAMILIES
 def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     rng = np.random.default_rng(3)

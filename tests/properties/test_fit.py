@@ -35,6 +35,7 @@ def fitted(table, settings):
             return None
 
 
+@pytest.mark.theory
 @given(tables(), settings_of_fit)
 def test_a_fit_is_no_worse_than_the_mean(table, settings):
     model = fitted(table, settings)
@@ -55,6 +56,7 @@ def test_a_fit_is_no_worse_than_the_mean(table, settings):
 
 
 # What is drawn is not there to be read.
+@pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ReadabilityWarning")
 @given(tables(), settings_of_fit, st.floats(1.0, 1e3))
 def test_a_model_answers_everywhere_and_comes_back(table, settings, reach):

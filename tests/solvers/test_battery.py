@@ -69,6 +69,7 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
     assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
 
 
+@pytest.mark.theory
 @every_solver
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("n_outputs", [1, 2])
@@ -94,6 +95,7 @@ def test_best_point_is_returned(name, kind):
         assert (np.diff(result.loss_curve) <= 0.0).all()
 
 
+@pytest.mark.theory
 @every_iterative_solver
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("agreement", [0.05, 1.0])

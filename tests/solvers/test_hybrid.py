@@ -105,6 +105,7 @@ def two_bells(rows, alpha=0.0):
 
 
 class TestAgainstTheTranscription:
+    @pytest.mark.theory
     @pytest.mark.parametrize("step_size", [0.01, 0.1])
     @pytest.mark.parametrize("raw", [True, False])
     def test_three_input_problem(self, step_size, raw):
@@ -127,6 +128,7 @@ class TestAgainstTheTranscription:
         found = np.stack([width, slope, center], axis=-1).reshape(premises.shape)
         assert_allclose(found, premises, rtol=1e-7, atol=1e-7)
 
+    @pytest.mark.theory
     @pytest.mark.parametrize("subset", ["train", "check"])
     def test_error_that_goes_up_and_down(self, subset):
         X, y = make_jang_three_input(subset)

@@ -322,6 +322,7 @@ class TestOnRuleBases:
         found = rows.targets.offset + rows.targets.scale * (phi @ result.evaluation.coefficients)
         assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
 
+    @pytest.mark.theory
     @pytest.mark.parametrize("kind", ["grid", "two families", "scattered"])
     @pytest.mark.parametrize("agreement", [0.0, 0.1])
     def test_result_is_stationary(self, kind, agreement):
@@ -423,6 +424,7 @@ class TestOnRuleBases:
         assert_allclose(result.loss_curve[0], there.mean_squared_error, rtol=1e-12)
         assert_array_equal(start, before)
 
+    @pytest.mark.theory
     def test_from_its_own_result_it_goes_nowhere(self):
         rows, premise, *_ = planted("grid", 0, noise=0.1)
         at = []

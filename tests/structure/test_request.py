@@ -154,6 +154,7 @@ def friedman(n_rows):
     return X, y
 
 
+@pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize("partition", ["subtractive", "fcm"])
 def test_named_clusterings_find_rules_that_generalise(partition):
@@ -186,6 +187,7 @@ def test_number_of_fuzzy_clusters_is_reported(data):
     assert model.structures_[0]["structure"] == f"{model.n_rules_} fuzzy clusters"
 
 
+@pytest.mark.theory
 def test_families_may_differ_from_input_to_input(data):
     X, y = (part[:150] for part in data)
     mixed = ["bell", "gaussian", "triangular"]
@@ -216,6 +218,7 @@ def test_families_that_are_none_are_refused(data, mf, message):
 
 
 class TestFeatures:
+    @pytest.mark.theory
     @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
     def test_rules_are_on_the_premise_features_alone(self, data, settings):
         settings = {"n_mfs": "auto", "premise_features": ["time", "temperature"]} | settings
@@ -223,6 +226,7 @@ class TestFeatures:
         assert {term["input"] for term in model.memberships_} <= {"time", "temperature"}
         assert model.n_rules_ > 1
 
+    @pytest.mark.theory
     @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
     def test_consequents_are_in_the_consequent_features_alone(self, data, settings):
         X, y = data

@@ -427,6 +427,7 @@ def piecewise_linear(rng, n_rows=600):
     return X, y + 0.02 * rng.standard_normal(n_rows)
 
 
+@pytest.mark.floors
 def test_family_is_that_of_the_truth_where_it_is_asked_for(rng):
     X, y = piecewise_linear(rng)
     settings = {"order": 0, "n_mfs": 5}
@@ -439,6 +440,7 @@ def test_family_is_that_of_the_truth_where_it_is_asked_for(rng):
     assert left < 0.5 * of_gaussians
 
 
+@pytest.mark.floors
 def test_searched_structure_is_tried_with_every_family(rng):
     X, y = piecewise_linear(rng)
     model = ANFISRegressor(partition="grid", mf="auto").fit(X, y)
@@ -477,6 +479,7 @@ def test_only_candidates_that_may_still_lead_are_trained_out(rng):
     assert alone.found[other].score == turned_once
 
 
+@pytest.mark.floors
 def test_without_terms_there_is_nothing_to_train_out(rng):
     X = inputs(rng, 50, 2)
     found, linear = search_of(X, X[:, 0] + 0.1 * rng.standard_normal(50)), Candidate((1, 1))
@@ -500,6 +503,7 @@ def test_what_parameters_cost_falls_as_the_rows_rise(rng):
     assert_allclose(found.error(linear) ** 2, on_all, rtol=1e-4)
 
 
+@pytest.mark.floors
 def test_next_to_exact_data_all_candidates_are_trained_out(rng):
     X = inputs(rng, 300, 2)
     y = X[:, 1] + 0.03 * np.sin(3.0 * X[:, 0])

@@ -43,6 +43,7 @@ def run_and_level_folds(run, level):
     ]
 
 
+@pytest.mark.floors
 def test_finds_what_the_regressor_finds_with_groups():
     X, y, run, _ = campaign(0.0)
     found = search_terms(X, y, run_folds(run))

@@ -97,6 +97,7 @@ def flat_rising_flat(x, width):
     return np.sum(shares * np.column_stack([-np.ones(x.size), x, np.ones(x.size)]), axis=1)
 
 
+@pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 @pytest.mark.parametrize(
     ("seed", "width", "noise", "n_rules"), [(3, 0.3, 0.4, 3), (1, 0.15, 0.3, 6)]

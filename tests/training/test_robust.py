@@ -124,6 +124,7 @@ def test_unit_weights_are_none(n_rows):
     assert_allclose(weighted.predict(X), plain.predict(X), rtol=0, atol=1e-9)
 
 
+@pytest.mark.floors
 def test_weights_that_do_not_settle_are_told(monkeypatch):
     monkeypatch.setattr(fit, "_MOST_TURNS", 1)
     X, y, *_ = with_outliers(200)
@@ -131,6 +132,7 @@ def test_weights_that_do_not_settle_are_told(monkeypatch):
         ANFISRegressor(n_mfs=2, loss="huber").fit(X, y)
 
 
+@pytest.mark.floors
 def test_of_many_rows_some_show_the_outliers_and_all_are_weighed(monkeypatch):
     X, y, truth, is_outlier = with_outliers(1500)
     whole = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, y)
