@@ -10,7 +10,7 @@ writing Python.
 
 import matplotlib.pyplot as plt
 import numpy as np
-from sklearn.model_selection import LeaveOneGroupOut
+from sklearn.model_selection import GroupKFold
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -30,9 +30,9 @@ from skanfis.gyro import (
 # A campaign, and a compensation checked on it
 # --------------------------------------------
 #
-# Ten runs of two hours, each over another part of the chamber's ramp. Each run is compensated by a
-# model trained on the other nine. A row outside their range gets NaN: it would be flagged on board,
-# and is left out of the pictures.
+# Ten runs of two hours, each over another part of the chamber's ramp. Two by two they are
+# compensated by a model trained on the other eight. A row outside their range gets NaN: it would be
+# flagged on board, and is left out of the pictures.
 
 log = make_ofog(n_devices=1, n_runs=10, profile="ramps", duration=7200.0, random_state=0)
 thermal_rate = ThermalRate(30.0, time="time", run="run")
@@ -42,7 +42,7 @@ X = log[["time", "temperature", "dT/dt", "output"]]
 anfis = ANFISRegressor([2, 2, 1, 4], out_of_bounds="nan")
 model = make_pipeline(StandardScaler(), anfis)
 predicted = np.empty(len(log))
-for train, test in LeaveOneGroupOut().split(X, groups=log["run"]):
+for train, test in GroupKFold(5).split(X, groups=log["run"]):
     predicted[test] = model.fit(X.iloc[train], log["error"].iloc[train]).predict(X.iloc[test])
 rates = log["rate"], log["output"], log["output"] - predicted
 

@@ -119,7 +119,7 @@ search = GridSearchCV(
     model,
     {"anfisregressor__n_mfs": ["auto", 1, [1, 1, 2, 1, 1], [1, 1, 2, 2, 1]]},
     scoring="neg_root_mean_squared_error",
-    cv=5,
+    cv=3,
 ).fit(X_train, y_train)
 found = pd.DataFrame(search.cv_results_)[["param_anfisregressor__n_mfs", "mean_test_score"]]
 found.set_axis(["n_mfs", "score"], axis=1).round(1)
