@@ -129,10 +129,11 @@ check-dist: wheel
 	$(DEV)/bin/check-wheel-contents --package skanfis --package-omit "__pycache__,*.pyc" dist/*.whl
 
 # With nothing but what it asks for itself and pytest: what a wheel may lack is files, modules and
-# what they need; what they compute has been tested.
+# what they need; what they compute has been tested. The pip is that of the environment beside it.
 $(WHEEL)/.installed: wheel
-	$(call make-venv,$(WHEEL),$(PYTHON),>=)
-	wheel=$$(echo dist/*.whl) && $(call pip-install,$(WHEEL)) "$$wheel[plot]" pytest
+	$(PYTHON) -m venv --clear --without-pip $(WHEEL)
+	wheel=$$(echo dist/*.whl) && $(DEV)/bin/python -m pip --python $(WHEEL)/bin/python install \
+		--no-compile "$$wheel[plot]" pytest
 	@touch $@
 
 test-wheel: $(WHEEL)/.installed

@@ -11,7 +11,14 @@ from scipy import integrate, optimize, special, stats
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.data import StandardisedData
-from skanfis.evidence import PRIOR_DISPLACEMENT, extrapolated, is_settled, laplace, reestimated
+from skanfis.evidence import (
+    PRIOR_DISPLACEMENT,
+    extrapolated,
+    is_settled,
+    laplace,
+    least_weights,
+    reestimated,
+)
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
@@ -331,6 +338,19 @@ class TestReestimated:
         assert_allclose(ratio, np.clip(determined / cost, 0.01, 100.0), rtol=1e-6)
         assert replace(stepped, **{key: getattr(penalty, key)}) == penalty
 
+    def test_no_weight_falls_below_its_own_least_or_moves_by_more_than_a_step(self):
+        at, penalty = at_fixed_premises(1)
+        found = at(penalty)
+        free = reestimated(found, CONSEQUENTS)
+        for key in CONSEQUENTS:
+            least = {key: 2.0 * getattr(free, key)}
+            held = reestimated(found, CONSEQUENTS, least)
+            assert held == replace(free, **least)
+        # Where nothing is paid at all, the weight rises as far as a step goes.
+        unpaid = found.by_weight | {"alpha": (0.0, *found.by_weight["alpha"][1:])}
+        risen = reestimated(replace(found, by_weight=unpaid), ["alpha"])
+        assert_allclose(risen.alpha, 100.0 * penalty.alpha, rtol=1e-12)
+
     def test_it_is_where_the_evidence_is_largest(self):
         at, penalty = at_fixed_premises(14)
         for _ in range(300):
@@ -362,6 +382,25 @@ class TestReestimated:
         assert_allclose(noise, 1.0, rtol=0.05)
         # n rho / sigma^2 is the precision of the slopes, where inputs have a deviation of one.
         assert_allclose(noise / (2000 * penalty.rho), slopes.var(), rtol=0.15)
+
+
+# Distinct rows for every consequent, and what that asks of all weights.
+@pytest.mark.parametrize(("rows_each", "least"), [(0.9, 1e-4), (1.0, 1e-6), (1.9, 1e-6), (2.0, 0)])
+def test_least_weights_are_those_at_which_rules_are_as_far_apart_as_a_target(rows_each, least):
+    at, penalty = at_fixed_premises(1)
+    found = at(penalty)
+    # Of the prior: a disagreement, and a rule's departure from the line, of two deviations squared.
+    departure = found.noise_variance / found.n_rows / 4.0
+    expected = {
+        "agreement": max(found.n_columns * departure, least),
+        "alpha": max(departure, least),
+        "slope": least,
+    }
+    assert departure > 1e-4
+    n_distinct = rows_each * found.n_columns
+    assert least_weights(found, 4, n_distinct) == pytest.approx(expected, rel=1e-12)
+    # A single rule agrees with itself.
+    assert least_weights(found, 1, n_distinct) == dict.fromkeys(CONSEQUENTS, least)
 
 
 STEPS = np.array([-0.01, 0.0, 0.01])

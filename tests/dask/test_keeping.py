@@ -14,6 +14,7 @@ import dask.array as da
 from skanfis.dask import keeping, rows
 from skanfis.dask.blocks import Blocks
 
+of_the_cluster = keeping._workers
 # Two workers, of three threads together.
 WORKERS = [{"nthreads": 2, "memory_limit": 10**6}, {"nthreads": 1, "memory_limit": 10**6}]
 
@@ -75,3 +76,20 @@ def test_data_that_workers_hold_stay_where_they_are():
     kept = keeping.kept_blocks(Blocks(held, blocks.layout), 700)
     assert len(kept.pieces) == 7
     assert_array_equal(loaded(kept.pieces[3])[0].X, X[300:400])
+
+
+class Client:
+    """What a cluster's client says of its workers."""
+
+    def get(self, dsk, keys, **options):
+        raise NotImplementedError
+
+    def scheduler_info(self, n_workers):
+        assert n_workers == -1  # all of them
+        return {"workers": dict(enumerate(WORKERS))}
+
+
+def test_the_cluster_is_that_of_the_scheduler_in_use():
+    assert of_the_cluster() == []
+    with dask.config.set(scheduler=Client().get):
+        assert of_the_cluster() == WORKERS

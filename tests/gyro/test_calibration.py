@@ -16,7 +16,7 @@ from skanfis.gyro._summary import errors_and_verdict
 
 pytestmark = pytest.mark.theory
 
-N_RUNS, N_ROWS = 8, 40
+N_RUNS, N_ROWS = 8, 60
 NOISE = 2e-4
 
 
