@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.data import StandardisedData
 from skanfis.evidence import FREE, PRIOR_DISPLACEMENT
@@ -38,6 +38,25 @@ def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
     for is_loose in (False, True):
         tuning.tune(*two_rules, FREE, 100.0, turns=1, is_loose=is_loose)
     assert_allclose(begun, [noise / (100.0 * PRIOR_DISPLACEMENT**2), 1e-12])
+
+
+def test_premises_start_where_they_are_told_to(two_rules):
+    problem, premise = two_rules
+    x = np.linspace(-0.2, 0.3, premise.size)
+    found = tuning.tune(problem, premise, FREE, 100.0, turns=0, displacement=x)
+    assert_array_equal(found.displacement, x)
+    costs = [problem.evaluate(premise.parameters(at)).cost for at in (x, 0.0 * x)]
+    assert found.evaluation.cost == costs[0] != costs[1]
+
+
+def test_nothing_is_computed_where_no_weight_is_to_be_found(monkeypatch, two_rules):
+    # Premises that stay where they are have no stiffness.
+    monkeypatch.setattr(tuning, "search_sample", None)
+    antecedent, rows = two_rules[0].antecedent, two_rules[0].rows
+    given = {"agreement": 0.1, "alpha": 0.01, "slope": 0.02}
+    start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), given, premises_move=False)
+    assert start.antecedent is antecedent
+    assert start.penalty == Penalty(**given, stiffness=0.0)
 
 
 def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
