@@ -26,6 +26,7 @@ __all__ = [
     "on_host",
     "positive_weights",
     "refuse_lazy",
+    "untold",
     "warn_user",
 ]
 
@@ -297,11 +298,27 @@ def collected_warnings():
         _collected.reset(before)
 
 
+# Likewise.
+_untold: ContextVar[type | tuple] = ContextVar("untold", default=())
+
+
+@contextmanager
+def untold(category):
+    """Leave what ``warn_user`` is told of a category in here untold."""
+    before = _untold.set(category)
+    try:
+        yield
+    finally:
+        _untold.reset(before)
+
+
 def warn_user(message, category):
     """Warn at the line that called this package, or scikit-learn, whatever lies between.
 
     Not from within scikit-learn's cross-validation, where the category is this package's own.
     """
+    if issubclass(category, _untold.get()):
+        return
     told = _collected.get()
     if told is not None:
         told.append((message, category))

@@ -13,8 +13,10 @@ from skanfis._validation import (
     check_finite,
     collected_warnings,
     positive_weights,
+    untold,
     warn_user,
 )
+from skanfis.exceptions import OutOfBoundsWarning
 
 NAMES = ["a", "b"]
 
@@ -93,14 +95,15 @@ def test_first_negative_weight_is_named():
         positive_weights(np.array([1.0, -0.25, -7.0]), 3)
 
 
+def in_another_thread(message, category):
+    thread = Thread(target=warn_user, args=(message, category))
+    thread.start()
+    thread.join()
+
+
 def test_collected_are_the_warnings_of_one_thread_alone():
     """While one thread collects, another warns as ever; an error ends the collecting."""
     told, inner = [], []
-
-    def another():
-        thread = Thread(target=warn_user, args=("another's", UserWarning))
-        thread.start()
-        thread.join()
 
     def collects():
         with collected_warnings() as outermost:
@@ -109,7 +112,7 @@ def test_collected_are_the_warnings_of_one_thread_alone():
                 warn_user("of a trial", UserWarning)
             inner.extend(of_trial)
             with pytest.warns(UserWarning, match="another's"):
-                another()
+                in_another_thread("another's", UserWarning)
             told.extend(outermost)
             raise KeyError
 
@@ -119,3 +122,14 @@ def test_collected_are_the_warnings_of_one_thread_alone():
     assert inner == [("of a trial", UserWarning)]
     with pytest.warns(UserWarning, match="at last"):
         warn_user("at last", UserWarning)
+
+
+def test_untold_is_one_category_in_one_thread():
+    with untold(OutOfBoundsWarning):
+        warn_user("beyond", OutOfBoundsWarning)
+        with pytest.warns(UserWarning, match="of another kind"):
+            warn_user("of another kind", UserWarning)
+        with pytest.warns(OutOfBoundsWarning, match="another's"):
+            in_another_thread("another's", OutOfBoundsWarning)
+    with pytest.warns(OutOfBoundsWarning, match="beyond"):
+        warn_user("beyond", OutOfBoundsWarning)

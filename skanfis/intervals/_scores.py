@@ -1,7 +1,7 @@
 """Scores: how many standard deviations rows that a model has not seen lie from its predictions."""
 
 import inspect
-import warnings
+from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +9,7 @@ from sklearn.frozen import FrozenEstimator
 from sklearn.pipeline import Pipeline
 
 from .._sklearn import safe_indexing
+from .._validation import untold
 from ..exceptions import OutOfBoundsWarning
 
 __all__ = ["Scorer", "final_step"]
@@ -41,10 +42,8 @@ class Scorer:
 
     def predicted(self, estimator, X, warn=True):
         """Predictions and deviations, (n_rows, n_outputs)."""
-        with warnings.catch_warnings():
-            if not warn:
-                # That a row held out lies beyond the others is what is to be measured.
-                warnings.simplefilter("ignore", OutOfBoundsWarning)
+        # That a row held out lies beyond the others is what is to be measured.
+        with nullcontext() if warn else untold(OutOfBoundsWarning):
             if not self.scaled:
                 centers = np.asarray(estimator.predict(X), dtype=float)
                 centers = centers.reshape(len(centers), -1)
