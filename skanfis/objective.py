@@ -343,15 +343,19 @@ class SeparableProblem:
 
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
-        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
         for chunk in self.rows.chunks(self._block_rows):
             for part in chunk:
-                Z, target, weight = self.rows.read(part)
-                strengths = evaluation.antecedent.strengths(Z)
-                basis_rows = self._design.basis(Z)
-                for k in range(self.n_outputs):
-                    target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
-                yield part, target, weight
+                yield part, *self.residual(evaluation, part)
+
+    def residual(self, evaluation, part):
+        """Residual (n_outputs, n_rows) of the standardised target, and weights, of some rows."""
+        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
+        Z, target, weight = self.rows.read(part)
+        strengths = evaluation.antecedent.strengths(Z)
+        basis_rows = self._design.basis(Z)
+        for k in range(self.n_outputs):
+            target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+        return target, weight
 
     def strongest_alone(self, evaluation):
         """RMS of the strongest rule's distance from the model, of the output where it is largest.
@@ -414,14 +418,19 @@ class SeparableProblem:
 
         Where something is ``held``, of every output, (n_outputs, n_rows).
         """
-        Z, _, _ = self.rows.read(part)
-        strengths = evaluation.antecedent.strengths(Z)
-        design = (strengths[:, None, :] * self._design.basis(Z)).reshape(self.n_columns, -1)
-        half = evaluation.normal.factor.half_solve(self.local.transform_rows(design))
+        half = self.half(evaluation, part)
         found = np.sum(half**2, axis=0)
         if held is not None:
             found = np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])
-        return found / self._weight
+        return found
+
+    def half(self, evaluation, part):
+        """W^-1/2 L^-1 phi of some rows, (n_columns, n_rows), of which squares are leverages."""
+        Z, _, _ = self.rows.read(part)
+        strengths = evaluation.antecedent.strengths(Z)
+        design = (strengths[:, None, :] * self._design.basis(Z)).reshape(self.n_columns, -1)
+        found = evaluation.normal.factor.half_solve(self.local.transform_rows(design))
+        return found / np.sqrt(self._weight)
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""

@@ -43,6 +43,7 @@ from ..structure import (
 from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
 from .knowing import grown
+from .left_out import leave_group_out_error
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
 from .result import Fitted, SolverRun
@@ -426,12 +427,15 @@ class _Fit:
     def expected_error(self, run, evaluation, solved):
         """Mean squared error on new rows of consequents that keep what is known.
 
-        That of rows left out one by one, with what holds the consequents back still held.
+        That of rows left out one by one, or of groups, with what holds the consequents back held.
         """
         rows, problem = run.problem.rows, run.problem.on_sample or run.problem
         n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
         held = solved.held(evaluation.normal.factor)
-        left_out = problem.leave_one_out_error(evaluation, n_rows, held)
+        if problem.rows.groups is None or self.n_units == 1:
+            left_out = problem.leave_one_out_error(evaluation, n_rows, held)
+        else:
+            left_out = leave_group_out_error(problem, evaluation, held)
         n_premises = 0.0
         if self.solver.moves_premises:
             n_premises = effective_premises(run.problem, run.premise, evaluation)

@@ -7,11 +7,12 @@ grows on, one term at a time, by what is expected on new rows of the fits that k
 
     n log E ,
 
-with E the mean square of rows left out one by one, at fixed premises and with whatever constraints
-hold the consequents back held on (``Tuned.expected_error`` without any): exact while these stay the
-same. A term is taken for a gain of two, "positive" in the words of Kass and Raftery (1995), where
-the search without constraints asks for ten: few candidates are compared here, and what is known
-speaks for them too. Of rows that come in groups n is the number of groups.
+with E the mean square of rows left out one by one, or of whole groups where rows come in groups, at
+fixed premises and with whatever constraints hold the consequents back held on
+(``Tuned.expected_error`` without any): exact while these stay the same; n is the number of rows, or
+of groups. A term is taken for a gain of two, "positive" in the words of Kass and Raftery (1995),
+where the search without constraints asks for ten: few candidates are compared here, and what is
+known speaks for them too.
 """
 
 from collections.abc import Callable

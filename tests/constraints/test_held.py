@@ -1,4 +1,6 @@
-"""What holds the consequents back, by brute force: every row left out and solved for anew."""
+"""What holds the consequents back, by brute force: rows and groups left out and solved for anew."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from numpy.testing import assert_allclose
 from skanfis import ANFISRegressor
 from skanfis.constraints import FixedPoint
 from skanfis.training import fit as training
+from skanfis.training.left_out import leave_group_out_error
 
 from .. import oracles
 
@@ -15,7 +18,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWa
 
 @pytest.mark.parametrize("points", [[], [FixedPoint([0.3, 0.2], [0.5, 0.0])]])
 def test_rows_left_out_under_what_is_held(points, rng, monkeypatch):
-    """Of the smaller problem that is left at the constraints met, two outputs and repeated rows."""
+    """Of the smaller problem that is left at the constraints met, two outputs and repeated rows.
+
+    Then groups, of fewer rows than there are coefficients and of more.
+    """
     X, weight = rng.uniform(-1.0, 1.0, (40, 2)), rng.integers(1, 4, 40)
     y = np.column_stack([np.tanh(3.0 * X[:, 0]), X[:, 1] ** 2]) + 0.3 * rng.normal(size=(40, 2))
     seen = []
@@ -37,18 +43,31 @@ def test_rows_left_out_under_what_is_held(points, rng, monkeypatch):
     design = oracles.dense_design(problem.antecedent, theta, Z, 1)
     local, targets = problem.local.transform_rows(design.T.copy()).T, targets.T
     assert min(map(len, solved.rows)) > len(points)
-    expected = 0.0
-    for k, held in enumerate(solved.rows):
-        for i in range(40):
-            left = weight - (np.arange(40) == i)
+
+    def squares(left):
+        """Of the rows, by a fit to what is left of their weight."""
+        found = np.empty((40, 2))
+        for k, held in enumerate(solved.rows):
             matrix = (local.T * left) @ local / total + normal.penalty
             corner = np.zeros((len(held), len(held)))
             right = [local.T @ (left * targets[:, k]) / total, held @ solved.local[:, k]]
             # Karush, Kuhn and Tucker; of rows that say the same, the least multipliers.
             whole = np.block([[matrix, held.T], [held, corner]])
             u = np.linalg.lstsq(whole, np.concatenate(right), rcond=None)[0][: len(matrix)]
-            expected += weight[i] / total * (targets[i, k] - local[i] @ u) ** 2
-    found = problem.leave_one_out_error(ended, total, solved.held(normal.factor))
+            found[:, k] = (targets[:, k] - local @ u) ** 2
+        return found.sum(axis=1)
+
+    every, held = np.arange(40), solved.held(normal.factor)
+    expected = sum(weight[i] * squares(weight - (every == i))[i] for i in every) / total
+    found = problem.leave_one_out_error(ended, total, held)
     assert_allclose(found, expected, rtol=1e-7)
+    groups = rng.permutation(np.repeat([3, 1, 7, 2], [21, 12, 6, 1]))
+    expected = sum(
+        (weight * squares(weight * (groups != own)))[groups == own].sum() for own in set(groups)
+    )
+    monkeypatch.setattr(problem, "rows", replace(rows, groups=groups))
+    monkeypatch.setattr("skanfis.training.left_out.fitting_rows", lambda _: 8)
+    grouped = leave_group_out_error(problem, ended, held)
+    assert_allclose(grouped, expected / total, rtol=1e-7)
     free = problem.leave_one_out_error(ended, total)
     assert abs(found - free) > 0.01 * free
