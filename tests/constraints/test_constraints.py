@@ -14,7 +14,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import bounds, monotonicity
-from skanfis.constraints import FixedPoint, OutputLimits
+from skanfis.constraints import FixedPoint, OutputLimits, exchange
 from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
@@ -125,6 +125,26 @@ def test_what_holds_already_is_left_alone(rng):
     assert held.constraints_["certified"]
     assert held.constraints_["rows"] == 0
     assert_allclose(held.consequents_, free.consequents_, rtol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+def test_proofs_are_not_what_finds_violations(monkeypatch):
+    """A staircase, whose rules fall between the points of the sample wherever they are not held."""
+    proofs, largest = [], exchange.largest
+
+    def counted(*args, **kwargs):
+        proofs.append(largest(*args, **kwargs))
+        return proofs[-1]
+
+    monkeypatch.setattr(exchange, "largest", counted)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        X = rng.uniform(-1.0, 1.0, (100, 2))
+        y = np.digitize(X[:, 0], [-0.3, 0.4]) + np.sin(X[:, 1]) + 0.1 * rng.normal(size=100)
+        model = ANFISRegressor(**QUICK | {"n_mfs": [6, 3]}, monotonic_cst=[1, 0]).fit(X, y)
+        assert model.constraints_["certified"]
+        assert falls(model, 0, rng) <= 0.0
+    assert len(proofs) <= 5
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
