@@ -125,6 +125,7 @@ TABLE = {
             "antecedent",
             "naming",
             "support",
+            "deviation",
             "posterior",
             "policies",
             "model",

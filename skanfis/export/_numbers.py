@@ -262,8 +262,10 @@ def _term_tables(model, low, high):
         others = np.array([_rounded(other, dtype, what) for other in others])
         tables.append((group, start, near, rest, others))
         start += group.n_terms
-    # One function per family: it adds a second part to locations if any of its terms needs it.
-    in_two = {group.family for group, _, _, rest, _ in tables if rest.any()}
+    # One function per family: it adds a second part to locations if any of its terms needs it. In
+    # single precision nearly all do.
+    is_single = dtype == np.float32
+    in_two = {group.family for group, _, _, rest, _ in tables if is_single or rest.any()}
     for group, start, near, rest, others in tables:
         is_in_two = group.family in in_two
         columns = [near, rest, others] if is_in_two else [near, others]

@@ -125,6 +125,44 @@ def test_deviations_are_those_of_python(std, tmp_path):
 
 
 @needs_compiler
+def test_columns_far_from_the_origin_lose_no_digits(tmp_path):
+    """A step inside is a hundredth of a deviation, and of floats out there the spacing is more."""
+    g = np.random.default_rng(5)
+    X = g.uniform(-1.0, 1.0, (150, 2)) + np.array([1e5, -300.0])
+    y = np.sin(3.0 * (X[:, 0] - 1e5)) + X[:, 1] + 300.0 + 0.1 * g.normal(size=150)
+    for dtype, tolerance in ((np.float32, 3e-3), (np.float64, 1e-6)):
+        # As they are held.
+        held = X.astype(dtype)
+        clusters = {"n_mfs": "auto", "partition": KMeans(3, n_init=1, random_state=0)}
+        kinds = quick(), quick("trapezoidal"), quick(**clusters)
+        models = [rules.fit(held, y) for rules in kinds]
+        word = "double" if dtype is np.float64 else "float"
+        codes = [
+            export_c(model, name=f"m{i}", dtype=word, deviation=True)
+            for i, model in enumerate(models)
+        ]
+        rows = around(X, dtype=dtype)
+        for model, one in zip(models, answers(codes, rows, tmp_path, 1), strict=True):
+            wanted = model.model_.standard_deviation(rows.astype(float))
+            np.testing.assert_allclose(one, wanted, rtol=tolerance)
+
+
+def test_steps_that_do_not_tell_what_goes_on_at_an_edge_are_refused():
+    """At the lower end one term of two is as good as false, and the other just begins."""
+    X, y = surface()
+    model = quick("pi_shaped", n_mfs=[2, 1]).fit(X, y).model_
+    group, low, spread = model.antecedent.groups[0], model.minimum[0], model.spread[0]
+    theta = group.theta.copy()
+    theta[:, 0] = low + 1.2 * spread, *np.log(spread * np.array([1.001, 1.0, 0.4]))
+    theta[:, 1] = low + 2.6 * spread, *np.log(spread * np.array([1.2, 1.0, 0.4]))
+    antecedent = replace(model.antecedent, groups=(replace(group, theta=theta),))
+    model = replace(model, antecedent=antecedent)
+    with pytest.raises(ValueError, match=r"0\.0078 standard deviations, and is off by .* of 'x0'"):
+        export_c(model, name="m", dtype="float", deviation=True)
+    export_c(model, name="m", dtype="double", deviation=True)
+
+
+@needs_compiler
 @pytest.mark.parametrize("policy", ["linear", "nan", "raise"])
 def test_interval_is_that_of_the_conformal_regressor(policy, tmp_path):
     X, y = surface(n_outputs=2)
@@ -153,14 +191,14 @@ def test_deviation_takes_a_posterior_and_an_interval_one_model():
     bare = replace(rules.fit(X, y).model_, posterior=None)
     with pytest.raises(ValueError, match="knows of no posterior"):
         export_c(bare, name="m", deviation=True)
-    # A foot a hundredth of a deviation inside the range: within three steps of single precision.
+    # A foot that little inside the range lies within three steps of single precision.
     flanks = quick("triangular", max_iter=1).fit(X, y).model_
     group = flanks.antecedent.groups[0]
     theta = group.theta.copy()
-    theta[1, 1] = np.log(theta[0, 1] - flanks.minimum[0] - 0.01 * flanks.spread[0])
+    theta[1, 1] = np.log(theta[0, 1] - flanks.minimum[0] - 0.002 * flanks.spread[0])
     near = replace(flanks.antecedent, groups=(replace(group, theta=theta),))
     near = replace(flanks, antecedent=near)
-    with pytest.raises(ValueError, match=r"flank lies 0\.01 standard deviations inside .* 'x0'"):
+    with pytest.raises(ValueError, match=r"flank lies 0\.002 standard deviations inside .* 'x0'"):
         export_c(near, name="m", dtype="float", deviation=True)
     export_c(near.with_out_of_bounds("nan"), name="m", dtype="float", deviation=True)
     with pytest.raises(ValueError, match="deviation='yes' must be True or False"):

@@ -7,8 +7,9 @@ from typing import Any
 from .._numbers import Numbers, as_held
 from ..folding import fold
 from ._cost import CCost, cost, with_deviation, with_learner
-from ._deviation import DeviationSource, deviation_test
+from ._deviation import DeviationSource
 from ._deviation_tables import deviation_of
+from ._deviation_test import deviation_test
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._header import header
@@ -179,7 +180,8 @@ def export_c(
             numbers, dialect, model.out_of_bounds, min_coverage, found, limits=limits
         )
         price = with_deviation(cost(numbers, sure), sure)
-        test, call = deviation_test(as_held(model, numbers), dialect, answers[0]), "deviation_test"
+        test = deviation_test(as_held(model, numbers), dialect, answers[0], sure)
+        call = "deviation_test"
         declarations, body = sure.declarations(), sure
     elif forgetting is None:
         body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)

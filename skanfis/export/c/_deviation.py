@@ -8,7 +8,8 @@ term k, g its derivatives by the term's parameters, and tables of F, T and B F,
 all over the square of a power of two near the noise. Where the premises were not learnt there is no
 v. Out of the box u and v are taken at two points a little inside, which give what they are at its
 edge and their slopes along the way out, as in Python. In single precision the steps are longer,
-because a difference has the fewer digits the shorter it is, and the points three, for parabolas.
+because a difference has the fewer digits the shorter it is, and the points three, for parabolas;
+points are given by their distances there (``_deviation_halves``).
 
 The derivatives of a membership by its parameters follow from its derivative by x, which the
 continuation "linear" needs too, and from the distances and constants of its family.
@@ -18,6 +19,7 @@ import numpy as np
 
 from ._deviation_code import (
     BEYOND,
+    BY_DISTANCE,
     CHANGES_OF,
     DECLARATION,
     DECLARATION_OF_INTERVAL,
@@ -27,42 +29,32 @@ from ._deviation_code import (
     INTERVAL,
     KNOWN,
     KNOWN_OF_PREMISES,
-    PREMISES,
-    PRODUCTS,
     SUM,
-    TEST,
+    TO_POINT,
 )
+from ._deviation_halves import HalvesSource
+from ._deviation_rounding import Differences
 from ._deviation_tables import fitting
 from ._families import words_of
 from ._fragments import CENTRE, FINITE_INPUT, INPUTS
 from ._source import Source
 from ._text import literals
 
-__all__ = ["DeviationSource", "deviation_test"]
+__all__ = ["DeviationSource"]
 
 # Weights of what is found at the steps inside.
 _OF_SLOPE = {np.dtype(np.float64): (1.0, -1.0), np.dtype(np.float32): (2.5, -4.0, 1.5)}
 _AT_EDGE = {np.dtype(np.float64): (2.0, -1.0), np.dtype(np.float32): (3.0, -3.0, 1.0)}
-# As parts of a deviation: what rounding leaves of differences, or in range.
-_TOLERANCE = {np.dtype(np.float64): 1e-9, np.dtype(np.float32): 2e-2}
 
 
-class DeviationSource(Source):
+class DeviationSource(HalvesSource):
     """A Source with the function of the deviation, and of the interval where it has a reach."""
 
-    def __init__(
-        self, numbers, dialect, policy, min_coverage, found, *, is_part=False, limits=None
-    ):
-        super().__init__(numbers, dialect, policy, min_coverage, is_part=is_part, limits=limits)
-        self.found, self.given_policy = found, policy
+    def __init__(self, numbers, dialect, policy, *args, **kwargs):
+        super().__init__(numbers, dialect, policy, *args, **kwargs)
         # The way out of the box along which the prediction's tangent is not followed.
         self._along = Source(numbers, dialect, policy, None)
         self._along.policy = "linear"
-
-    @property
-    def answers_beyond(self):
-        """Whether rows out of the box have a deviation."""
-        return self.given_policy in ("clip", "linear")
 
     @property
     def leaves_tangent(self):
@@ -72,21 +64,12 @@ class DeviationSource(Source):
         return self.answers_beyond and not is_constant and not endless
 
     @property
-    def size(self):
-        """Values that the halves take."""
-        return self.found.n + self.found.q * self.numbers.n_outputs
-
-    @property
-    def words(self):
-        """Sizes that templates name."""
-        found = self.found
-        return {
-            "n": found.n,
-            "q": found.q,
-            "all": self.size,
-            "n_parameters": found.terms.size,
-            "n_terms": self.n_logarithms,
-        }
+    def differences(self):
+        """How it goes out of the range."""
+        dtype = self.numbers.dtype
+        return Differences(
+            self.found.step, _OF_SLOPE[dtype], _AT_EDGE[dtype], by_distance=self.moves_terms
+        )
 
     def declarations(self):
         """What the header says of it."""
@@ -152,6 +135,8 @@ class DeviationSource(Source):
             parts.append(self._along.tangent())
         if self.leaves_tangent:
             parts.append(self.leave())
+        if self.moves_terms:
+            parts += [self.moving(k, terms) for k, terms in enumerate(self.numbers.terms)]
         inner = self.write(self.inner(), n_pinned=self.found.pinned.shape[1], **self.words)
         parts += [self.halves(), inner.lstrip(), self.deviation()]
         if self.found.reach is not None:
@@ -171,110 +156,6 @@ class DeviationSource(Source):
         parts += [self.table(self.dialect.real, *item) for item in self.deviation_tables().items()]
         parts += [self.index_table(*item) for item in self.index_tables().items()]
         return "\n".join(parts)
-
-    def halves(self):
-        """The function that writes u, then v of every output, of a row in the box."""
-        found, numbers = self.found, self.numbers
-        lines = [
-            "/* Of a row in the box, roots of what its variance is the sum of squares of. */",
-            "static void $name_halves(const $real *c, $real *u)",
-            "{",
-            f"    $real phi[{found.n}];",
-        ]
-        lines += self.strength_arrays()
-        if found.q:
-            lines.append(f"    $real g[{found.terms.size}], change[{found.terms.size}];")
-            lines.append(f"    $real t[{self.n_logarithms}], y[{numbers.n_outputs}];")
-            lines.append(f"    $real h[{numbers.n_outputs}][{numbers.n_rules}];")
-            lines.append("    $real *v = u + $n;")
-            if self.has_slopes:
-                lines.append(f"    $real z[{numbers.n_inputs}];")
-        lines.append("    const $real *f;")
-        lines.append("    long a, b;")
-        names = [name for name in self.loop_variables(tangent=False) if name not in ("o", "i")]
-        if numbers.terms or (found.q and self.has_slopes):
-            names.append("i")
-        if found.q:
-            names.append("o")
-        if found.inputs.size:
-            names.append("m")
-        if "j" in names and not found.q:
-            names.remove("j")
-        lines.append(f"    $int {', '.join(names)};")
-        if not (self.has_shares or found.inputs.size):
-            lines.append("    (void)c;")
-        lines += self.strengths("l", "w", "")
-        if found.q:
-            if self.has_slopes:
-                lines += [
-                    f"    for (i = 0; i < {numbers.n_inputs}; ++i) {{",
-                    "        z[i] = c[i] - $name_reference[i];",
-                    "    }",
-                ]
-            lines += [
-                "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-                "        y[o] = 0.0R;",
-                "    }",
-            ]
-        lines += self.over_rules(self._of_rule, tangent=False)
-        lines.append(PRODUCTS.strip("\n"))
-        if found.q:
-            lines += self._by_parameters()
-            sums = "\n".join(f"    {line}" for line in self.over_rules(self._of_term, False))
-            lines.append(PREMISES.replace("$sums", sums).strip("\n"))
-        return self.write("\n".join([*lines, "}"]) + "\n", **self.words)
-
-    def _of_rule(self, strength, _):
-        n_basis = 1 + self.found.inputs.size
-        lines = [f"phi[{n_basis} * r] = {strength};"]
-        if self.found.inputs.size:
-            at = "$name_deviation_input[m]"
-            lines += [
-                f"for (m = 0; m < {self.found.inputs.size}; ++m) {{",
-                f"    phi[{n_basis} * r + 1 + m] = {strength} * (c[{at}] - $name_reference[{at}]);",
-                "}",
-            ]
-        if not self.found.q:
-            return lines
-        return [
-            *lines,
-            "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            f"    $real value = {self.height};",
-            *self.slope_loop(f"value += {self.slope} * z[@];", "    "),
-            f"    h[o][r] = {strength} * value;",
-            "    y[o] += h[o][r];",
-            "}",
-        ]
-
-    def _of_term(self, strength, _):
-        numbers = self.numbers
-        value = f"h[o][r] - {strength} * y[o]"
-        if self.is_grid:
-            starts = zip(numbers.block_starts, range(len(numbers.counts)), strict=True)
-            return [f"t[{start} + i{k}] += {value};" for start, k in starts]
-        at = "$name_rule_terms[r][k]"
-        if numbers.rule_terms is None:
-            at = f"r * {numbers.terms_per_rule} + k"
-        return [
-            f"for (k = 0; k < {numbers.terms_per_rule}; ++k) {{",
-            f"    t[{at}] += {value};",
-            "}",
-        ]
-
-    def _by_parameters(self):
-        """Derivatives of every term by its parameters, term by term."""
-        lines, start = [], 0
-        for k, terms in enumerate(self.numbers.terms):
-            position = f"{terms.start} + i" if terms.start else "i"
-            n_parameters = len(terms.family.parameters)
-            call = f"$name_{terms.family.name}_by(c[$name_term_input[{position}]], "
-            lines += [
-                f"    for (i = 0; i < {len(terms.constants)}; ++i) {{",
-                f"        {call}$name_terms{k}[i], g + {start} + {n_parameters} * i);",
-                "    }",
-            ]
-            start += n_parameters * len(terms.constants)
-        return lines
 
     def deviation(self):
         """The function that is called."""
@@ -301,9 +182,19 @@ class DeviationSource(Source):
                 "        return $NAME_REJECT(deviation, status);",
                 "    }",
             ]
-        lines.append("    $name_halves(c, half);")
+        if self.moves_terms:
+            lines += [
+                "    for (i = 0; i < $NAME_N_INPUTS; ++i) {",
+                "        e[i] = 0.0R;",
+                "    }",
+                "    $name_halves(c, e, half);",
+            ]
+        else:
+            lines.append("    $name_halves(c, half);")
         if self.answers_beyond:
-            lines.append(BEYOND.replace("$unfollowed", self.unfollowed()).strip("\n"))
+            inside = (BY_DISTANCE if self.moves_terms else TO_POINT).strip("\n")
+            beyond = BEYOND.replace("$inside", inside)
+            lines.append(beyond.replace("$unfollowed", self.unfollowed()).strip("\n"))
         lines.append(SUM.replace("$growth", GROWTH if self.answers_beyond else "").strip("\n"))
         step = self.dialect.number(self.found.step)
         weights = {
@@ -365,16 +256,3 @@ class DeviationSource(Source):
             ]
         values = ", ".join([*self._along.places, "e", *self._along.shares, "sum"])
         return self.write("\n".join([*lines, f"    $name_tangent({values});", "}"]) + "\n")
-
-
-def deviation_test(model, dialect, X):
-    """The test of the deviations at the rows of the self-test; ``model`` as it is held."""
-    policy = "linear" if model.out_of_bounds == "linear" else "clip"
-    wanted = model.with_out_of_bounds(policy).standard_deviation(X.astype(float))
-    factor = " * $NAME_TEST_FACTOR" if dialect.real == "double" else ""
-    return dialect.write(
-        TEST.replace("$factor", factor),
-        n_test=len(X),
-        deviations=literals(wanted.astype(dialect.dtype)),
-        tolerance=dialect.number(_TOLERANCE[dialect.dtype]),
-    )

@@ -4,6 +4,7 @@ from ...membership import MEMBERSHIPS
 
 __all__ = [
     "BEYOND",
+    "BY_DISTANCE",
     "CHANGES_OF",
     "DECLARATION",
     "DECLARATION_OF_INTERVAL",
@@ -13,10 +14,12 @@ __all__ = [
     "INTERVAL",
     "KNOWN",
     "KNOWN_OF_PREMISES",
+    "MOVED",
     "PREMISES",
     "PRODUCTS",
     "SUM",
     "TEST",
+    "TO_POINT",
 ]
 
 # Of every family what g[1], g[2] .. are, with s its derivative by x; g[0] is -s. A flank with a
@@ -172,10 +175,7 @@ BEYOND = """
             slope[a] = half[a] = 0.0R;
         }
         for (k = 0; k < $n_steps; ++k) {
-            for (i = 0; i < $NAME_N_INPUTS; ++i) {
-                e[i] = c[i] - (($real)(k + 1)) * ((x[i] - c[i]) * part);
-            }
-            $name_halves(e, near);
+$inside
             for (a = 0; a < $all; ++a) {
                 slope[a] += of_slope[k] * near[a];
                 half[a] += at_edge[k] * near[a];
@@ -187,6 +187,34 @@ BEYOND = """
 $unfollowed
     }
 """
+# A step inside: to a point, or, in single precision, by a distance that no digit is lost of.
+TO_POINT = """
+            for (i = 0; i < $NAME_N_INPUTS; ++i) {
+                e[i] = c[i] - (($real)(k + 1)) * ((x[i] - c[i]) * part);
+            }
+            $name_halves(e, near);
+"""
+BY_DISTANCE = """
+            for (i = 0; i < $NAME_N_INPUTS; ++i) {
+                e[i] = (($real)(k + 1)) * ((x[i] - c[i]) * part);
+            }
+            $name_halves(c, e, near);
+"""
+MOVED = """
+/* Constants of term i, for x - e in place of x. */
+static const $real *$name_moved$k(int i, $real e, $real *p)
+{
+    int m;
+    for (m = 0; m < $n_constants; ++m) {
+        p[m] = $name_terms$k[i][m];
+    }
+    for (m = $first; m < $last; ++m) {
+        p[m] += e;
+    }
+    return p;
+}
+"""
+
 SUM = """
     for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
         $real square = $name_noise[o] * $name_noise[o] + $name_inner(half, half, o);
@@ -239,6 +267,10 @@ TEST = """
 static const $real $name_test_deviation[$n_test][$NAME_N_OUTPUTS] =
 $deviations;
 
+/* As much as they may be off. */
+static const $real $name_test_deviation_tolerance[$n_test][$NAME_N_OUTPUTS] =
+$tolerance;
+
 /* Returns 0, or 2000 and the number of the first row that fails. */
 static int $name_deviation_test(void)
 {
@@ -250,8 +282,8 @@ static int $name_deviation_test(void)
             return 2001 + i;
         }
         for (o = 0; o < $NAME_N_OUTPUTS && !(status & $NAME_NO_OUTPUT); ++o) {
-            const $real wanted = $name_test_deviation[i][o], off = s[o] - wanted;
-            const $real allowed = $tolerance$factor * wanted;
+            const $real off = s[o] - $name_test_deviation[i][o];
+            const $real allowed = $name_test_deviation_tolerance[i][o]$factor;
             if (!(off <= allowed && -off <= allowed)) {
                 return 2001 + i;
             }

@@ -13,7 +13,7 @@ _HAVE_CORNERS = {Triangular, Trapezoidal}
 # difference has the fewer digits the shorter it is, and three of them. Before a corner they are
 # halved, so many times at the most.
 _STEP = {np.dtype(np.float64): 2.0**-14, np.dtype(np.float32): 2.0**-7}
-_N_STEPS, _HALVINGS, _DIGITS_OF_STEP = 3, 3, 1e3
+_N_STEPS, _HALVINGS = 3, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +105,7 @@ def _step_before_corners(model):
                 if ahead < nearest:
                     nearest, name = ahead, model.input_names[j]
     steps = _STEP[np.dtype(np.float32)] * 2.0 ** -np.arange(_HALVINGS + 1)
-    # Shorter steps are lost in the last digits of a column that lies far from the origin.
-    farthest = np.maximum(np.abs(model.minimum), np.abs(model.maximum)) / model.spread
-    digits = steps > _DIGITS_OF_STEP * np.finfo(np.float32).eps * farthest.max()
-    clear = steps[((_N_STEPS + 0.5) * steps < nearest) & (digits | (steps == steps[0]))]
+    clear = steps[(_N_STEPS + 0.5) * steps < nearest]
     if clear.size:
         return float(clear[0])
     raise ValueError(

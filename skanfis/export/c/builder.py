@@ -6,9 +6,10 @@ the same header and self-test; :func:`skanfis.export.export_c` is made of the sa
 
 from .._numbers import Numbers, as_held
 from ._cost import CCost, cost, with_deviation
-from ._deviation import DeviationSource, deviation_test
+from ._deviation import DeviationSource
 from ._deviation_code import DECLARATION
 from ._deviation_tables import deviation_of
+from ._deviation_test import deviation_test
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._fragments import FINITE_INPUT, rejection
@@ -123,7 +124,7 @@ class RulesPart:
 
     def deviation_test(self, dialect: Dialect, rows) -> str:
         """The self-test of deviations of a file in a dialect, at ``rows`` of the rules."""
-        return deviation_test(self.model, dialect, rows)
+        return deviation_test(self.model, dialect, rows, self._source)
 
     def text(self) -> str:
         """The C code, for after the lines that include other files."""
