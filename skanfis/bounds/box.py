@@ -26,19 +26,28 @@ def read_box(box, model: TSKModel):
                 raise ValueError(f"box[{name!r}]={ends!r} must be two numbers: (low, high).")
             found[j] = given
     else:
-        found = np.array(box, dtype=float)
-        if found.shape != (model.n_inputs, 2):
-            raise ValueError(
-                f"box must have one (low, high) for each of the {model.n_inputs} inputs "
-                f"({', '.join(map(repr, model.input_names))}), or be a dict by their names; got "
-                f"an array of shape {found.shape}."
-            )
+        found = _pairs(box, model)
     for name, (low, high) in zip(model.input_names, found, strict=True):
         if not low <= high:
             raise ValueError(
                 f"box has ({low:g}, {high:g}) for {name!r}: low must not be above high, and "
                 "neither may be NaN."
             )
+    return found
+
+
+def _pairs(box, model):
+    """A box that is given as one pair per input."""
+    try:
+        found = np.array(box, dtype=float)
+        what = f"an array of shape {found.shape}"
+    except (TypeError, ValueError):
+        found, what = np.empty(0), repr(box)
+    if found.shape != (model.n_inputs, 2):
+        raise ValueError(
+            f"box must have one (low, high) for each of the {model.n_inputs} inputs "
+            f"({', '.join(map(repr, model.input_names))}), or be a dict by their names; got {what}."
+        )
     return found
 
 

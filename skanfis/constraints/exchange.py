@@ -307,6 +307,10 @@ class _Exchange:
         cuts = np.stack([model.minimum, model.maximum], axis=1)
         worst, is_undecided = [], False
         for demand in self.held.demands:
+            if demand.input is not None and _is_constant(model, demand.output):
+                # Its slopes are nothing but rounding, which no bound is below.
+                worst.append(self.sample[:0])
+                continue
             enclosure = Enclosure(model, demand.output, -demand.sign)
             until = -demand.sign * demand.limit
             seen: list[tuple[np.ndarray, np.ndarray]] = []
@@ -329,3 +333,9 @@ class _Exchange:
             worst.append(self._chosen(points, excess, until))
             is_undecided |= found.bound > until and not len(points)
         return worst, is_undecided
+
+
+def _is_constant(model, output):
+    """Whether all rules say the same, whatever the row."""
+    coefficients = model.coefficients[:, :, output]
+    return not coefficients[:, 1:].any() and not np.ptp(coefficients[:, 0])

@@ -80,16 +80,20 @@ class Scorer:
 
 
 def final_step(estimator):
-    """What predicts: behind what freezes it, the last step of a Pipeline."""
+    """What predicts: behind what freezes it or found it, the last step of a Pipeline."""
     if isinstance(estimator, FrozenEstimator):
         return final_step(estimator.estimator)
+    if hasattr(estimator, "best_estimator_"):
+        return final_step(estimator.best_estimator_)
     return final_step(estimator.steps[-1][1]) if isinstance(estimator, Pipeline) else estimator
 
 
 def _with_deviation(estimator, X):
-    """Prediction and standard deviation, of a Pipeline by its last step."""
+    """Prediction and standard deviation, of a Pipeline its last step's, of a search its best."""
     if isinstance(estimator, FrozenEstimator):
         return _with_deviation(estimator.estimator, X)
+    if hasattr(estimator, "best_estimator_"):
+        return _with_deviation(estimator.best_estimator_, X)
     if isinstance(estimator, Pipeline):
         # By itself: with metadata routing a Pipeline would have to be told of return_std.
         for _, step in estimator.steps[:-1]:

@@ -46,7 +46,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     estimator : regressor, default=None
-        What predicts; a Pipeline for example. None is ``ANFISRegressor()``.
+        What predicts; a Pipeline or a search, for example. None is ``ANFISRegressor()``.
     method : {"folds", "cross", "split", "loo"}, default="folds"
         Which rows give the scores. "folds": every row, by a model of the folds without it; the
         intervals are about the model of all rows, as wide as its own deviation says. Near what is

@@ -195,6 +195,7 @@ def test_a_constant_is_bounded_by_itself():
     ("box", "message"),
     [
         ([(0.0, 1.0)], r"one \(low, high\) for each of the 3 inputs .*shape \(1, 2\)"),
+        ("all", r"one \(low, high\) for each of the 3 inputs .*got 'all'"),
         ({"speed": (0.0, 1.0)}, r"box names 'speed', which is no input .*'rate', at positions 0"),
         ({"rate": (1.0, 0.0)}, r"box has \(1, 0\) for 'rate': low must not be above high"),
         ({"rate": (np.nan, 0.0)}, "neither may be NaN"),
