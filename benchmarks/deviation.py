@@ -53,6 +53,6 @@ def _measured(n_rows, n_mfs):
         Measure("in range, over plain", inside, "x", 4.0),
         Measure("a row", seconds["std"] / n_rows * 1e6, "µs"),
         Measure("out of range along one input, over plain", outside, "x", 4.0),
-        Measure("along two", corner, "x"),
+        Measure("along two", corner, "x", 4.0),
     ]
     return Row(f"{work} ({' x '.join(str(n) for n in n_mfs if n > 1)})", measures)

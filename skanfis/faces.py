@@ -8,23 +8,25 @@ few inputs leave the range, far fewer products do than in general.
 they are, and the basis changes by the way's own direction. The quadratic form of the range serves
 for all three products.
 
-*On a face.* Rows that leave it along one input j with terms, and no other: the shares of j and its
-basis function are the same numbers for all of them. With chi the products of the other inputs'
-shares and basis functions, the design and what it changes by over a step are
+*On a face.* Rows that leave it along up to three inputs, one of them with terms, and no other: at
+the edge the shares of these and their basis functions are the same numbers for all of them. With
+chi the products of the other inputs' shares and basis functions, and a how many steps inside a row
+is along each input that it leaves the range by, the design there is
 
-    phi = K_0 chi ,    change of phi = K_1 chi ,
+    phi = K(a) chi ,    K(a) = sum_m c_m(a) K_m ,
 
-with two matrices that are found once for every face: of 6 x 6 terms on three inputs chi has 18
-entries and phi 144. So are outputs and the derivatives by j's own terms; those by others' terms
-take their shares too. Quadratic forms of F K_0 and F K_1 are by pairs of chi's factors (see
-``quadratic``).
+by Newton's interpolation of the second order: a step is so short that the third counts for nothing.
+Along one input the two points asked for are those that are interpolated. The matrices K_m are found
+once for every face: of 6 x 6 terms on three inputs chi has 18 entries and phi 144. So are outputs
+and the derivatives by the edge's own terms; those by others' terms take their shares too. Quadratic
+forms of F K_m are by pairs of chi's factors (see ``quadratic``).
 
 *Elsewhere* the design is formed at one step inside and at two.
 """
 
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import pairwise
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 from scipy.linalg import blas
@@ -33,7 +35,7 @@ from .antecedent import Antecedent
 from .deviation import inner_products
 from .quadratic import QuadraticForm
 
-__all__ = ["STEP", "Face", "on_faces", "products_off_faces", "products_on_line"]
+__all__ = ["STEP", "Face", "nodes", "on_faces", "products_off_faces", "products_on_line"]
 
 # Derivatives along a way out of the box, by differences over this part of a standard deviation.
 # They are taken inside: terms may have a corner on the edge.
@@ -42,10 +44,14 @@ STEP = 2.0**-14
 _ENOUGH = 64
 # Columns of the design up to which there are any: they are kept, half a megabyte of each face.
 _MOST_COLUMNS = 512
+# Inputs that rows of a face leave the range by: of more there are few rows on each.
+_MOST_AWAY = 3
+# Inputs of a block up to which their sides make one number, exactly.
+_MOST_SIDES = 32
 
 
 def on_faces(way, antecedent: Antecedent, n_columns):
-    """Rows on a line (None, 0, rows), and on each face (input, side, rows) if they are enough.
+    """Rows on a line (None, rows), and on each face ((input, side), ...), if they are enough.
 
     ``way`` (n_inputs, n_rows) leads from the range to the rows; of a design of ``n_columns``.
     """
@@ -54,20 +60,61 @@ def on_faces(way, antecedent: Antecedent, n_columns):
     n_with_terms = outside[with_terms].sum(axis=0)
     rows = np.flatnonzero(n_with_terms == 0)
     if rows.size:
-        yield None, 0, rows
-    if n_columns > _MOST_COLUMNS or None in antecedent.share_inputs:
+        yield None, rows
+    used = np.flatnonzero(outside.any(axis=1))
+    if n_columns > _MOST_COLUMNS or None in antecedent.share_inputs or used.size > _MOST_SIDES:
         return
-    alone = (n_with_terms == 1) & (outside.sum(axis=0) == 1)
-    for j in with_terms[outside[with_terms].any(axis=1)]:
-        for side in (-1, 1):
-            rows = np.flatnonzero(alone & (side * way[j] > 0.0))
-            if rows.size >= _ENOUGH:
-                yield int(j), side, rows
+    rows = np.flatnonzero((n_with_terms > 0) & (outside.sum(axis=0) <= _MOST_AWAY))
+    sides = np.sign(way[used][:, rows])
+    numbers = 3.0 ** np.arange(used.size) @ sides
+    while rows.size >= _ENOUGH:
+        own = numbers == numbers[0]
+        if np.count_nonzero(own) >= _ENOUGH:
+            away = zip(used.tolist(), sides[:, 0].astype(int).tolist(), strict=True)
+            yield tuple((j, side) for j, side in away if side), rows[own]
+        if own.all():
+            return
+        rows, sides, numbers = rows[~own], sides[:, ~own], numbers[~own]
+
+
+def nodes(n_away):
+    """Points of a face, in steps inside, (n_nodes, n_away), and its parts as their differences."""
+    if n_away == 1:
+        return np.array([[1], [2]]), np.array([[1.0, 0.0], [1.0, -1.0]])
+    unit = np.eye(n_away, dtype=int)
+    seconds = [unit[i] + unit[j] for i in range(n_away) for j in range(i, n_away)]
+    points = np.vstack([np.zeros((1, n_away), dtype=int), unit, *seconds])
+    # What of a part is at each point: the inverse of the parts' values there.
+    return 1 + points, np.linalg.inv(_newton(points.T.astype(float)).T)
+
+
+def _newton(at):
+    """Newton's polynomials up to the second order at points (n_away, n_points), a row each."""
+    n_away = len(at)
+    seconds = [
+        0.5 * at[i] * (at[i] - 1.0) if i == j else at[i] * at[j]
+        for i in range(n_away)
+        for j in range(i, n_away)
+    ]
+    return np.stack([np.ones(at.shape[1]), *at, *seconds])
+
+
+def _weights_of_parts(directions, dtype):
+    """Of a face's parts a step along directions (n_away, n_rows), and what it changes by.
+
+    None along one input, where these are the parts themselves.
+    """
+    if len(directions) == 1:
+        return None
+    once, twice = (_newton(k * directions - 1.0) for k in (1.0, 2.0))
+    change = once - twice
+    change[0] = 0.0
+    return once.astype(dtype), change.astype(dtype)
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """What rows on one face are multiplied with, for n_outputs outputs.
+    """What rows on one face are multiplied with, for n_outputs outputs and n_parts parts K_m.
 
     Attributes
     ----------
@@ -78,11 +125,11 @@ class Face:
     terms : list of (ndarray, ndarray)
         Of every group the terms of inputs that vary, among the group's and among all.
     forms : QuadraticForm
-        The three of K_0' F' F K_0, of K_0' F' F K_1 and of K_1' F' F K_1.
-    by_term : ndarray of shape (n_outputs, 2 (n_terms + 1), n_varying)
-        Of chi: what the rules of each term that varies add up to, and the output; their changes.
-    joint : ndarray of shape (n_outputs, 2 n_halves, n_varying)
-        What ``DeviationTables.joint`` makes of chi: at one step inside, and the change.
+        Those of K_m' F' F K_n, m <= n.
+    by_term : ndarray of shape (n_outputs, n_parts, n_terms + 1, n_varying)
+        Of chi: what the rules of each term that varies add up to, and the output.
+    joint : ndarray of shape (n_outputs, n_parts, n_halves, n_varying)
+        What ``DeviationTables.joint`` makes of chi.
     own : ndarray of shape (n_outputs, n_halves, n_parameters)
         The same of the derivatives by the parameters of terms that vary.
     unit : ndarray of shape (n_outputs, 1)
@@ -101,37 +148,38 @@ class Face:
     n_added: int
 
     @classmethod
-    def of(cls, model, tables, inputs, j, once, twice):
-        """The face of input j, in the precision of ``tables``: ``once`` and ``twice`` inside.
+    def of(cls, model, tables, inputs, away, points):
+        """The face of the inputs ``away``, in the precision of ``tables``.
 
-        These are rows (``DerivativeRows``, of which one point is enough) where only the values of
-        input j count; ``inputs`` are those of the basis functions.
+        ``points`` are rows (``DerivativeRows``, one point each) at its ``nodes``, of which only the
+        values of these inputs count; ``inputs`` are those of the basis functions.
         """
         antecedent = model.antecedent
         edges = np.cumsum([0, *antecedent.share_counts])
         parts = [slice(*ends) for ends in pairwise(edges)]
-        place = [own == j for own in antecedent.share_inputs]
-        varying = np.flatnonzero(np.append(True, inputs != j))
-        both = [_from_varying(row, parts, place, inputs, j) for row in (once, twice)]
-        half, change = both[0], both[0] - both[1]
+        place = [own in away for own in antecedent.share_inputs]
+        varying = np.flatnonzero(np.append(True, ~np.isin(inputs, away)))
+        at_points = [_from_varying(row, parts, place, inputs, away) for row in points]
+        differences = nodes(len(away))[1]
+        matrices = np.tensordot(differences, np.stack(at_points), axes=1)
         shares = [part for part, is_fixed in zip(parts, place, strict=True) if not is_fixed]
-        halves, changes = tables.factor @ half, tables.factor @ change
-        counts = [part.stop - part.start for part in shares]
-        across = halves.T @ changes
-        squares = halves.T @ halves, 0.5 * (across + across.T), changes.T @ changes
+        counts, forms = [part.stop - part.start for part in shares], []
+        for one, other in combinations_with_replacement(tables.factor @ matrices, 2):
+            across = one.T @ other
+            forms.append(QuadraticForm.of(0.5 * (across + across.T), counts, varying.size))
         terms, start = [], 0
         for group in antecedent.groups:
-            own = np.flatnonzero(group.inputs != j)
+            own = np.flatnonzero(~np.isin(group.inputs, away))
             terms.append((own, start + own))
             start += group.n_terms
-        maps = _DerivativeMaps(model, tables, inputs, j, once, twice, half, change)
+        maps = _DerivativeMaps(model, tables, inputs, away, points, at_points, differences)
         found = [maps.of_output(k) for k in range(len(tables.unit))]
         by_term, joint, own = (np.stack(one) for one in zip(*found, strict=True))
         return cls(
             shares,
             varying,
             terms,
-            QuadraticForm.stack([QuadraticForm.of(one, counts, varying.size) for one in squares]),
+            QuadraticForm.stack(forms),
             by_term,
             joint,
             own,
@@ -144,24 +192,25 @@ class Face:
         arrays = {name: getattr(self, name).astype(dtype) for name in ("by_term", "joint", "own")}
         return replace(self, **arrays, forms=self.forms.astype(dtype))
 
-    def products(self, noise, row):
+    def products(self, noise, row, directions):
         """Products of h with itself, of h with e, of e with itself, (3, n_outputs, n_rows).
 
-        ``row`` is at the edge, where what varies is what it is at a step inside.
+        ``row`` is at the edge, where what varies is what it is at a step inside; ``directions``
+        (n_away, n_rows) of the way out, in standard deviations, are of length one.
         """
         dtype, n_rows = self.joint.dtype, row.basis.shape[1]
         kept = [row.shares[part] for part in self.shares]
         shares = np.concatenate(kept or [np.empty((0, n_rows))]).astype(dtype, copy=False)
         basis = row.basis[self.basis].astype(dtype)
-        squares = self.forms.values(shares, basis)
+        weights = _weights_of_parts(directions, dtype)
+        squares = _squares(weights, self.forms.values(shares, basis))
         found = (noise[:, None] / self.unit) ** 2 * squares[:, None]
-        if self.joint.shape[1]:
+        if self.joint.shape[2]:
             chi = self._chi(shares, basis)
             for k in range(len(self.joint)):
-                sides = self.joint[k] @ chi
+                half, change = _weighed(weights, np.tensordot(self.joint[k], chi, axes=1))
                 if self.own.shape[2]:
-                    self._add_own(k, row, chi, sides)
-                half, change = np.split(sides, 2)
+                    self._add_own(k, row, chi, weights, (half, change))
                 found[:, k] += signed_products(half, change, self.n_added)
         near, both, change = found
         return np.stack([near + 2.0 * both + change, (both + change) / STEP, change / STEP**2])
@@ -172,12 +221,12 @@ class Face:
         n_rows = basis.shape[1]
         return reduce(lambda a, b: (a[:, None] * b).reshape(-1, n_rows), factors)
 
-    def _add_own(self, k, row, chi, sides):
+    def _add_own(self, k, row, chi, weights, both):
         """What derivatives by the terms that vary add, at one step inside and to the change."""
         of_terms = np.concatenate([own for _, own in self.terms])
         shares = row.shares[of_terms].astype(chi.dtype)
-        sums = self.by_term[k] @ chi
-        for part, own_sums in zip(np.split(sides, 2), np.split(sums, 2), strict=True):
+        sums = _weighed(weights, np.tensordot(self.by_term[k], chi, axes=1))
+        for own_sums, part in zip(sums, both, strict=True):
             by_term = own_sums[:-1] - shares * own_sums[-1]
             start, changes = 0, []
             for (own, _), gradient in zip(self.terms, row.gradients, strict=True):
@@ -188,32 +237,53 @@ class Face:
             part += self.own[k] @ np.concatenate(changes)
 
 
-def _from_varying(row, parts, place, inputs, j):
-    """K: the design of rows with the shares and the basis function of input j of one row."""
+def _squares(weights, values):
+    """Products of h with itself, of h with e, of e with itself, (3, n_rows), by those of parts."""
+    if weights is None:
+        return values
+    once, change = weights
+    found, pairs = np.zeros((3, once.shape[1])), combinations_with_replacement(range(len(once)), 2)
+    for (m, n), value in zip(pairs, values, strict=True):
+        own = value if m == n else 2.0 * value
+        found[0] += once[m] * once[n] * own
+        found[1] += 0.5 * (once[m] * change[n] + once[n] * change[m]) * own
+        found[2] += change[m] * change[n] * own
+    return found
+
+
+def _weighed(weights, parts):
+    """Of parts (n_parts, n, n_rows) what they are at one step inside, and its change."""
+    if weights is None:
+        return list(parts)
+    return [np.einsum("mn,mqn->qn", one, parts) for one in weights]
+
+
+def _from_varying(row, parts, place, inputs, away):
+    """K: the design of rows with the shares and the basis functions of inputs of one row."""
     factors = [
         row.shares[part, :1] if is_fixed else np.eye(part.stop - part.start)
         for part, is_fixed in zip(parts, place, strict=True)
     ]
-    varying = np.flatnonzero(np.append(True, inputs != j))
-    of_basis = np.eye(row.basis.shape[0])[:, varying]
-    of_basis[np.append(False, inputs == j), 0] = row.basis[1:, 0][inputs == j]
+    is_away = np.append(False, np.isin(inputs, away))
+    of_basis = np.eye(row.basis.shape[0])[:, ~is_away]
+    of_basis[is_away, 0] = row.basis[is_away, 0]
     return reduce(np.kron, [*factors, of_basis])
 
 
 class _DerivativeMaps:
     """What makes derivatives by the premises of chi."""
 
-    def __init__(self, model, tables, inputs, j, once, twice, half, change):
-        antecedent, self.tables, self.half, self.change = model.antecedent, tables, half, change
-        self.once, self.twice = once, twice
+    def __init__(self, model, tables, inputs, away, points, at_points, differences):
+        antecedent, self.tables, self.points = model.antecedent, tables, points
+        self.at_points, self.differences = np.stack(at_points), differences
         columns = np.concatenate([[0], 1 + inputs]) if model.order == 1 else [0]
         widths = np.concatenate([[1.0], model.spread[inputs]])
         self.coefficients = model.coefficients[:, columns] * widths[:, None]
         self.contains = antecedent.sum_over_rules(np.eye(antecedent.n_rules))
         inputs_of_terms = np.concatenate([g.inputs for g in antecedent.groups])
-        self.is_fixed = inputs_of_terms == j
+        self.is_fixed = np.isin(inputs_of_terms, away)
         self.of_parameters = np.concatenate(
-            [np.tile(g.inputs == j, len(g.theta)) for g in antecedent.groups]
+            [np.tile(np.isin(g.inputs, away), len(g.theta)) for g in antecedent.groups]
         )
 
     def of_output(self, k):
@@ -223,23 +293,24 @@ class _DerivativeMaps:
         sums = (self.contains[:, :, None] * coefficients).reshape(len(self.contains), -1)
         # Of every term the rules that have it, then of all rules: the output.
         sums = np.vstack([sums, coefficients.ravel()])
-        inside, change = sums @ self.half, sums @ self.change
-        kept = np.append(~self.is_fixed, True)
-        by_term = np.vstack([inside[kept], change[kept]])
+        # Differences come first, of which no digits are lost thereafter.
+        matrices = np.tensordot(self.differences, self.at_points, axes=1)
+        by_term = sums[np.append(~self.is_fixed, True)] @ matrices
         joint = self.tables.joint[k]
         premises, consequents = joint[:, :n_premises], joint[:, n_premises:]
-        sides = [consequents @ self.half, consequents @ self.change]
+        sides = consequents @ matrices
         if not n_premises:
-            return by_term, np.vstack(sides), premises
-        first = self._of_fixed(self.once, inside)
-        second = self._of_fixed(self.twice, inside - change)
-        fixed = premises[:, self.of_parameters]
-        sides[0] += fixed @ first
-        sides[1] += fixed @ (first - second)
-        return by_term, np.vstack(sides), premises[:, ~self.of_parameters]
+            return by_term, sides, premises
+        at_points = [
+            self._of_fixed(row, sums @ one)
+            for row, one in zip(self.points, self.at_points, strict=True)
+        ]
+        fixed = np.tensordot(self.differences, np.stack(at_points), axes=1)
+        sides = sides + premises[:, self.of_parameters] @ fixed
+        return by_term, sides, premises[:, ~self.of_parameters]
 
     def _of_fixed(self, row, sums):
-        """Derivatives by the parameters of j's own terms, of chi, (n_parameters, n_varying)."""
+        """Derivatives by the parameters of the edge's own terms, of chi, (n, n_varying)."""
         by_term = sums[:-1] - row.shares[:, :1] * sums[-1]
         start, found = 0, []
         for gradient in row.gradients:

@@ -40,7 +40,7 @@ from scipy.special import ndtr
 from .antecedent import Antecedent
 from .consequent import NormalFactor
 from .deviation import DerivativeRows, DeviationTables, points_of_range
-from .faces import STEP, Face, on_faces, products_off_faces, products_on_line
+from .faces import STEP, Face, nodes, on_faces, products_off_faces, products_on_line
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
@@ -57,6 +57,8 @@ _DEPENDENT = 1e-7
 _DIGITS, _N_COMPARED = 1e-5, 512
 # Standard deviations beyond an edge at which they are compared.
 _LENGTHS = (0.0, 0.3, 3.0, 100.0)
+# Faces whose tables are kept: of three inputs there are 26.
+_MOST_FACES = 64
 # Points of the range at which products are found that others make up for.
 _N_EVEN = 512
 
@@ -279,15 +281,17 @@ class Posterior:
         tables = self._tables(model, exact)
         found = np.empty((3, self.noise.size, Z.shape[1]))
         left = np.full(Z.shape[1], True)
-        for j, side, rows in on_faces(way, model.antecedent, self.consequents.shape[0]):
+        for away, rows in on_faces(way, model.antecedent, self.consequents.shape[0]):
             part = slice(None) if rows.size == left.size else rows
             some = row.part(part)
-            if j is None:
+            if away is None:
                 ways = way[:, part] / (length[part] * model.spread[:, None])
                 found[:, :, part] = products_on_line(self, model, tables, some, ways)
             else:
-                face = self._face(model, tables, j, side)
-                found[:, :, part] = face.products(self.noise, some)
+                face, inputs = self._face(model, tables, away), [j for j, _ in away]
+                directions = np.abs(way[inputs][:, part]) / model.spread[inputs, None]
+                directions /= length[part]
+                found[:, :, part] = face.products(self.noise, some, directions)
             left[rows] = False
         if left.any():
             part = slice(None) if left.all() else left
@@ -298,26 +302,38 @@ class Posterior:
         square = self._square(found, length, unit)
         return np.sqrt(square + (unfollowed / unit) ** 2) * unit
 
-    def _face(self, model, tables, j, side):
-        """What rows beyond one end of input j are multiplied with, found once."""
-        edge = float((model.maximum if side > 0 else model.minimum)[j])
-        known, key = self.__dict__.setdefault("_faces", {}), (j, side, edge, tables.dtype)
-        if key not in known:
-            at = np.tile(model.minimum[:, None], 2)
-            at[j] = edge
-            at[j] -= side * STEP * model.spread[j] * np.array([1.0, 2.0])
-            rows = [self._row(model, np.ascontiguousarray(one[:, None])) for one in at.T]
+    def _face(self, model, tables, away):
+        """What rows beyond the ends of some inputs, (input, side) each, are multiplied with."""
+        known = self.__dict__.setdefault("_faces", {})
+        at = model.minimum.copy()
+        for j, side in away:
+            at[j] = (model.maximum if side > 0 else model.minimum)[j]
+        key = away, at.tobytes(), tables.dtype
+        face = known.get(key)
+        if face is None:
+            inputs, inside = [j for j, _ in away], nodes(len(away))[0]
+            steps = STEP * model.spread[inputs] * [side for _, side in away]
+            points = np.tile(at[:, None], len(inside))
+            points[inputs] -= steps[:, None] * inside.T
+            rows = [self._row(model, np.ascontiguousarray(one[:, None])) for one in points.T]
             double = self._tables(model, exact=True)
-            face = Face.of(model, double, self.inputs, j, *rows)
-            known[key] = face if tables is double else self._quickest_face(model, face, j, edge)
-        return known[key]
+            face = Face.of(model, double, self.inputs, inputs, rows)
+            if tables is not double:
+                face = self._quickest_face(model, face, inputs, at)
+            if len(known) >= _MOST_FACES:
+                known.clear()
+            known[key] = face
+        return face
 
-    def _quickest_face(self, model, face, j, edge):
+    def _quickest_face(self, model, face, inputs, at):
         """The same in single precision where deviations are right to ``_DIGITS`` by it."""
-        Z = points_of_range(model, _N_COMPARED, np.random.default_rng(0))
-        Z[j] = edge
+        rng = np.random.default_rng(0)
+        Z = points_of_range(model, _N_COMPARED, rng)
+        Z[inputs] = at[inputs, None]
+        ways = np.abs(rng.normal(size=(len(inputs), _N_COMPARED)))
+        ways /= np.sqrt(np.sum(ways**2, axis=0))
         row, single = self._row(model, Z), face.astype(np.float32)
-        right, found = (one.products(self.noise, row) for one in (face, single))
+        right, found = (one.products(self.noise, row, ways) for one in (face, single))
         for length in _LENGTHS:
             squares = [self._square(one, length, face.unit) for one in (right, found)]
             # A part of a square is twice that of its root.

@@ -386,7 +386,7 @@ def test_json_of_a_posterior_that_is_none_is_refused(change, message):
 
 @pytest.mark.parametrize("kind", ["grid", "order 0", "one slope", "two outputs", "known", "linear"])
 def test_on_a_face_fewer_columns_say_the_same(kind, monkeypatch):
-    """Rows beyond one input alone, or inputs without terms, beside rows beyond several."""
+    """Rows beyond one input alone, two, three, inputs without terms; and some of all kinds."""
     rng = np.random.default_rng(11)
     X, y = wave(rng, 150)
     X = np.column_stack([X, rng.normal(size=150)])
@@ -399,15 +399,19 @@ def test_on_a_face_fewer_columns_say_the_same(kind, monkeypatch):
     }.get(kind, {})
     y = np.column_stack([y, y**2]) if kind == "two outputs" else y
     model = ANFISRegressor(**settings).fit(X, y).model_
-    new = rng.uniform(model.minimum, model.maximum, (600, 3))
+    new = rng.uniform(model.minimum, model.maximum, (900, 3))
     for i, (j, end) in enumerate([(0, -1.0), (0, 1.0), (1, 1.0), (2, -1.0)]):
         own = slice(100 * i, 100 * (i + 1))
         new[own, j] = (model.maximum if end > 0 else model.minimum)[j]
         new[own, j] += end * model.spread[j] * rng.exponential(size=100)
-    new[500:] += 2.0 * model.spread * rng.normal(size=(100, 3))
+    new[500:600] += 2.0 * model.spread * rng.normal(size=(100, 3))
+    for i, away in enumerate([[0, 1], [1, 2], [0, 1, 2]], start=6):
+        own = slice(100 * i, 100 * (i + 1))
+        steps = rng.exponential(size=(100, len(away)))
+        new[own, away] = model.maximum[away] + model.spread[away] * steps
     exact, single = model.standard_deviation(new), model.predict_with_deviation(new)[1]
     n_faces = len(getattr(model.posterior, "_faces", {}))
-    assert n_faces == {"order 0": 8, "linear": 0}.get(kind, 6)
+    assert n_faces == {"order 0": 14, "linear": 0}.get(kind, 12)
     monkeypatch.setattr("skanfis.posterior.on_faces", lambda *_: [])
     assert_allclose(exact, model.standard_deviation(new), rtol=1e-8)
     assert_allclose(single, exact, rtol=1e-4)
