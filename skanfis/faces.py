@@ -33,6 +33,7 @@ from scipy.linalg import blas
 
 from .antecedent import Antecedent
 from .deviation import inner_products
+from .gram import pair_index
 from .quadratic import QuadraticForm
 
 __all__ = ["STEP", "Face", "nodes", "on_faces", "products_off_faces", "products_on_line"]
@@ -242,13 +243,12 @@ def _squares(weights, values):
     if weights is None:
         return values
     once, change = weights
-    found, pairs = np.zeros((3, once.shape[1])), combinations_with_replacement(range(len(once)), 2)
-    for (m, n), value in zip(pairs, values, strict=True):
-        own = value if m == n else 2.0 * value
-        found[0] += once[m] * once[n] * own
-        found[1] += 0.5 * (once[m] * change[n] + once[n] * change[m]) * own
-        found[2] += change[m] * change[n] * own
-    return found
+    # Of all pairs; those of m > n are those of n < m.
+    by_pair = values[pair_index(len(once))]
+    near, far = (np.einsum("mpn,pn->mn", by_pair, one) for one in weights)
+    return np.stack(
+        [np.einsum("mn,mn->n", *pair) for pair in ((once, near), (change, near), (change, far))]
+    )
 
 
 def _weighed(weights, parts):
