@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from numbers import Integral
 
 import numpy as np
+from scipy.sparse import issparse
 from sklearn import get_config
 
 from ._callers import is_silent
@@ -24,6 +25,7 @@ __all__ = [
     "group_numbers",
     "named_refusals",
     "on_host",
+    "position_of",
     "positive_weights",
     "refuse_lazy",
     "untold",
@@ -77,6 +79,12 @@ def on_host(table):
 
 
 def _check_kind(table, what):
+    if issparse(table):
+        raise TypeError(
+            f"Sparse data was passed for {what}, but dense data is required: give "
+            f"{what}.toarray(). In a Pipeline, OneHotEncoder(sparse_output=False) and "
+            "ColumnTransformer(..., sparse_threshold=0) hand on dense data."
+        )
     names, dtypes = getattr(table, "columns", None), getattr(table, "dtypes", None)
     if names is None or dtypes is None:
         dtype = getattr(table, "dtype", None)
@@ -208,10 +216,13 @@ def check_finite(values, what, names):
             value = values[part.start + row, column]
             kind = "NaN" if np.isnan(value) else "infinity"
             n_bad = int(np.count_nonzero(~np.isfinite(values[:, column])))
+            advice = "Drop these rows."
+            if what == "X":
+                advice = "Drop these rows, or impute them in a Pipeline before (sklearn.impute)."
             raise ValueError(
                 f"Input {what} contains {kind} in column {names[column]!r}, first at row "
-                f"{part.start + row}; {n_bad} of its {values.shape[0]} values are not finite. Drop "
-                "these rows, or impute them in a Pipeline before (sklearn.impute)."
+                f"{part.start + row}; {n_bad} of its {values.shape[0]} values are not finite. "
+                f"{advice}"
             )
 
 
@@ -240,14 +251,28 @@ def feature_indices(given, names, parameter):
     return np.sort(found)
 
 
-def _feature_index(entry, names, parameter):
+def position_of(entry, names):
+    """Position of what is given by its name or position, the last from -1 on; None if none is."""
     if isinstance(entry, str) and entry in names:
         return list(names).index(entry)
     if isinstance(entry, Integral) and -len(names) <= int(entry) < len(names):
         return int(entry) % len(names)
+    return None
+
+
+def _feature_index(entry, names, parameter):
+    index = position_of(entry, names)
+    if index is not None:
+        return index
+    advice = ""
+    if isinstance(entry, str) and list(names) == [f"x{j}" for j in range(len(names))]:
+        advice = (
+            " X came without names: give a frame; a step in front hands names on with "
+            "set_output(transform='pandas')."
+        )
     raise ValueError(
         f"{parameter} names {entry!r}, which is no column of X; its columns are "
-        f"{', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}."
+        f"{', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}.{advice}"
     )
 
 

@@ -9,15 +9,44 @@ from sklearn.utils import check_random_state
 from ._validation import feature_indices
 from .membership import TRIED_FAMILIES, membership_families
 from .model import TSKModel
-from .solvers import SOLVERS, Solver
+from .options import EarlyStopping, Huber, LinearExtrapolation
+from .solvers import SOLVERS, Solver, VariableProjection
 from .structure import StructureRequest, check_inputs
 
 __all__ = [
+    "check_settings",
     "found_weights",
     "given_weights",
     "solver_of",
     "structure_request",
 ]
+
+
+# Parameters of which a word stands for an object's defaults.
+_OBJECTS: dict[str, type] = {
+    "solver": VariableProjection,
+    "loss": Huber,
+    "early_stopping": EarlyStopping,
+    "out_of_bounds": LinearExtrapolation,
+}
+
+
+def check_settings(estimator, parameters):
+    """Raise ValueError where a setting is given to a word: solver__tol where solver is "varpro"."""
+    for key in parameters:
+        name, _, setting = key.partition("__")
+        if not setting or name not in _OBJECTS:
+            continue
+        given = parameters.get(name, getattr(estimator, name))
+        if isinstance(given, str | bool):
+            of_word = _OBJECTS[name]
+            if name == "solver":
+                of_word = SOLVERS.get(str(given), of_word)
+            raise ValueError(
+                f"{key} is a setting of an object, but {name}={given!r} is a word for its "
+                f"defaults: give {name}={of_word.__name__}(), of "
+                f"skanfis.{'solvers' if name == 'solver' else 'options'}, in its place."
+            )
 
 
 def structure_request(estimator, names):

@@ -35,7 +35,7 @@ from .membership import (
     Membership,
 )
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
-from .parameters import structure_request
+from .parameters import check_settings, structure_request
 from .policies import OUT_OF_BOUNDS
 from .readable import readability_of_rows
 from .row_checks import ChecksRowsMixin
@@ -360,6 +360,27 @@ class ANFISRegressor(
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
+
+    def set_params(self, **params: Any) -> Self:
+        """Set parameters, and settings of objects among them, such as ``solver__tol``.
+
+        Parameters
+        ----------
+        **params : dict
+            By name; ``solver__tol`` is the setting ``tol`` of the object given as ``solver``.
+
+        Returns
+        -------
+        self : ANFISRegressor
+
+        Raises
+        ------
+        ValueError
+            If there is no such parameter, or a setting is given where there is a word and no
+            object, such as ``solver__tol`` with ``solver="varpro"``.
+        """
+        check_settings(self, params)
+        return super().set_params(**params)
 
     @fit_context(prefer_skip_nested_validation=False)
     def fit(

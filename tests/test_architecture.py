@@ -63,7 +63,10 @@ TABLE = {
         [*KERNEL, "_threads", "_validation", "constraints", "options", "solvers", "structure"],
         LEARNING,
     ),
-    "parameters": ([*KERNEL, "_validation", "solvers", "structure"], [*NUMERIC, "sklearn"]),
+    "parameters": (
+        [*KERNEL, "_validation", "options", "solvers", "structure"],
+        [*NUMERIC, "sklearn"],
+    ),
     "streaming": (
         [
             *KERNEL,

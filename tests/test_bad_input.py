@@ -74,8 +74,10 @@ def test_missing_value_in_a_column_of_nullable_integers():
 
 @pytest.mark.parametrize(("value", "kind"), [(np.nan, "NaN"), (-np.inf, "infinity")])
 def test_entry_of_y_that_is_not_finite(value, kind):
-    with refused(ValueError, f"Input y contains {kind}", "row 3", "1 of its 60"):
+    # No step of a Pipeline sees a target.
+    with refused(ValueError, f"Input y contains {kind}", "row 3", "1 of its 60") as caught:
         ANFISRegressor().fit(X, with_entry(Y, 3, value))
+    assert "impute" not in str(caught.value)
 
 
 def test_entry_of_one_of_several_targets_that_is_not_finite():
@@ -228,7 +230,7 @@ def test_text_as_y():
 
 @pytest.mark.parametrize("form", [sparse.csr_matrix, sparse.csr_array])
 def test_sparse_x(form):
-    with refused(TypeError, "Sparse data was passed for X", "toarray"):
+    with refused(TypeError, "Sparse data was passed for X", "toarray", "sparse_output=False"):
         ANFISRegressor().fit(form(X), Y)
     with refused(TypeError, "Sparse data was passed for X", "toarray"):
         ANFISRegressor(**QUICK).fit(X, Y).predict(form(X))
@@ -590,6 +592,26 @@ def test_no_worker_at_all():
 def test_unknown_parameter():
     with refused(ValueError, "Invalid parameter 'mfs'", "n_mfs"):
         ANFISRegressor().set_params(mfs=3)
+
+
+@pytest.mark.parametrize(
+    ("given", "setting", "advice"),
+    [
+        ({}, "solver__stiffness", "give solver=VariableProjection(), of skanfis.solvers"),
+        ({"solver": "hybrid"}, "solver__step_size", "solver='hybrid'.*give solver=Hybrid()"),
+        ({"loss": "huber"}, "loss__epsilon", "give loss=Huber(), of skanfis.options"),
+        ({}, "early_stopping__tol", "early_stopping=False.*give early_stopping=EarlyStopping()"),
+        ({}, "out_of_bounds__max_extrapolation", "give out_of_bounds=LinearExtrapolation()"),
+    ],
+)
+def test_setting_of_a_word(given, setting, advice):
+    model = ANFISRegressor(**given)
+    with refused(ValueError, f"{setting} is a setting", *advice.split(".*")):
+        model.set_params(**{setting: 1.0})
+    assert model.get_params() == ANFISRegressor(**given).get_params()
+    # The object may come with it, or be there.
+    model.set_params(solver=Hybrid(), solver__step_size=0.5)
+    assert model.set_params(solver__step_size=0.25).solver.step_size == 0.25
 
 
 def test_clusterer_that_takes_no_weights():

@@ -12,6 +12,8 @@ from sklearn.cluster import HDBSCAN, AgglomerativeClustering, KMeans, MiniBatchK
 from sklearn.datasets import make_friedman1
 from sklearn.mixture import GaussianMixture
 from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
@@ -275,6 +277,13 @@ class TestFeatures:
     def test_what_does_not_fit_is_refused(self, data, settings, message):
         with pytest.raises(ValueError, match=message):
             ANFISRegressor(**settings).fit(*data)
+
+    def test_a_name_that_a_step_in_front_has_taken_away(self, data):
+        model = make_pipeline(StandardScaler(), ANFISRegressor(premise_features="rate"))
+        with pytest.raises(ValueError, match=r"'rate'.*set_output\(transform='pandas'\)"):
+            model.fit(*data)
+        model.set_output(transform="pandas").set_params(anfisregressor__n_mfs=[1, 1, 2])
+        assert model.fit(*data)[-1].n_rules_ == 2
 
 
 def test_names_of_terms_are_carried(data):
