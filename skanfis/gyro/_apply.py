@@ -7,14 +7,13 @@ import numpy as np
 
 from ..export.c.status import STATUS
 from ._carried import Carried
-from ._console import UsageError, refuse_existing, say
+from ._console import UsageError, refuse_existing, say, usage_errors
 from ._files import check_different, find_logs
 from ._logs import request_of
 from ._staging import Staging
 from ._stream import LogStream
 from ._units import SIGNALS
 from .compensator import GyroCompensator
-from .errors import LogError
 
 __all__ = ["apply"]
 
@@ -59,14 +58,9 @@ def apply(options, tell):
 
 def _open(path, options, needed, compensator, tell):
     """The log of one file, checked: read once, piece by piece, and to be read again."""
-    try:
+    with usage_errors():  # signs that do not go together
         request = request_of(options, needed)
         stream = LogStream(path, request, options.max_gap, options.device)
-    except LogError:
-        raise
-    except ValueError as error:
-        # Signs that do not go together.
-        raise UsageError(str(error)) from error
     unit, due = stream.units["output"], compensator.output_unit
     if (unit if unit in SIGNALS else "deg/s") != due:
         raise UsageError(

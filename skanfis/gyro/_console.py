@@ -2,15 +2,36 @@
 
 import sys
 import time
+from contextlib import contextmanager
 
 from ..inspection.labels import printable
 from .errors import LogError
 
-__all__ = ["ExistsError", "Progress", "UsageError", "pairs", "refuse_existing", "say", "say_error"]
+__all__ = [
+    "ExistsError",
+    "Progress",
+    "UsageError",
+    "pairs",
+    "refuse_existing",
+    "say",
+    "say_error",
+    "usage_errors",
+]
 
 
 class UsageError(ValueError):
     """Options that make no sense."""
+
+
+@contextmanager
+def usage_errors():
+    """Let what is wrong with options be a UsageError; what is wrong with a log stays a LogError."""
+    try:
+        yield
+    except (LogError, UsageError):
+        raise
+    except ValueError as error:
+        raise UsageError(str(error)) from error
 
 
 class ExistsError(Exception):

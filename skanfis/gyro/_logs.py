@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._checks import LARGEST_AT_REST, check_at_rest, check_log
-from ._console import UsageError, pairs
+from ._console import UsageError, pairs, usage_errors
 from ._layout import Request
 from ._table import LogFile
 from ._thinned import read_thinned
@@ -34,12 +34,8 @@ def find_tasks(options, paths):
     told = dict(text.partition("=")[::2] for text in options.axes or ())
     if options.axes is not None and len(told) < len(options.axes):
         raise UsageError("--axes: an axis is given twice.")
-    try:
+    with usage_errors():
         layout = LogFile.open(paths[0], request_of(options, ())).layout
-    except LogError:
-        raise
-    except ValueError as error:
-        raise UsageError(str(error)) from error
     found = layout.axes
     tasks = []
     for axis, name in (told or dict.fromkeys(found, "")).items():
@@ -69,26 +65,16 @@ def request_of(options, require, columns=None):
         drop_missing=options.missing == "drop",
         average=options.average,
     )
-    try:
+    with usage_errors():  # an unknown part or unit
         return checked_request(request)
-    except LogError:
-        raise
-    except ValueError as error:
-        # An unknown part or unit.
-        raise UsageError(str(error)) from error
 
 
 def read_for(options, paths, require, tell, columns=None):
     """Read files as the options say; what was found out is told."""
     if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
         require = (*require, "time")
-    try:
+    with usage_errors():  # signs that do not go together
         reading = _read(options, paths, request_of(options, require, columns), tell)
-    except (LogError, UsageError):
-        raise
-    except ValueError as error:
-        # Signs that do not go together.
-        raise UsageError(str(error)) from error
     for note in reading.notes:
         tell(f"note: {note}")
     tell(f"{reading.n_rows:,} rows{_counts(reading.log)}")

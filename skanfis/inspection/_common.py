@@ -1,10 +1,11 @@
 """What the displays have in common: axes to draw on, and which inputs to look at."""
 
 from collections.abc import Mapping
-from numbers import Integral, Real
+from numbers import Real
 
 import numpy as np
 
+from .._validation import position_of
 from ..export.rules import conditions, knows_data
 
 __all__ = [
@@ -73,10 +74,9 @@ def colors(count, colormap):
 
 def position(feature, names, what="input"):
     """Position of an input or output given by its name or position."""
-    if isinstance(feature, str) and feature in names:
-        return names.index(feature)
-    if isinstance(feature, Integral) and -len(names) <= int(feature) < len(names):
-        return int(feature) % len(names)
+    found = position_of(feature, names)
+    if found is not None:
+        return found
     raise ValueError(
         f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
         f"{', '.join(map(repr, names))}."
