@@ -44,28 +44,28 @@ class Problem:
 # Tables in which each input comes many times ----------------------------------------------------
 
 
-def levels_21(seed, alpha, options):
+def levels_21(seed, options):
     """21 levels, 100 noisy rows of each."""
     x = np.repeat(np.linspace(-1, 1, 21), 100)[:, np.newaxis]
     fresh = np.linspace(-1, 1, 1001)[:, np.newaxis]
-    return replicated(x, fresh, lambda X: np.sin(4 * X[:, 0]) + X[:, 0], seed, alpha, options)
+    return replicated(x, fresh, lambda X: np.sin(4 * X[:, 0]) + X[:, 0], seed, options)
 
 
-def levels_7_9(seed, alpha, options):
+def levels_7_9(seed, options):
     """A table of 7 by 9 levels, 50 noisy rows of each."""
     table = np.stack(np.meshgrid(np.linspace(-1, 1, 7), np.linspace(-1, 1, 9)), axis=-1)
     X = np.repeat(table.reshape(-1, 2), 50, axis=0)
     fresh = np.random.default_rng(1).uniform(-1, 1, (_N_TEST, 2))
-    return replicated(X, fresh, lambda X: np.sin(3 * X[:, 0]) * X[:, 1], seed, alpha, options)
+    return replicated(X, fresh, lambda X: np.sin(3 * X[:, 0]) * X[:, 1], seed, options)
 
 
-def replicated(X, fresh, truth, seed, alpha, options):
+def replicated(X, fresh, truth, seed, options):
     """RMSE to the truth, and that over what it is without exact repeats."""
     rng = np.random.default_rng(seed)
     y = truth(X) + 0.3 * rng.standard_normal(len(X))
     found = []
     for rows in (X, X + _JITTER * rng.standard_normal(X.shape)):
-        model, seconds = fitted(rows, y, options, alpha=alpha)
+        model, seconds = fitted(rows, y, options)
         found.append((rms(model.predict(fresh) - truth(fresh)), model.n_rules_, seconds))
     (error, n_rules, seconds), (without, without_rules, _) = found
     return {
@@ -255,8 +255,8 @@ _COLD_STARTS = {
     for grouped in (False, True)
 }
 _REPLICATED = {
-    f"{name}, alpha={alpha!r}": Kind(
-        partial(measure, alpha=alpha),
+    name: Kind(
+        measure,
         range(5),
         "RMSE to the truth over that without repeats",
         1.05,
@@ -265,7 +265,6 @@ _REPLICATED = {
         (("error", None),),
     )
     for name, measure in (("21 levels x 100", levels_21), ("7 x 9 levels x 50", levels_7_9))
-    for alpha in ("auto", "gcv")
 }
 KINDS = {
     **_REPLICATED,
