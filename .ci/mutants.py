@@ -40,7 +40,7 @@ GROUPS = {
         "test_consequent.py test_penalty.py test_objective.py solvers/test_gradient.py "
         "test_posterior.py training/test_many_rows.py"
     ),
-    "premise": "test_premise.py",
+    "ordered_terms premise": "test_ordered_terms.py test_premise.py",
     "evidence": "test_evidence.py",
     "faces posterior": "test_posterior.py",
     "dask/keeping": "dask/test_keeping.py",

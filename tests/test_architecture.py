@@ -25,6 +25,7 @@ KERNEL = [
     "penalty",
     "objective",
     "evidence",
+    "ordered_terms",
     "premise",
     "naming",
     "support",

@@ -1,0 +1,121 @@
+"""Antecedents of every kind, points in the box of their premises, and their terms by input."""
+
+import numpy as np
+import pytest
+
+from skanfis.antecedent import RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
+
+from . import oracles
+
+LOW, HIGH = np.array([-2.0, -3.0, -1.0]), np.array([2.5, 1.0, 4.0])
+# As in the module.
+MARGIN, FREE_MARGIN = 0.25, 1.0
+FACTOR, RATIO, OUTER, UNIT = np.log(4.0), np.log(2.2), np.log(1.45), 3.0**0.5
+
+
+def grid(families, counts, inputs=None):
+    return oracles.random_grid(np.random.default_rng(1), families, counts, inputs)
+
+
+def scattered(family, n_rules, inputs, is_listed=True):
+    """Rules with terms of their own, all in different places."""
+    g, inputs = np.random.default_rng(2), np.array(inputs)
+    centers = g.uniform(LOW[inputs], HIGH[inputs], (n_rules, inputs.size))
+    theta = family.from_center_and_width(centers, g.uniform(0.5, 1.5, centers.shape))
+    own = ScatteredAntecedent.build(family, inputs, theta)
+    # The same listed one by one, whose terms are in order on each input.
+    return RuleTableAntecedent(own.groups, own.rule_terms) if is_listed else own
+
+
+def shared_places(family):
+    """Four terms on each of two inputs, two of the four in one place; one input with one term."""
+    centers = np.array([[-1.0, 0.5, 0.5, 2.0], [-2.0, -2.0, 0.0, 0.5]])
+    theta = family.from_center_and_width(centers, np.array([[1.0, 0.5, 0.8, 1.2]] * 2))
+    groups = [TermGroup(family, np.full(4, j), theta[:, j]) for j in range(2)]
+    groups.append(
+        TermGroup(
+            family, np.array([2]), family.from_center_and_width(np.array([1.5]), np.array([2.0]))
+        )
+    )
+    table = np.array([[0, 4, 8], [1, 5, 8], [2, 6, 8], [3, 7, 8]])
+    return RuleTableAntecedent(tuple(groups), table)
+
+
+ORDERED = {
+    "equal counts": grid([Gaussian] * 2, [3, 3], [0, 2]),
+    "gaussians": grid([Gaussian] * 3, [2, 4, 3]),
+    "bells": grid([Bell] * 2, [3, 2], [0, 2]),
+    "families that alternate": grid([Bell, Gaussian, Bell], [2, 3, 4]),
+    "scattered": scattered(Gaussian, 3, [0, 1, 2]),
+    "scattered bells": scattered(Bell, 4, [1, 2]),
+    **{name: grid([family] * 2, [2, 5], [0, 1]) for name, family in MEMBERSHIPS.items()},
+}
+ALONE = {
+    "shared places": shared_places(Gaussian),
+    "shared, bells": shared_places(Bell),
+    "terms of their own": scattered(Gaussian, 3, [0, 1, 2], is_listed=False),
+}
+ANTECEDENTS = ORDERED | ALONE
+ALL = pytest.mark.parametrize("antecedent", ANTECEDENTS.values(), ids=list(ANTECEDENTS))
+ON_ORDERED = pytest.mark.parametrize("antecedent", ORDERED.values(), ids=list(ORDERED))
+ON_ALONE = pytest.mark.parametrize("antecedent", ALONE.values(), ids=list(ALONE))
+FREE_OR_NOT = pytest.mark.parametrize("is_free", [False, True])
+
+
+def in_the_box(premise, rng, n=20):
+    """Displacements inside the box, and at its corners."""
+    inside = rng.uniform(premise.lower, premise.upper, (n, premise.size))
+    corners = np.where(rng.random((n, premise.size)) < 0.5, premise.lower, premise.upper)
+    return np.vstack([inside, corners, premise.lower, premise.upper])
+
+
+def terms(antecedent, vector):
+    """A vector laid out as the parameters, by input: families and columns from left to right."""
+    by_input, start = {}, 0
+    at_start = antecedent.parameters
+    for group in antecedent.groups:
+        shape = group.theta.shape
+        block = vector[start : start + group.theta.size].reshape(shape)
+        places = at_start[start : start + group.theta.size].reshape(shape)[0]
+        start += group.theta.size
+        for t, j in enumerate(group.inputs.tolist()):
+            by_input.setdefault(j, []).append((places[t], group.family, block[:, t]))
+    return {j: sorted(own, key=lambda term: term[0]) for j, own in by_input.items()}
+
+
+def locations(antecedent, vector):
+    return {j: np.array([t[0] for _, _, t in own]) for j, own in terms(antecedent, vector).items()}
+
+
+def kind_of(antecedent):
+    """Of every parameter, "location", "log_width" or "log_shape"."""
+    kinds = [
+        np.repeat([p.kind for p in group.family.parameters], group.n_terms)
+        for group in antecedent.groups
+    ]
+    return np.concatenate(kinds)
+
+
+def distances(places, start):
+    """To the nearer and to the farther neighbour of each term, smooth, one by one."""
+    near, far = [], []
+    for k, place in enumerate(places):
+        gaps = [abs(place - places[o]) for o in (k - 1, k + 1) if o in range(len(places))]
+        # How far the outer ones have moved inward, twice.
+        inward = [2.0 * (place - start[0])] * (k == 0) + [2.0 * (start[-1] - place)] * (
+            k == len(places) - 1
+        )
+        near.append(sum(gap**-8.0 for gap in gaps) ** -0.125)
+        far.append(sum(gap**8.0 for gap in [*gaps, *inward] if gap > 0.0) ** 0.125)
+    return np.array(near), np.array(far)
+
+
+def span(places, j, margin):
+    """Where the terms of an input may stand."""
+    low, high = min(LOW[j], places[0]), max(HIGH[j], places[-1])
+    if margin == MARGIN:
+        low = max(low, places[0] - (places[1] - places[0]))
+        high = min(high, places[-1] + (places[-1] - places[-2]))
+    beyond = margin * (places[-1] - places[0]) / (len(places) - 1)
+    return low - beyond, high + beyond
