@@ -23,7 +23,6 @@ target, or half a one where L is less, of its range. Whatever the inputs, no ans
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Real
 from typing import Self
 
 import numpy as np
@@ -31,45 +30,15 @@ import numpy as np
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .naming import default_term_names
-from .policies import MAX_EXTRAPOLATION, OUT_OF_BOUNDS
+from .policies import MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
+from .target import TargetRange
 
-__all__ = ["TSKModel", "TargetRange"]
-
-# Of the target, in standard deviations, whatever the limit of inputs: what a peak between rows may
-# take beyond the range that was seen. The range has two deviations at least, so that this is a
-# quarter of it at most.
-_LEAST_MARGIN = 0.5
+__all__ = ["TSKModel"]
 
 # Bytes that the intermediate results of one block of rows may take.
 _BLOCK_BYTES = 2**21
-
-
-@dataclass(frozen=True, eq=False)
-class TargetRange:
-    """What the target was in training.
-
-    Attributes
-    ----------
-    minimum, maximum : ndarray of shape (n_outputs,)
-    spread : ndarray of shape (n_outputs,)
-        Weighted standard deviation, positive.
-    """
-
-    minimum: np.ndarray
-    maximum: np.ndarray
-    spread: np.ndarray
-
-    def change_units(self, offset, scale):
-        """The same in units y = offset + scale * y_now, with positive scales."""
-        low, high = (offset + scale * end for end in (self.minimum, self.maximum))
-        return TargetRange(low, high, scale * self.spread)
-
-    def limits(self, max_extrapolation):
-        """Lowest and highest output, (2, n_outputs)."""
-        margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
-        return np.stack([self.minimum - margin, self.maximum + margin])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -336,17 +305,7 @@ class TSKModel:
 
     def describe_out_of_bounds(self, X) -> str:
         """Say which inputs leave the box of the training data, in how many rows, and how far."""
-        parts = []
-        for j, name in enumerate(self.input_names):
-            column = X[:, j]
-            outside = (column < self.minimum[j]) | (column > self.maximum[j])
-            if outside.any():
-                parts.append(
-                    f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
-                    f"[{self.minimum[j]:.6g}, {self.maximum[j]:.6g}], "
-                    f"found [{column.min():.6g}, {column.max():.6g}])"
-                )
-        return "X lies outside the training data: " + "; ".join(parts) + "."
+        return describe_out_of_bounds(X, self.minimum, self.maximum, self.input_names)
 
     @property
     def policy(self) -> str:
@@ -361,12 +320,7 @@ class TSKModel:
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
         if policy == self.out_of_bounds and limit == self.max_extrapolation:
             return self
-        if policy not in OUT_OF_BOUNDS:
-            raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
-        if not (isinstance(limit, Real) and float(limit) >= 0.0):
-            raise ValueError(
-                f"max_extrapolation={limit!r} must be a number, zero or positive, or infinite."
-            )
+        check_policy(policy, limit)
         return replace(self, out_of_bounds=policy, max_extrapolation=float(limit))
 
     def _by_block(self, X, of_block, n_columns, n_more=0):

@@ -1,8 +1,16 @@
 """What is answered outside the range of the training data: the policies, and what they say."""
 
 import math
+from numbers import Real
 
-__all__ = ["MAX_EXTRAPOLATION", "OUT_OF_BOUNDS", "SILENT", "policy_in_words"]
+__all__ = [
+    "MAX_EXTRAPOLATION",
+    "OUT_OF_BOUNDS",
+    "SILENT",
+    "check_policy",
+    "describe_out_of_bounds",
+    "policy_in_words",
+]
 
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # Those that answer nothing.
@@ -24,3 +32,27 @@ def policy_in_words(policy: str, max_extrapolation: float) -> str:
         f"{tangent}, for each input up to {max_extrapolation:g} of its standard deviations, and "
         "holds the value reached there"
     )
+
+
+def check_policy(policy, max_extrapolation):
+    """Raise ValueError where there is no such policy, or its limit is no number from zero on."""
+    if policy not in OUT_OF_BOUNDS:
+        raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
+    if not (isinstance(max_extrapolation, Real) and float(max_extrapolation) >= 0.0):
+        raise ValueError(
+            f"max_extrapolation={max_extrapolation!r} must be a number, zero or positive, or "
+            "infinite."
+        )
+
+
+def describe_out_of_bounds(X, minimum, maximum, names) -> str:
+    """Say which columns of X leave their range, in how many rows, and how far."""
+    parts = []
+    for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
+        outside = (column < low) | (column > high)
+        if outside.any():
+            parts.append(
+                f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
+                f"[{low:.6g}, {high:.6g}], found [{column.min():.6g}, {column.max():.6g}])"
+            )
+    return "X lies outside the training data: " + "; ".join(parts) + "."

@@ -33,6 +33,7 @@ KERNEL = [
     "faces",
     "posterior",
     "policies",
+    "target",
     "model",
 ]
 
@@ -132,6 +133,7 @@ TABLE = {
             "deviation",
             "posterior",
             "policies",
+            "target",
             "model",
             "options",
             "_validation",

@@ -13,10 +13,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian
-from skanfis.model import TargetRange, TSKModel
+from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
 from skanfis.solvers import VariableProjection
 from skanfis.support import RuleSupport
+from skanfis.target import TargetRange
 
 from . import oracles
 
@@ -482,8 +483,3 @@ def test_no_row_however_far_is_answered_beyond_the_limits():
     anywhere = estimator.model_.predict(g.standard_t(0.5, (2000, 3)))
     assert anywhere.min() >= limits[0]
     assert anywhere.max() <= limits[1]
-
-
-def test_target_in_other_units():
-    moved = TARGET.change_units(np.array([10.0]), np.array([2.0]))
-    assert_allclose(moved.limits(0.5), 10.0 + 2.0 * TARGET.limits(0.5))

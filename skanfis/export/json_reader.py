@@ -14,9 +14,10 @@ from ..antecedent import (
     TermGroup,
 )
 from ..membership import MEMBERSHIPS
-from ..model import TargetRange, TSKModel
+from ..model import TSKModel
 from ..policies import OUT_OF_BOUNDS
 from ..support import RuleSupport
+from ..target import TargetRange
 from ._posterior_json import read_posterior
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, shown
 

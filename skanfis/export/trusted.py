@@ -33,7 +33,6 @@ TRUSTED_TYPES = [
     "skanfis.membership.sigmoid.SigmoidDifference",
     "skanfis.membership.sigmoid.SigmoidProduct",
     "skanfis.model.TSKModel",
-    "skanfis.model.TargetRange",
     "skanfis.options.EarlyStopping",
     "skanfis.options.Huber",
     "skanfis.options.LinearExtrapolation",
@@ -53,4 +52,5 @@ TRUSTED_TYPES = [
     "skanfis.streaming.moments.Moments",
     "skanfis.streaming.stream.Stream",
     "skanfis.support.RuleSupport",
+    "skanfis.target.TargetRange",
 ]

@@ -11,12 +11,13 @@ import numpy as np
 
 from ..data import StandardisedData, check_scales
 from ..evidence import laplace, least_weights
-from ..model import TargetRange, TSKModel
+from ..model import TSKModel
 from ..objective import SeparableProblem
 from ..penalty import Penalty
 from ..posterior import Posterior
 from ..premise import Premise
 from ..structure.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
+from ..target import TargetRange
 from ..training import RuleStatistics, redundant_rules
 from .farthest import Farthest
 from .firing import Distinct, RuleFiring, row_keys

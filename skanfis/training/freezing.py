@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from ..data import StandardisedData
-from ..model import TargetRange, TSKModel
+from ..model import TSKModel
 from ..objective import Evaluation
 from ..options import policy_of
 from ..penalty import Penalty
 from ..solvers import SolverResult
 from ..structure import Start, StructureRequest, imported_antecedent
 from ..support import RuleFiring, RuleSupport
+from ..target import TargetRange
 from .data import ValidatedData
 from .pruning import redundant_rules, rule_statistics
 from .result import Fitted

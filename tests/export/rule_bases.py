@@ -6,7 +6,8 @@ import numpy as np
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian, TwoSidedGaussian
-from skanfis.model import TargetRange, TSKModel
+from skanfis.model import TSKModel
+from skanfis.target import TargetRange
 
 from .. import oracles
 
