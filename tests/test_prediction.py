@@ -1,0 +1,151 @@
+"""Predictions in the range of the training data and out of it, under every policy, and warnings."""
+
+import math
+import pickle
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
+
+from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.options import LinearExtrapolation
+from skanfis.policies import MAX_EXTRAPOLATION
+
+from . import oracles
+from .quick import quick
+
+NAMES = ["time", "temperature", "rate"]
+X = np.random.default_rng(0).uniform([0.0, -40.0, -300.0], [1800.0, 85.0, 300.0], (240, 3))
+FRAME = pd.DataFrame(X, columns=NAMES)
+Y = np.exp(-X[:, 0] / 600.0) + np.tanh(X[:, 2] / 150.0) * np.sin(X[:, 1] / 30.0)
+
+
+@pytest.fixture(scope="module")
+def trained():
+    """Trained where temperature is in [-40, 85] and rate in [-300, 300]."""
+    return quick(2).fit(FRAME, Y)
+
+
+OUTSIDE = pd.DataFrame(
+    [[900.0, 20.0, 100.0], [900.0, 120.0, 100.0], [900.0, 99.5, -400.0], [-5.0, 20.0, 0.0]],
+    columns=NAMES,
+)
+
+
+def test_out_of_bounds_rows_are_reported(trained):
+    low, high = FRAME["temperature"].min(), FRAME["temperature"].max()
+    message = (
+        rf"'time' in 1 of 4 rows .*'temperature' in 2 of 4 rows "
+        rf"\(trained on \[{low:.6g}, {high:.6g}\], found \[20, 120\]\); "
+        rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='linear', "
+        rf"max_extrapolation={MAX_EXTRAPOLATION}"
+    )
+    with pytest.warns(OutOfBoundsWarning, match=message) as caught:
+        trained.predict(OUTSIDE)
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+    assert_array_equal(trained.in_bounds(OUTSIDE), [True, False, False, False])
+
+
+def test_columns_within_bounds_are_not_reported(trained):
+    with pytest.warns(OutOfBoundsWarning) as caught:
+        trained.predict(OUTSIDE[:2])
+    assert "'temperature'" in str(caught[0].message)
+    assert "'time'" not in str(caught[0].message)
+    assert "'rate'" not in str(caught[0].message)
+
+
+def test_score_reports_out_of_bounds_rows_too(trained):
+    with pytest.warns(OutOfBoundsWarning, match="'temperature'"):
+        trained.score(OUTSIDE, np.arange(4.0))
+
+
+def test_training_data_themselves_are_within_bounds(trained):
+    assert trained.in_bounds(FRAME).all()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        trained.predict(FRAME)
+
+
+def with_policy(estimator, policy):
+    return clone(estimator).set_params(out_of_bounds=policy).fit(FRAME, Y)
+
+
+@pytest.mark.parametrize("policy", ["clip", "nan"])
+def test_an_answer_that_was_asked_for_is_given_without_a_word(trained, policy):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with_policy(trained, policy).predict(OUTSIDE)
+
+
+def test_clip_holds_the_value_at_the_edge(trained):
+    model = with_policy(trained, "clip")
+    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1)
+    assert_array_equal(model.predict(OUTSIDE), model.predict(nearest))
+    assert_allclose(model.strengths(OUTSIDE), model.strengths(nearest), rtol=1e-14)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_linear_goes_on_along_the_tangent_of_the_edge(trained):
+    model = with_policy(trained, "linear").set_params(out_of_bounds=LinearExtrapolation(math.inf))
+    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1).to_numpy()
+    slope = model.model_.gradient(nearest)[:, :, 0]
+    expected = trained.model_.predict(nearest)[:, 0]
+    expected += ((OUTSIDE.to_numpy() - nearest) * slope).sum(axis=1)
+    assert_allclose(model.predict(OUTSIDE), expected, rtol=1e-9)
+    edge = OUTSIDE.assign(temperature=FRAME["temperature"].max(), time=900.0, rate=0.0)
+    beyond = edge.assign(temperature=edge["temperature"] + 1e-9)
+    assert_allclose(model.predict(beyond), model.predict(edge), rtol=1e-9)
+
+
+def test_nan_marks_the_rows_out_of_bounds_alone(trained):
+    model = with_policy(trained, "nan")
+    found = model.predict(OUTSIDE)
+    assert_array_equal(np.isnan(found), [False, True, True, True])
+    assert_allclose(found[0], trained.predict(OUTSIDE[:1])[0], rtol=1e-14)
+
+
+def test_raise_names_the_columns(trained):
+    model = with_policy(trained, "raise")
+    with pytest.raises(ValueError, match=r"'temperature' in 2 of 4 rows .*'rate' in 1 of 4 rows"):
+        model.predict(OUTSIDE)
+    assert_array_equal(model.predict(OUTSIDE[:1]), trained.predict(OUTSIDE[:1]))
+
+
+def test_far_away_the_prediction_is_no_silent_zero(trained):
+    far = OUTSIDE + 1e9
+    model = with_policy(trained, "clip")
+    corner = FRAME.max().to_frame().T
+    assert_allclose(model.predict(far), model.predict(corner)[0], rtol=1e-14)
+    assert_allclose(model.strengths(far).sum(axis=1), 1.0, rtol=1e-14)
+    assert_array_equal(model.coverage(far), 0.0)
+
+
+def test_strengths_are_positive_and_sum_to_one(trained):
+    strengths = trained.strengths(pd.concat([FRAME, OUTSIDE]))
+    assert (strengths > 0).all()
+    assert_allclose(strengths.sum(axis=1), 1.0, rtol=1e-14)
+
+
+def test_array_in_place_of_the_frame_is_warned_of(trained):
+    with pytest.warns(UserWarning, match="valid feature names"):
+        found = trained.predict(X)
+    assert_array_equal(found, trained.predict(FRAME))
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_policy_may_be_changed_after_training(trained):
+    model = pickle.loads(pickle.dumps(trained))
+    for policy in ("linear", "nan", "clip"):
+        found = model.set_params(out_of_bounds=policy).predict(OUTSIDE)
+        assert_array_equal(found, with_policy(trained, policy).predict(OUTSIDE))
+    model.set_params(out_of_bounds=LinearExtrapolation())
+    for limit in (0.0, 0.2, math.inf):
+        found = model.set_params(out_of_bounds__max_extrapolation=limit).predict(OUTSIDE)
+        expected = oracles.held_tangent(trained.model_, OUTSIDE.to_numpy(), limit)
+        assert_allclose(found, expected[:, 0], rtol=1e-10)
+    with pytest.raises(ValueError, match="max_extrapolation=-1 must be a number"):
+        model.set_params(out_of_bounds__max_extrapolation=-1).predict(OUTSIDE)
