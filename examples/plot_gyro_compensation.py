@@ -109,6 +109,7 @@ figure = plt.figure(figsize=(10, 8), layout="constrained")
 upper, lower = figure.subfigures(2, 1, height_ratios=(4, 5))
 panels = upper.subplots(1, 3, sharey=True)
 MembershipDisplay.from_estimator(anfis, X[~new], ax=panels)
+upper.supxlabel("dashed: before training; grey: data", fontsize="small", color="0.4")
 for panel, unit in zip(panels, ("s", "°C", "°/s"), strict=True):
     panel.set_xlabel(f"{panel.get_xlabel()} [{unit}]")
     panel.label_outer()
