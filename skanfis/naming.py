@@ -49,7 +49,7 @@ def given_term_names(antecedent, input_names, term_names):
     is_mapping = isinstance(term_names, Mapping)
     if is_mapping and (unknown := [key for key in term_names if key not in input_names]):
         raise ValueError(
-            f"term_names has the key {unknown[0]!r}, which is no input; the inputs are "
+            f"names has the key {unknown[0]!r}, which is no input; the inputs are "
             f"{', '.join(map(repr, input_names))}."
         )
     for j in np.unique(inputs):
@@ -88,13 +88,12 @@ def _plain(number, digits):
 def _check_given(given, n_terms, input_name):
     if isinstance(given, str) or not all(isinstance(name, str) and name for name in given):
         raise TypeError(
-            f"term_names for input {input_name!r} must be a sequence of non-empty str, got "
-            f"{given!r}."
+            f"names for input {input_name!r} must be a sequence of non-empty str, got {given!r}."
         )
     if len(given) != n_terms:
         raise ValueError(
-            f"term_names has {len(given)} names for input {input_name!r}, which has {n_terms} "
+            f"names: there are {len(given)} names for input {input_name!r}, which has {n_terms} "
             "terms. Give one name per term, or a dict from input to names."
         )
     if len(set(given)) != len(given):
-        raise ValueError(f"term_names for input {input_name!r} repeats a name: {list(given)!r}.")
+        raise ValueError(f"names for input {input_name!r} repeats a name: {list(given)!r}.")

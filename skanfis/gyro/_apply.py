@@ -58,7 +58,7 @@ def apply(options, tell):
 
 def _open(path, options, needed, compensator, tell):
     """The log of one file, checked: read once, piece by piece, and to be read again."""
-    with usage_errors():  # signs that do not go together
+    with usage_errors():  # characters that do not go together
         request = request_of(options, needed)
         stream = LogStream(path, request, options.max_gap, options.device)
     unit, due = stream.units["output"], compensator.output_unit

@@ -73,7 +73,7 @@ def read_for(options, paths, require, tell, columns=None):
     """Read files as the options say; what was found out is told."""
     if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
         require = (*require, "time")
-    with usage_errors():  # signs that do not go together
+    with usage_errors():  # characters that do not go together
         reading = _read(options, paths, request_of(options, require, columns), tell)
     for note in reading.notes:
         tell(f"note: {note}")

@@ -62,8 +62,8 @@ def sign(text):
         or found in "\"'+- "
     ):
         raise argparse.ArgumentTypeError(
-            f"{_shown(text)} must be one sign, such as a comma, and neither letter, digit, blank, "
-            "quote, + nor -"
+            f"{_shown(text)} must be one character, such as a comma, and neither letter, digit, "
+            "blank, quote, + nor -"
         )
     return found
 

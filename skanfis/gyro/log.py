@@ -314,6 +314,6 @@ def _check_signs(separator, decimal):
         if sign is None:
             continue
         if not isinstance(sign, str) or len(sign) != 1 or sign.isalnum() or sign in '\r\n"':
-            raise ValueError(f"{name}={sign!r} must be one sign, such as a comma.")
+            raise ValueError(f"{name}={sign!r} must be one character, such as a comma.")
     if separator is not None and separator == decimal:
         raise ValueError(f"separator and decimal are both {separator!r}: numbers would be cut.")

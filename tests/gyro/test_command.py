@@ -327,8 +327,8 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--terms", "9,9,9,9"], "9,9,9,9 makes 6,561 rules; at most 500"),
         (["--max-rules", "1000"], "must be a whole number from 1 to 500"),
         (["--inputs", "output", "output"], "--inputs: output is given twice"),
-        (["--separator", "(("], "must be one sign"),
-        (["--separator", ""], "must be one sign"),
+        (["--separator", "(("], "must be one character"),
+        (["--separator", ""], "must be one character"),
         (["--decimal", ","], "separator and decimal are both ','"),
     ],
 )
