@@ -42,7 +42,8 @@ def named_refusals(**tables):
     """Let scikit-learn check tables, given by what they are: X=..., y=...
 
     What it and NumPy refuse without the column's name, or take for numbers that it is not, is
-    refused by name: columns of text, times, or two of one name, sparse and lazy frames.
+    refused by name: columns of text, times, or two of one name, sparse and lazy frames, masked
+    values.
     """
     refuse_lazy(**tables)
     for what, table in tables.items():
@@ -84,6 +85,13 @@ def _check_kind(table, what):
             f"Sparse data was passed for {what}, but dense data is required: give "
             f"{what}.toarray(). In a Pipeline, OneHotEncoder(sparse_output=False) and "
             "ColumnTransformer(..., sparse_threshold=0) hand on dense data."
+        )
+    if np.ma.is_masked(table):
+        masked = np.ma.getmaskarray(table).reshape(len(table), -1).any(axis=1)
+        raise ValueError(
+            f"{what} is a masked array with masked values in {np.count_nonzero(masked)} of "
+            f"{masked.size} rows, first at row {masked.argmax()}: drop these rows"
+            + (", or impute X.filled(numpy.nan) in a Pipeline." if what == "X" else ".")
         )
     names, dtypes = getattr(table, "columns", None), getattr(table, "dtypes", None)
     if names is None or dtypes is None:

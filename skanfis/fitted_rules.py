@@ -34,6 +34,11 @@ class TellsOfRulesMixin:
         Returns
         -------
         inside : ndarray of bool of shape (n_samples,)
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
         """
         X = self._check_inputs(X)
         return self.model_.in_bounds(X)
@@ -56,6 +61,11 @@ class TellsOfRulesMixin:
         -------
         coverage : ndarray of shape (n_samples,)
             From 0, where no data speak, to 1.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
         """
         X = self._check_inputs(X)
         return self.model_.coverage(X)
@@ -72,6 +82,11 @@ class TellsOfRulesMixin:
         strengths : ndarray of shape (n_samples, n_rules)
             Positive, with sum one in every row. Rows outside the training range are taken at its
             edge.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
         """
         X = self._check_inputs(X)
         return self.model_.strengths(X)

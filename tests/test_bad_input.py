@@ -187,6 +187,19 @@ def test_sparse_frame(fill):
         ANFISRegressor().fit(frame, Y)
 
 
+def test_masked_values_are_not_taken_for_what_lies_beneath():
+    masked = np.ma.array(X, mask=False)
+    model = ANFISRegressor(**QUICK).fit(masked, Y)
+    assert_array_equal(model.predict(X), ANFISRegressor(**QUICK).fit(X, Y).predict(X))
+    masked[[7, 9], 1] = np.ma.masked
+    with refused(ValueError, "X is a masked array", "2 of 60 rows", "row 7", "filled"):
+        ANFISRegressor(**QUICK).fit(masked, Y)
+    with refused(ValueError, "X is a masked array"):
+        model.predict(masked)
+    with refused(ValueError, "y is a masked array", "1 of 60 rows", "row 2"):
+        ANFISRegressor(**QUICK).fit(X, np.ma.array(Y, mask=np.arange(N_ROWS) == 2))
+
+
 def test_frames_of_polars():
     polars = pytest.importorskip("polars")
     frame = polars.DataFrame({name: FRAME[name].to_numpy() for name in NAMES})

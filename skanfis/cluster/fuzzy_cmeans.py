@@ -313,6 +313,11 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         -------
         labels : ndarray of shape (n_samples,)
             Positions in ``cluster_centers_``.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
         """
         check_is_fitted(self)
         return nearest(check_rows(self, X), self.cluster_centers_)
@@ -329,6 +334,11 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         memberships : ndarray of shape (n_samples, n_clusters)
             From 0 to 1, with sum one in every row; one where a row coincides with a centre, or
             shared equally where it coincides with several.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
         """
         check_is_fitted(self)
         X = check_rows(self, X)

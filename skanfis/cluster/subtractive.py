@@ -242,6 +242,11 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         -------
         labels : ndarray of shape (n_samples,)
             Positions in ``cluster_centers_``.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
         """
         check_is_fitted(self)
         return self._labels(check_rows(self, X))

@@ -107,6 +107,12 @@ class DaskANFISRegressor(ANFISRegressor):
         y_std : likewise
             Only with ``return_std``: standard deviations, as of
             :meth:`skanfis.ANFISRegressor.predict`.
+
+        Raises
+        ------
+        ValueError
+            If X has other columns than in training. What is not finite is refused when blocks are
+            computed.
         """
         if not is_collection(X):
             return super().predict(X, return_std)
@@ -176,6 +182,11 @@ class DaskANFISRegressor(ANFISRegressor):
         -------
         score : float
             1 - (squared error) / (squares about the mean), the mean over outputs.
+
+        Raises
+        ------
+        ValueError
+            If X has other columns than in training, or y or weights are not cut as X is.
         """
         if not is_collection(X):
             return super().score(X, y, sample_weight)

@@ -36,6 +36,11 @@ class RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         -------
         self : object
             The transformer.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite or lacks a column named, or time does not increase within a run.
         """
         self._check_parameters()
         names, columns = self._columns_of(X, reset=True)
@@ -62,6 +67,12 @@ class RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         -------
         features : ndarray of shape (n_samples, n_features_out)
             The new columns alone.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, has other columns than in ``fit``, or time does not increase within
+            a run.
         """
         check_is_fitted(self)
         order, starts, steps, quantities = self._rows_by_run(*self._columns_of(X, reset=False))

@@ -165,6 +165,11 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         y : ndarray of shape (n_samples,)
+
+        Raises
+        ------
+        ValueError
+            If X is refused by either part.
         """
         check_is_fitted(self)
         return self.base_.predict(X) + self.residual_.predict(X)
@@ -180,6 +185,11 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         inside : ndarray of bool of shape (n_samples,)
+
+        Raises
+        ------
+        ValueError
+            If X is refused by either part.
         """
         check_is_fitted(self)
         return np.logical_and.reduce(self._answers("in_bounds", X))
@@ -196,6 +206,11 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         -------
         coverage : ndarray of shape (n_samples,)
             From 0 to 1; see :meth:`skanfis.ANFISRegressor.coverage`.
+
+        Raises
+        ------
+        ValueError
+            If X is refused by either part.
         """
         check_is_fitted(self)
         return np.minimum.reduce(self._answers("coverage", X))

@@ -150,6 +150,16 @@ class RuleContributionDisplay:
         Returns
         -------
         display : RuleContributionDisplay
+
+        Raises
+        ------
+        ValueError
+            If there is no such input or output, ``held`` lies outside the training range, or a
+            number is out of its range.
+        TypeError
+            If ``estimator`` has no rules.
+        ImportError
+            Without matplotlib.
         """
         check_count("n_points", n_points, 2)
         model = fold(estimator)
@@ -200,6 +210,13 @@ class RuleContributionDisplay:
         Returns
         -------
         display : RuleContributionDisplay
+
+        Raises
+        ------
+        ValueError
+            If ``max_rules`` is less than 1.
+        ImportError
+            Without matplotlib.
         """
         check_count("max_rules", max_rules, 1)
         self.ax_ = one_axes(ax, width=7.5)

@@ -49,6 +49,13 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
         reading them one by one: what the estimator's ``readability_`` says, where it has one, or
         what can be said without rows. :func:`readability` says more.
 
+    Raises
+    ------
+    ValueError
+        If a step of a pipeline cannot be folded, or a number is out of its range.
+    TypeError
+        If ``estimator`` has no rules.
+
     Examples
     --------
     >>> from IPython.display import HTML  # doctest: +SKIP

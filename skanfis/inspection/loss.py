@@ -84,6 +84,13 @@ class LossCurveDisplay:
         Returns
         -------
         display : LossCurveDisplay
+
+        Raises
+        ------
+        TypeError
+            If ``estimator`` has no rules, or has not been trained here.
+        ImportError
+            Without matplotlib.
         """
         last = last_step(estimator)
         loss = getattr(last, "loss_curve_", None)

@@ -107,6 +107,16 @@ class MembershipDisplay:
         Returns
         -------
         display : MembershipDisplay
+
+        Raises
+        ------
+        ValueError
+            If the model, or an input asked for, has no terms, or X has other columns than in
+            training.
+        TypeError
+            If ``estimator`` has no rules.
+        ImportError
+            Without matplotlib.
         """
         check_count("n_points", n_points, 2)
         check_count("bins", bins, 1)

@@ -238,6 +238,15 @@ class ReadabilityDisplay:
         Returns
         -------
         display : ReadabilityDisplay
+
+        Raises
+        ------
+        ValueError
+            If X or y do not go with the model.
+        TypeError
+            If ``estimator`` has no rules.
+        ImportError
+            Without matplotlib.
         """
         check_count("n_points", n_points, 2)
         check_count("max_rows", max_rows, 1)

@@ -130,11 +130,26 @@ class ResponseSurfaceDisplay:
         Returns
         -------
         display : ResponseSurfaceDisplay
+
+        Raises
+        ------
+        ValueError
+            If ``features`` are not two different inputs, there is no such output, ``held`` lies
+            outside the training range, or the model has one input.
+        TypeError
+            If ``estimator`` has no rules.
+        ImportError
+            Without matplotlib.
         """
         check_count("grid_resolution", grid_resolution, 2)
         model, table = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
         if isinstance(features, str) or len(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
+        if model.n_inputs == 1:
+            raise ValueError(
+                "The model has one input, and a surface takes two: RuleContributionDisplay draws "
+                "the prediction along one."
+            )
         first, second = (position(feature, model.input_names) for feature in features)
         if first == second:
             raise ValueError(f"features={features!r} is the same input twice.")
@@ -178,6 +193,13 @@ class ResponseSurfaceDisplay:
         Returns
         -------
         display : ResponseSurfaceDisplay
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``plot_method``.
+        ImportError
+            Without matplotlib.
         """
         check_choice("plot_method", plot_method, _PLOT_METHODS)
         self.ax_ = one_axes(ax)

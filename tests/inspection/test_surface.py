@@ -78,3 +78,9 @@ def test_a_flat_surface_can_be_drawn():
 def test_surface_parameters_are_checked(settings, error, message):
     with pytest.raises(error, match=message):
         ResponseSurfaceDisplay.from_estimator(A_GRID, **settings)
+
+
+def test_a_model_of_one_input_has_no_surface():
+    x = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
+    with pytest.raises(ValueError, match="one input, and a surface takes two: RuleContribution"):
+        ResponseSurfaceDisplay.from_estimator(ANFISRegressor(n_mfs=2).fit(x, x[:, 0]))

@@ -126,6 +126,13 @@ class AllanDisplay(CompensationDisplay):
         -------
         display : AllanDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``unit``.
+        ImportError
+            Without matplotlib.
         """
         self.unit_ = check_unit(unit)
         self.figure_, axes = make_axes(ax, 1, (6.2, 4.4))

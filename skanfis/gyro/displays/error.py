@@ -120,6 +120,13 @@ class ErrorDisplay(CompensationDisplay):
         Returns
         -------
         display : ErrorDisplay
+
+        Raises
+        ------
+        ValueError
+            If columns differ in length, are empty or not finite, or there is no such ``unit``.
+        ImportError
+            Without matplotlib.
         """
         rate, before, after, position = check_rows(
             rate=rate, before=before, after=after, position=position
@@ -153,6 +160,13 @@ class ErrorDisplay(CompensationDisplay):
         -------
         display : ErrorDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``unit``, or ``ax`` has another number of axes.
+        ImportError
+            Without matplotlib.
         """
         self.unit_ = check_unit(unit)
         factor = PER_UNIT[unit]

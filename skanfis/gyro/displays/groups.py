@@ -87,6 +87,13 @@ class GroupResidualDisplay(CompensationDisplay):
         Returns
         -------
         display : GroupResidualDisplay
+
+        Raises
+        ------
+        ValueError
+            If columns differ in length, are empty or not finite, or there is no such ``unit``.
+        ImportError
+            Without matplotlib.
         """
         rate, before, after, groups = check_rows(
             rate=rate, before=before, after=after, groups=groups
@@ -112,6 +119,13 @@ class GroupResidualDisplay(CompensationDisplay):
         -------
         display : GroupResidualDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``unit``.
+        ImportError
+            Without matplotlib.
         """
         self.unit_ = check_unit(unit)
         factor = PER_UNIT[unit]

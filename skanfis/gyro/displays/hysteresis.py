@@ -105,6 +105,13 @@ class HysteresisDisplay(CompensationDisplay):
         Returns
         -------
         display : HysteresisDisplay
+
+        Raises
+        ------
+        ValueError
+            If columns differ in length, are empty or not finite, or there is no such ``unit``.
+        ImportError
+            Without matplotlib.
         """
         rate, before, after, temperature, temperature_rate = check_rows(
             rate=rate,
@@ -149,6 +156,13 @@ class HysteresisDisplay(CompensationDisplay):
         -------
         display : HysteresisDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``unit``, or ``ax`` has another number of axes.
+        ImportError
+            Without matplotlib.
         """
         self.unit_ = check_unit(unit)
         factor = PER_UNIT[unit] / _PER_HOUR

@@ -108,6 +108,13 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         Returns
         -------
         display : ResidualSurfaceDisplay
+
+        Raises
+        ------
+        ValueError
+            If columns differ in length, are empty or not finite, or there is no such ``unit``.
+        ImportError
+            Without matplotlib.
         """
         rate, _, after, temperature = check_rows(
             rate=rate, before=before, after=after, temperature=temperature
@@ -144,6 +151,13 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         -------
         display : ResidualSurfaceDisplay
             Itself.
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``unit``, or ``ax`` has another number of axes.
+        ImportError
+            Without matplotlib.
         """
         from matplotlib.colors import LogNorm
 
