@@ -1,6 +1,7 @@
 """Imports point one way: the layers of the package as a table, held against its source."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
@@ -352,3 +353,14 @@ def test_what_is_shared_is_used_and_not_by_the_gyro_wing():
                     layers[taken].add(module.split(".")[1])
     assert all(layers.values())
     assert not any("gyro" in users for users in layers.values())
+
+
+def test_where_the_page_says_that_things_are_decided_there_is_something():
+    page = Path(__file__).parents[1] / "docs" / "layers.rst"
+    if not page.is_file():
+        pytest.skip("the documentation is not here")
+    named = re.findall(r"``(skanfis\.[\w.]+)``", page.read_text(encoding="utf-8"))
+    assert len(named) > 25
+    for name in named:
+        path = PACKAGE.joinpath(*name.split(".")[1:])
+        assert path.is_dir() or path.with_suffix(".py").is_file(), name
