@@ -1,7 +1,8 @@
 """Options of ANFISRegressor that have settings of their own: each with a word for its defaults.
 
 They are scikit-learn objects without data: ``clone`` copies them, and a search reaches into them,
-as in ``GridSearchCV(model, {"loss__epsilon": [1.1, 1.35, 2.0]})``.
+as in ``GridSearchCV(ANFISRegressor(loss=Huber()), {"loss__epsilon": [1.1, 1.35, 2.0]})``; not into
+the word ``"huber"``, which has no settings.
 """
 
 import math
