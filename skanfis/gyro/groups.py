@@ -378,8 +378,8 @@ def _warn_of_levels(report):
     if leaks.any():
         warnings.warn(
             f"{leaks.sum()} of {len(report)} splits test at rate levels that they train at, "
-            f"{share.max():.0%} of the test rows at worst. A flexible model may know the levels by "
-            "heart, look good, and fail between them. Hold out levels: "
+            f"{share.max():.0%} of the test rows at worst. A flexible model may memorise the "
+            "levels, look good, and fail between them. Hold out levels: "
             "groups=group_by_rate_level(rate) with GroupKFold.",
             SplitLeakWarning,
             stacklevel=3,

@@ -231,7 +231,7 @@ def test_splits_may_be_given_as_scikit_learn_takes_them(table_data):
 
 @pytest.mark.theory
 def test_the_trap_is_real():
-    # A forest learns the list of levels by heart: runs held out, it seems hundreds of times better
+    # A forest memorises the list of levels: runs held out, it seems hundreds of times better
     # than it is between the levels.
     data = make_ofog(n_devices=1, n_runs=10, n_rate_levels=29, dwell_time=60.0, random_state=0)
     X, rate = data[["output", "temperature"]], data["rate"]
