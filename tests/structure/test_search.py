@@ -479,6 +479,20 @@ def test_only_candidates_that_may_still_lead_are_trained_out(rng):
     assert alone.found[other].score == turned_once
 
 
+@pytest.mark.parametrize("clustering", ["k-means", "fcm"])
+def test_no_more_clusters_than_rows_are_tried(rng, clustering):
+    X = inputs(rng, 12, 1)
+    found = search_of(X, X[:, 0] + 0.1 * rng.standard_normal(12))
+    few, many, linear = (
+        Candidate(None, 2, clustering),
+        Candidate(None, 13, clustering),
+        Candidate((1,)),
+    )
+    assert set(found._promising([many, few, linear])) == {few, linear}
+    assert found._score(many) == np.inf
+    assert np.isfinite(found._score(linear))
+
+
 @pytest.mark.floors
 def test_without_terms_there_is_nothing_to_train_out(rng):
     X = inputs(rng, 50, 2)

@@ -33,11 +33,14 @@ def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
     monkeypatch.setattr(
         tuning,
         "varpro",
-        lambda *args, **more: begun.append(more["stiffness"]) or varpro(*args, **more),
+        lambda problem, *args, **more: (
+            begun.append(problem.penalty) or varpro(problem, *args, **more)
+        ),
     )
     for is_loose in (False, True):
         tuning.tune(*two_rules, FREE, 100.0, turns=1, is_loose=is_loose)
-    assert_allclose(begun, [noise / (100.0 * PRIOR_DISPLACEMENT**2), 1e-12])
+    assert_allclose(begun[0].stiffness, noise / (100.0 * PRIOR_DISPLACEMENT**2))
+    assert begun[1] == Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-12)
 
 
 def test_premises_start_where_they_are_told_to(two_rules):
@@ -168,6 +171,10 @@ def test_agreement_rises_until_the_strongest_rule_holds_or_the_price_is_too_high
         assert found.is_apart is not holds
         assert (found.problem.strongest_alone(found.evaluation) <= limit) is holds
         assert error == 1.0 if not holds else 1.0 < error < tuning.HOLDING
+        # The other weights are those that the evidence found.
+        raised = found.penalty.agreement
+        assert found.penalty == replace(apart.penalty, agreement=raised)
+        assert (raised > apart.penalty.agreement) is holds
         # What is given is not changed.
         fixed = tuning.tune(*two_rules, FREE[1:], 100.0)
         assert fixed.penalty.agreement == tuning.FIRST_PENALTY.agreement
