@@ -1,12 +1,14 @@
 """Families of membership functions; ``base`` has the conventions that all of them follow."""
 
-from .base import LEAST_TRUTH, Membership, Parameter
+from .base import GREATEST_CROSSING, GREATEST_WORDLESS, LEAST_TRUTH, Membership, Parameter
 from .bell import Bell
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
 from .gaussian import Gaussian
 from .sigmoid import SigmoidDifference, SigmoidProduct
 
 __all__ = [
+    "GREATEST_CROSSING",
+    "GREATEST_WORDLESS",
     "LEAST_TRUTH",
     "MEMBERSHIPS",
     "NAMES_IN_MATLAB",

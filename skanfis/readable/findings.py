@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..membership import LEAST_TRUTH
+from ..membership import GREATEST_CROSSING, GREATEST_WORDLESS, LEAST_TRUTH
 from ..penalty import GREATEST_ALONE
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
 
@@ -21,19 +21,12 @@ __all__ = [
     "findings_without_rows",
 ]
 
-# Neighbours that cross above this are both all but true at one place: no reader can say which of
-# the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
-GREATEST_CROSSING = 0.9
 # In ranges of the target. Rules whose values lie in the target's range reach one at most. At two,
 # at least half of what the rules say on some row is there to cancel the rest.
 GREATEST_SUM = 2.0
 # In ranges of the target. A rule may say a little more than was ever seen, for its neighbours take
 # part everywhere; a quarter of the range beyond is no mean of anything that was.
 GREATEST_BEYOND = 0.25
-
-# Of the rows. Outer terms stand a little inside of the data, so that a few rows on either side have
-# no true term; beyond, a stretch of the input has no name.
-GREATEST_WORDLESS = 0.05
 
 # A sentence names so many terms, pairs or rules; beyond, it counts them.
 _MOST_NAMED = 5

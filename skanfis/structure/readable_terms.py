@@ -7,13 +7,11 @@ import numpy as np
 from ..antecedent import Antecedent
 from ..blocks import BLOCK_ROWS
 from ..data import StandardisedData
-from ..membership import LEAST_TRUTH
+from ..membership import GREATEST_CROSSING, LEAST_TRUTH
 
 __all__ = ["has_idle_term", "has_twin_terms"]
 
-# Neighbours cannot be told apart where they cross above this.
-_HIGHEST_CROSSING = 0.9
-# Places in the range of an input where they are looked at.
+# Places in the range of an input where neighbours are looked at.
 _PLACES = 401
 
 
@@ -37,6 +35,6 @@ def has_twin_terms(rows: StandardisedData, antecedent: Antecedent) -> bool:
         mine = np.flatnonzero(antecedent.term_inputs == j)
         mine = mine[np.argsort(antecedent.term_places[mine], kind="stable")]
         for left, right in pairwise(log_truth[mine]):
-            if np.minimum(left, right).max() > np.log(_HIGHEST_CROSSING):
+            if np.minimum(left, right).max() > np.log(GREATEST_CROSSING):
                 return True
     return False

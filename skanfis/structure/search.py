@@ -20,7 +20,7 @@ Rows that come in groups, runs of an instrument say, are more alike within a gro
 criterion on the same rows can know. Where the groups are given, the score is instead the error of
 short trainings on the groups that are left out, a fifth of them at a time.
 
-Beyond a thousand rows, the candidates see representative rows only: the search then takes no
+Beyond two thousand rows, the candidates see representative rows only: the search then takes no
 longer, whatever the number of rows.
 """
 
@@ -50,7 +50,6 @@ from .tuning import (
     FIRST_PENALTY,
     FIRST_STEPS,
     HOLDING,
-    MOST_ROWS,
     ROWS_EACH,
     Tuned,
     held_for_nothing,
@@ -64,6 +63,9 @@ __all__ = ["SEARCHED", "StructureSearch"]
 # The partitions whose size the data decide on: which candidates each of them has.
 SEARCHED = ("auto", "grid", "subtractive", "fcm")
 
+# Candidates are compared on at most so many representative rows. Twice as many as rules that are
+# given need: to tell candidates apart takes more than to find the weights of one.
+_MOST_ROWS = 2000
 # Consequent parameters of a candidate, of which a pass costs the square; of many inputs, so many
 # rules' worth, up to a limit of time.
 _MOST_COLUMNS = 256
@@ -149,7 +151,7 @@ class StructureSearch:
         is_constant = rows.inputs.is_constant
         self.inputs = premise_inputs[~is_constant[premise_inputs]]
         self.n_basis = 1 + np.count_nonzero(~is_constant[consequent_inputs])
-        self.sample = search_sample(rows, MOST_ROWS)
+        self.sample = search_sample(rows, _MOST_ROWS)
         self.spacing = Spacing(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.n_all = effective_weight(rows)
@@ -288,6 +290,8 @@ class StructureSearch:
         by few others: then that and the evidence, two readings of the same, count for half each,
         and the best of so many has to make good for having been chosen.
         """
+        if not self._score(candidate) < self._score(than):  # both are exact, or neither can be had
+            return 0.0
         gain = self._score(than) - self._score(candidate)
         if not np.isfinite(gain):
             return gain

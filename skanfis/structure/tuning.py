@@ -43,7 +43,6 @@ __all__ = [
     "FIRST_PENALTY",
     "FIRST_STEPS",
     "HOLDING",
-    "MOST_ROWS",
     "ROWS_EACH",
     "WORTHWHILE",
     "Tuned",
@@ -57,8 +56,8 @@ __all__ = [
     "with_premises",
 ]
 
-# The weights are found on at most so many representative rows.
-MOST_ROWS = 1000
+# The weights of rules that are given are found on at most so many representative rows.
+_MOST_ROWS = 1000
 # In the middle of what data of every kind ask for; from there the first steps find their way.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Loose: what rounding errors need.
@@ -71,7 +70,7 @@ _LESS_NOISE = 0.5
 # The same where terms are freed beyond all reading: only for data that are next to exact. And of
 # the error, where they are freed, and can be read nevertheless.
 _LEAST_NOISE = 0.01
-_LESS_ERROR = 0.5
+_LESS_ERROR = 0.1
 # Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
 # lead from the start to any end.
 FIRST_STEPS = 5
@@ -174,18 +173,33 @@ def _may_be_free(problem: SeparableProblem) -> bool:
 def _freed_if_worth_it(bounded: Tuned, free, n_rows: float) -> tuple[Tuned, Premise, bool]:
     """The better of terms within bounds and without, the premise of these, and whether without.
 
-    Freedom is worth half of the error if the terms can still be told apart, and next to all of the
-    noise if not.
+    Freedom is worth nine tenths of the squared error if the terms can still be told apart, and next
+    to all of the noise if not.
     """
     problem = bounded.problem
     premise = _premise(problem, is_free=True)
-    freed = tune(problem, premise, free, n_rows, is_loose=True, has_least=False)
-    rows, antecedent = problem.rows, freed.evaluation.antecedent
-    is_read = not has_idle_term(rows, antecedent) and not has_twin_terms(rows, antecedent)
-    is_better = is_read and _priced(freed) < _LESS_ERROR * _priced(bounded)
-    if is_better or bounded.is_beaten_loosely(freed, _LEAST_NOISE):
+    freed = _freely(problem, premise, free, n_rows)
+    if bounded.is_beaten_loosely(freed, _LEAST_NOISE):
         return freed, premise, True
+    if freed.expected_error < _LESS_ERROR * _priced(bounded):
+        freed = _held(freed, premise, free, n_rows)
+        rows, antecedent = problem.rows, freed.evaluation.antecedent
+        is_read = not has_idle_term(rows, antecedent) and not has_twin_terms(rows, antecedent)
+        if is_read and _priced(freed) < _LESS_ERROR * _priced(bounded):
+            return freed, premise, True
     return bounded, _premise(problem), False
+
+
+def _freely(problem, premise, free, n_rows) -> Tuned:
+    """Rules that may compensate one another."""
+    return tune(problem, premise, free, n_rows, is_loose=True, has_least=False, is_last=False)
+
+
+def _held(tuned, premise, free, n_rows) -> Tuned:
+    """The same with rules that hold one by one, if that is cheap and agreement is free."""
+    if "agreement" not in free:
+        return tuned
+    return _together(tuned, _Weights(tuned.problem, n_rows), premise, free)
 
 
 def _premise(problem, is_free=False):
@@ -426,7 +440,7 @@ def tuned_start(
         penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
     if not free and not is_compared:
         return Start(antecedent, penalty)
-    sample = search_sample(rows, MOST_ROWS)
+    sample = search_sample(rows, _MOST_ROWS)
     problem = SeparableProblem(
         sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
     )
@@ -436,9 +450,10 @@ def tuned_start(
     first_steps = FIRST_STEPS if premises_move else ARRIVING
     best = tune(problem, premise, free, n_sample, turns, first_steps)
     if premises_move and _may_be_free(problem) and not is_noisy:
-        loose = tune(problem, premise, free, n_sample, turns, is_loose=True, has_least=False)
-        if HOLDING * _priced(loose) < _priced(best):
-            best = loose
+        loose = _freely(problem, premise, free, n_sample)
+        if best.is_beaten_loosely(loose):
+            loose = _held(loose, premise, free, n_sample)
+            best = loose if _priced(loose) < _priced(best) else best
         best, premise, is_free = _freed_if_worth_it(best, free, n_sample)
     if premises_move:
         best = held_for_nothing(best, premise, free, n_sample, effective_weight(rows))
