@@ -107,11 +107,13 @@ for name, value in rms.items():
 
 figure = plt.figure(figsize=(10, 8), layout="constrained")
 upper, lower = figure.subfigures(2, 1, height_ratios=(4, 5))
-panels = upper.subplots(1, 3, sharey=True)
+units = {"time": "s", "temperature": "°C", "output": "°/s"}
+with_terms = {term["input"] for term in anfis.memberships_}
+panels = upper.subplots(1, len(with_terms), sharey=True)
 MembershipDisplay.from_estimator(anfis, X[~new], ax=panels)
 upper.supxlabel("dashed: before training; grey: data", fontsize="small", color="0.4")
-for panel, unit in zip(panels, ("s", "°C", "°/s"), strict=True):
-    panel.set_xlabel(f"{panel.get_xlabel()} [{unit}]")
+for panel in panels:
+    panel.set_xlabel(f"{panel.get_xlabel()} [{units[panel.get_xlabel()]}]")
     panel.label_outer()
 
 axes = lower.subplots()

@@ -28,6 +28,8 @@ GREATEST_SUM = 2.0
 # part everywhere; a quarter of the range beyond is no mean of anything that was.
 GREATEST_BEYOND = 0.25
 
+# Of figures that are compared.
+_DIGITS = 6
 # A sentence names so many terms, pairs or rules; beyond, it counts them.
 _MOST_NAMED = 5
 
@@ -129,7 +131,8 @@ def _on_values(beyond, of_output):
     rules = np.flatnonzero(beyond > GREATEST_BEYOND)
     if not rules.size:
         return []
-    rules = rules[np.argsort(-beyond[rules], kind="stable")]
+    # Rules that are alike but for rounding stay in their order.
+    rules = rules[np.argsort(-np.round(beyond[rules], _DIGITS), kind="stable")]
     what = "A rule says where it fires"
     if rules.size > 1:
         what = f"{rules.size} of {beyond.size} rules say where they fire"

@@ -20,8 +20,8 @@ Rows that come in groups, runs of an instrument say, are more alike within a gro
 criterion on the same rows can know. Where the groups are given, the score is instead the error of
 short trainings on the groups that are left out, a fifth of them at a time.
 
-Beyond two thousand rows, the candidates see representative rows only: the search then takes no
-longer, whatever the number of rows.
+Beyond two thousand rows, one thousand in groups, the candidates see representative rows only: the
+search then takes no longer, whatever the number of rows.
 """
 
 from collections.abc import Callable, Sequence
@@ -64,8 +64,9 @@ __all__ = ["SEARCHED", "StructureSearch"]
 SEARCHED = ("auto", "grid", "subtractive", "fcm")
 
 # Candidates are compared on at most so many representative rows. Twice as many as rules that are
-# given need: to tell candidates apart takes more than to find the weights of one.
-_MOST_ROWS = 2000
+# given need: to tell candidates apart takes more than to find the weights of one. Rows of one group
+# are alike, and every candidate is trained once for each part that is left out.
+_MOST_ROWS, _MOST_ROWS_IN_GROUPS = 2000, 1000
 # Consequent parameters of a candidate, of which a pass costs the square; of many inputs, so many
 # rules' worth, up to a limit of time.
 _MOST_COLUMNS = 256
@@ -151,7 +152,8 @@ class StructureSearch:
         is_constant = rows.inputs.is_constant
         self.inputs = premise_inputs[~is_constant[premise_inputs]]
         self.n_basis = 1 + np.count_nonzero(~is_constant[consequent_inputs])
-        self.sample = search_sample(rows, _MOST_ROWS)
+        most = _MOST_ROWS if rows.groups is None else _MOST_ROWS_IN_GROUPS
+        self.sample = search_sample(rows, most)
         self.spacing = Spacing(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.n_all = effective_weight(rows)

@@ -451,7 +451,7 @@ def tuned_start(
     best = tune(problem, premise, free, n_sample, turns, first_steps)
     if premises_move and _may_be_free(problem) and not is_noisy:
         loose = _freely(problem, premise, free, n_sample)
-        if best.is_beaten_loosely(loose):
+        if loose.posterior.noise_variance < _LESS_NOISE * best.posterior.noise_variance:
             loose = _held(loose, premise, free, n_sample)
             best = loose if _priced(loose) < _priced(best) else best
         best, premise, is_free = _freed_if_worth_it(best, free, n_sample)
