@@ -22,7 +22,7 @@ from itertools import product
 
 import numpy as np
 
-from .membership import LEAST_TRUTH
+from .membership import GREATEST_CROSSING, LEAST_TRUTH
 
 __all__ = ["LOG_FACTOR", "LOG_FLATTER", "OrderedTerms", "Term", "terms_of"]
 
@@ -47,8 +47,6 @@ LOG_FLATTER = np.log(1.5)
 # Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
 # more than half true at the edge. Where they are free, by the second.
 _BEYOND, _FREE_BEYOND = 0.25, 1.0
-# Neighbours can be told apart where they cross below this.
-_HIGHEST_CROSSING = 0.9
 # Of the smooth minimum and maximum of two gaps.
 _POWER = 8.0
 # A gap that a step has closed, as part of the range.
@@ -324,7 +322,7 @@ def _most_growth(family, theta, is_width):
         logs = [family.log_value(np.full((_CHANGES, 1), x), moved)[:, 0] for x in (-0.5, 0.5)]
         truth = np.maximum(truth, np.exp(logs))
     # A term that is true to one side for good has its flank on the other.
-    flanks = [values for values in truth if values[0] < _HIGHEST_CROSSING]
+    flanks = [values for values in truth if values[0] < GREATEST_CROSSING]
     if not flanks:
         return 0.0
-    return float(growth[np.flatnonzero(np.max(flanks, axis=0) <= _HIGHEST_CROSSING)[-1]])
+    return float(growth[np.flatnonzero(np.max(flanks, axis=0) <= GREATEST_CROSSING)[-1]])

@@ -1,6 +1,6 @@
 """Families of membership functions; ``base`` has the conventions that all of them follow."""
 
-from .base import GREATEST_CROSSING, GREATEST_WORDLESS, LEAST_TRUTH, Membership, Parameter
+from .base import GREATEST_CROSSING, LEAST_TRUTH, Membership, Parameter
 from .bell import Bell
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
 from .gaussian import Gaussian
@@ -8,7 +8,6 @@ from .sigmoid import SigmoidDifference, SigmoidProduct
 
 __all__ = [
     "GREATEST_CROSSING",
-    "GREATEST_WORDLESS",
     "LEAST_TRUTH",
     "MEMBERSHIPS",
     "NAMES_IN_MATLAB",

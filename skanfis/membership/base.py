@@ -28,7 +28,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-__all__ = ["GREATEST_CROSSING", "GREATEST_WORDLESS", "LEAST_TRUTH", "Membership", "Parameter"]
+__all__ = ["GREATEST_CROSSING", "LEAST_TRUTH", "Membership", "Parameter"]
 
 # A term that is never truer than this is, on every row, more false than true: its name describes
 # no row.
@@ -36,9 +36,6 @@ LEAST_TRUTH = 0.5
 # Neighbours that cross above this are both all but true at one place: no reader can say which of
 # the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
 GREATEST_CROSSING = 0.9
-# Of the rows. Outer terms stand a little inside of the data, so that a few rows on either side have
-# no true term; beyond, a stretch of the input has no name.
-GREATEST_WORDLESS = 0.05
 
 # exp(-u^2 / 2) = 1/2 at this u.
 _HALF_HEIGHT = np.sqrt(2.0 * np.log(2.0))

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..membership import GREATEST_CROSSING, GREATEST_WORDLESS, LEAST_TRUTH
+from ..membership import GREATEST_CROSSING, LEAST_TRUTH
 from ..penalty import GREATEST_ALONE
 from .terms import crossings, distinct_terms, greatest_truth_in_box, own_terms
 
@@ -27,6 +27,10 @@ GREATEST_SUM = 2.0
 # In ranges of the target. A rule may say a little more than was ever seen, for its neighbours take
 # part everywhere; a quarter of the range beyond is no mean of anything that was.
 GREATEST_BEYOND = 0.25
+
+# Of the rows. Outer terms stand a little inside of the data, so that a few rows on either side have
+# no true term; beyond, a stretch of the input has no name.
+GREATEST_WORDLESS = 0.05
 
 # Of figures that are compared.
 _DIGITS = 6

@@ -9,8 +9,9 @@ evidence, and the turns end when it has not risen twice.
 The weights come first, at the premises of the start: from weights that are far too small, the first
 steps of the premises would go where no evidence leads back from. Data without noise are the other
 case: what the premises of the start leave would be taken for noise. So there is a second way in,
-*loose*, in which the premises come first and the weights are next to nothing. It is taken where the
-evidence is for it and half of the noise is gone.
+*loose*, in which the premises come first and the weights are next to nothing. It is taken where
+half of the noise is gone, and the evidence is for it; of rules that are given, the error to be
+expected on new rows.
 """
 
 from dataclasses import dataclass, replace
@@ -170,24 +171,23 @@ def _may_be_free(problem: SeparableProblem) -> bool:
     )
 
 
-def _freed_if_worth_it(bounded: Tuned, free, n_rows: float) -> tuple[Tuned, Premise, bool]:
-    """The better of terms within bounds and without, the premise of these, and whether without.
+def _freed(bounded: Tuned, premise: Premise, free, n_rows: float) -> Tuned | None:
+    """The same with terms that have no bounds, where that is worth it.
 
     Freedom is worth nine tenths of the squared error if the terms can still be told apart, and next
     to all of the noise if not.
     """
     problem = bounded.problem
-    premise = _premise(problem, is_free=True)
     freed = _freely(problem, premise, free, n_rows)
     if bounded.is_beaten_loosely(freed, _LEAST_NOISE):
-        return freed, premise, True
+        return freed
     if freed.expected_error < _LESS_ERROR * _priced(bounded):
         freed = _held(freed, premise, free, n_rows)
         rows, antecedent = problem.rows, freed.evaluation.antecedent
         is_read = not has_idle_term(rows, antecedent) and not has_twin_terms(rows, antecedent)
         if is_read and _priced(freed) < _LESS_ERROR * _priced(bounded):
-            return freed, premise, True
-    return bounded, _premise(problem), False
+            return freed
+    return None
 
 
 def _freely(problem, premise, free, n_rows) -> Tuned:
@@ -292,7 +292,8 @@ def tune(
     is_loose : bool
         Whether the premises come before the weights.
     has_least : bool
-        Whether rules may not compensate one another beyond all reading (``least_weights``).
+        Whether weights stay above those of ``least_weights``; without, rules may compensate one
+        another beyond all reading.
     begun : Tuned, optional
         What earlier turns of the same have found: these go on from there.
     is_last : bool
@@ -454,7 +455,10 @@ def tuned_start(
         if loose.posterior.noise_variance < _LESS_NOISE * best.posterior.noise_variance:
             loose = _held(loose, premise, free, n_sample)
             best = loose if _priced(loose) < _priced(best) else best
-        best, premise, is_free = _freed_if_worth_it(best, free, n_sample)
+        anywhere = _premise(problem, is_free=True)
+        freed = _freed(best, anywhere, free, n_sample)
+        if freed is not None:
+            best, premise, is_free = freed, anywhere, True
     if premises_move:
         best = held_for_nothing(best, premise, free, n_sample, effective_weight(rows))
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held)

@@ -82,4 +82,6 @@ class ValidationLoss:
 
     def restored(self, result):
         """The result with the parameters of the smallest held-out error."""
+        if not self.losses:  # the run was at its end before an iteration
+            self(0, result.evaluation)
         return result if self.best is None else replace(result, evaluation=self.best)
