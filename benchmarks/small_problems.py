@@ -12,6 +12,7 @@ from functools import partial
 
 import numpy as np
 from sklearn.datasets import make_friedman1
+from sklearn.linear_model import BayesianRidge
 from sklearn.model_selection import LeaveOneGroupOut
 
 from skanfis.datasets import make_ofog
@@ -199,6 +200,25 @@ def wide(seed, n_rows, options, n_inputs=200):
     }
 
 
+def few_rows(seed, n_rows, n_inputs, n_active, options):
+    """A linear truth, half noise, or noise alone: error over that of Bayesian ridge regression."""
+    rng = np.random.default_rng(seed)
+    X, fresh = rng.standard_normal((n_rows, n_inputs)), rng.standard_normal((_N_TEST, n_inputs))
+    noise = np.sqrt(max(n_active, 1))
+    y = X[:, :n_active].sum(axis=1) + noise * rng.standard_normal(n_rows)
+    model, seconds = fitted(X, y, options)
+    errors = [
+        np.hypot(rms(one.predict(fresh) - fresh[:, :n_active].sum(axis=1)), noise)
+        for one in (model, BayesianRidge().fit(X, y))
+    ]
+    return {
+        "ratio": float(errors[0] / errors[1]),
+        "over the target's deviation": float(errors[0] / np.sqrt(noise**2 + n_active)),
+        "seconds": seconds,
+        "rules": int(model.n_rules_),
+    }
+
+
 @contextmanager
 def patience(seconds):
     """TimeoutError after so many seconds, where the system can tell."""
@@ -266,8 +286,22 @@ _REPLICATED = {
     )
     for name, measure in (("21 levels x 100", levels_21), ("7 x 9 levels x 50", levels_7_9))
 }
+_FEW_ROWS = {
+    f"{n_rows} rows x {n_inputs} inputs, {n_active} of them linear": Kind(
+        partial(few_rows, n_rows=n_rows, n_inputs=n_inputs, n_active=n_active),
+        range(4),
+        "error over Bayesian ridge regression's",
+        1.1,
+        1.02,
+        "median",
+        (("over the target's deviation", None),),
+    )
+    for n_rows, n_inputs in ((60, 20), (60, 50), (100, 200), (150, 200), (300, 200))
+    for n_active in (0, 3)
+}
 KINDS = {
     **_REPLICATED,
+    **_FEW_ROWS,
     "Friedman 1, 100 x 5": Kind(
         partial(friedman, n_rows=100, n_inputs=5), range(10), "test RMSE", 1.5, 1.35
     ),
