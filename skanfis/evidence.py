@@ -31,6 +31,7 @@ takes no pass over the rows: for any weights, beta is one solve away.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -87,9 +88,12 @@ class Laplace:
         Those that vary.
     determinants : float
         log |M| - log |P|+ + log R.
-    by_weight : dict of str to (float, float, float)
-        Of each part of the penalty: what is paid, beta' tau P beta (or kappa |x|^2); its trace in
-        the prior; its trace in the posterior.
+    paid : dict of str to float
+        For each part of the penalty, beta' tau P beta (or kappa |x|^2).
+    parts : dict of str to ndarray
+        Matrices of those of the consequents.
+    prior, factor : NormalFactor
+        Of P, its null space joined in at P's own size, and of M.
     curvature : ndarray of shape (n_displacements,)
         Eigenvalues of H.
     n_columns : int
@@ -101,9 +105,40 @@ class Laplace:
     twice_cost: float
     n_outputs: int
     determinants: float
-    by_weight: dict
+    paid: dict
+    parts: dict
+    prior: NormalFactor
+    factor: NormalFactor
     curvature: np.ndarray
     n_columns: int
+
+    @cached_property
+    def held_before(self):
+        """Of each part of the penalty, by its weight, the trace in the prior.
+
+        These and ``held_after`` take as long as all the rest, and are seldom asked of the last of
+        several posteriors.
+        """
+        found = self._traces(self.prior)
+        if self.curvature.size:
+            found["stiffness"] = float(self.curvature.size)
+        return found
+
+    @cached_property
+    def held_after(self):
+        """The same in the posterior: how many parameters each part holds."""
+        found = self._traces(self.factor)
+        if self.curvature.size:
+            stiffness = self.penalty.stiffness
+            # Without stiffness nothing is held, not even where there is no curvature either.
+            held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
+            found["stiffness"] = float(held)
+        return found
+
+    def _traces(self, factor):
+        weights = _weighted(self.penalty)
+        traces = factor.traces(self.parts.values())
+        return {key: weights[key] * one for key, one in zip(self.parts, traces, strict=True)}
 
     @property
     def freedom(self):
@@ -137,14 +172,12 @@ class Laplace:
     @property
     def n_effective(self):
         """Effective number of all parameters: of consequents, what the penalty leaves free."""
-        held = sum(after for key, (_, _, after) in self.by_weight.items() if key != "stiffness")
-        return self.n_columns - held + self.n_effective_premises
+        return self.n_columns + self.curvature.size - sum(self.held_after.values())
 
     @property
     def n_effective_premises(self):
         """Effective number of the displacements: of each, the part that the data decide on."""
-        _, before, after = self.by_weight.get("stiffness", (0.0, 0.0, 0.0))
-        return before - after
+        return self.curvature.size - self.held_after["stiffness"] if self.curvature.size else 0.0
 
 
 def _weighted(penalty):
@@ -184,34 +217,23 @@ def laplace(
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
-    by_weight = {
-        key: tuple(weights[key] * value for value in values)
-        for key, *values in zip(
-            parts,
-            [float(np.sum(solved * (part @ solved))) for part in parts.values()],
-            prior.traces(parts.values()),
-            factor.traces(parts.values()),
-            strict=True,
-        )
+    paid = {
+        key: weights[key] * float(np.sum(solved * (part @ solved))) for key, part in parts.items()
     }
     curvature = np.empty(0) if curvature is None else curvature
-    stiffness = penalty.stiffness
-    paid = 0.0
     if curvature.size:
-        paid = stiffness * float(displacement @ displacement)
-        by_weight["stiffness"] = (
-            paid,
-            float(curvature.size),
-            # Without stiffness nothing is held, not even where there is no curvature either.
-            float(np.sum(stiffness / (curvature + stiffness))) if stiffness else 0.0,
-        )
+        paid["stiffness"] = penalty.stiffness * float(displacement @ displacement)
+    of_displacements = paid.get("stiffness", 0.0)
     return Laplace(
         penalty,
         n_rows,
-        max(error + float(np.sum(solved * (matrix @ solved))) + paid, _LEAST_ERROR),
+        max(error + float(np.sum(solved * (matrix @ solved))) + of_displacements, _LEAST_ERROR),
         normal.coefficients.shape[1] if n_outputs is None else n_outputs,
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
-        by_weight,
+        paid,
+        parts,
+        prior,
+        factor,
         curvature,
         matrix.shape[0],
     )
@@ -241,7 +263,8 @@ def least_weights(posterior: Laplace, n_rules, n_distinct):
 def reestimated(posterior: Laplace, free, least=None):
     """The penalty after one step of every free weight, none below ``least``."""
     weights = _all_weights(posterior.penalty)
-    for key, (paid, before, after) in posterior.by_weight.items():
+    for key, paid in posterior.paid.items():
+        before, after = posterior.held_before[key], posterior.held_after[key]
         if key not in free or before <= 0.0:
             continue
         outputs = 1 if key == "stiffness" else posterior.n_outputs

@@ -132,12 +132,12 @@ class SecondPass:
         weighted_mean = (-0.5 * agreement) * mean[:, None, :] * weighted_basis
         cross += weighted_mean.reshape(-1, n_rows) @ excess.T
         cross = cross.reshape(n_raw, self.design.n_basis, antecedent.n_rules)
+        squares *= 0.25 * agreement * weight
+        excess *= 0.5 * agreement
         for r, rows in enumerate(_own_parameters(antecedent)):
             gradient = every[rows]
-            square[rows[:, None], rows] += (
-                gradient * (0.25 * agreement * weight * squares[r])
-            ) @ gradient.T
-            cross[rows, :, r] += (gradient * (0.5 * agreement * excess[r])) @ weighted_basis.T
+            square[rows[:, None], rows] += (gradient * squares[r]) @ gradient.T
+            cross[rows, :, r] += (gradient * excess[r]) @ weighted_basis.T
 
 
 @dataclass(frozen=True, eq=False)

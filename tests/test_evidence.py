@@ -57,8 +57,7 @@ def posterior(rows, antecedent, order, penalty, at=FIRST, n_rows=None):
 
 def n_effective(found):
     """Effective number of parameters, consequents of one output and premises."""
-    held = sum(after for _, _, after in found.by_weight.values())
-    return found.n_columns + found.curvature.size - held
+    return found.n_columns + found.curvature.size - sum(found.held_after.values())
 
 
 def in_full(found):
@@ -330,9 +329,8 @@ class TestReestimated:
         now = at(penalty)
         stepped = reestimated(now, [key])
         ratio = getattr(stepped, key) / getattr(penalty, key)
-        paid, prior, posterior_trace = now.by_weight[key]
-        cost = now.n_rows / now.noise_variance * paid
-        determined = now.n_outputs * (prior - posterior_trace)
+        cost = now.n_rows / now.noise_variance * now.paid[key]
+        determined = now.n_outputs * (now.held_before[key] - now.held_after[key])
         slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
         assert_allclose(cost - determined, slope, rtol=1e-4, atol=1e-5)
         assert_allclose(ratio, np.clip(determined / cost, 0.01, 100.0), rtol=1e-6)
@@ -347,8 +345,7 @@ class TestReestimated:
             held = reestimated(found, CONSEQUENTS, least)
             assert held == replace(free, **least)
         # Where nothing is paid at all, the weight rises as far as a step goes.
-        unpaid = found.by_weight | {"alpha": (0.0, *found.by_weight["alpha"][1:])}
-        risen = reestimated(replace(found, by_weight=unpaid), ["alpha"])
+        risen = reestimated(replace(found, paid=found.paid | {"alpha": 0.0}), ["alpha"])
         assert_allclose(risen.alpha, 100.0 * penalty.alpha, rtol=1e-12)
 
     def test_it_is_where_the_evidence_is_largest(self):

@@ -159,6 +159,7 @@ class StructureSearch:
         self.n_all = effective_weight(rows)
         self.parent: Tuned | None = None  # of the grids that are tried
         self.found: dict[Candidate, Tuned] = {}
+        self.untrained: dict[Candidate, Tuned] = {}  # of this round
         self.begun: dict[Candidate, Tuned] = {}
         self.scores: dict[Candidate, float] = {}
         self.max_rules = max_rules
@@ -229,10 +230,12 @@ class StructureSearch:
 
     def _promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
-        fits = [c for c in candidates if not self._is_too_many(c, self.sample.n_rows)]
-        untrained = [self._train(c, self.sample, turns=0, first_steps=2) for c in fits]
-        order = np.argsort([self._expected(tuned) for tuned in untrained], kind="stable")
-        return [fits[k] for k in order]
+        self.untrained = {
+            candidate: self._train(candidate, self.sample, turns=0, first_steps=2)
+            for candidate in candidates
+            if not self._is_too_many(candidate, self.sample.n_rows)
+        }
+        return sorted(self.untrained, key=lambda c: self._expected(self.untrained[c]))
 
     @staticmethod
     def _with_one_more(candidate, j):
@@ -310,7 +313,9 @@ class StructureSearch:
         if not self.folds:
             for candidate in candidates:
                 if candidate not in self.found:
-                    self.begun[candidate] = self._train(candidate, self.sample, _FIRST_TURNS)
+                    tuned = self._train(candidate, self.sample, _FIRST_TURNS)
+                    # Without terms that move there is nothing to train out.
+                    (self.begun if tuned.is_trained else self.found)[candidate] = tuned
             errors = [self._expected({**self.begun, **self.found}[c]) for c in candidates]
             least = min(*errors, self._expected(self._tuned(before)))
             for candidate, error in zip(candidates, errors, strict=True):
@@ -341,7 +346,7 @@ class StructureSearch:
             return SubtractiveClustering(radius=radius, max_clusters=_MOST_RULES)
         if candidate.clustering == "fcm":
             return FuzzyCMeans(candidate.size, m="auto", random_state=self.seed)
-        return KMeans(candidate.size, n_init=3, random_state=self.seed)
+        return KMeans(candidate.size, n_init=1, random_state=self.seed)
 
     def _score(self, candidate):
         """N log of the expected error, or the error on groups left out."""
@@ -416,6 +421,8 @@ class StructureSearch:
     def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
         """A short training on some rows, from the weights that were best so far."""
         is_last = turns == _TURNS
+        if begun is None and rows is self.sample:
+            begun = self.untrained.get(candidate)
         if begun is None:
             problem = SeparableProblem(
                 rows,
@@ -424,8 +431,10 @@ class StructureSearch:
                 self.first,
                 consequent_inputs=self.consequent_inputs,
             )
-        else:
+        elif begun.is_trained:
             problem, turns = begun.problem, turns - _FIRST_TURNS
+        else:
+            problem = begun.problem.with_penalty(self.first)
         antecedent = problem.antecedent
         premise = Premise.of(antecedent, rows.inputs.minimum, rows.inputs.maximum)
         return tune(

@@ -135,6 +135,11 @@ class Tuned:
         """-2 log p."""
         return self.posterior.minus_twice_log
 
+    @property
+    def is_trained(self):
+        """Whether premises have moved, or looked where to."""
+        return self.posterior.curvature.size > 0
+
     @cached_property
     def expected_error(self):
         """Mean squared error to be expected on new rows, of the standardised target.
@@ -295,7 +300,8 @@ def tune(
         Whether weights stay above those of ``least_weights``; without, rules may compensate one
         another beyond all reading.
     begun : Tuned, optional
-        What earlier turns of the same have found: these go on from there.
+        What earlier turns of the same have found: these go on from there. Without turns, the
+        evaluation at the start.
     is_last : bool
         Whether no turns follow; then the rules are made to hold one by one.
     """
@@ -304,13 +310,17 @@ def tune(
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    weights, best = _Weights(problem, n_rows, has_least), begun
-    if begun is None:
-        x = np.zeros(premise.size) if displacement is None else displacement
+    weights = _Weights(problem, n_rows, has_least)
+    best = begun if begun is not None and begun.is_trained else None
+    if best is None:
+        if begun is not None:
+            x, evaluation = begun.displacement, begun.evaluation
+        else:
+            x = np.zeros(premise.size) if displacement is None else displacement
+            evaluation = problem.evaluate(premise.parameters(x))
         penalty = problem.penalty
         if is_loose:
             penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
-        evaluation = problem.evaluate(premise.parameters(x))
         posterior = weights.improved(evaluation, x, penalty, 0 if is_loose else first_steps, free)
         penalty = posterior.penalty
         if premise.size == 0 or turns == 0:
@@ -319,12 +329,10 @@ def tune(
             stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
             penalty = replace(penalty, stiffness=stiffness)
     else:
-        if premise.size == 0:
-            return begun
-        x, penalty, evaluation = begun.displacement, begun.penalty, begun.evaluation
+        x, penalty, evaluation = best.displacement, best.penalty, best.evaluation
     without_rise = 0
     for turn in range(turns):
-        is_first = is_loose and turn == 0 and begun is None
+        is_first = is_loose and turn == 0 and best is None
         iterations = _LOOSE_ITERATIONS if is_first else _ITERATIONS
         steps = FIRST_STEPS if is_first else steps_a_turn
         found = _turned(weights, premise, penalty, x, evaluation, free, iterations, steps)

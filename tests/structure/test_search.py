@@ -494,12 +494,18 @@ def test_no_more_clusters_than_rows_are_tried(rng, clustering):
 
 
 @pytest.mark.floors
-def test_without_terms_there_is_nothing_to_train_out(rng):
+def test_without_terms_there_is_nothing_to_train_out(rng, monkeypatch):
     X = inputs(rng, 50, 2)
     found, linear = search_of(X, X[:, 0] + 0.1 * rng.standard_normal(50)), Candidate((1, 1))
     # So are scattered rules whose terms could not be told apart.
-    found.begun[linear] = begun = found._train(linear, found.sample, turns=1)
-    assert found._tuned(linear) is begun
+    train, trained = found._train, []
+    monkeypatch.setattr(
+        found,
+        "_train",
+        lambda *args, **kwargs: trained.append(train(*args, **kwargs)) or trained[-1],
+    )
+    found._leading([linear], linear)
+    assert [found._tuned(linear)] == trained
 
 
 def test_what_parameters_cost_falls_as_the_rows_rise(rng):
