@@ -1,6 +1,7 @@
 """Which rules the data speak for, and which cells of the rule base are empty."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -20,6 +21,7 @@ _EMPTY = 0.5
 _MOST_NUMBERED = 100
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class RuleActivationDisplay:
     """Map of the rules: how much of the data each fires on, with empty cells shown.
 
@@ -63,24 +65,13 @@ class RuleActivationDisplay:
     (3, 2)
     """
 
-    def __init__(
-        self,
-        *,
-        weights: np.ndarray,
-        rows: np.ndarray,
-        rules: np.ndarray,
-        labels_down: Sequence[str],
-        labels_across: Sequence[str],
-        inputs_down: Sequence[str],
-        inputs_across: Sequence[str],
-    ) -> None:
-        self.weights = weights
-        self.rows = rows
-        self.rules = rules
-        self.labels_down = labels_down
-        self.labels_across = labels_across
-        self.inputs_down = inputs_down
-        self.inputs_across = inputs_across
+    weights: np.ndarray
+    rows: np.ndarray
+    rules: np.ndarray
+    labels_down: Sequence[str]
+    labels_across: Sequence[str]
+    inputs_down: Sequence[str]
+    inputs_across: Sequence[str]
 
     @classmethod
     def from_estimator(

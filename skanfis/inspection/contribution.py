@@ -1,6 +1,7 @@
 """What each rule contributes to the prediction along one input."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Self
 
@@ -24,6 +25,7 @@ from .labels import as_label
 __all__ = ["RuleContributionDisplay"]
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class RuleContributionDisplay:
     """Contributions of the rules to the prediction along one input, the rest held.
 
@@ -78,30 +80,16 @@ class RuleContributionDisplay:
     ['very low', 'low', 'high', 'very high']
     """
 
-    def __init__(
-        self,
-        *,
-        grid: np.ndarray,
-        contributions: np.ndarray,
-        baseline: float,
-        coverage: np.ndarray,
-        rule_terms: Sequence[str],
-        premise_inputs: Sequence[str],
-        input_name: str,
-        output_name: str,
-        held: dict[str, Any],
-        band: np.ndarray | None = None,
-    ) -> None:
-        self.grid = grid
-        self.contributions = contributions
-        self.baseline = baseline
-        self.coverage = coverage
-        self.rule_terms = rule_terms
-        self.premise_inputs = premise_inputs
-        self.input_name = input_name
-        self.output_name = output_name
-        self.held = held
-        self.band = band
+    grid: np.ndarray
+    contributions: np.ndarray
+    baseline: float
+    coverage: np.ndarray
+    rule_terms: Sequence[str]
+    premise_inputs: Sequence[str]
+    input_name: str
+    output_name: str
+    held: dict[str, Any]
+    band: np.ndarray | None = None
 
     @classmethod
     def from_estimator(

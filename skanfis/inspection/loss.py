@@ -1,5 +1,6 @@
 """The error during training."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -11,6 +12,7 @@ from .labels import as_label
 __all__ = ["LossCurveDisplay"]
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class LossCurveDisplay:
     """The error in training, iteration by iteration, and that of the rows held out if any.
 
@@ -50,18 +52,10 @@ class LossCurveDisplay:
     True
     """
 
-    def __init__(
-        self,
-        *,
-        loss: np.ndarray,
-        validation_loss: np.ndarray | None = None,
-        name: str | None = None,
-        status: str | None = None,
-    ) -> None:
-        self.loss = loss
-        self.validation_loss = validation_loss
-        self.name = name
-        self.status = status
+    loss: np.ndarray
+    validation_loss: np.ndarray | None = None
+    name: str | None = None
+    status: str | None = None
 
     @classmethod
     def from_estimator(

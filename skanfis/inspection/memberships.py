@@ -1,6 +1,7 @@
 """Membership functions before and after training, over the data."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -31,6 +32,7 @@ class InputTerms(NamedTuple):
     counts: np.ndarray | None  # rows in each bin, (n_bins,)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class MembershipDisplay:
     """Membership functions before and after training, over a histogram of the data.
 
@@ -66,8 +68,7 @@ class MembershipDisplay:
     ('low', 'medium', 'high')
     """
 
-    def __init__(self, *, inputs: Any) -> None:
-        self.inputs = inputs
+    inputs: Any
 
     @classmethod
     def from_estimator(

@@ -1,5 +1,6 @@
 """Whether the rules of a fitted estimator can be read one by one: in figures, and as a picture."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -140,6 +141,7 @@ def _source(estimator, X, y, sample_weight):
     return model, Source(n_rows, read, y, sample_weight)
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ReadabilityDisplay:
     """Terms as bands with their greatest truth; the strongest rule alone against the model.
 
@@ -186,20 +188,11 @@ class ReadabilityDisplay:
     ((4, 201), (121,))
     """
 
-    def __init__(
-        self,
-        *,
-        readability: Any,
-        memberships: np.ndarray,
-        predictions: np.ndarray,
-        alone: np.ndarray,
-        output: int,
-    ) -> None:
-        self.readability = readability
-        self.memberships = memberships
-        self.predictions = predictions
-        self.alone = alone
-        self.output = output
+    readability: Any
+    memberships: np.ndarray
+    predictions: np.ndarray
+    alone: np.ndarray
+    output: int
 
     @classmethod
     def from_estimator(

@@ -1,6 +1,7 @@
 """The prediction over two inputs, the rest held."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -18,6 +19,7 @@ _PLOT_METHODS = ("contourf", "pcolormesh")
 _LEVELS = 15
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ResponseSurfaceDisplay:
     """Prediction over two inputs with the rest held; it fades where no data cover it.
 
@@ -67,26 +69,14 @@ class ResponseSurfaceDisplay:
     {}
     """
 
-    def __init__(
-        self,
-        *,
-        xx0: np.ndarray,
-        xx1: np.ndarray,
-        response: np.ndarray,
-        coverage: np.ndarray,
-        input_names: Sequence[str],
-        output_name: str,
-        held: dict[str, Any],
-        points: np.ndarray | None = None,
-    ) -> None:
-        self.xx0 = xx0
-        self.xx1 = xx1
-        self.response = response
-        self.coverage = coverage
-        self.input_names = input_names
-        self.output_name = output_name
-        self.held = held
-        self.points = points
+    xx0: np.ndarray
+    xx1: np.ndarray
+    response: np.ndarray
+    coverage: np.ndarray
+    input_names: Sequence[str]
+    output_name: str
+    held: dict[str, Any]
+    points: np.ndarray | None = None
 
     @classmethod
     def from_estimator(

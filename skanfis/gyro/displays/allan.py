@@ -1,6 +1,7 @@
 """AllanDisplay: the Allan deviation of the error, before and after compensation."""
 
 import textwrap
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -25,6 +26,7 @@ CAUTION = (
 )
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class AllanDisplay(CompensationDisplay):
     """Allan deviation of the error against averaging time, before and after compensation.
 
@@ -68,9 +70,8 @@ class AllanDisplay(CompensationDisplay):
 
     _PER_ROW = ("run",)
 
-    def __init__(self, *, before: Any, after: Any) -> None:
-        self.before = before
-        self.after = after
+    before: Any
+    after: Any
 
     @classmethod
     def from_predictions(

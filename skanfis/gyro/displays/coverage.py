@@ -1,5 +1,6 @@
 """CoverageDisplay: where the compensator knows what it says, and where it only goes on."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -18,6 +19,7 @@ _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some,
 _SYMBOLS = {"degC": "°C", "deg/s": "°/s", "degC/min": "°C/min"}
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class CoverageDisplay:
     """Where the calibration data cover what a compensator may be asked: a map over two inputs.
 
@@ -68,30 +70,16 @@ class CoverageDisplay:
     ((96, 96), False)
     """
 
-    def __init__(
-        self,
-        *,
-        x: np.ndarray,
-        y: np.ndarray,
-        coverage: np.ndarray,
-        inside: np.ndarray,
-        rows: np.ndarray,
-        x_edges: Any,
-        y_edges: Any,
-        counts: np.ndarray,
-        min_coverage: float,
-        names: Any,
-    ) -> None:
-        self.x = x
-        self.y = y
-        self.coverage = coverage
-        self.inside = inside
-        self.rows = rows
-        self.x_edges = x_edges
-        self.y_edges = y_edges
-        self.counts = counts
-        self.min_coverage = min_coverage
-        self.names = names
+    x: np.ndarray
+    y: np.ndarray
+    coverage: np.ndarray
+    inside: np.ndarray
+    rows: np.ndarray
+    x_edges: Any
+    y_edges: Any
+    counts: np.ndarray
+    min_coverage: float
+    names: Any
 
     @classmethod
     def from_estimator(

@@ -1,5 +1,6 @@
 """ErrorDisplay: the error against time, temperature or anything else, before and after."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ _N_BINS = 300
 _N_POINTS = 3_000
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ErrorDisplay(CompensationDisplay):
     """The rate error before and after compensation, against time or temperature.
 
@@ -67,26 +69,14 @@ class ErrorDisplay(CompensationDisplay):
 
     _PER_ROW = ("position",)
 
-    def __init__(
-        self,
-        *,
-        position: np.ndarray,
-        before: np.ndarray,
-        after: np.ndarray,
-        edges: np.ndarray,
-        range_before: np.ndarray,
-        range_after: np.ndarray,
-        rms: Any,
-        position_label: str = "time [s]",
-    ) -> None:
-        self.position = position
-        self.before = before
-        self.after = after
-        self.edges = edges
-        self.range_before = range_before
-        self.range_after = range_after
-        self.rms = rms
-        self.position_label = position_label
+    position: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    edges: np.ndarray
+    range_before: np.ndarray
+    range_after: np.ndarray
+    rms: Any
+    position_label: str = "time [s]"
 
     @classmethod
     def from_predictions(

@@ -1,5 +1,6 @@
 """GroupResidualDisplay: the residual of every group that was held out."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -16,6 +17,7 @@ __all__ = ["GroupResidualDisplay"]
 _MOST_LINES = 30
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class GroupResidualDisplay(CompensationDisplay):
     """RMS error of every held-out group, before and after compensation, on a logarithmic axis.
 
@@ -52,10 +54,9 @@ class GroupResidualDisplay(CompensationDisplay):
 
     _PER_ROW = ("groups",)
 
-    def __init__(self, *, groups: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
-        self.groups = groups
-        self.before = before
-        self.after = after
+    groups: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
 
     @classmethod
     def from_predictions(

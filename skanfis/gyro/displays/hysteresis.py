@@ -1,5 +1,6 @@
 """HysteresisDisplay: bias against temperature, warming and cooling apart."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -19,6 +20,7 @@ _POWERS = (1, 3, 5, 7)
 _PER_HOUR = 3600.0
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class HysteresisDisplay(CompensationDisplay):
     """Bias against temperature while it rises and while it falls, before and after compensation.
 
@@ -65,10 +67,9 @@ class HysteresisDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature", "temperature_rate")
 
-    def __init__(self, *, temperature: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
-        self.temperature = temperature
-        self.before = before
-        self.after = after
+    temperature: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
 
     @classmethod
     def from_predictions(

@@ -1,5 +1,6 @@
 """ScaleFactorErrorDisplay: what is left of the scale factor's error, by rate and temperature."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -18,6 +19,7 @@ _N_RATES = 41
 _SMALLEST_SHARE = 0.05
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ScaleFactorErrorDisplay(CompensationDisplay):
     r"""Scale-factor error against rate, at several temperatures, before and after compensation.
 
@@ -63,18 +65,10 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature",)
 
-    def __init__(
-        self,
-        *,
-        rate: np.ndarray,
-        before: np.ndarray,
-        after: np.ndarray,
-        temperature_edges: np.ndarray,
-    ) -> None:
-        self.rate = rate
-        self.before = before
-        self.after = after
-        self.temperature_edges = temperature_edges
+    rate: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    temperature_edges: np.ndarray
 
     @classmethod
     def from_predictions(

@@ -1,5 +1,6 @@
 """ResidualSurfaceDisplay: where over temperature and rate error is left, and where data are."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -21,6 +22,7 @@ from ._style import (
 __all__ = ["ResidualSurfaceDisplay"]
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class ResidualSurfaceDisplay(CompensationDisplay):
     """Mean error after compensation over temperature and rate, beside the number of rows.
 
@@ -62,18 +64,10 @@ class ResidualSurfaceDisplay(CompensationDisplay):
 
     _PER_ROW = ("temperature",)
 
-    def __init__(
-        self,
-        *,
-        temperature_edges: np.ndarray,
-        rate_edges: np.ndarray,
-        residual: np.ndarray,
-        counts: np.ndarray,
-    ) -> None:
-        self.temperature_edges = temperature_edges
-        self.rate_edges = rate_edges
-        self.residual = residual
-        self.counts = counts
+    temperature_edges: np.ndarray
+    rate_edges: np.ndarray
+    residual: np.ndarray
+    counts: np.ndarray
 
     @classmethod
     def from_predictions(
