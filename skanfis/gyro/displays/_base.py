@@ -11,11 +11,12 @@ from ._style import PER_UNIT
 
 __all__ = [
     "CompensationDisplay",
+    "DisplayInUnit",
     "binned",
     "cells_table",
     "check_rows",
-    "check_unit",
     "compensated_rate",
+    "mean_by_cell",
 ]
 
 PREDICTS = ("error", "rate")
@@ -74,6 +75,44 @@ class CompensationDisplay:
         return cls.from_predictions(rate, before, after, ax=ax, **options)
 
 
+class DisplayInUnit(CompensationDisplay):
+    """One whose errors are drawn in a unit that can be chosen."""
+
+    _UNIT: ClassVar[str] = "deg/s"
+
+    def plot(self, ax: Any = None, *, unit: str | None = None) -> Self:
+        """Draw.
+
+        Parameters
+        ----------
+        ax : matplotlib axes or array of these, default=None
+            Where to draw, one for each panel; None makes a figure.
+        unit : {"deg/s", "deg/h"}, default=None
+            Unit to draw in; None is the default of ``from_predictions``.
+
+        Returns
+        -------
+        display
+            Itself.
+
+        Raises
+        ------
+        ValueError
+            If there is no such ``unit``, or ``ax`` has another number of axes.
+        ImportError
+            Without matplotlib.
+        """
+        unit = self._UNIT if unit is None else unit
+        if unit not in PER_UNIT:
+            raise ValueError(f"unit={unit!r} must be one of {', '.join(PER_UNIT)}.")
+        self.unit_ = unit
+        self._draw(ax)
+        return self
+
+    def _draw(self, ax):
+        raise NotImplementedError
+
+
 def column(X, values):
     """A column of X by its name; anything else is the values themselves."""
     return X[values] if isinstance(values, str) else values
@@ -102,19 +141,19 @@ def check_rows(**columns) -> list[np.ndarray]:
     return list(arrays.values())
 
 
-def check_unit(unit):
-    """The unit itself; ValueError where it is none of a rate."""
-    if unit not in PER_UNIT:
-        raise ValueError(f"unit={unit!r} must be one of {', '.join(PER_UNIT)}.")
-    return unit
-
-
 def binned(positions, n_bins):
     """Edges of equal bins over the finite positions, and the bin of each row."""
     low, high = positions.min(), positions.max()
     edges = np.linspace(low, high if high > low else low + 1.0, n_bins + 1)
     bins = np.searchsorted(edges, positions, side="right") - 1
     return edges, np.clip(bins, 0, n_bins - 1)
+
+
+def mean_by_cell(values, cells, n_cells):
+    """Mean of the values of each cell, (n_cells,); NaN where it has none."""
+    counts = np.bincount(cells, minlength=n_cells)
+    sums = np.bincount(cells, values, minlength=n_cells)
+    return np.divide(sums, counts, out=np.full(n_cells, np.nan), where=counts > 0)
 
 
 def cells_table(edges, values):

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from ..allan import allan_coefficients, allan_deviation
-from ._base import CompensationDisplay, check_unit
+from ._base import DisplayInUnit
 from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, mark_decades
 
 __all__ = ["AllanDisplay"]
@@ -27,7 +27,7 @@ CAUTION = (
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class AllanDisplay(CompensationDisplay):
+class AllanDisplay(DisplayInUnit):
     """Allan deviation of the error against averaging time, before and after compensation.
 
     Angle random walk N is read where the slope of -1/2 passes 1 s, bias instability B at the
@@ -69,6 +69,7 @@ class AllanDisplay(CompensationDisplay):
     """
 
     _PER_ROW = ("run",)
+    _UNIT = "deg/h"
 
     before: Any
     after: Any
@@ -113,35 +114,13 @@ class AllanDisplay(CompensationDisplay):
         ]
         return cls(before=curves[0], after=curves[1]).plot(ax=ax, unit=unit)
 
-    def plot(self, ax: Any = None, *, unit: str = "deg/h") -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : matplotlib axes, default=None
-            Where to draw; None makes a figure.
-        unit : {"deg/s", "deg/h"}, default="deg/h"
-            Unit to draw the deviation in.
-
-        Returns
-        -------
-        display : AllanDisplay
-            Itself.
-
-        Raises
-        ------
-        ValueError
-            If there is no such ``unit``.
-        ImportError
-            Without matplotlib.
-        """
-        self.unit_ = check_unit(unit)
+    def _draw(self, ax):
         self.figure_, axes = make_axes(ax, 1, (6.2, 4.4))
         self.ax_ = axes[0]
         for name, curve, color in (("before", self.before, BEFORE), ("after", self.after, AFTER)):
             time = curve["averaging_time"].to_numpy()
             deviation, error = (
-                PER_UNIT[unit] / _PER_HOUR * curve[column].to_numpy()
+                PER_UNIT[self.unit_] / _PER_HOUR * curve[column].to_numpy()
                 for column in ("deviation", "error")
             )
             self.ax_.fill_between(
@@ -154,7 +133,7 @@ class AllanDisplay(CompensationDisplay):
             )
             self.ax_.loglog(time, deviation, "o-", color=color, label=name, ms=3, linewidth=1.4)
             self._mark(time, deviation, color)
-        dress(self.ax_, "averaging time [s]", f"Allan deviation [{SYMBOL[unit]}]")
+        dress(self.ax_, "averaging time [s]", f"Allan deviation [{SYMBOL[self.unit_]}]")
         for axis, ends in (
             (self.ax_.xaxis, self.ax_.get_xlim()),
             (self.ax_.yaxis, self.ax_.get_ylim()),
@@ -162,7 +141,6 @@ class AllanDisplay(CompensationDisplay):
             mark_decades(axis, *ends)
         self.ax_.legend(frameon=False)
         self.ax_.set_title("\n".join(textwrap.wrap(CAUTION, 76)), loc="left", fontsize="small")
-        return self
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.

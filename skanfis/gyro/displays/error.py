@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._base import CompensationDisplay, binned, check_rows, check_unit
+from ._base import DisplayInUnit, binned, check_rows
 from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
 
 __all__ = ["ErrorDisplay"]
@@ -19,7 +19,7 @@ _N_POINTS = 3_000
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class ErrorDisplay(CompensationDisplay):
+class ErrorDisplay(DisplayInUnit):
     """The rate error before and after compensation, against time or temperature.
 
     Two panels, one above the other, each with its own scale: a good compensation would be a
@@ -136,30 +136,8 @@ class ErrorDisplay(CompensationDisplay):
         )
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax: Any = None, *, unit: str = "deg/s") -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : array of two matplotlib axes, default=None
-            For the errors before and after; None makes a figure.
-        unit : {"deg/s", "deg/h"}, default="deg/s"
-            Unit to draw the errors in.
-
-        Returns
-        -------
-        display : ErrorDisplay
-            Itself.
-
-        Raises
-        ------
-        ValueError
-            If there is no such ``unit``, or ``ax`` has another number of axes.
-        ImportError
-            Without matplotlib.
-        """
-        self.unit_ = check_unit(unit)
-        factor = PER_UNIT[unit]
+    def _draw(self, ax):
+        factor, symbol = PER_UNIT[self.unit_], SYMBOL[self.unit_]
         self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.4), nrows=2, sharex=True)
         panels = (
             ("before", self.before, self.range_before, BEFORE),
@@ -182,10 +160,9 @@ class ErrorDisplay(CompensationDisplay):
                 self.position, factor * errors, ".", color=color, markersize=2.5, alpha=0.6, mew=0
             )
             peak = np.nanmax(np.abs(factor * ranges))
-            title = f"{name}: RMS {figures(factor * rms)}, peak {figures(peak)} {SYMBOL[unit]}"
-            dress(axes, ylabel=f"error [{SYMBOL[unit]}]", title=title)
+            title = f"{name}: RMS {figures(factor * rms)}, peak {figures(peak)} {symbol}"
+            dress(axes, ylabel=f"error [{symbol}]", title=title)
         self.axes_[1].set_xlabel(self.position_label)
-        return self
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.

@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from ...inspection.labels import as_label
-from ._base import CompensationDisplay, check_rows, check_unit
+from ._base import DisplayInUnit, check_rows, mean_by_cell
 from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, mark_decades
 
 __all__ = ["GroupResidualDisplay"]
@@ -18,7 +18,7 @@ _MOST_LINES = 30
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class GroupResidualDisplay(CompensationDisplay):
+class GroupResidualDisplay(DisplayInUnit):
     """RMS error of every held-out group, before and after compensation, on a logarithmic axis.
 
     One line per run, device or rate level, the worst at the top; with more than 30, only the worst
@@ -106,30 +106,8 @@ class GroupResidualDisplay(CompensationDisplay):
         display = cls(groups=labels[order], before=results[0][order], after=results[1][order])
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax: Any = None, *, unit: str = "deg/s") -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : matplotlib axes, default=None
-            Where to draw; None makes a figure.
-        unit : {"deg/s", "deg/h"}, default="deg/s"
-            Unit to draw in.
-
-        Returns
-        -------
-        display : GroupResidualDisplay
-            Itself.
-
-        Raises
-        ------
-        ValueError
-            If there is no such ``unit``.
-        ImportError
-            Without matplotlib.
-        """
-        self.unit_ = check_unit(unit)
-        factor = PER_UNIT[unit]
+    def _draw(self, ax):
+        factor = PER_UNIT[self.unit_]
         shown = slice(-_MOST_LINES, None)
         groups = self.groups[shown]
         before, after = factor * self.before[shown], factor * self.after[shown]
@@ -152,13 +130,12 @@ class GroupResidualDisplay(CompensationDisplay):
         worst = figures(np.nanmax(after))
         dress(
             self.ax_,
-            f"RMS error [{SYMBOL[unit]}]",
+            f"RMS error [{SYMBOL[self.unit_]}]",
             "held-out group",
             f"{extent} groups: after, {figures(np.nanmedian(factor * self.after))} in the median, "
             f"{worst} in the worst",
         )
         self.ax_.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-        return self
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in; groups that are not drawn, too.
@@ -187,9 +164,4 @@ def _with_room(axes, values):
 
 def _rms_by_group(errors, codes):
     known = np.isfinite(errors)
-    n_groups = codes.max() + 1
-    counts = np.bincount(codes[known], minlength=n_groups)
-    squares = np.bincount(codes[known], errors[known] ** 2, minlength=n_groups)
-    means = np.full(n_groups, np.nan)
-    np.divide(squares, counts, out=means, where=counts > 0)
-    return np.sqrt(means)
+    return np.sqrt(mean_by_cell(errors[known] ** 2, codes[known], codes.max() + 1))

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._base import CompensationDisplay, binned, check_rows, check_unit
+from ._base import DisplayInUnit, binned, check_rows, mean_by_cell
 from ._style import COOLING, PER_UNIT, SYMBOL, WARMING, dress, figures, make_axes
 
 __all__ = ["HysteresisDisplay"]
@@ -21,7 +21,7 @@ _PER_HOUR = 3600.0
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class HysteresisDisplay(CompensationDisplay):
+class HysteresisDisplay(DisplayInUnit):
     """Bias against temperature while it rises and while it falls, before and after compensation.
 
     Where the bias depends on more than the temperature that is logged, the two branches part: the
@@ -66,6 +66,7 @@ class HysteresisDisplay(CompensationDisplay):
     """
 
     _PER_ROW = ("temperature", "temperature_rate")
+    _UNIT = "deg/h"
 
     temperature: np.ndarray
     before: np.ndarray
@@ -143,30 +144,8 @@ class HysteresisDisplay(CompensationDisplay):
         """Largest distance between the branches after compensation [deg/h]."""
         return _gap(self.after)
 
-    def plot(self, ax: Any = None, *, unit: str = "deg/h") -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : array of two matplotlib axes, default=None
-            For before and after; None makes a figure.
-        unit : {"deg/s", "deg/h"}, default="deg/h"
-            Unit to draw the bias in.
-
-        Returns
-        -------
-        display : HysteresisDisplay
-            Itself.
-
-        Raises
-        ------
-        ValueError
-            If there is no such ``unit``, or ``ax`` has another number of axes.
-        ImportError
-            Without matplotlib.
-        """
-        self.unit_ = check_unit(unit)
-        factor = PER_UNIT[unit] / _PER_HOUR
+    def _draw(self, ax):
+        factor = PER_UNIT[self.unit_] / _PER_HOUR
         self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.6), nrows=2, sharex=True)
         panels = zip(
             self.axes_,
@@ -184,11 +163,10 @@ class HysteresisDisplay(CompensationDisplay):
             axes.plot(self.temperature, cooling, "v-", color=COOLING, label="cooling", ms=4)
             what = "branches never meet"
             if both.any():
-                what = f"largest gap {figures(gap)} {SYMBOL[unit]}"
-            dress(axes, ylabel=f"bias [{SYMBOL[unit]}]", title=f"{name}: {what}")
+                what = f"largest gap {figures(gap)} {SYMBOL[self.unit_]}"
+            dress(axes, ylabel=f"bias [{SYMBOL[self.unit_]}]", title=f"{name}: {what}")
         self.axes_[1].set_xlabel("temperature [°C]")
         self.axes_[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-        return self
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.
@@ -222,8 +200,7 @@ def _bias_by_cell(error, rate, temperature, cells, rows):
     counts = np.bincount(cells, minlength=2 * _N_BINS)
 
     def mean(values):
-        sums = np.bincount(cells, values, minlength=2 * _N_BINS)
-        return np.divide(sums, counts, out=np.full(sums.shape, np.nan), where=counts > 0)
+        return mean_by_cell(values, cells, 2 * _N_BINS)
 
     largest = np.abs(rate).max(initial=0.0) or 1.0
     spread = temperature.std() if temperature.size else 0.0

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._base import CompensationDisplay, binned, check_rows
+from ._base import CompensationDisplay, binned, check_rows, mean_by_cell
 from ._style import dress, figures, make_axes
 
 __all__ = ["ScaleFactorErrorDisplay"]
@@ -120,7 +120,7 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
             for indicated in (before, after)
         ]
         display = cls(
-            rate=_mean_by_cell(rate, cells, far, shape),
+            rate=_mean_of_rows(rate, cells, far, shape),
             before=results[0],
             after=results[1],
             temperature_edges=edges,
@@ -217,15 +217,9 @@ def _in_ppm(rate, error, bands, cells, far, shape):
         rows = known & (bands == band)
         if np.ptp(rate[rows]) > 0 if rows.any() else False:
             bias[band] = np.polyfit(rate[rows], error[rows], 1)[1]
-    means = _mean_by_cell(error - bias[bands], cells, far & known, shape)
-    return _PPM * means / _mean_by_cell(rate, cells, far & known, shape)
+    means = _mean_of_rows(error - bias[bands], cells, far & known, shape)
+    return _PPM * means / _mean_of_rows(rate, cells, far & known, shape)
 
 
-def _mean_by_cell(values, cells, rows, shape):
-    """Mean over the chosen rows of each cell; NaN where it has none."""
-    n_cells = shape[0] * shape[1]
-    counts = np.bincount(cells[rows], minlength=n_cells)
-    sums = np.bincount(cells[rows], values[rows], minlength=n_cells)
-    means = np.full(n_cells, np.nan)
-    np.divide(sums, counts, out=means, where=counts > 0)
-    return means.reshape(shape)
+def _mean_of_rows(values, cells, rows, shape):
+    return mean_by_cell(values[rows], cells[rows], shape[0] * shape[1]).reshape(shape)

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._base import CompensationDisplay, binned, cells_table, check_rows, check_unit
+from ._base import DisplayInUnit, binned, cells_table, check_rows, mean_by_cell
 from ._style import (
     NO_DATA,
     PER_UNIT,
@@ -23,7 +23,7 @@ __all__ = ["ResidualSurfaceDisplay"]
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class ResidualSurfaceDisplay(CompensationDisplay):
+class ResidualSurfaceDisplay(DisplayInUnit):
     """Mean error after compensation over temperature and rate, beside the number of rows.
 
     What has a colour of its own on the left is not noise: averages over many rows are left. Where
@@ -117,51 +117,25 @@ class ResidualSurfaceDisplay(CompensationDisplay):
         temperature_edges, columns = binned(temperature, n_bins[0])
         rate_edges, rows = binned(rate, n_bins[1])
         cells = (rows * n_bins[0] + columns)[known]
-        n_cells = n_bins[0] * n_bins[1]
-        counts = np.bincount(cells, minlength=n_cells)
-        residual = np.full(n_cells, np.nan)
-        sums = np.bincount(cells, (after - rate)[known], minlength=n_cells)
-        np.divide(sums, counts, out=residual, where=counts > 0)
         shape = (n_bins[1], n_bins[0])
+        n_cells = shape[0] * shape[1]
         display = cls(
             temperature_edges=temperature_edges,
             rate_edges=rate_edges,
-            residual=residual.reshape(shape),
-            counts=counts.reshape(shape),
+            residual=mean_by_cell((after - rate)[known], cells, n_cells).reshape(shape),
+            counts=np.bincount(cells, minlength=n_cells).reshape(shape),
         )
         return display.plot(ax=ax, unit=unit)
 
-    def plot(self, ax: Any = None, *, unit: str = "deg/s") -> Self:
-        """Draw.
-
-        Parameters
-        ----------
-        ax : array of two matplotlib axes, default=None
-            For residual and counts; None makes a figure.
-        unit : {"deg/s", "deg/h"}, default="deg/s"
-            Unit to draw the residual in.
-
-        Returns
-        -------
-        display : ResidualSurfaceDisplay
-            Itself.
-
-        Raises
-        ------
-        ValueError
-            If there is no such ``unit``, or ``ax`` has another number of axes.
-        ImportError
-            Without matplotlib.
-        """
+    def _draw(self, ax):
         from matplotlib.colors import LogNorm
 
-        self.unit_ = check_unit(unit)
-        residual = PER_UNIT[unit] * self.residual
+        residual = PER_UNIT[self.unit_] * self.residual
         self.figure_, self.axes_ = make_axes(ax, 2, (7.0, 3.3), ncols=2, sharey=True)
         limit = symmetric_limit(residual)
         mesh = self._draw_cells(0, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
         bar = self.figure_.colorbar(mesh, ax=self.axes_[0], extend="both")
-        bar.set_label(f"mean error after [{SYMBOL[unit]}]")
+        bar.set_label(f"mean error after [{SYMBOL[self.unit_]}]")
         counts = np.where(self.counts > 0, self.counts, np.nan)
         # A scale needs two ends, even where all cells have as many rows.
         norm = LogNorm(vmin=1, vmax=max(self.counts.max(), 2))
@@ -174,11 +148,10 @@ class ResidualSurfaceDisplay(CompensationDisplay):
             self.axes_[0],
             "temperature [°C]",
             "true rate [°/s]",
-            f"residual: largest {figures(largest)} {SYMBOL[unit]}",
+            f"residual: largest {figures(largest)} {SYMBOL[self.unit_]}",
         )
         empty = np.mean(self.counts == 0)
         dress(self.axes_[1], "temperature [°C]", title=f"data: {empty:.0%} of the cells empty")
-        return self
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn, in the unit that it was drawn in.
