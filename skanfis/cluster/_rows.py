@@ -4,16 +4,27 @@ Fitting on the sorted distinct rows, with the weight of all that are equal, make
 same to the last bit in whatever order the rows come, and whether a row is repeated or weighted.
 """
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 from sklearn import get_config
+from sklearn.base import ClusterMixin
 from sklearn.utils import gen_batches
-from sklearn.utils.validation import validate_data
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .._sklearn import check_sample_weight
 from .._validation import check_finite, check_not_negative
 
-__all__ = ["check_rows", "distance_blocks", "distinct_rows", "nearest", "numbers_that_fit"]
+__all__ = [
+    "NearestCenterMixin",
+    "check_rows",
+    "distance_blocks",
+    "distinct_rows",
+    "nearest",
+    "numbers_that_fit",
+]
 
 # Distances in a block: a few arrays of this size stay in the cache.
 _BLOCK_SIZE = 32_768
@@ -62,3 +73,32 @@ def nearest(points, centers):
     for part, distances in distance_blocks(points, centers):
         distances.argmin(axis=0, out=labels[part])
     return labels
+
+
+class NearestCenterMixin(ClusterMixin):
+    """Clusters that a row belongs to by the nearest of ``cluster_centers_``."""
+
+    cluster_centers_: np.ndarray
+
+    def predict(self, X: ArrayLike) -> Any:
+        """Find the nearest centre.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        labels : ndarray of shape (n_samples,)
+            Positions in ``cluster_centers_``.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite, or has other columns than in training.
+        """
+        check_is_fitted(self)
+        return self._labels(check_rows(self, X))
+
+    def _labels(self, X):
+        return nearest(X, self.cluster_centers_)

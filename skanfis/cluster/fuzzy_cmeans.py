@@ -38,7 +38,6 @@ from scipy.spatial.distance import pdist, squareform
 from sklearn.base import (
     BaseEstimator,
     ClassNamePrefixFeaturesOutMixin,
-    ClusterMixin,
     TransformerMixin,
 )
 from sklearn.cluster import kmeans_plusplus
@@ -47,7 +46,7 @@ from sklearn.utils import check_array, check_random_state
 from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import Interval, StrOptions, fit_context
-from ._rows import check_rows, distance_blocks, distinct_rows, nearest
+from ._rows import NearestCenterMixin, check_rows, distance_blocks, distinct_rows
 
 __all__ = ["FuzzyCMeans"]
 
@@ -134,7 +133,9 @@ def count_distinct(centers, spread):
     return sum(apart[k, :k].all() for k in range(centers.shape[0]))
 
 
-class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixin, BaseEstimator):
+class FuzzyCMeans(
+    ClassNamePrefixFeaturesOutMixin, TransformerMixin, NearestCenterMixin, BaseEstimator
+):
     r"""Fuzzy c-means: clusters to which every row belongs by degrees.
 
     Centres :math:`c_k` and memberships :math:`u_{ik}` minimise [1]_
@@ -298,29 +299,9 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, ClusterMixi
         self.cluster_centers_ = mean + scale * best.centers
         self.inertia_ = scale**2 * best.objective
         self.n_iter_ = best.n_iter
-        self.labels_ = nearest(X, self.cluster_centers_)
+        self.labels_ = self._labels(X)
         self._n_features_out = self.n_clusters
         return self
-
-    def predict(self, X: ArrayLike) -> Any:
-        """Find the cluster of largest membership.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        labels : ndarray of shape (n_samples,)
-            Positions in ``cluster_centers_``.
-
-        Raises
-        ------
-        ValueError
-            If X is not finite, or has other columns than in training.
-        """
-        check_is_fitted(self)
-        return nearest(check_rows(self, X), self.cluster_centers_)
 
     def transform(self, X: ArrayLike) -> Any:
         """Find the memberships.

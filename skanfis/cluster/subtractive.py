@@ -22,12 +22,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
-from sklearn.base import BaseEstimator, ClusterMixin
+from sklearn.base import BaseEstimator
 from sklearn.utils import gen_batches
-from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import Interval, fit_context
-from ._rows import check_rows, distinct_rows, nearest, numbers_that_fit
+from ._rows import NearestCenterMixin, check_rows, distinct_rows, nearest, numbers_that_fit
 
 __all__ = ["SubtractiveClustering"]
 
@@ -81,7 +80,7 @@ def find_centers(points, potential, *, squash, accept, reject, max_clusters):
     return centers, np.array(peaks)
 
 
-class SubtractiveClustering(ClusterMixin, BaseEstimator):
+class SubtractiveClustering(NearestCenterMixin, BaseEstimator):
     r"""Subtractive clustering: finds the number of clusters and their centres.
 
     Each row is a possible centre. Its potential [1]_ counts the rows near it,
@@ -230,26 +229,6 @@ class SubtractiveClustering(ClusterMixin, BaseEstimator):
         self.cluster_centers_ = rows[centers]
         self.labels_ = self._labels(X)
         return self
-
-    def predict(self, X: ArrayLike) -> Any:
-        """Find the nearest centre.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        labels : ndarray of shape (n_samples,)
-            Positions in ``cluster_centers_``.
-
-        Raises
-        ------
-        ValueError
-            If X is not finite, or has other columns than in training.
-        """
-        check_is_fitted(self)
-        return self._labels(check_rows(self, X))
 
     def _checked_radius(self):
         if self.reject > self.accept:

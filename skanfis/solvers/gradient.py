@@ -19,10 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..objective import JointGradient
-from .hybrid import DescentSolver, NaturalPremise, Point, descend
-from .lse import lse
+from .hybrid import DescentSolver, Point, View
 
-__all__ = ["GradientDescent", "gradient"]
+__all__ = ["GradientDescent"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,12 +31,8 @@ class _JointPoint(Point):
     joint: JointGradient
 
 
-class _FreeConsequents:
-    """The descent's view of the problem: premises and consequents move."""
-
-    def __init__(self, problem, premise, stiffness):
-        self.problem, self.premise, self.stiffness = problem, premise, stiffness
-        self.natural = NaturalPremise(premise)
+class _FreeConsequents(View):
+    """Premises and consequents move."""
 
     def start(self, x):
         return self._at(x, self.problem.evaluate(self.premise.parameters(x)).coefficients)
@@ -57,42 +52,6 @@ class _FreeConsequents:
         coefficients = point.evaluation.coefficients
         change = step[point.x.size :].reshape(coefficients.shape)
         return self._at(self.natural.move(point.x, step[: point.x.size]), coefficients + change)
-
-
-def gradient(
-    problem,
-    premise,
-    *,
-    max_iter,
-    tol,
-    stiffness=0.0,
-    start=None,
-    on_iteration=None,
-    step_size=0.01,
-    error_goal=None,
-):
-    """Train by back-propagation.
-
-    Takes what :meth:`Solver.solve` does, with epochs for iterations, whose evaluations have no
-    factor, and the settings of :class:`GradientDescent`. There is no other end than ``max_iter``,
-    ``error_goal`` and a projected gradient of zero.
-
-    Returns
-    -------
-    SolverResult
-        The epoch of the lowest cost; the loss curve has all of them.
-    """
-    if not premise.size:
-        return lse(problem, premise, on_iteration=on_iteration)
-    return descend(
-        _FreeConsequents(problem, premise, stiffness),
-        np.zeros(premise.size) if start is None else start,
-        max_iter=max_iter,
-        tol=tol,
-        on_iteration=on_iteration,
-        step_size=step_size,
-        error_goal=error_goal,
-    )
 
 
 class GradientDescent(DescentSolver):
@@ -133,4 +92,4 @@ class GradientDescent(DescentSolver):
     {'solver__step_size': 0.1}
     """
 
-    _run = staticmethod(gradient)
+    _view = _FreeConsequents

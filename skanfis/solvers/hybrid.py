@@ -20,7 +20,6 @@ without square matrices gives (``SeparableProblem.joint``): an epoch is that pas
 """
 
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 from typing import ClassVar
@@ -39,8 +38,8 @@ __all__ = [
     "NaturalPremise",
     "Point",
     "StepSize",
+    "View",
     "descend",
-    "hybrid",
 ]
 
 _RISE, _FALL = 1.0, -1.0
@@ -135,12 +134,20 @@ class Point:
     cost: float  # with the pull of the stiffness
 
 
-class _SolvedConsequents:
-    """The descent's view of the problem: premises move, consequents are solved for."""
+class View:
+    """A problem as a descent sees it: where it starts, the slope there, and where a step leads.
+
+    ``start(x)`` gives a :class:`Point`; ``slope(point)`` the gradient in the descent's variables,
+    and the largest entry of that projected on the box; ``step(point, step)`` the next point.
+    """
 
     def __init__(self, problem, premise, stiffness):
         self.problem, self.premise, self.stiffness = problem, premise, stiffness
         self.natural = NaturalPremise(premise)
+
+
+class _SolvedConsequents(View):
+    """Premises move, consequents are solved for."""
 
     def start(self, x):
         return self._at(x, None)
@@ -160,11 +167,11 @@ class _SolvedConsequents:
 
 
 def descend(view, x, *, max_iter, tol, on_iteration, step_size, error_goal):
-    """Take steps of Jang's length down the slope that a view of the problem gives.
+    """Take steps of Jang's length down the slope that a :class:`View` gives.
 
-    ``view`` has ``start(x)``, which gives a :class:`Point`; ``slope(point)``, which gives the
-    gradient in the descent's variables and the largest entry of that projected on the box; and
-    ``step(point, step)``, which gives the next point.
+    There is no other end than ``max_iter``, ``error_goal`` and a projected gradient of zero;
+    without the last the error may rise and fall for ever. The result is the epoch of the lowest
+    cost.
     """
     point = best = view.start(x)
     length = StepSize(step_size, point.cost)
@@ -195,46 +202,10 @@ def _rms_error(point):
     return np.sqrt(point.evaluation.mean_squared_error / n_outputs)
 
 
-def hybrid(
-    problem,
-    premise,
-    *,
-    max_iter,
-    tol,
-    stiffness=0.0,
-    start=None,
-    on_iteration=None,
-    step_size=0.01,
-    error_goal=None,
-):
-    """Train by Jang's hybrid rule.
-
-    Takes what :meth:`Solver.solve` does, with epochs for iterations, each a step of the premises,
-    and the settings of :class:`Hybrid`. The rule has no other end than ``max_iter``, ``error_goal``
-    and a projected gradient of zero; without the last the error may rise and fall for ever.
-
-    Returns
-    -------
-    SolverResult
-        The epoch of the lowest cost; the loss curve has all of them.
-    """
-    if not premise.size:
-        return lse(problem, premise, on_iteration=on_iteration)
-    return descend(
-        _SolvedConsequents(problem, premise, stiffness),
-        np.zeros(premise.size) if start is None else start,
-        max_iter=max_iter,
-        tol=tol,
-        on_iteration=on_iteration,
-        step_size=step_size,
-        error_goal=error_goal,
-    )
-
-
 class DescentSolver(Solver):
     """A solver whose epochs are steps of steepest descent, with its settings."""
 
-    _run: ClassVar[Callable[..., SolverResult]]  # the function that minimises
+    _view: ClassVar[type[View]]
 
     _parameter_constraints: ClassVar[dict] = {
         "step_size": [Interval(Real, 0, None, closed="neither")],
@@ -259,13 +230,13 @@ class DescentSolver(Solver):
     def solve(
         self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
     ) -> SolverResult:
-        return self._run(
-            problem,
-            premise,
+        if not premise.size:
+            return lse(problem, premise, on_iteration=on_iteration)
+        return descend(
+            self._view(problem, premise, stiffness),
+            np.zeros(premise.size) if start is None else start,
             max_iter=max_iter,
             tol=self.tol,
-            stiffness=stiffness,
-            start=start,
             on_iteration=on_iteration,
             step_size=self.step_size,
             error_goal=self.error_goal,
@@ -311,4 +282,4 @@ class Hybrid(DescentSolver):
     {'solver__step_size': 0.1}
     """
 
-    _run = staticmethod(hybrid)
+    _view = _SolvedConsequents

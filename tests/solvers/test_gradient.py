@@ -7,11 +7,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.solvers.gradient import gradient
+from skanfis.solvers import GradientDescent
 
 from .. import oracles
 from ..test_objective import CASES, FULL, PLAIN, Case
 from .test_varpro import planted
+
+
+def gradient(problem, premise, *, max_iter, on_iteration=None, **settings):
+    """A run of back-propagation with settings of its own."""
+    solver = GradientDescent(**settings)
+    return solver.solve(problem, premise, max_iter=max_iter, on_iteration=on_iteration)
 
 
 @pytest.fixture(

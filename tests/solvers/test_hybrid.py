@@ -13,10 +13,16 @@ from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
 from skanfis.premise import Premise
-from skanfis.solvers.hybrid import NaturalPremise, StepSize, hybrid
+from skanfis.solvers import Hybrid
+from skanfis.solvers.hybrid import NaturalPremise, StepSize
 
 from .. import oracles
 from .test_varpro import planted
+
+
+def hybrid(problem, premise, *, max_iter, on_iteration=None, **settings):
+    """A run of the rule with settings of its own."""
+    return Hybrid(**settings).solve(problem, premise, max_iter=max_iter, on_iteration=on_iteration)
 
 
 class Jang1993:
