@@ -22,6 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from ._columns import evenly_chosen
+
 __all__ = ["Budget", "budget_of", "noise_within", "scatter_between"]
 
 # The level of every interval in the report.
@@ -51,9 +53,10 @@ class Budget:
         return float(np.sqrt(np.nansum(np.square([self.noise, self.scatter, self.model]))))
 
 
-def budget_of(calibration, rules):
-    """The budget of a calibration, whose ANFIS is ``rules``."""
-    rows = np.linspace(0, len(calibration.X) - 1, min(len(calibration.X), _MOST_ROWS)).astype(int)
+def budget_of(calibration):
+    """The budget of a calibration."""
+    rules = calibration.rules[-1]
+    rows = evenly_chosen(len(calibration.X), _MOST_ROWS)
     X, estimator = calibration.X.iloc[rows], calibration.compensator.estimator
     rate, before = calibration.rate[rows], calibration.before[rows]
     residual = calibration.compensator.compensate(before, estimator.predict(X)) - rate
@@ -65,7 +68,7 @@ def budget_of(calibration, rules):
     scatter, low, high = scatter_between(errors, groups[in_range])
     model = np.nan
     if rules.noise_std_ is not None:
-        deviation = _pipeline_of(estimator).predict(X[answered], return_std=True)[1]
+        deviation = calibration.rules.predict(X[answered], return_std=True)[1]
         # Of the difference of two squares rounding may leave less than nothing.
         beyond = np.maximum(deviation**2 - rules.noise_std_**2, 0.0)
         model = float(np.sqrt(np.mean(beyond)))
@@ -104,8 +107,3 @@ def scatter_between(errors, groups):
     tails = chi2.ppf(0.5 + np.array([0.5, -0.5]) * _CONFIDENCE, n_groups - 1)
     ends = (n_groups - 1) * between / tails
     return tuple(float(np.sqrt(max(end - of_noise, 0.0))) for end in (between, *ends))
-
-
-def _pipeline_of(estimator):
-    """What predicts by rules: beside the arcsine law, what adds to it."""
-    return getattr(estimator, "residual_", estimator)

@@ -17,7 +17,7 @@ from ._units import SIGNALS
 from ._verdict import Verdict, judge
 from .compensator import GyroCompensator, features
 from .log import LogError
-from .metrics import scale_factor
+from .metrics import rms, scale_factor
 
 __all__ = ["MAX_EXTRAPOLATION", "MODEL", "Calibration", "Recipe", "calibrate"]
 
@@ -79,6 +79,11 @@ class Calibration:
     warnings: list
     glitches: list
     n_rows: int
+
+    @property
+    def rules(self):
+        """The pipeline of the rules: beside the arcsine law, what adds to it."""
+        return getattr(self.compensator.estimator, "residual_", self.compensator.estimator)
 
     @property
     def is_thinned(self):
@@ -206,7 +211,7 @@ def _what_is_worse(before, after, inside, unit):
         answered = rows & np.isfinite(after)
         if not answered.any():
             continue
-        was, became = (float(np.sqrt(np.mean(e[answered] ** 2))) for e in (before, after))
+        was, became = rms(before[answered]), rms(after[answered])
         if became > was:
             yield (
                 f"the compensation makes held-out rows {where} worse, from {was:.4g} to "

@@ -43,13 +43,12 @@ class Certain:
 def certain_of(calibration):
     """Bounds over the box of the recipe, other inputs in the range of the calibration."""
     recipe, compensator = calibration.recipe, calibration.compensator
-    rules = getattr(compensator.estimator, "residual_", compensator.estimator)
     box = {name: (low, high) for name, low, high in recipe.box} or None
-    found = bounds(rules, box, max_boxes=_MOST_BOXES)
+    found = bounds(calibration.rules, box, max_boxes=_MOST_BOXES)
     if recipe.physics or "output" not in recipe.inputs:
         return Certain(found, None)
     # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-    slope = gradient_bounds(rules, "output", box, max_boxes=_MOST_BOXES)
+    slope = gradient_bounds(calibration.rules, "output", box, max_boxes=_MOST_BOXES)
     own = 1.0 / compensator.scale_factor
     rises = slope.upper[0] < own if own > 0.0 else slope.lower[0] > own
     return Certain(found, bool(np.all(rises)))

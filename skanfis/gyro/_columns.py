@@ -2,7 +2,14 @@
 
 import numpy as np
 
-__all__ = ["check_column", "check_labels", "check_weights", "column_position"]
+__all__ = [
+    "check_column",
+    "check_labels",
+    "check_weights",
+    "column_position",
+    "evenly_chosen",
+    "label_texts",
+]
 
 
 def check_column(values, name, n_rows=None) -> np.ndarray:
@@ -69,3 +76,14 @@ def column_position(names, role, given) -> int:
     if not -len(names) <= given < len(names):
         raise ValueError(f"{role}={given} is no column of X, which has {len(names)} feature(s).")
     return int(given) % len(names)
+
+
+def evenly_chosen(n_rows, most) -> np.ndarray:
+    """Positions of some rows, the first and the last among them, at most so many."""
+    return np.unique(np.linspace(0, n_rows - 1, min(n_rows, most)).astype(int))
+
+
+def label_texts(labels) -> np.ndarray:
+    """A Series of labels as texts: one for all rows of a label, not one for each."""
+    own = labels.astype("category").cat
+    return own.categories.astype(str).to_numpy(dtype=object)[own.codes.to_numpy()]

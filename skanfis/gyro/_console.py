@@ -11,6 +11,7 @@ __all__ = [
     "ExistsError",
     "Progress",
     "UsageError",
+    "check_device",
     "pairs",
     "refuse_existing",
     "say",
@@ -45,14 +46,10 @@ class Progress:
         self._quiet = quiet
         self._start = time.monotonic()
 
-    @property
-    def seconds(self):
-        """Time since the start [s]."""
-        return time.monotonic() - self._start
-
     def __call__(self, text):
         if not self._quiet:
-            _write_to(sys.stderr, f"{self.seconds:7.1f} s  {printable(text)}\n")
+            seconds = time.monotonic() - self._start
+            _write_to(sys.stderr, f"{seconds:7.1f} s  {printable(text)}\n")
             sys.stderr.flush()
 
 
@@ -94,6 +91,14 @@ def pairs(texts, option):
             raise UsageError(f"{option}: {key} is given twice.")
         found[key] = value
     return found
+
+
+def check_device(name, devices):
+    """UsageError where a device is none of these; they are None of a log that tells of none."""
+    if devices is None:
+        raise UsageError("--device: the log has no column for the device.")
+    if name not in devices:
+        raise UsageError(f"--device {name}: the log has {', '.join(devices)}.")
 
 
 def refuse_existing(paths, force):

@@ -53,7 +53,7 @@ def figures_of_merit(full_scale, nominal, averaging_times, allan):
         *_of_stability(averaging_times),
     ]
     if allan:
-        reader = _AllanReader(_error)
+        reader = _AllanReader()
         figures += [reader.figure(name, unit) for name, unit in FIGURES_OF_ALLAN.items()]
     return figures
 
@@ -72,20 +72,15 @@ def _error(rows, which):
 
 
 def _of_what_is_left():
+    def of(metric):
+        return lambda rows, which: metric(_left(rows, which))
+
     peak = "largest value: no interval"
     return [
-        Figure("residual_rms", "deg/s", lambda r, w: metrics.residual_rms(_left(r, w))),
+        Figure("residual_rms", "deg/s", of(metrics.residual_rms)),
+        Figure("residual_peak", "deg/s", of(metrics.residual_peak), no_interval=peak),
         Figure(
-            "residual_peak",
-            "deg/s",
-            lambda r, w: metrics.residual_peak(_left(r, w)),
-            no_interval=peak,
-        ),
-        Figure(
-            "residual_peak_to_peak",
-            "deg/s",
-            lambda r, w: metrics.residual_peak_to_peak(_left(r, w)),
-            no_interval=peak,
+            "residual_peak_to_peak", "deg/s", of(metrics.residual_peak_to_peak), no_interval=peak
         ),
         Figure(
             "reduction_factor",
@@ -196,8 +191,7 @@ def _of_stability(averaging_times):
 class _AllanReader:
     """Reads coefficients off the Allan curve of the error, which is made once per column."""
 
-    def __init__(self, error):
-        self._error = error
+    def __init__(self):
         self._read = {}
 
     def figure(self, name, unit):
@@ -222,7 +216,7 @@ class _AllanReader:
         interval = np.median(intervals)
         if np.abs(intervals - interval).max() > _UNEVEN * interval:
             raise ValueError("no Allan deviation: the rows are not evenly spaced in time")
-        curve = allan_deviation(self._error(rows, which), interval, run=rows.get("run"))
+        curve = allan_deviation(_error(rows, which), interval, run=rows.get("run"))
         return allan_coefficients(curve["averaging_time"], curve["deviation"])
 
 

@@ -1,7 +1,8 @@
 """Which compensation to use, in words that report and command share."""
 
+from ._rate_units import RATE_UNITS
 from ._simpler import LAW_AND_LINE, NOTHING
-from .displays._style import PER_UNIT, SYMBOL, figures
+from .displays._style import SYMBOL, figures
 
 __all__ = ["ARTICLES", "headline", "held_out_groups"]
 
@@ -72,4 +73,4 @@ def _against_the_model(calibration, unit):
 
 
 def _shown(error, unit):
-    return f"{figures(PER_UNIT[unit] * error)} {SYMBOL[unit]}"
+    return f"{figures(RATE_UNITS[unit] * error)} {SYMBOL[unit]}"

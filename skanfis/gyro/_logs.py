@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._checks import LARGEST_AT_REST, check_at_rest, check_log
-from ._console import UsageError, pairs, usage_errors
+from ._console import UsageError, check_device, pairs, usage_errors
 from ._layout import Request
 from ._table import LogFile
 from ._thinned import read_thinned
@@ -14,7 +14,7 @@ from .compensator import INPUTS
 from .errors import LogError
 from .log import checked_request, read
 
-__all__ = ["Task", "find_tasks", "read_for", "read_task", "request_of"]
+__all__ = ["Task", "find_tasks", "read_task", "request_of"]
 
 
 @dataclass(frozen=True)
@@ -69,40 +69,36 @@ def request_of(options, require, columns=None):
         return checked_request(request)
 
 
-def read_for(options, paths, require, tell, columns=None):
-    """Read files as the options say; what was found out is told."""
+def read_task(options, paths, task, tell):
+    """The checked log of one axis; returns its reading and the inputs.
+
+    What was found out is told. Of too many rows to be held, some are.
+    """
+    required = ["temperature", "output"]
     if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
-        require = (*require, "time")
+        required.append("time")
     with usage_errors():  # characters that do not go together
-        reading = _read(options, paths, request_of(options, require, columns), tell)
+        request = request_of(options, required, task.columns)
+        max_gap, most_rows = options.max_gap, options.check_rows
+        reading = read(paths, request, max_gap=max_gap, tell=tell, most_rows=most_rows)
+        if reading is None:
+            tell(f"more than {most_rows:,} rows: not all are held")
+            reading = read_thinned(
+                paths,
+                request,
+                max_gap=max_gap,
+                most_rows=most_rows,
+                time_constant=options.time_constant,
+                tell=tell,
+                device=options.device,
+            )
+        elif options.device is not None:
+            labels = reading.log.get("device")
+            check_device(options.device, None if labels is None else list(labels.cat.categories))
+            reading = reading.of_device(options.device)
     for note in reading.notes:
         tell(f"note: {note}")
     tell(f"{reading.n_rows:,} rows{_counts(reading.log)}")
-    return reading
-
-
-def _read(options, paths, request, tell):
-    """All rows of the files, or of a device; some of them where they are too many to be held."""
-    most_rows = options.check_rows
-    reading = read(paths, request, max_gap=options.max_gap, tell=tell, most_rows=most_rows)
-    if reading is not None:
-        return reading if options.device is None else _of_device(reading, options.device)
-    tell(f"more than {most_rows:,} rows: not all are held")
-    return read_thinned(
-        paths,
-        request,
-        max_gap=options.max_gap,
-        most_rows=most_rows,
-        time_constant=options.time_constant,
-        tell=tell,
-        device=options.device,
-    )
-
-
-def read_task(options, paths, task, tell):
-    """The checked log of one axis; returns its reading and the inputs."""
-    required = ("temperature", "output")
-    reading = read_for(options, paths, required, tell, task.columns)
     try:
         at_rest = _settle_rest(options, reading, tell)
         inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
@@ -172,15 +168,6 @@ def _default_inputs(log, at_rest):
     elif "run" not in log or log["run"].nunique() < 3:
         inputs = ("temperature", "temperature_rate", "output")
     return tuple(name for name in inputs if not (at_rest and name == "output"))
-
-
-def _of_device(reading, device):
-    if "device" not in reading.log:
-        raise UsageError("--device: the log has no column for the device.")
-    names = list(reading.log["device"].cat.categories)
-    if device not in names:
-        raise UsageError(f"--device {device}: the log has {', '.join(names)}.")
-    return reading.of_device(device)
 
 
 def _counts(log):

@@ -1,6 +1,5 @@
 """The models of a calibration: law, rules, and what is simpler than rules."""
 
-from sklearn.dummy import DummyRegressor
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
@@ -11,7 +10,6 @@ from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
 __all__ = [
-    "make_constant",
     "make_estimator",
     "make_law",
     "make_law_and_line",
@@ -56,11 +54,6 @@ def make_law_and_line(inputs):
     """The law and a straight line in all inputs, in turns, as a single rule beside it is fitted."""
     law = make_law(inputs, 1, "linear")
     return ResidualRegressor(law, make_polynomial(1), n_rounds=_ROUNDS)
-
-
-def make_constant():
-    """The mean of what is to be predicted."""
-    return DummyRegressor()
 
 
 def make_polynomial(degree):

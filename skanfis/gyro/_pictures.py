@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..inspection import MembershipDisplay
-from ._results import rules_of
+from ._columns import evenly_chosen
 from .displays import (
     AllanDisplay,
     CoverageDisplay,
@@ -20,14 +20,13 @@ from .displays import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
+from .displays.groups import MOST_LINES
 
 __all__ = ["PICTURES", "Picture", "draw_coverage", "draw_memberships"]
 
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
 # Points beyond cover one another.
 _MOST_ROWS_SHOWN = 20_000
-# The picture of groups shows the worst, as many as can be read.
-_MOST_LINES = 30
 
 
 class Picture(NamedTuple):
@@ -119,7 +118,7 @@ def draw_surface(results):
 
 def draw_groups(results):
     groups = results.calibration.split.labels
-    n_lines = min(np.unique(groups.astype(str)).size, _MOST_LINES)
+    n_lines = min(np.unique(groups.astype(str)).size, MOST_LINES)
     figure, axes = _panels(1, height=1.6 + 0.2 * n_lines)
     display = GroupResidualDisplay.from_predictions(
         *_rates(results), groups=groups, unit=results.unit, ax=axes
@@ -175,15 +174,13 @@ def draw_coverage(calibration):
 
 def draw_memberships(calibration):
     """None where no input has terms."""
-    n_inputs = len({term["input"] for term in rules_of(calibration).memberships_})
+    n_inputs = len({term["input"] for term in calibration.rules[-1].memberships_})
     if not n_inputs:
         return None
     figure, axes = _panels(n_inputs, height=0.6 + 1.9 * n_inputs, sharex=False)
-    estimator = calibration.compensator.estimator
+    rows = evenly_chosen(len(calibration.X), _MOST_ROWS_SHOWN)
     display = MembershipDisplay.from_estimator(
-        getattr(estimator, "residual_", estimator),
-        _some_rows(calibration.X),
-        ax=list(np.atleast_1d(axes)),
+        calibration.rules, calibration.X.iloc[rows], ax=list(np.atleast_1d(axes))
     )
     alt = "Membership functions before and after training, over histograms of the data"
     caption = "Fuzzy terms before training (dashed) and after, over the data."
@@ -239,8 +236,3 @@ def _figure(width, height):
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
-
-
-def _some_rows(X):
-    places = np.linspace(0, len(X) - 1, min(len(X), _MOST_ROWS_SHOWN)).astype(int)
-    return X.iloc[np.unique(places)]

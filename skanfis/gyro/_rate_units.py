@@ -1,8 +1,9 @@
 """Units that are a rate, or a rate per something: deg/s, deg/h/degC; not deg/sqrt(h)."""
 
-__all__ = ["RATE_UNITS", "in_rate_unit", "rate_unit_of"]
+__all__ = ["PER_HOUR", "RATE_UNITS", "in_rate_unit", "rate_unit_of"]
 
-RATE_UNITS = {"deg/s": 1.0, "deg/h": 3600.0}  # of each in 1 deg/s
+PER_HOUR = 3600.0  # 1 deg/s in deg/h
+RATE_UNITS = {"deg/s": 1.0, "deg/h": PER_HOUR}  # of each in 1 deg/s
 
 
 def rate_unit_of(unit):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..inspection import readability
+from ._columns import evenly_chosen
 
 __all__ = ["readability_of"]
 
@@ -15,11 +16,11 @@ def readability_of(calibration):
 
     Beside the arcsine law that is what the law leaves of the rate, otherwise the gyro's error.
     """
-    places = np.linspace(0, len(calibration.X) - 1, min(len(calibration.X), _MOST_ROWS)).astype(int)
+    places = evenly_chosen(len(calibration.X), _MOST_ROWS)
     X, estimator = calibration.X.iloc[places], calibration.compensator.estimator
     if not calibration.recipe.physics:
         return readability(estimator, X, (calibration.before - calibration.rate)[places])
     left = calibration.rate[places] - estimator.base_.predict(X)
     # Rows that the law refuses are no business of the rules.
     known = np.isfinite(left)
-    return readability(estimator.residual_, X[known], left[known])
+    return readability(calibration.rules, X[known], left[known])

@@ -8,17 +8,19 @@ import pandas as pd
 
 from ._budget import budget_of
 from ._certain import certain_of
+from ._columns import label_texts
 from ._dossier import Dossier
 from ._figures_of_merit import FIGURES_OF_ALLAN
-from ._rate_units import in_rate_unit
+from ._rate_units import RATE_UNITS, in_rate_unit
 from ._reading import readability_of
 from ._specification import check_limits
 from .allan import ROWS_PER_TIME, allan_coefficients, allan_deviation
 from .compensator import features
-from .displays._style import PER_UNIT, SYMBOL, figures
+from .displays._style import SYMBOL, figures
+from .metrics import rms
 from .report import gyro_report
 
-__all__ = ["COUNTS", "Results", "rms", "rules_of"]
+__all__ = ["COUNTS", "Results"]
 
 COUNTS = ("rows", "rows_refused", "rows_outside")
 
@@ -61,7 +63,7 @@ class Results:
             if self.time is not None
             else None
         )
-        self.run = _texts(self.log["run"]) if "run" in self.log else None
+        self.run = label_texts(self.log["run"]) if "run" in self.log else None
 
     @property
     def unit(self):
@@ -72,7 +74,7 @@ class Results:
 
     def shown(self, error):
         """An error [deg/s] in the unit for errors."""
-        return figures(PER_UNIT[self.unit] * error)
+        return figures(RATE_UNITS[self.unit] * error)
 
     @property
     def symbol(self):
@@ -152,7 +154,7 @@ class Results:
     @cached_property
     def budget(self):
         """The parts of a row's uncertainty."""
-        return budget_of(self.calibration, rules_of(self.calibration))
+        return budget_of(self.calibration)
 
     @cached_property
     def certain(self):
@@ -212,12 +214,6 @@ class Results:
         return rates is not None and rates.min() < -_CLEARLY < _CLEARLY < rates.max()
 
 
-def _texts(labels):
-    """Labels as text: one for all rows of a label, not one for each."""
-    own = labels.astype("category").cat
-    return own.categories.astype(str).to_numpy(dtype=object)[own.codes.to_numpy()]
-
-
 def _read_off(curve, name):
     """A coefficient of an Allan curve and "", or NaN and why there is none."""
     try:
@@ -227,14 +223,3 @@ def _read_off(curve, name):
         return np.nan, str(error)
     value = getattr(read, name)
     return (np.nan, read.notes[name]) if value is None else (value, "")
-
-
-def rules_of(calibration):
-    """The ANFIS at the end of a calibration's estimator."""
-    estimator = calibration.compensator.estimator
-    return getattr(estimator, "residual_", estimator)[-1]
-
-
-def rms(errors):
-    """Root mean square."""
-    return float(np.sqrt(np.mean(errors**2)))

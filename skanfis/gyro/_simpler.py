@@ -7,15 +7,22 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from sklearn.dummy import DummyRegressor
 from sklearn.exceptions import ConvergenceWarning
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
-from ._models import make_constant, make_law, make_law_and_line, make_polynomial
+from ._models import make_law, make_law_and_line, make_polynomial
 
-__all__ = ["LAW_AND_LINE", "NOTHING", "Simpler", "simpler_compensations"]
+__all__ = ["LAW_AND_LINE", "NOTHING", "Simpler", "options_for", "simpler_compensations"]
 
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"
+# Options by which the command writes the files of one: a single rule is a straight line.
+_OPTIONS = {
+    "straight line": "--terms {ones}",
+    "arcsine law": "--physics --terms {ones}",
+    LAW_AND_LINE: "--physics --terms {ones}",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +65,7 @@ def simpler_compensations(X, rate, before, folds, rows):
 
 
 def _kinds(inputs):
-    yield _Kind("constant", make_constant)
+    yield _Kind("constant", DummyRegressor)
     yield _Kind("straight line", partial(make_polynomial, 1))
     if "output" in inputs:
         yield _Kind("arcsine law", partial(make_law, inputs, 1, "linear"), "rate")
@@ -82,3 +89,8 @@ def _fitted(kind, X, rate, before, folds, rows):
         raise ValueError(f"it has no finite prediction for {n_lost} rows")
     after = predicted if kind.predicts == "rate" else before - predicted
     return Simpler(kind.name, kind.predicts, after, model)
+
+
+def options_for(name, n_inputs):
+    """Options of the command that make the files of a simple compensation; None where none do."""
+    return _OPTIONS[name].format(ones=",".join("1" * n_inputs)) if name in _OPTIONS else None

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from sklearn.model_selection import GroupKFold
 
+from ._columns import label_texts
 from ._legs import cut_legs, find_legs, name_legs
 from .errors import LogError
 from .groups import find_rate_levels, group_by_rate_level
@@ -206,9 +207,7 @@ def _hold_out(number):
 
 def _labels(log, part):
     if part != "level":
-        labels = log[part].astype("category").cat
-        # One text for all rows of a label, not one for each.
-        return labels.categories.astype(str).to_numpy(dtype=object)[labels.codes.to_numpy()]
+        return label_texts(log[part])
     sizes = np.abs(log["rate"].to_numpy())
     levels = find_rate_levels(sizes)
     names = np.array([f"|{level:.4g}| °/s" for level in levels], dtype=object)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ._checks import check_log
-from ._console import UsageError
+from ._console import check_device
 from ._layout import COLUMNS
 from ._runs import LostRows, Splitter
 from ._table import LogFile
@@ -17,9 +17,6 @@ from .errors import LogError
 from .log import Reading
 
 __all__ = ["LogStream", "rows_before"]
-
-# After so many pieces of a long file, a line of progress.
-_PIECES_TOLD = 10
 
 
 class LogStream:
@@ -75,7 +72,7 @@ class LogStream:
     def check(self, tell):
         """Read the file for the first time, and count the rows of its runs."""
         runs = _Runs()
-        for n_pieces, (codes, keys, piece) in enumerate(self._keyed(self.file, self._splitter), 1):
+        for codes, keys, piece in self._keyed(self.file, self._splitter, tell):
             log = pd.DataFrame(piece | {"run": codes})
             try:
                 runs.check(
@@ -89,8 +86,6 @@ class LogStream:
             self.n_rows += len(log)
             for key, count in zip(keys, np.bincount(codes).tolist(), strict=True):
                 self.counts[key] = self.counts.get(key, 0) + count
-            if n_pieces % _PIECES_TOLD == 0:
-                tell(f"{self.path}: {self.file.n_rows:,} rows so far")
 
     def found(self, n_dropped):
         """What the time has told of all files read so far: runs, and rows that are missing."""
@@ -100,12 +95,8 @@ class LogStream:
 
     def check_device(self, devices):
         """UsageError where the device that is asked for is none of these."""
-        if self._device is None:
-            return
-        if "device" not in self._parts:
-            raise UsageError("--device: the log has no column for the device.")
-        if self._device not in devices:
-            raise UsageError(f"--device {self._device}: the log has {', '.join(devices)}.")
+        if self._device is not None:
+            check_device(self._device, devices if "device" in self._parts else None)
 
     def pieces(self):
         """Its rows as logs, one after the other."""
@@ -126,9 +117,9 @@ class LogStream:
             splitter = self._splitter.again()
         yield from self._keyed(LogFile.open(self.path, self._request, self._first), splitter)
 
-    def _keyed(self, file, splitter):
+    def _keyed(self, file, splitter, tell=None):
         """Pieces of the file, with the run of every row: its place among keys (device, label)."""
-        for piece in file.pieces():
+        for piece in file.pieces(tell):
             n_rows = len(next(iter(piece.values()))) if piece else 0
             if n_rows == 0:
                 continue

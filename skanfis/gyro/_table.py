@@ -20,6 +20,8 @@ __all__ = ["LogFile"]
 
 # Of a piece, which is all that is held beside the log itself.
 _ROWS = 200_000
+# After so many pieces of a long file, a line of progress.
+_PIECES_TOLD = 10
 # The form of a clock is told by its first rows.
 _CLOCK_ROWS = 200
 
@@ -60,17 +62,22 @@ class LogFile:
             _check_alike(file, first)
         return file
 
-    def pieces(self):
-        """Parts as arrays, those of labels as lists of strings, so many rows at a time."""
+    def pieces(self, tell=None):
+        """Parts as arrays, those of labels as lists of strings, so many rows at a time.
+
+        ``tell`` is called with a line of text now and then.
+        """
         self.source.check_lengths()
         clock = self._clock()
         average = None if self.request.average is None else Averager(self.request.average)
-        for table in self._tables(clock):
+        for n_pieces, table in enumerate(self._tables(clock), start=1):
             piece = self._converted(table, clock)
             self.n_rows += len(table)
             if average is not None:
                 piece = average.add(piece)
             yield piece
+            if tell is not None and n_pieces % _PIECES_TOLD == 0:
+                tell(f"{self.path}: {self.n_rows:,} rows so far")
         if average is not None:
             yield average.rest()
             if average.n_rows:
@@ -211,10 +218,8 @@ class LogFile:
         said = f"{len(self.dropped):,} of {self.n_rows:,} rows lack a value ({parts})"
         if 2 * len(self.dropped) > self.n_rows:
             raise LogError(f"{self.path}: {said}: too many to go on without them.")
-        self.notes.append(f"{said}; they are left out, the first of them {self._first_dropped()}")
-
-    def _first_dropped(self):
-        return self.source.place_of(self.dropped[0])
+        first = self.source.place_of(self.dropped[0])
+        self.notes.append(f"{said}; they are left out, the first of them {first}")
 
 
 def _check_alike(file, first):

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from .metrics import rms
+
 __all__ = ["Gain", "Verdict", "judge"]
 
 # The reasons stand at the head of the module.
@@ -82,10 +84,10 @@ def judge(errors, groups):
     verdict : Verdict
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
-    rms = {name: _rms(error) for name, error in errors.items()}
-    floor = _ROUNDING * next(iter(rms.values())) or np.finfo(float).tiny
+    of_all = {name: rms(error) for name, error in errors.items()}
+    floor = _ROUNDING * next(iter(of_all.values())) or np.finfo(float).tiny
     sizes = {
-        name: np.maximum(np.append(_rms_by_group(error, codes), rms[name]), floor)
+        name: np.maximum(np.append(_rms_by_group(error, codes), of_all[name]), floor)
         for name, error in errors.items()
     }
     names = list(errors)
@@ -95,7 +97,7 @@ def judge(errors, groups):
         if not any(_gain(sizes[name], sizes[other]).is_decisive for other in names[place + 1 :])
     )
     gains = {name: _gain(sizes[name], sizes[names[-1]]) for name in names[:-1]}
-    return Verdict(rms, gains, int(codes.max()) + 1, recommended)
+    return Verdict(of_all, gains, int(codes.max()) + 1, recommended)
 
 
 def _gain(simple, elaborate):
@@ -110,7 +112,3 @@ def _gain(simple, elaborate):
 
 def _rms_by_group(error, codes):
     return np.sqrt(np.bincount(codes, error**2) / np.bincount(codes))
-
-
-def _rms(error):
-    return float(np.sqrt(np.mean(error**2)))

@@ -17,11 +17,11 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from ._columns import check_column
+from ._rate_units import PER_HOUR
 from .metrics import rows_by_run
 
 __all__ = ["AllanCoefficients", "allan_coefficients", "allan_deviation"]
 
-_SECONDS_PER_HOUR = 3600.0
 _FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
 # A slope read off two points has no check.
 _POINTS_PER_SLOPE = 3
@@ -81,7 +81,7 @@ def allan_deviation(
     for rows in rows_by_run(run, error.size, at_least=1):
         if rows.size < ROWS_PER_TIME:
             continue
-        drift = _SECONDS_PER_HOUR * error[rows]
+        drift = PER_HOUR * error[rows]
         times, deviations, _, counts = oadev(
             drift, rate=1.0 / sampling_interval, data_type="freq", taus="octave"
         )

@@ -256,7 +256,3 @@ def _hysteresis_line(calibration, rows):
     return [
         f"hysteresis     {before:.4g} deg/h between warming and cooling before, {after:.4g} after"
     ]
-
-
-def _rms(errors):
-    return float(np.sqrt(np.mean(errors**2))) if errors.size else float("nan")

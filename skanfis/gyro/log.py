@@ -35,10 +35,6 @@ __all__ = [
 ]
 
 
-# After so many pieces of a long file, a line of progress.
-_PIECES_TOLD = 10
-
-
 def read_log(
     paths: Any,
     *,
@@ -197,12 +193,10 @@ def read(paths, request, *, max_gap=None, tell=None, most_rows=None):
     for path in paths:
         file = LogFile.open(path, request, files[0] if files else None)
         files.append(file)
-        for n_pieces, piece in enumerate(file.pieces(), start=1):
+        for piece in file.pieces(tell):
             columns.add(piece, len(files) - 1)
             if most_rows is not None and columns.n_rows > most_rows:
                 return None
-            if tell is not None and n_pieces % _PIECES_TOLD == 0:
-                tell(f"{path}: {file.n_rows:,} rows so far")
         if tell is not None and len(paths) > 1:
             tell(f"read {len(files):,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
     log = columns.table(list(files[0].layout.places), short_names(paths))

@@ -314,12 +314,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
                 ConstantInputWarning,
                 stacklevel=3,
             )
-        most = n_values - 1
-        return (
-            min(self.amplitude_degree, most),
-            min(self.sagnac_degree, most),
-            min(self.bias_degree, most),
-        )
+        degrees = (self.amplitude_degree, self.sagnac_degree, self.bias_degree)
+        return tuple(min(degree, n_values - 1) for degree in degrees)
 
     def _keep(self, log, law):
         """Coefficients in the units of X and y, in powers of T minus the reference."""
@@ -395,7 +391,8 @@ def check_parameters(law):
         include_boundaries="neither",
     )
     if law.out_of_bounds not in OUT_OF_BOUNDS:
-        choices = ", ".join(OUT_OF_BOUNDS)
-        raise ValueError(f"out_of_bounds={law.out_of_bounds!r} must be one of {choices}.")
+        raise ValueError(
+            f"out_of_bounds={law.out_of_bounds!r} must be one of {', '.join(OUT_OF_BOUNDS)}."
+        )
     if law.reference_temperature is not None and not np.isfinite(law.reference_temperature):
         raise ValueError(f"reference_temperature={law.reference_temperature} must be finite.")

@@ -10,7 +10,6 @@ from skanfis.gyro._budget import budget_of, noise_within, scatter_between
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._certain import certain_of
 from skanfis.gyro._option_types import box
-from skanfis.gyro._results import rules_of
 from skanfis.gyro._split import Split, choose_split
 from skanfis.gyro.command import main
 
@@ -36,13 +35,13 @@ def calibrated(error, gain=1.0, noise=NOISE, scatter=SCATTER, **options):
 
 def test_planted_noise_and_scatter_are_found():
     calibration = calibrated(lambda t: 0.005 + 2e-4 * t)
-    budget = budget_of(calibration, rules_of(calibration))
+    budget = budget_of(calibration)
     n = N_RUNS * N_ROWS
     assert budget.noise == pytest.approx(NOISE, rel=4.0 / np.sqrt(2 * n))
     assert budget.scatter == pytest.approx(SCATTER, rel=2.5 / np.sqrt(2 * (N_RUNS - 1)))
     assert budget.scatter_low < SCATTER < budget.scatter_high
     # One rule of two slopes is a line: the mean leverage of its rows is 3 / n.
-    in_fit = rules_of(calibration).noise_std_
+    in_fit = calibration.rules[-1].noise_std_
     assert budget.model == pytest.approx(in_fit * np.sqrt(3 / n), rel=0.02)
     error = (calibration.after - calibration.rate)[calibration.in_range]
     assert budget.combined == pytest.approx(np.sqrt(np.mean(error**2)), rel=0.1)
@@ -111,7 +110,7 @@ def test_one_group_in_range_leaves_the_scatter_open():
     object.__setattr__(
         calibration, "split", Split("run", calibration.split.folds, labels, "as one")
     )
-    budget = budget_of(calibration, rules_of(calibration))
+    budget = budget_of(calibration)
     assert np.isnan(budget.scatter)
     assert budget.combined == pytest.approx(np.hypot(budget.noise, budget.model))
 

@@ -3,9 +3,10 @@
 import numpy as np
 
 from .._headline import ARTICLES, headline
-from .._results import rms, rules_of
+from .._rate_units import RATE_UNITS
 from .._simpler import NOTHING
-from ..displays._style import PER_UNIT, figures
+from ..displays._style import figures
+from ..metrics import rms
 from .words import terms_text
 
 __all__ = ["cards", "conclusion"]
@@ -28,7 +29,7 @@ def conclusion(page, results):
         )
     is_good = verdict.model_is_worth_it and all(check.is_kept for check in results.checks)
     page.banner(title, sentences, "good" if is_good else "bad")
-    for sentence in calibration.cautions_in(results.symbol, PER_UNIT[results.unit]):
+    for sentence in calibration.cautions_in(results.symbol, RATE_UNITS[results.unit]):
         page.paragraph(f"Warning: {sentence}", kind="warn")
 
 
@@ -60,7 +61,7 @@ def cards(page, results):
         ("RMS error after", f"{results.shown(rms(after))} {unit}", "held-out rows in range"),
         ("Reduction", f"{figures(results.gain)} ×", _beside(results)),
         ("Largest error after", f"{results.shown(np.abs(after).max())} {unit}", "same rows"),
-        ("Rules", f"{rules_of(calibration).n_rules_}", terms_text(calibration.choice.terms)),
+        ("Rules", f"{calibration.rules[-1].n_rules_}", terms_text(calibration.choice.terms)),
     ]
     if results.beyond.any():
         remark = f"{results.beyond.mean():.1%} of the held-out rows, all flagged"

@@ -1,21 +1,12 @@
 """The simpler compensation, where that is the one to use: what to compute, to the last digit."""
 
 from .._headline import ARTICLES
-from .._simpler import LAW_AND_LINE, NOTHING
+from .._simpler import LAW_AND_LINE, NOTHING, options_for
 from .words import law_table
 
 __all__ = ["formula_of", "instead"]
 
 _DIGITS = ".9g"
-# How to get all files for it.
-_COMMANDS = {
-    "straight line": "The command writes its files, C code included, with --terms {ones}: a single "
-    "rule is a straight line.",
-    "arcsine law": "The command writes its files, C code included, with --physics --terms {ones}: "
-    "to the law it adds a single rule, which is a straight line.",
-    LAW_AND_LINE: "The command writes its files, C code included, with --physics --terms {ones}: a "
-    "single rule is a straight line.",
-}
 
 
 def instead(page, results):
@@ -35,8 +26,11 @@ def instead(page, results):
         "deg/s, inputs in the units of the range of the calibration below."
     )
     page.preformatted(formula_of(calibration, name), "What to compute", is_open=True)
-    if name in _COMMANDS:
-        page.paragraph(_COMMANDS[name].format(ones=",".join("1" for _ in calibration.X)))
+    if wanted := options_for(name, calibration.X.shape[1]):
+        why = "a single rule is a straight line"
+        if name == "arcsine law":
+            why = "to the law it adds a single rule, which is a straight line"
+        page.paragraph(f"The command writes its files, C code included, with {wanted}: {why}.")
 
 
 def formula_of(calibration, name):

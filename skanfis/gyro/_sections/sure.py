@@ -3,7 +3,7 @@
 import numpy as np
 
 from .._headline import held_out_groups
-from .._results import rms
+from ..metrics import rms
 from .words import unit_of, words
 
 __all__ = ["sure"]

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._style import PER_UNIT
+from .._rate_units import RATE_UNITS
+from ._style import SYMBOL
 
 __all__ = [
     "CompensationDisplay",
@@ -78,6 +79,7 @@ class CompensationDisplay:
 class DisplayInUnit(CompensationDisplay):
     """One whose errors are drawn in a unit that can be chosen."""
 
+    # Of the errors stored, and as drawn unless asked otherwise.
     _UNIT: ClassVar[str] = "deg/s"
 
     def plot(self, ax: Any = None, *, unit: str | None = None) -> Self:
@@ -103,11 +105,20 @@ class DisplayInUnit(CompensationDisplay):
             Without matplotlib.
         """
         unit = self._UNIT if unit is None else unit
-        if unit not in PER_UNIT:
-            raise ValueError(f"unit={unit!r} must be one of {', '.join(PER_UNIT)}.")
+        if unit not in RATE_UNITS:
+            raise ValueError(f"unit={unit!r} must be one of {', '.join(RATE_UNITS)}.")
         self.unit_ = unit
         self._draw(ax)
         return self
+
+    @property
+    def _factor(self):
+        """What errors stored are multiplied by."""
+        return RATE_UNITS[self.unit_] / RATE_UNITS[self._UNIT]
+
+    @property
+    def _symbol(self):
+        return SYMBOL[self.unit_]
 
     def _draw(self, ax):
         raise NotImplementedError

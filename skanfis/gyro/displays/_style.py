@@ -6,7 +6,6 @@ __all__ = [
     "AFTER",
     "BEFORE",
     "COOLING",
-    "PER_UNIT",
     "SYMBOL",
     "WARMING",
     "dress",
@@ -21,7 +20,6 @@ WARMING, COOLING = "#c8443c", "#3a6ea5"
 NO_DATA = "#e9e9e6"
 
 SYMBOL = {"deg/s": "°/s", "deg/h": "°/h"}
-PER_UNIT = {"deg/s": 1.0, "deg/h": 3600.0}
 
 _LEAST_ROOM = 0.14  # between two marks, as a part of the axis
 # From a hundred to a million, figures are written as whole numbers; else to three digits.

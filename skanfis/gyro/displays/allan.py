@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..allan import allan_coefficients, allan_deviation
 from ._base import DisplayInUnit
-from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, mark_decades
+from ._style import AFTER, BEFORE, dress, figures, make_axes, mark_decades
 
 __all__ = ["AllanDisplay"]
 
@@ -18,7 +18,6 @@ _FEWEST_TIMES = 3  # for reading a slope off the curve
 # Part by which a line of slope -1/2 may miss the first point of the curve.
 _NEARLY = 0.3
 _PER_ROOT_HOUR = 60.0  # deg/h at 1 s per deg/sqrt(h)
-_PER_HOUR = 3600.0
 
 CAUTION = (
     "Smoothing is not compensation: a filter lowers the left of a curve and hides as much of the "
@@ -120,8 +119,7 @@ class AllanDisplay(DisplayInUnit):
         for name, curve, color in (("before", self.before, BEFORE), ("after", self.after, AFTER)):
             time = curve["averaging_time"].to_numpy()
             deviation, error = (
-                PER_UNIT[self.unit_] / _PER_HOUR * curve[column].to_numpy()
-                for column in ("deviation", "error")
+                self._factor * curve[column].to_numpy() for column in ("deviation", "error")
             )
             self.ax_.fill_between(
                 time,
@@ -133,7 +131,7 @@ class AllanDisplay(DisplayInUnit):
             )
             self.ax_.loglog(time, deviation, "o-", color=color, label=name, ms=3, linewidth=1.4)
             self._mark(time, deviation, color)
-        dress(self.ax_, "averaging time [s]", f"Allan deviation [{SYMBOL[self.unit_]}]")
+        dress(self.ax_, "averaging time [s]", f"Allan deviation [{self._symbol}]")
         for axis, ends in (
             (self.ax_.xaxis, self.ax_.get_xlim()),
             (self.ax_.yaxis, self.ax_.get_ylim()),
@@ -152,7 +150,7 @@ class AllanDisplay(DisplayInUnit):
         """
         curves = []
         for name, curve in (("before", self.before), ("after", self.after)):
-            factor = PER_UNIT[self.unit_] / _PER_HOUR
+            factor = self._factor
             columns = {
                 "curve": name,
                 "averaging time [s]": curve["averaging_time"],
@@ -166,7 +164,7 @@ class AllanDisplay(DisplayInUnit):
         """N at 1 s on its line of slope -1/2, and the minimum, where the curve has them."""
         if time.size < _FEWEST_TIMES or not (deviation > 0).all():
             return
-        factor = PER_UNIT[self.unit_] / _PER_HOUR
+        factor = self._factor
         read = allan_coefficients(time, deviation / factor)
         walk, instability = read.angle_random_walk, read.bias_instability
         if walk is not None and _is_read_at_short_times(walk, time, deviation / factor):
@@ -184,7 +182,7 @@ class AllanDisplay(DisplayInUnit):
         if instability is not None:
             place = np.argmin(deviation)
             self.ax_.annotate(
-                f"B = {figures(factor * instability)} {SYMBOL[self.unit_]}",
+                f"B = {figures(factor * instability)} {self._symbol}",
                 (time[place], deviation[place]),
                 xytext=(0, -14),
                 textcoords="offset points",

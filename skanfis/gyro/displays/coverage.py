@@ -8,6 +8,7 @@ import pandas as pd
 
 from ...inspection.labels import as_label
 from .._ask import ask
+from .._columns import evenly_chosen
 from ._base import binned, cells_table
 from ._style import NO_DATA, dress, make_axes
 
@@ -140,7 +141,7 @@ class CoverageDisplay:
         grid = X.median().to_frame().T.assign(**others)
         grid = grid.loc[grid.index.repeat(n_points**2)].reset_index(drop=True)
         grid[x], grid[y] = (values.ravel() for values in np.meshgrid(*axes))
-        some = np.unique(np.linspace(0, len(X) - 1, min(len(X), _N_POINTS)).astype(int))
+        some = evenly_chosen(len(X), _N_POINTS)
         bins = [binned(X[name].to_numpy(dtype=float), n_cells) for name in (x, y)]
         (x_edges, columns), (y_edges, lines) = bins
         counts = np.bincount(lines * n_cells + columns, minlength=n_cells**2)

@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from .._columns import evenly_chosen
 from ._base import DisplayInUnit, binned, check_rows
-from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes
+from ._style import AFTER, BEFORE, dress, figures, make_axes
 
 __all__ = ["ErrorDisplay"]
 
@@ -123,7 +124,7 @@ class ErrorDisplay(DisplayInUnit):
         )
         errors = before - rate, after - rate
         edges, bins = binned(position, _N_BINS)
-        some = np.unique(np.linspace(0, rate.size - 1, min(rate.size, _N_POINTS)).astype(int))
+        some = evenly_chosen(rate.size, _N_POINTS)
         display = cls(
             position=position[some],
             before=errors[0][some],
@@ -137,7 +138,7 @@ class ErrorDisplay(DisplayInUnit):
         return display.plot(ax=ax, unit=unit)
 
     def _draw(self, ax):
-        factor, symbol = PER_UNIT[self.unit_], SYMBOL[self.unit_]
+        factor, symbol = self._factor, self._symbol
         self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.4), nrows=2, sharex=True)
         panels = (
             ("before", self.before, self.range_before, BEFORE),
@@ -172,7 +173,7 @@ class ErrorDisplay(DisplayInUnit):
         tables : dict of str to DataFrame
             "points", and "bands", from the smallest to the largest error in each bin.
         """
-        factor = PER_UNIT[self.unit_]
+        factor = self._factor
         points = pd.DataFrame(
             {
                 self.position_label: self.position,

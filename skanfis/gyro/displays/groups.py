@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 
 from ...inspection.labels import as_label
 from ._base import DisplayInUnit, check_rows, mean_by_cell
-from ._style import AFTER, BEFORE, PER_UNIT, SYMBOL, dress, figures, make_axes, mark_decades
+from ._style import AFTER, BEFORE, dress, figures, make_axes, mark_decades
 
-__all__ = ["GroupResidualDisplay"]
+__all__ = ["MOST_LINES", "GroupResidualDisplay"]
 
 # The worst groups: more lines cannot be read.
-_MOST_LINES = 30
+MOST_LINES = 30
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -107,8 +107,8 @@ class GroupResidualDisplay(DisplayInUnit):
         return display.plot(ax=ax, unit=unit)
 
     def _draw(self, ax):
-        factor = PER_UNIT[self.unit_]
-        shown = slice(-_MOST_LINES, None)
+        factor = self._factor
+        shown = slice(-MOST_LINES, None)
         groups = self.groups[shown]
         before, after = factor * self.before[shown], factor * self.after[shown]
         height = 1.4 + 0.2 * len(groups)
@@ -130,7 +130,7 @@ class GroupResidualDisplay(DisplayInUnit):
         worst = figures(np.nanmax(after))
         dress(
             self.ax_,
-            f"RMS error [{SYMBOL[self.unit_]}]",
+            f"RMS error [{self._symbol}]",
             "held-out group",
             f"{extent} groups: after, {figures(np.nanmedian(factor * self.after))} in the median, "
             f"{worst} in the worst",
@@ -145,7 +145,7 @@ class GroupResidualDisplay(DisplayInUnit):
         tables : dict of str to DataFrame
             "groups", the smallest error after compensation first.
         """
-        factor = PER_UNIT[self.unit_]
+        factor = self._factor
         columns = {
             "group": self.groups,
             f"RMS error before [{self.unit_}]": factor * self.before,

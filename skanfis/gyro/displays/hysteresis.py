@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from .._rate_units import PER_HOUR
 from ._base import DisplayInUnit, binned, check_rows, mean_by_cell
-from ._style import COOLING, PER_UNIT, SYMBOL, WARMING, dress, figures, make_axes
+from ._style import COOLING, WARMING, dress, figures, make_axes
 
 __all__ = ["HysteresisDisplay"]
 
@@ -17,7 +18,6 @@ _N_BINS = 25
 _FEWEST_ROWS = 3  # of a bin, below which its mean is not drawn
 # Odd ones: what an error of the scale factor adds changes its sign with the rate.
 _POWERS = (1, 3, 5, 7)
-_PER_HOUR = 3600.0
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -126,7 +126,7 @@ class HysteresisDisplay(DisplayInUnit):
         moving = np.abs(temperature_rate) >= least_rate_of_change
         cells = bins + _N_BINS * (temperature_rate < 0)
         branches = [
-            _PER_HOUR * _bias_by_cell(indicated - rate, rate, temperature, cells, moving)
+            PER_HOUR * _bias_by_cell(indicated - rate, rate, temperature, cells, moving)
             for indicated in (before, after)
         ]
         display = cls(
@@ -145,7 +145,7 @@ class HysteresisDisplay(DisplayInUnit):
         return _gap(self.after)
 
     def _draw(self, ax):
-        factor = PER_UNIT[self.unit_] / _PER_HOUR
+        factor = self._factor
         self.figure_, self.axes_ = make_axes(ax, 2, (6.2, 4.6), nrows=2, sharex=True)
         panels = zip(
             self.axes_,
@@ -163,8 +163,8 @@ class HysteresisDisplay(DisplayInUnit):
             axes.plot(self.temperature, cooling, "v-", color=COOLING, label="cooling", ms=4)
             what = "branches never meet"
             if both.any():
-                what = f"largest gap {figures(gap)} {SYMBOL[self.unit_]}"
-            dress(axes, ylabel=f"bias [{SYMBOL[self.unit_]}]", title=f"{name}: {what}")
+                what = f"largest gap {figures(gap)} {self._symbol}"
+            dress(axes, ylabel=f"bias [{self._symbol}]", title=f"{name}: {what}")
         self.axes_[1].set_xlabel("temperature [°C]")
         self.axes_[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
@@ -176,7 +176,7 @@ class HysteresisDisplay(DisplayInUnit):
         tables : dict of str to DataFrame
             "bias", by temperature.
         """
-        factor = PER_UNIT[self.unit_] / _PER_HOUR
+        factor = self._factor
         columns = {"temperature [degC]": self.temperature}
         for name, branches in (("before", self.before), ("after", self.after)):
             for branch, values in zip(("warming", "cooling"), branches, strict=True):

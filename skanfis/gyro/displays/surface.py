@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 from ._base import DisplayInUnit, binned, cells_table, check_rows, mean_by_cell
 from ._style import (
     NO_DATA,
-    PER_UNIT,
-    SYMBOL,
     dress,
     figures,
     make_axes,
@@ -130,12 +128,12 @@ class ResidualSurfaceDisplay(DisplayInUnit):
     def _draw(self, ax):
         from matplotlib.colors import LogNorm
 
-        residual = PER_UNIT[self.unit_] * self.residual
+        residual = self._factor * self.residual
         self.figure_, self.axes_ = make_axes(ax, 2, (7.0, 3.3), ncols=2, sharey=True)
         limit = symmetric_limit(residual)
         mesh = self._draw_cells(0, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
         bar = self.figure_.colorbar(mesh, ax=self.axes_[0], extend="both")
-        bar.set_label(f"mean error after [{SYMBOL[self.unit_]}]")
+        bar.set_label(f"mean error after [{self._symbol}]")
         counts = np.where(self.counts > 0, self.counts, np.nan)
         # A scale needs two ends, even where all cells have as many rows.
         norm = LogNorm(vmin=1, vmax=max(self.counts.max(), 2))
@@ -148,7 +146,7 @@ class ResidualSurfaceDisplay(DisplayInUnit):
             self.axes_[0],
             "temperature [°C]",
             "true rate [°/s]",
-            f"residual: largest {figures(largest)} {SYMBOL[self.unit_]}",
+            f"residual: largest {figures(largest)} {self._symbol}",
         )
         empty = np.mean(self.counts == 0)
         dress(self.axes_[1], "temperature [°C]", title=f"data: {empty:.0%} of the cells empty")
@@ -164,7 +162,7 @@ class ResidualSurfaceDisplay(DisplayInUnit):
         edges = {"temperature [degC]": self.temperature_edges, "true rate [deg/s]": self.rate_edges}
         values = {
             "rows": self.counts,
-            f"mean error after [{self.unit_}]": PER_UNIT[self.unit_] * self.residual,
+            f"mean error after [{self.unit_}]": self._factor * self.residual,
         }
         return {"cells": cells_table(edges, values)}
 

@@ -16,6 +16,7 @@ The figures over runs are made in two steps, one value (or two) per run and then
 bootstrap over runs repeats the second only.
 """
 
+from ._lines import rms
 from ._runs import rows_by_run
 from .bias import (
     bias,
@@ -55,6 +56,7 @@ __all__ = [
     "residual_peak",
     "residual_peak_to_peak",
     "residual_rms",
+    "rms",
     "rows_by_run",
     "scale_factor",
     "scale_factor_asymmetry",

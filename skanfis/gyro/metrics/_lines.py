@@ -40,5 +40,5 @@ def centred(values, name, n_rows) -> np.ndarray:
     return values - (values[0] if np.ptp(values) == 0 else values.mean())
 
 
-def rms(values):
-    return np.sqrt(np.mean(values**2))
+def rms(values) -> float:
+    return float(np.sqrt(np.mean(values**2)))

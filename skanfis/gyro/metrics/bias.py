@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._columns import check_column
+from .._rate_units import PER_HOUR
 from ._lines import centred, least_squares, line, rate_and_output
 from ._runs import rows_by_run
 
@@ -17,8 +18,6 @@ __all__ = [
     "input_error",
     "spread_of_bias",
 ]
-
-_SECONDS_PER_HOUR = 3600.0  # 1 deg/s is 3600 deg/h
 
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
 _HYSTERESIS_BINS = 20
@@ -84,7 +83,7 @@ def bias(error: ArrayLike) -> float:
     >>> bias([0.001, 0.003])
     7.2
     """
-    return float(_SECONDS_PER_HOUR * np.mean(check_column(error, "error")))
+    return float(PER_HOUR * np.mean(check_column(error, "error")))
 
 
 def bias_repeatability(error: ArrayLike, run: ArrayLike) -> float:
@@ -236,7 +235,7 @@ def hysteresis(error: ArrayLike, temperature: ArrayLike, temperature_rate: Array
             "No hysteresis: warming and cooling share no temperature at which both have "
             f"{_ROWS_PER_MEAN} rows."
         )
-    return float(_SECONDS_PER_HOUR * np.nanmax(gaps))
+    return float(PER_HOUR * np.nanmax(gaps))
 
 
 def error_by_run(error, run):
@@ -247,7 +246,7 @@ def error_by_run(error, run):
 
 def spread_of_bias(means):
     """Standard deviation of mean errors [deg/h]."""
-    return float(_SECONDS_PER_HOUR * np.std(means, ddof=1))
+    return float(PER_HOUR * np.std(means, ddof=1))
 
 
 def _bias_slopes(error, first, second, name="temperature"):
@@ -259,7 +258,7 @@ def _bias_slopes(error, first, second, name="temperature"):
         design.insert(1, centred(second, "temperature_rate", error.size))
         without = "temperature and temperature_rate do not change independently of each other"
     slopes = least_squares(design, error, without)
-    return [float(_SECONDS_PER_HOUR * slope) for slope in slopes[:-1]]
+    return [float(PER_HOUR * slope) for slope in slopes[:-1]]
 
 
 def _means_by_bin(values, temperature, edges):

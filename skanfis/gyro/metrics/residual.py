@@ -33,7 +33,7 @@ def residual_rms(error: ArrayLike) -> float:
     >>> residual_rms([0.3, -0.4])
     0.35355
     """
-    return float(rms(check_column(error, "error")))
+    return rms(check_column(error, "error"))
 
 
 def residual_peak(error: ArrayLike) -> float:

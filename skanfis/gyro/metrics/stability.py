@@ -4,11 +4,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._columns import check_column
+from .._rate_units import PER_HOUR
 from ._runs import rows_by_run
 
 __all__ = ["bias_stability", "pooled_deviation", "squares_by_run"]
-
-_SECONDS_PER_HOUR = 3600.0
 
 
 def bias_stability(
@@ -74,7 +73,7 @@ def pooled_deviation(squares):
     sum_of_squares, degrees_of_freedom = np.sum(squares, axis=0)
     if degrees_of_freedom == 0:
         raise ValueError("No bias stability: no run is as long as two averaging times.")
-    return float(_SECONDS_PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
+    return float(PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
 
 
 def _means(error, time, averaging_time):
