@@ -29,7 +29,7 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
-from .naming import default_term_names
+from .naming import default_output_names, default_term_names
 from .policies import MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
@@ -103,8 +103,7 @@ class TSKModel:
         if not self.term_names:
             object.__setattr__(self, "term_names", default_term_names(self.antecedent))
         if not self.output_names:
-            names = ("y",) if self.n_outputs == 1 else tuple(f"y{k}" for k in range(self.n_outputs))
-            object.__setattr__(self, "output_names", names)
+            object.__setattr__(self, "output_names", default_output_names(self.n_outputs))
 
     def __repr__(self):
         inputs, outputs = ", ".join(self.input_names), ", ".join(self.output_names)
@@ -148,10 +147,7 @@ class TSKModel:
     def memberships(self, trained=True) -> list[dict]:
         """Memberships in the user's units, after training or before it.
 
-        Returns
-        -------
-        list of dict
-            One per term, with keys "input" (its name), "name", "function" and one per parameter.
+        One dict per term, with keys "input" (its name), "name", "function" and one per parameter.
         """
         antecedent = self.antecedent if trained else self.initial_antecedent
         terms: list[dict] = []
@@ -171,7 +167,7 @@ class TSKModel:
 
     def strengths(self, X) -> np.ndarray:
         """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
-        return self._by_block(X, self._strengths, self.n_rules)
+        return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
 
     def predict(self, X, inside=None) -> np.ndarray:
         """Outputs, shape (n_rows, n_outputs), by the policy for rows out of bounds.
@@ -181,10 +177,11 @@ class TSKModel:
         inside = self.in_bounds(X) if inside is None else inside
         if inside.all():
             return self._by_block(X, self._outputs, self.n_outputs)
-        self._refuse(X, inside)
+        if self.out_of_bounds == "raise":
+            raise ValueError(self.describe_out_of_bounds(X))
         if self.out_of_bounds == "linear" and self.max_extrapolation > 0.0:
             return self._by_block(X, self._outputs_linear, self.n_outputs, self._n_slopes)
-        outputs = self._by_block(X, self._outputs_clipped, self.n_outputs)
+        outputs = self._by_block(X, lambda Z: self._outputs(self._clip(Z)), self.n_outputs)
         if self.out_of_bounds == "nan":
             outputs[~inside] = np.nan
         return outputs
@@ -228,7 +225,8 @@ class TSKModel:
         if inside.all():
             found = self._by_block(X, within, 2 * n_outputs)
             return found[:, :n_outputs], found[:, n_outputs:]
-        self._refuse(X, inside)
+        if self.out_of_bounds == "raise":
+            raise ValueError(self.describe_out_of_bounds(X))
         found = np.full((X.shape[0], 2 * n_outputs), np.nan)
         if inside.any():
             found[inside] = self._by_block(X[inside], within, 2 * n_outputs)
@@ -244,7 +242,7 @@ class TSKModel:
         n_values = self.n_inputs * self.n_outputs
 
         def of_block(Z):
-            return self._values_and_gradient(self._clip(Z))[1].reshape(n_values, -1)
+            return self._linearised(self._clip(Z))[1].reshape(n_values, -1)
 
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
@@ -277,11 +275,6 @@ class TSKModel:
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
         return self._by_block(X, of_block, 1, n_distances)[:, 0]
-
-    def _refuse(self, X, inside):
-        """Raise ValueError where the policy says so for rows out of bounds."""
-        if self.out_of_bounds == "raise" and not inside.all():
-            raise ValueError(self.describe_out_of_bounds(X))
 
     def _why_no_posterior(self):
         n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
@@ -364,28 +357,22 @@ class TSKModel:
         """The limits as columns; for a single row they are a sixth of what the rest takes."""
         return self.output_limits[:, :, None]
 
-    def _strengths(self, Z):
-        return self.antecedent.strengths(self._clip(Z))
-
     def _outputs(self, Z):
-        return self._hold(self._combine(self.antecedent.strengths(Z), Z))
-
-    def _outputs_clipped(self, Z):
-        return self._outputs(self._clip(Z))
+        strengths, basis_rows = self.antecedent.strengths(Z), self._basis(Z)
+        by_rule = self.coefficients.transpose(2, 0, 1)
+        outputs = [rule_outputs(one, strengths, basis_rows)[1] for one in by_rule]
+        return self._hold(np.stack(outputs))
 
     def _outputs_linear(self, Z):
         """Value and slope of the nearest point in the box."""
         inside = self._clip(Z)
-        values, gradient = self._values_and_gradient(inside)
-        return self._hold(values + np.einsum("ji,joi->oi", self._held(Z - inside), gradient))
-
-    def _values_and_gradient(self, Z):
-        """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows)."""
-        return self._linearised(Z)[:2]
+        values, slopes, _ = self._linearised(inside)
+        return self._hold(values + np.einsum("ji,joi->oi", self._held(Z - inside), slopes))
 
     def _linearised(self, Z):
-        """The same, and what they are made of: strengths, shares, basis and derivatives by terms.
+        """y (n_outputs, n_rows), dy/dx (n_inputs, n_outputs, n_rows), and what they are made of.
 
+        These are strengths, shares, basis and derivatives by terms.
         Memberships depend on x and their location through the difference alone: the derivative of
         log mu by x is minus that by the location.
         """
@@ -411,8 +398,3 @@ class TSKModel:
         if self.order == 1:
             np.subtract(Z, self.reference[:, None], out=basis_rows[1:])
         return basis_rows
-
-    def _combine(self, strengths, Z):
-        basis_rows = self._basis(Z)
-        by_rule = self.coefficients.transpose(2, 0, 1)
-        return np.stack([rule_outputs(one, strengths, basis_rows)[1] for one in by_rule])

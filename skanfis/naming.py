@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-__all__ = ["LINGUISTIC", "default_term_names", "given_term_names"]
+__all__ = ["LINGUISTIC", "default_output_names", "default_term_names", "given_term_names"]
 
 # Six as in the founding paper, negative large to positive large; seven with zero between them.
 LINGUISTIC = {
@@ -36,6 +36,11 @@ def default_term_names(antecedent):
         else:
             names[own] = _near(places[own])
     return tuple(names)
+
+
+def default_output_names(n_outputs):
+    """The name "y", or "y0", "y1", ... of several outputs."""
+    return ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
 
 
 def given_term_names(antecedent, input_names, term_names):

@@ -1,20 +1,28 @@
-"""What the parameters of an estimator ask for, in the words of structure and training.
+"""What the parameters of an estimator may be, and ask for in the words of structure and training.
 
 Names of columns, families and solvers are resolved here, and parameters that contradict one another
-refused; what each may be by itself, scikit-learn checks before.
+refused; each by itself is checked by scikit-learn before.
 """
 
+from numbers import Integral, Real
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 
+from ._sklearn import HasMethods, Hidden, Interval, StrOptions
 from ._validation import feature_indices
-from .membership import TRIED_FAMILIES, membership_families
+from .constraints import FixedPoint, OutputLimits
+from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, TRIED_FAMILIES, membership_families
 from .model import TSKModel
 from .options import EarlyStopping, Huber, LinearExtrapolation
+from .policies import OUT_OF_BOUNDS
 from .solvers import SOLVERS, Solver, VariableProjection
 from .structure import StructureRequest, check_inputs
 
 __all__ = [
-    "check_settings",
+    "SettingsMixin",
     "found_weights",
     "given_weights",
     "solver_of",
@@ -31,22 +39,75 @@ _OBJECTS: dict[str, type] = {
 }
 
 
-def check_settings(estimator, parameters):
-    """Raise ValueError where a setting is given to a word: solver__tol where solver is "varpro"."""
-    for key in parameters:
-        name, _, setting = key.partition("__")
-        if not setting or name not in _OBJECTS:
-            continue
-        given = parameters.get(name, getattr(estimator, name))
-        if isinstance(given, str | bool):
-            of_word = _OBJECTS[name]
-            if name == "solver":
-                of_word = SOLVERS.get(str(given), of_word)
-            raise ValueError(
-                f"{key} is a setting of an object, but {name}={given!r} is a word for its "
-                f"defaults: give {name}={of_word.__name__}(), of "
-                f"skanfis.{'solvers' if name == 'solver' else 'options'}, in its place."
-            )
+class SettingsMixin(BaseEstimator):
+    """What each parameter may be; settings of the objects among them, such as ``solver__tol``."""
+
+    _parameter_constraints: ClassVar[dict] = {
+        "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
+        "partition": [
+            StrOptions({"auto", "grid", "subtractive", "fcm"}),
+            HasMethods(["fit", "fit_predict"]),
+            HasMethods(["predict", "strengths"]),
+        ],
+        "mf": [
+            StrOptions({"auto", *MEMBERSHIPS}),
+            # Refused with the name that they have here.
+            Hidden(StrOptions(set(NAMES_IN_MATLAB))),
+            type,
+            list,
+            tuple,
+            np.ndarray,
+        ],
+        "premise_features": ["array-like", str, Integral, None],
+        "consequent_features": ["array-like", str, Integral, None],
+        "order": [Interval(Integral, 0, 1, closed="both")],
+        "monotonic_cst": ["array-like", dict, None],
+        "constraints": [list, tuple, OutputLimits, FixedPoint, None],
+        "loss": [StrOptions({"squared_error", "huber"}), Huber],
+        "solver": [StrOptions(set(SOLVERS)), Solver],
+        "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+        "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+        "max_iter": [Interval(Integral, 0, None, closed="left")],
+        "early_stopping": ["boolean", EarlyStopping],
+        "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
+        "verbose": ["verbose"],
+        "random_state": ["random_state"],
+        "n_jobs": [Integral, None],
+    }
+
+    def set_params(self, **params: Any) -> Self:
+        """Set parameters, and settings of objects among them, such as ``solver__tol``.
+
+        Parameters
+        ----------
+        **params : dict
+            By name; ``solver__tol`` is the setting ``tol`` of the object given as ``solver``.
+
+        Returns
+        -------
+        self : ANFISRegressor
+
+        Raises
+        ------
+        ValueError
+            If there is no such parameter, or a setting is given where there is a word and no
+            object, such as ``solver__tol`` with ``solver="varpro"``.
+        """
+        for key in params:
+            name, _, setting = key.partition("__")
+            if not setting or name not in _OBJECTS:
+                continue
+            given = params.get(name, getattr(self, name))
+            if isinstance(given, str | bool):
+                of_word = _OBJECTS[name]
+                if name == "solver":
+                    of_word = SOLVERS.get(str(given), of_word)
+                raise ValueError(
+                    f"{key} is a setting of an object, but {name}={given!r} is a word for its "
+                    f"defaults: give {name}={of_word.__name__}(), of "
+                    f"skanfis.{'solvers' if name == 'solver' else 'options'}, in its place."
+                )
+        return super().set_params(**params)
 
 
 def structure_request(estimator, names):

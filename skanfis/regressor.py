@@ -1,8 +1,7 @@
 """ANFISRegressor: the estimator."""
 
 from collections.abc import Sequence
-from numbers import Integral, Real
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,30 +9,16 @@ from sklearn.base import BaseEstimator, RegressorMixin
 
 from ._memory import keeps_freed_memory
 from ._notebook import RulesReprMixin
-from ._sklearn import (
-    CallbackSupportMixin,
-    HasMethods,
-    Hidden,
-    Interval,
-    StrOptions,
-    check_parameters,
-    fit_context,
-)
+from ._sklearn import CallbackSupportMixin, check_parameters, fit_context
 from ._threads import one_blas_thread
-from .constraints import FixedPoint, OutputLimits
 from .fitted_rules import TellsOfRulesMixin
-from .membership import (
-    MEMBERSHIPS,
-    NAMES_IN_MATLAB,
-    Membership,
-)
+from .membership import Membership
 from .options import EarlyStopping, Huber, LinearExtrapolation
-from .parameters import check_settings, structure_request
-from .policies import OUT_OF_BOUNDS
+from .parameters import SettingsMixin, structure_request
 from .prediction import PredictsMixin
 from .readable import readability_of_rows
 from .row_checks import ChecksRowsMixin
-from .solvers import SOLVERS, Solver
+from .solvers import Solver
 from .streaming.learning import LearnsFromChunksMixin
 from .training import Callbacks, fit_rules
 
@@ -45,6 +30,7 @@ class ANFISRegressor(
     LearnsFromChunksMixin,
     TellsOfRulesMixin,
     ChecksRowsMixin,
+    SettingsMixin,
     RulesReprMixin,
     CallbackSupportMixin,
     RegressorMixin,
@@ -277,39 +263,6 @@ class ANFISRegressor(
     True
     """
 
-    _parameter_constraints: ClassVar[dict] = {
-        "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
-        "partition": [
-            StrOptions({"auto", "grid", "subtractive", "fcm"}),
-            HasMethods(["fit", "fit_predict"]),
-            HasMethods(["predict", "strengths"]),
-        ],
-        "mf": [
-            StrOptions({"auto", *MEMBERSHIPS}),
-            # Refused with the name that they have here.
-            Hidden(StrOptions(set(NAMES_IN_MATLAB))),
-            type,
-            list,
-            tuple,
-            np.ndarray,
-        ],
-        "premise_features": ["array-like", str, Integral, None],
-        "consequent_features": ["array-like", str, Integral, None],
-        "order": [Interval(Integral, 0, 1, closed="both")],
-        "monotonic_cst": ["array-like", dict, None],
-        "constraints": [list, tuple, OutputLimits, FixedPoint, None],
-        "loss": [StrOptions({"squared_error", "huber"}), Huber],
-        "solver": [StrOptions(set(SOLVERS)), Solver],
-        "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-        "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
-        "max_iter": [Interval(Integral, 0, None, closed="left")],
-        "early_stopping": ["boolean", EarlyStopping],
-        "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
-        "verbose": ["verbose"],
-        "random_state": ["random_state"],
-        "n_jobs": [Integral, None],
-    }
-
     def __init__(
         self,
         n_mfs: str | int | ArrayLike = "auto",
@@ -355,27 +308,6 @@ class ANFISRegressor(
         tags = super().__sklearn_tags__()
         tags.target_tags.multi_output = True
         return tags
-
-    def set_params(self, **params: Any) -> Self:
-        """Set parameters, and settings of objects among them, such as ``solver__tol``.
-
-        Parameters
-        ----------
-        **params : dict
-            By name; ``solver__tol`` is the setting ``tol`` of the object given as ``solver``.
-
-        Returns
-        -------
-        self : ANFISRegressor
-
-        Raises
-        ------
-        ValueError
-            If there is no such parameter, or a setting is given where there is a word and no
-            object, such as ``solver__tol`` with ``solver="varpro"``.
-        """
-        check_settings(self, params)
-        return super().set_params(**params)
 
     @fit_context(prefer_skip_nested_validation=False)
     def fit(

@@ -21,6 +21,7 @@ from ._validation import (
 )
 from .constraints.wishes import Wishes
 from .model import TSKModel
+from .naming import default_output_names
 from .training import ValidatedData
 
 __all__ = ["ChecksRowsMixin"]
@@ -55,8 +56,7 @@ class ChecksRowsMixin:
         self._single_output = y.ndim == 1
         targets = y.reshape(-1, 1) if y.ndim == 1 else y
         if output_names is None or len(output_names) != targets.shape[1]:
-            n_outputs = targets.shape[1]
-            output_names = ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
+            output_names = default_output_names(targets.shape[1])
         check_finite(X, "X", self._input_names())
         check_finite(targets, "y", output_names)
         groups = None if groups is None else group_numbers(groups)

@@ -67,7 +67,7 @@ TABLE = {
         LEARNING,
     ),
     "parameters": (
-        [*KERNEL, "_validation", "options", "solvers", "structure"],
+        [*KERNEL, "_sklearn", "_validation", "constraints", "options", "solvers", "structure"],
         [*NUMERIC, "sklearn"],
     ),
     "streaming": (

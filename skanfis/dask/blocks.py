@@ -7,6 +7,7 @@ import numpy as np
 
 from .._validation import check_finite, positive_weights
 from ..data import Scale, StandardisedData, column_statistics
+from ..naming import default_output_names
 from .fusing import Unread, fused
 
 __all__ = ["Blocks", "Layout", "Loaded", "describe", "is_collection", "joined_scales"]
@@ -40,7 +41,7 @@ class Layout:
         """Names of the outputs, "y" or "y0", "y1", ... where they have none."""
         if names := _strings(self.given_output_names):
             return names
-        return ("y",) if self.n_outputs == 1 else tuple(f"y{k}" for k in range(self.n_outputs))
+        return default_output_names(self.n_outputs)
 
 
 def _strings(names):

@@ -1,6 +1,5 @@
 """A seeded simulator of thermal runs of open-loop fiber-optic gyros on a rate table."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,10 +7,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
-from ._ofog_chamber import PROFILES, Schedule, thermal_history
+from ._ofog_chamber import thermal_history
+from ._ofog_conditions import given_conditions, rate_table_of, schedule_of
 from ._ofog_population import (
-    RATE_ORDERS,
-    RateTable,
     check_phase,
     draw_devices,
     draw_runs,
@@ -23,9 +21,6 @@ from ._ofog_run import simulate_power_up
 from ._validation import check_choice, check_count, check_real
 
 __all__ = ["make_ofog"]
-
-# Outside, neither the polynomials in temperature nor any chamber for gyros would hold.
-_COLDEST, _HOTTEST = -60.0, 100.0  # degC
 
 
 def make_ofog(
@@ -279,18 +274,18 @@ def make_ofog(
     max_residual_heat = check_real(max_residual_heat, "max_residual_heat", min_val=0, max_val=1)
     noise = check_real(noise, "noise", min_val=0)
     device_spread = check_real(device_spread, "device_spread", min_val=0, max_val=1)
-    given = {
-        "duration": duration,
-        "sampling_interval": sampling_interval,
-        "max_rate": max_rate,
-        "n_rate_levels": n_rate_levels,
-        "rates": rates,
-        "dwell_time": dwell_time,
-        "ambient_range": ambient_range,
-    }
-    conditions = _conditions(PRESETS[preset].conditions, given)
-    schedule = _schedule(conditions, profile, n_power_ups, off_time, n_soaks)
-    table = _rate_table(conditions, rate_order)
+    conditions = given_conditions(
+        PRESETS[preset].conditions,
+        duration=duration,
+        sampling_interval=sampling_interval,
+        max_rate=max_rate,
+        n_rate_levels=n_rate_levels,
+        rates=rates,
+        dwell_time=dwell_time,
+        ambient_range=ambient_range,
+    )
+    schedule = schedule_of(conditions, profile, n_power_ups, off_time, n_soaks)
+    table = rate_table_of(conditions, rate_order)
     check_phase(
         nominal,
         device_spread,
@@ -332,79 +327,7 @@ def _power_ups(number, run, schedule, table, random_state):
             normals,
             schedule.sampling_interval,
         )
-        labels = {
-            "run": number,
-            "power_up": number * schedule.n_power_ups + place,
-            "device": run.device_id,
-        }
+        power_up = number * schedule.n_power_ups + place
+        labels = {"run": number, "power_up": power_up, "device": run.device_id}
         columns = measurement | {name: np.full(rate.size, label) for name, label in labels.items()}
         yield columns | parts
-
-
-def _conditions(usual, given):
-    """The usual conditions but for what the caller gave; None is not given."""
-    given = {name: value for name, value in given.items() if value is not None}
-    levels = {"max_rate", "n_rate_levels"} & set(given)
-    if levels and "rates" in given:
-        raise ValueError(f"rates is given together with {sorted(levels)}; it takes their place.")
-    if levels:
-        given["rates"] = None
-    return replace(usual, **given)
-
-
-def _schedule(conditions, profile, n_power_ups, off_time, n_soaks):
-    """The clock and the chamber's program, checked."""
-    interval = check_real(
-        conditions.sampling_interval, "sampling_interval", min_val=0, include_boundaries="neither"
-    )
-    duration = check_real(conditions.duration, "duration", min_val=interval)
-    return Schedule(
-        # 0.3 / 0.1 is 2.9999999999999996, and three samples are meant.
-        n_samples=int(duration / interval * (1.0 + 1e-12)),
-        sampling_interval=interval,
-        n_power_ups=n_power_ups,
-        n_off=round(check_real(off_time, "off_time", min_val=0) / interval),
-        profile=check_choice(profile, "profile", PROFILES),
-        ambient_range=_check_ambient_range(conditions.ambient_range),
-        n_soaks=check_count(n_soaks, "n_soaks", min_val=2),
-    )
-
-
-def _check_ambient_range(ambient_range):
-    try:
-        low, high = ambient_range
-    except (TypeError, ValueError) as error:
-        message = f"ambient_range must be two temperatures; got {ambient_range!r}."
-        raise ValueError(message) from error
-    low = check_real(low, "ambient_range[0]", min_val=_COLDEST, max_val=_HOTTEST)
-    high = check_real(high, "ambient_range[1]", min_val=low, max_val=_HOTTEST)
-    return low, high
-
-
-def _rate_table(conditions, order):
-    """The rates of the table, checked."""
-    interval = conditions.sampling_interval
-    dwell_time = check_real(conditions.dwell_time, "dwell_time", min_val=interval)
-    check_choice(order, "rate_order", RATE_ORDERS)
-    if conditions.rates is None:
-        levels, largest = _equally_spaced(conditions.max_rate, conditions.n_rate_levels)
-    else:
-        levels = _check_rates(conditions.rates)
-        largest = float(np.abs(levels).max())
-    return RateTable(levels, largest, round(dwell_time / interval), order)
-
-
-def _equally_spaced(max_rate, n_rate_levels):
-    """Levels of the table, None where there are none, and the largest rate."""
-    max_rate = check_real(max_rate, "max_rate", min_val=0, include_boundaries="neither")
-    if n_rate_levels is None:
-        return None, max_rate
-    n_rate_levels = check_count(n_rate_levels, "n_rate_levels", min_val=2)
-    return np.linspace(-max_rate, max_rate, n_rate_levels), max_rate
-
-
-def _check_rates(rates):
-    levels = np.unique(np.asarray(rates, dtype=float))
-    if np.ndim(rates) != 1 or levels.size == 0 or not np.all(np.isfinite(levels)):
-        raise ValueError(f"rates must be a list of finite rates in deg/s; got {rates!r}.")
-    return levels
