@@ -1,5 +1,7 @@
 """Arithmetic that writes an ONNX graph: every operation on a :class:`Value` becomes a node."""
 
+from functools import partialmethod
+
 import numpy as np
 
 __all__ = ["Graph", "Value"]
@@ -51,57 +53,24 @@ class Value:
     def _node(self, operation, *others, **attributes):
         return self.graph.node(operation, self, *others, **attributes)
 
-    def __add__(self, other):
-        return self._node("Add", other)
-
-    def __sub__(self, other):
-        return self._node("Sub", other)
-
-    def __mul__(self, other):
-        return self._node("Mul", other)
-
-    def __truediv__(self, other):
-        return self._node("Div", other)
-
-    def __matmul__(self, other):
-        return self._node("MatMul", other)
-
-    def __neg__(self):
-        return self._node("Neg")
-
-    def __lt__(self, other):
-        return self._node("Less", other)
-
-    def __gt__(self, other):
-        return self._node("Greater", other)
-
-    def exp(self):
-        """Its exponential."""
-        return self._node("Exp")
-
-    def log(self):
-        """Its logarithm."""
-        return self._node("Log")
-
-    def sigmoid(self):
-        """1 / (1 + exp(-self))."""
-        return self._node("Sigmoid")
-
-    def abs(self):
-        """Its absolute value."""
-        return self._node("Abs")
-
-    def at_most(self, other):
-        """The smaller of the two."""
-        return self._node("Min", other)
-
-    def at_least(self, other):
-        """The larger of the two."""
-        return self._node("Max", other)
-
-    def where(self, if_true, if_false):
-        """Of a comparison: one value where it holds, another where not."""
-        return self._node("Where", if_true, if_false)
+    __add__ = partialmethod(_node, "Add")
+    __sub__ = partialmethod(_node, "Sub")
+    __mul__ = partialmethod(_node, "Mul")
+    __truediv__ = partialmethod(_node, "Div")
+    __matmul__ = partialmethod(_node, "MatMul")
+    __neg__ = partialmethod(_node, "Neg")
+    __lt__ = partialmethod(_node, "Less")
+    __gt__ = partialmethod(_node, "Greater")
+    exp = partialmethod(_node, "Exp")
+    log = partialmethod(_node, "Log")
+    abs = partialmethod(_node, "Abs")
+    # 1 / (1 + exp(-self)).
+    sigmoid = partialmethod(_node, "Sigmoid")
+    # The smaller of the two, and the larger.
+    at_most = partialmethod(_node, "Min")
+    at_least = partialmethod(_node, "Max")
+    # Of a comparison: one value where it holds, another where not.
+    where = partialmethod(_node, "Where")
 
     def softmax(self):
         """Normalised exponentials along the columns."""

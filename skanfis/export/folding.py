@@ -215,6 +215,7 @@ def _values(column, X):
 def _with_raw_inputs(model, columns, order, names):
     """The model with its inputs in raw units and in the order of their raw columns."""
     offset, scale = np.array([column.offset_and_scale() for column in columns]).T
+    support, posterior = model.support, model.posterior
     coefficients = model.coefficients.copy()
     if model.order:
         coefficients[:, 1:] = (coefficients[:, 1:] / scale[:, None])[:, order]
@@ -227,9 +228,9 @@ def _with_raw_inputs(model, columns, order, names):
         spread=(scale * model.spread)[order],
         minimum=_edges(columns, model.minimum, -1.0)[order],
         maximum=_edges(columns, model.maximum, 1.0)[order],
-        support=_with_raw_support(model.support, offset, scale, order),
+        support=support and support.change_units(offset, scale).reordered(order),
         input_names=tuple(map(str, names)),
-        posterior=_with_raw_posterior(model, scale, order),
+        posterior=posterior and posterior.change_units(model.antecedent, scale, order),
     )
     if model.term_names == default_term_names(model.antecedent):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
@@ -250,16 +251,6 @@ def _with_raw_terms(antecedent, offset, scale, order):
     return replace(moved, groups=groups)
 
 
-def _with_raw_support(support, offset, scale, order):
-    return None if support is None else support.change_units(offset, scale).reordered(order)
-
-
-def _with_raw_posterior(model, scale, order):
-    if model.posterior is None:
-        return None
-    return model.posterior.change_units(model.antecedent, scale, order)
-
-
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
     columns = columns_after(label, transformer, [Column(k) for k in range(model.n_outputs)])
@@ -272,6 +263,6 @@ def _with_raw_target(model, label, transformer):
     return replace(
         model,
         coefficients=coefficients,
-        target=None if target is None else target.change_units(offset, scale),
-        posterior=None if posterior is None else posterior.change_target_units(scale),
+        target=target and target.change_units(offset, scale),
+        posterior=posterior and posterior.change_target_units(scale),
     )

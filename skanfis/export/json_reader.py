@@ -136,14 +136,8 @@ def _inputs(inputs):
     for j, item in enumerate(inputs):
         where = f"inputs[{j}]"
         name, *numbers = _members(item, _INPUT, where)
-        low, high, reference, spread = (
-            number(value, f"{where}.{key}", SMALLEST_NUMBER if key == "spread" else -LARGEST_NUMBER)
-            for key, value in zip(_INPUT[1:], numbers, strict=True)
-        )
-        if low > high:
-            raise ValueError(f"{where}: minimum is above maximum.")
+        box.append(_range(numbers, _INPUT[1:], where))
         names.append(_text(name, where))
-        box.append([low, high, reference, spread])
     return tuple(names), np.array(box).T.copy()
 
 
@@ -156,16 +150,20 @@ def _outputs(outputs):
         names.append(_text(name, where))
         if all(value is None for value in numbers):
             continue
-        low, high, spread = (
-            number(value, f"{where}.{key}", SMALLEST_NUMBER if key == "spread" else -LARGEST_NUMBER)
-            for key, value in zip(OUTPUT[1:], numbers, strict=True)
-        )
-        if low > high:
-            raise ValueError(f"{where}: minimum is above maximum.")
-        known.append([low, high, spread])
+        known.append(_range(numbers, OUTPUT[1:], where))
     if known and len(known) < len(names):
         raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
     return tuple(names), TargetRange(*np.array(known).T.copy()) if known else None
+
+
+def _range(values, keys, where):
+    """Numbers that begin with minimum and maximum, and end with the spread."""
+    *numbers, spread = values
+    found = [number(value, f"{where}.{key}") for key, value in zip(keys[:-1], numbers, strict=True)]
+    found.append(number(spread, f"{where}.{keys[-1]}", SMALLEST_NUMBER))
+    if found[0] > found[1]:
+        raise ValueError(f"{where}: minimum is above maximum.")
+    return found
 
 
 def _read_terms(terms, n_inputs):
@@ -235,14 +233,9 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
             table[-1]
         ) != len(table[0]):
             raise ValueError(f"{where} has other numbers of terms or coefficients than rules[0].")
-    shape = (len(rules), len(table[0]))
+    terms = np.array(table, dtype=int).reshape(len(rules), len(table[0]))
     coefficients = np.array(consequents).transpose(0, 2, 1).copy()
-    return (
-        np.array(table, dtype=int).reshape(shape),
-        np.array(weights),
-        np.array(rows),
-        coefficients,
-    )
+    return terms, np.array(weights), np.array(rows), coefficients
 
 
 def _support(items, n_rules, n_inputs):

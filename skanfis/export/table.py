@@ -252,50 +252,29 @@ def _rule_lines(model, strengths, values, min_strength):
     told = np.take_along_axis(strengths, order, axis=1) >= min_strength
     row, place, output = np.nonzero(np.repeat(told[:, :, None], n_outputs, axis=2))
     rule = order[row, place]
-    fired = pd.DataFrame(
-        {
-            "row": row,
-            "output": output,
-            "rule": rule,
-            "if": premises[rule],
-            "strength": strengths[row, rule],
-            "value": values[row, rule, output],
-            "contribution": contributions[row, rule, output],
-            "place": place,
-        }
+    fired = _lines(
+        row,
+        output,
+        premises[rule],
+        contributions[row, rule, output],
+        place,
+        rule=rule,
+        strength=strengths[row, rule],
+        value=values[row, rule, output],
     )
     silent = strengths < min_strength
     row, output = np.nonzero(np.repeat(silent.any(axis=1)[:, None], n_outputs, axis=1))
-    others = pd.DataFrame(
-        {
-            "row": row,
-            "output": output,
-            "rule": np.nan,
-            "if": "other rules",
-            "strength": (strengths * silent).sum(axis=1)[row],
-            "value": np.nan,
-            "contribution": (contributions * silent[:, :, None]).sum(axis=1)[row, output],
-            "place": n_rules,
-        }
-    )
+    said = (contributions * silent[:, :, None]).sum(axis=1)[row, output]
+    strength = (strengths * silent).sum(axis=1)[row]
+    others = _lines(row, output, "other rules", said, n_rules, strength=strength)
     return pd.concat([fired, others]) if len(others) else fired
 
 
 def _lines_held(model, change):
     """A line for each output that is held at its limit."""
     row, output = np.nonzero(np.nan_to_num(change))
-    return pd.DataFrame(
-        {
-            "row": row,
-            "output": output,
-            "rule": np.nan,
-            "if": np.full(row.size, "held", dtype=object),
-            "strength": np.nan,
-            "value": np.nan,
-            "contribution": change[row, output],
-            "place": model.n_rules + 1 + model.n_inputs,
-        }
-    )
+    place = model.n_rules + 1 + model.n_inputs
+    return _lines(row, output, np.full(row.size, "held", dtype=object), change[row, output], place)
 
 
 def _lines_beyond(model, distance, gradient):
@@ -303,15 +282,21 @@ def _lines_beyond(model, distance, gradient):
     row, j, output = np.nonzero(np.repeat((distance != 0.0)[:, :, None], model.n_outputs, axis=2))
     names = np.array([f"beyond {name}" for name in model.input_names], dtype=object)
     slope = gradient[row, j, output]
+    said, place = slope * distance[row, j], model.n_rules + 1 + j
+    return _lines(row, output, names[j], said, place, value=slope)
+
+
+def _lines(row, output, what, contribution, place, *, rule=np.nan, strength=np.nan, value=np.nan):
+    """Lines of an explanation, in the order of their places."""
     return pd.DataFrame(
         {
             "row": row,
             "output": output,
-            "rule": np.nan,
-            "if": names[j],
-            "strength": np.nan,
-            "value": slope,
-            "contribution": slope * distance[row, j],
-            "place": model.n_rules + 1 + j,
+            "rule": rule,
+            "if": what,
+            "strength": strength,
+            "value": value,
+            "contribution": contribution,
+            "place": place,
         }
     )

@@ -6,7 +6,7 @@ from typing import Any
 
 from .._numbers import Numbers, as_held
 from ..folding import fold
-from ._cost import CCost, cost, with_deviation, with_learner
+from ._cost import CCost
 from ._deviation import DeviationSource
 from ._deviation_tables import deviation_of
 from ._deviation_test import deviation_test
@@ -171,32 +171,24 @@ def export_c(
     numbers = Numbers.of(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
     answers = known_answers(model, numbers, min_coverage, STATUS, limits)
-    declarations = test = ""
+    given = (numbers, dialect, model.out_of_bounds, min_coverage)
+    test, call = "", "learner_test"
     body: Source
-    call = "learner_test"
     if deviation:
         found = deviation_of(model, numbers, reach, coverage)
-        sure = DeviationSource(
-            numbers, dialect, model.out_of_bounds, min_coverage, found, limits=limits
-        )
-        price = with_deviation(cost(numbers, sure), sure)
-        test = deviation_test(as_held(model, numbers), dialect, answers[0], sure)
+        body = DeviationSource(*given, found, limits=limits)
+        test = deviation_test(as_held(model, numbers), dialect, answers[0], body)
         call = "deviation_test"
-        declarations, body = sure.declarations(), sure
     elif forgetting is None:
-        body = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits=limits)
-        price = cost(numbers, body)
+        body = Source(*given, limits=limits)
     else:
         learner = learner_of(estimator, numbers, forgetting)
-        learning = LearningSource(
-            numbers, dialect, model.out_of_bounds, min_coverage, learner, limits=limits
-        )
-        price = with_learner(cost(numbers, learning), learning)
-        declarations, body = learning.declarations(), learning
-        test = learning_test(as_held(model, numbers), learning)
+        body = LearningSource(*given, learner, limits=limits)
+        test = learning_test(as_held(model, numbers), body)
+    price = body.cost
     code = CCode(
         name,
-        header(model, numbers, dialect, price, min_coverage, limits, declarations),
+        header(model, numbers, dialect, price, min_coverage, limits, body.declarations()),
         body.text(f"{stem}.h") + self_test(answers, dialect, test, call),
         price,
     )

@@ -71,8 +71,9 @@ class CCost:
     deviation_stack_bytes: int = 0
 
 
-def cost(numbers, code):
-    """CCost of ``code``, a Source over ``numbers``, for a row in the box."""
+def cost(code):
+    """CCost of ``code``, a Source, for a row in the box."""
+    numbers = code.numbers
     n_rules, n_outputs, n_basis = numbers.coefficients.shape
     exponentials = logarithms = multiply_adds = 0
     for terms in numbers.terms:
@@ -103,7 +104,7 @@ def cost(numbers, code):
         logarithms,
         multiply_adds,
         divisions,
-        table_bytes(numbers, code),
+        table_bytes(code),
         stack(code),
         asked,
         asked,
@@ -159,8 +160,9 @@ def with_deviation(price, source):
     )
 
 
-def table_bytes(numbers, code):
+def table_bytes(code):
     """Of all constant tables, with the widths of types that nearly every machine has."""
+    numbers = code.numbers
     real = [numbers.low, numbers.high, numbers.offset, numbers.coefficients]
     real += [numbers.reference] if code.has_slopes or code.judges_coverage else []
     real += [terms.constants for terms in numbers.terms]

@@ -17,6 +17,7 @@ continuation "linear" needs too, and from the distances and constants of its fam
 
 import numpy as np
 
+from ._cost import with_deviation
 from ._deviation_code import (
     BEYOND,
     BY_DISTANCE,
@@ -57,6 +58,10 @@ class DeviationSource(HalvesSource):
         self._along.policy = "linear"
 
     @property
+    def cost(self):
+        return with_deviation(super().cost, self)
+
+    @property
     def leaves_tangent(self):
         """Whether there is a tangent that is not followed all the way."""
         is_constant = not self.numbers.n_terms and not self.numbers.slope_inputs.size
@@ -72,7 +77,6 @@ class DeviationSource(HalvesSource):
         )
 
     def declarations(self):
-        """What the header says of it."""
         text = self.write(DECLARATION)
         if self.found.reach is not None:
             text += self.write(DECLARATION_OF_INTERVAL, percent=f"{100 * self.found.coverage:g}")

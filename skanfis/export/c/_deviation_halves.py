@@ -10,6 +10,7 @@ import re
 
 import numpy as np
 
+from ...policies import SILENT
 from ._deviation_code import MOVED, PREMISES, PRODUCTS
 from ._source import Source
 
@@ -31,7 +32,7 @@ class HalvesSource(Source):
     @property
     def answers_beyond(self):
         """Whether rows out of the box have a deviation."""
-        return self.given_policy in ("clip", "linear")
+        return self.given_policy not in SILENT
 
     @property
     def moves_terms(self):

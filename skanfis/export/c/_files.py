@@ -3,6 +3,7 @@
 from numbers import Real
 from pathlib import Path
 
+from ..._validation import check_choice
 from ._dialect import DTYPES, STANDARDS
 from ._text import LONGEST_NAME, check_file_name, check_name
 
@@ -11,8 +12,8 @@ __all__ = ["check_arguments", "write_files"]
 
 def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_NAME):
     """The name of the files, without a suffix, and what identifiers start with."""
-    _check_choice("dtype", dtype, DTYPES)
-    _check_choice("std", std, STANDARDS)
+    check_choice("dtype", dtype, DTYPES)
+    check_choice("std", std, STANDARDS)
     if min_coverage is not None and not (
         isinstance(min_coverage, Real) and 0.0 < float(min_coverage) <= 1.0
     ):
@@ -33,8 +34,3 @@ def write_files(code, path):
     folder, stem = Path(path).parent, Path(path).name
     (folder / f"{stem}.h").write_text(code.header, encoding="ascii", newline="\n")
     (folder / f"{stem}.c").write_text(code.source, encoding="ascii", newline="\n")
-
-
-def _check_choice(parameter, value, choices):
-    if not isinstance(value, str) or value not in choices:
-        raise ValueError(f"{parameter}={value!r} must be one of {', '.join(choices)}.")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import qmc
 
+from ._cost import with_learner
 from ._self_test import ROWS
 from ._source import Source
 from ._text import literals
@@ -220,6 +221,10 @@ class LearningSource(Source):
         self._learnt = _Learnt(free, dialect, policy, min_coverage, limits=limits)
         self.index = "long" if learner.packed.size > 32767 else "int"
 
+    @property
+    def cost(self):
+        return with_learner(super().cost, self)
+
     def fill(self, template, **words):
         """A template of this module."""
         learner = self.learning
@@ -228,7 +233,6 @@ class LearningSource(Source):
         )
 
     def declarations(self):
-        """What the header says of it."""
         return self.fill(_TYPE)
 
     def learning_tables(self):

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.stats import qmc
 
+from ...policies import SILENT
 from .._numbers import as_held
 from ._text import literals
 
@@ -108,7 +109,7 @@ def known_answers(model, numbers, min_coverage, bits, limits=None):
     outside = ~((numbers.low <= X) & (numbers.high >= X)).all(axis=1)
     coverage = model.coverage(Z)
     status = np.where(outside, bits["OUT_OF_RANGE"], 0)
-    if model.out_of_bounds in ("nan", "raise"):
+    if model.out_of_bounds in SILENT:
         status |= np.where(outside, bits["NO_OUTPUT"], 0)
     if min_coverage is not None:
         judged = ~(status & bits["NO_OUTPUT"]).astype(bool)

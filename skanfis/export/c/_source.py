@@ -9,6 +9,8 @@ rule: the strongest rule is asked first, then the others, until there is enough.
 
 import re
 
+from ...policies import SILENT
+from ._cost import cost
 from ._families import BODIES, HELPERS, words_of
 from ._fragments import (
     CENTRE,
@@ -51,13 +53,18 @@ class Source(RuleLoops):
         self.linkage = "static " if is_part else ""
 
     @property
+    def cost(self):
+        """What it takes, as a CCost."""
+        return cost(self)
+
+    @property
     def is_linear(self):
         return self.policy == "linear"
 
     @property
     def measures_distance(self):
         """Whether rows outside the box get an answer, whose coverage falls with the distance."""
-        return self.min_coverage is not None and self.policy in ("clip", "linear")
+        return self.min_coverage is not None and self.policy not in SILENT
 
     @property
     def judges_coverage(self):
@@ -69,19 +76,17 @@ class Source(RuleLoops):
         """Whether the tangent ends."""
         return self.is_linear and self.numbers.reach is not None
 
+    def declarations(self):
+        """What the header says besides."""
+        return ""
+
     def text(self, include):
         """All of it; ``include`` is the name of the header."""
         return f'#include "{include}"\n\n#include <float.h>\n#include <math.h>\n\n{self.body()}'
 
     def body(self):
         """What follows the lines that include other files."""
-        parts = [
-            self.macros() + "\n",
-            self.tables(),
-            *self.families(),
-            self.functions(),
-        ]
-        return "\n".join(parts)
+        return "\n".join([self.macros() + "\n", self.tables(), *self.families(), self.functions()])
 
     def macros(self):
         """EXP and LOG, where the functions below take them."""
@@ -221,7 +226,7 @@ class Source(RuleLoops):
         if self.judges_coverage:
             lines.append("        u[i] = (c[i] - $name_reference[i]) * $name_inverse_spread[i];")
         lines.append("    }")
-        if self.policy in ("nan", "raise"):
+        if self.policy in SILENT:
             lines += [
                 "    if (status != $NAME_IN_RANGE) {",
                 "        return $NAME_REJECT(y, status);",

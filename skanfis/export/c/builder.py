@@ -5,7 +5,7 @@ the same header and self-test; :func:`skanfis.export.export_c` is made of the sa
 """
 
 from .._numbers import Numbers, as_held
-from ._cost import CCost, cost, with_deviation
+from ._cost import CCost
 from ._deviation import DeviationSource
 from ._deviation_code import DECLARATION
 from ._deviation_tables import deviation_of
@@ -111,15 +111,15 @@ class RulesPart:
         own = Dialect(self.name, dialect.real, dialect.std)
         self.limits = read_limits(saturate, numbers)
         given = (numbers, own, model.out_of_bounds, self.min_coverage)
-        self._source = Source(*given, is_part=True, limits=self.limits)
+        self._source: Source
         self.model = as_held(model, numbers)
         self.low, self.high = numbers.low, numbers.high
         if deviation:
             found = deviation_of(model, numbers)
-            sure = DeviationSource(*given, found, is_part=True, limits=self.limits)
-            self._source, self.cost = sure, with_deviation(cost(numbers, sure), sure)
+            self._source = DeviationSource(*given, found, is_part=True, limits=self.limits)
         else:
-            self.cost = cost(numbers, self._source)
+            self._source = Source(*given, is_part=True, limits=self.limits)
+        self.cost = self._source.cost
         self._outer = dialect.name.upper()
 
     def deviation_test(self, dialect: Dialect, rows) -> str:

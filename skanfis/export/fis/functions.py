@@ -28,8 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...membership import MEMBERSHIPS
-from ..limits import LARGEST_NUMBER
-from .syntax import shown
+from ..limits import LARGEST_NUMBER, shown
 
 __all__ = ["function_of", "theta_of"]
 

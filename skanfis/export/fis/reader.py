@@ -11,9 +11,9 @@ import numpy as np
 
 from ...antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ...model import TSKModel
-from ..limits import check_size, read_bytes
+from ..limits import check_size, read_bytes, shown
 from .functions import theta_of
-from .syntax import sections_of, shown, text_of
+from .syntax import sections_of, text_of
 
 __all__ = ["parse_fis", "read_fis"]
 
@@ -327,7 +327,7 @@ def _is_scattered(inputs, antecedents):
 
 
 def _grid(inputs, antecedents):
-    places = [(j, k) for j, column in enumerate(antecedents.T) for k in np.unique(column) if k > 0]
+    places = _places(antecedents)
     counts = tuple(Counter(j for j, _ in places).values())
     return GridAntecedent(_groups(inputs, places), counts=counts), _names(inputs, places)
 
@@ -340,11 +340,16 @@ def _scattered(inputs, antecedents):
 
 
 def _table(inputs, antecedents):
-    places = [(j, k) for j, column in enumerate(antecedents.T) for k in np.unique(column) if k > 0]
+    places = _places(antecedents)
     table = np.full(antecedents.shape, -1)
     for t, (j, k) in enumerate(places):
         table[antecedents[:, j] == k, j] = t
     return RuleTableAntecedent(_groups(inputs, places), table), _names(inputs, places)
+
+
+def _places(antecedents):
+    """Input and number of each term that a rule looks at, input by input."""
+    return [(j, k) for j, column in enumerate(antecedents.T) for k in np.unique(column) if k > 0]
 
 
 def _groups(inputs, places):

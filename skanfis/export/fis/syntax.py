@@ -6,9 +6,9 @@ Every pattern is anchored and passes over its line once, whatever the line holds
 import re
 from dataclasses import dataclass, field
 
-from ..limits import LARGEST_NUMBER
+from ..limits import LARGEST_NUMBER, shown
 
-__all__ = ["Entry", "Section", "sections_of", "shown", "text_of"]
+__all__ = ["Entry", "Section", "sections_of", "text_of"]
 
 _HEAD = re.compile(r"\[(System|Rules|(?:Input|Output)[1-9][0-9]{0,5})\]")
 _QUOTED = re.compile(r"'([^']*)'")
@@ -19,8 +19,6 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?
 _MEMBERSHIP = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^\]]*)\]")
 _RULE = re.compile(r"([^,]*),([^,(]*)\(([^()]*)\)\s*:(.*)")
 _BETWEEN = re.compile(r"\s*,\s*|\s+")
-# Of a line in a message.
-_SHOWN = 60
 # No number takes as many characters, and a longer text takes long to parse.
 _LONGEST_NUMBER = 100
 # Of sections in a file, and of entries or rules in a section: no sound file has more.
@@ -195,8 +193,3 @@ def _add(section, entry):
 def _check_number(entry, others):
     if len(others) == _MOST:
         raise entry.error(f"{_MOST:,} like this are the most that is read.")
-
-
-def shown(text):
-    """The text, shortened and safe to print."""
-    return ascii(text if len(text) <= _SHOWN else text[:_SHOWN] + "...")
