@@ -15,7 +15,7 @@ from ..readable import Readability, TargetScale, rule_sums
 from ..regressor import ANFISRegressor
 from ..sampling import is_many
 from .blocks import Blocks, is_collection
-from .rows import ClusterData, reduce_blocks
+from .rows import ClusterData, add_each, reduce_blocks
 
 __all__ = ["DaskANFISRegressor"]
 
@@ -194,16 +194,13 @@ class DaskANFISRegressor(ANFISRegressor):
         blocks = Blocks.of(X, y, sample_weight)
         self._check_names(blocks.layout.given_input_names, blocks.layout.n_inputs)
         # About the training mean: the squares lose no digits.
-        of_block = partial(_error_sums, model=self._local(), origin=self._origin())
-        weight, first, second, error = reduce_blocks(blocks, of_block, _add)
+        origin = self.readability_.measures.mean
+        of_block = partial(_error_sums, model=self._local(), origin=origin)
+        weight, first, second, error = reduce_blocks(blocks, of_block, add_each)
         spread = second - first**2 / weight
         with np.errstate(divide="ignore", invalid="ignore"):
             by_output = np.where(error == 0.0, 1.0, np.where(spread > 0, 1 - error / spread, 0.0))
         return float(np.mean(by_output))
-
-    def _origin(self):
-        measures = self.readability_.measures
-        return measures.mean
 
     def _local(self, has_names=True):
         """The model alone, as sent to the workers; of inputs without names it expects none."""
@@ -321,10 +318,6 @@ def _named(layout, X, y, sample_weight, groups):
 
 def _joined(one, other):
     return one.joined(other)
-
-
-def _add(one, other):
-    return [a + b for a, b in zip(one, other, strict=True)]
 
 
 def _apply(block, model, method, columns, name):

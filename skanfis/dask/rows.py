@@ -12,7 +12,7 @@ from ..data import Scale, StandardisedData, check_scales
 from .blocks import Blocks, Described, describe, joined
 from .keeping import kept_blocks
 
-__all__ = ["ClusterData", "ClusterRows", "reduce_blocks"]
+__all__ = ["ClusterData", "ClusterRows", "add_each", "reduce_blocks"]
 
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
@@ -96,7 +96,7 @@ class ClusterRows:
     def sum(self, one_pass, block_rows, map_ordered=map):
         """Sums of a pass over all rows; the workers are the cluster's, not ``map_ordered``."""
         del map_ordered
-        return self.reduce(partial(_sums, one_pass=one_pass, block_rows=block_rows), _add)
+        return self.reduce(partial(_sums, one_pass=one_pass, block_rows=block_rows), add_each)
 
 
 def _of_rows(loaded, inputs, targets, of_rows):
@@ -107,7 +107,8 @@ def _sums(rows, one_pass, block_rows):
     return rows.sum(one_pass, block_rows)
 
 
-def _add(one, other):
+def add_each(one, other):
+    """Sums of two results, one by one."""
     return [a + b for a, b in zip(one, other, strict=True)]
 
 

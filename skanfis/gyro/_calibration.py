@@ -19,10 +19,7 @@ from .compensator import GyroCompensator, features
 from .log import LogError
 from .metrics import rms, scale_factor
 
-__all__ = ["MAX_EXTRAPOLATION", "MODEL", "Calibration", "Recipe", "calibrate"]
-
-# That of the estimator.
-MAX_EXTRAPOLATION = LinearExtrapolation().max_extrapolation
+__all__ = ["MODEL", "Calibration", "Recipe", "calibrate"]
 
 # Its name in a verdict.
 MODEL = "this model"
@@ -41,7 +38,7 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    max_extrapolation: float = MAX_EXTRAPOLATION
+    max_extrapolation: float = LinearExtrapolation().max_extrapolation
     time_constant: float = 30.0
     min_coverage: float = 0.1
     max_rules: int = 36

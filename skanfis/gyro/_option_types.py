@@ -4,6 +4,8 @@ import argparse
 import codecs
 import math
 
+from .errors import shortened
+
 __all__ = [
     "MOST_RULES",
     "axis",
@@ -41,14 +43,14 @@ def terms(text):
         numbers = ()
     if not numbers or min(numbers) < 1:
         raise argparse.ArgumentTypeError(
-            f"{_shown(text)} must be search, auto, or numbers such as 2,3,3"
+            f"{shortened(text)} must be search, auto, or numbers such as 2,3,3"
         )
     n_rules = math.prod(numbers)
     if n_rules > MOST_RULES:
         made = f"{n_rules:,}" if n_rules < _MANY else "too many"
         raise argparse.ArgumentTypeError(
-            f"{_shown(text, str)} makes {made} rules; at most {MOST_RULES} are learnt. Use fewer "
-            "terms"
+            f"{shortened(text, str)} makes {made} rules; at most {MOST_RULES} are learnt. Use "
+            "fewer terms"
         )
     return numbers
 
@@ -62,7 +64,7 @@ def sign(text):
         or found in "\"'+- "
     ):
         raise argparse.ArgumentTypeError(
-            f"{_shown(text)} must be one character, such as a comma, and neither letter, digit, "
+            f"{shortened(text)} must be one character, such as a comma, and neither letter, digit, "
             "blank, quote, + nor -"
         )
     return found
@@ -112,7 +114,7 @@ def encoding(text):
     except (LookupError, ValueError, TypeError):
         is_text = False
     if not is_text:
-        raise argparse.ArgumentTypeError(f"{_shown(text)} is no encoding of text that is known")
+        raise argparse.ArgumentTypeError(f"{shortened(text)} is no encoding of text that is known")
     return text
 
 
@@ -121,7 +123,7 @@ def axis(text):
     # It becomes a folder's name.
     plain = letter.isascii() and letter.isalnum() and len(letter) <= _LONGEST_AXIS
     if not plain or bool(equals) != bool(name):
-        raise argparse.ArgumentTypeError(f"{_shown(text)} must be such as x or x=NAME")
+        raise argparse.ArgumentTypeError(f"{shortened(text)} must be such as x or x=NAME")
     return text
 
 
@@ -133,7 +135,7 @@ def box(text):
         low = high = math.nan
     if not (name and -math.inf < low <= high < math.inf):
         raise argparse.ArgumentTypeError(
-            f"{_shown(text)} must be INPUT=LOW:HIGH, two numbers, such as temperature=-40:85"
+            f"{shortened(text)} must be INPUT=LOW:HIGH, two numbers, such as temperature=-40:85"
         )
     return name, low, high
 
@@ -148,10 +150,5 @@ def _number(text, kind, is_valid, what):
     except ValueError:
         value = None
     if value is None or not is_valid(value):
-        raise argparse.ArgumentTypeError(f"{_shown(text)} must be {what}")
+        raise argparse.ArgumentTypeError(f"{shortened(text)} must be {what}")
     return value
-
-
-def _shown(text, show=repr):
-    shown = show(text)
-    return shown if len(shown) <= 60 else f"{shown[:50]}...{shown[-1]}"

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from .. import __version__
-from ._calibration import MAX_EXTRAPOLATION
+from ._calibration import Recipe
 from ._checks import QUANTITIES
 from ._dossier import add_report_options
 from ._layout import COLUMNS
@@ -212,23 +212,24 @@ def _add_model(group):
     group.add_argument(
         "--time-constant",
         type=seconds,
-        default=30.0,
+        default=Recipe.time_constant,
         metavar="S",
-        help="of the low-pass of the temperature's rate (30)",
+        help=f"of the low-pass of the temperature's rate ({Recipe.time_constant:g})",
     )
     group.add_argument(
         "--max-rules",
         type=rules,
-        default=36,
+        default=Recipe.max_rules,
         metavar="N",
-        help=f"most rules of a search (36); {MOST_RULES} at most",
+        help=f"most rules of a search ({Recipe.max_rules}); {MOST_RULES} at most",
     )
     group.add_argument(
         "--fit-rows",
         type=count,
-        default=100_000,
+        default=Recipe.fit_rows,
         metavar="N",
-        help="fit to so many rows, chosen at random, of a longer log (100000); all are checked",
+        help=f"fit to so many rows, chosen at random, of a longer log ({Recipe.fit_rows}); all are "
+        "checked",
     )
     group.add_argument(
         "--check-rows",
@@ -247,7 +248,7 @@ def _add_range(group):
     group.add_argument(
         "--outside",
         choices=("clip", "linear", "nan"),
-        default="linear",
+        default=Recipe.outside,
         help="policy for rows outside the range of the calibration, which are flagged in any case: "
         "hold the edge value (clip), go on along the tangent for a limited way (linear, default), "
         "or give no rate (nan)",
@@ -255,17 +256,17 @@ def _add_range(group):
     group.add_argument(
         "--max-extrapolation",
         type=extent,
-        default=MAX_EXTRAPOLATION,
+        default=Recipe.max_extrapolation,
         metavar="SD",
         help="how far the rules follow the tangent beyond the range of an input, in its standard "
-        f"deviations; inf for without end ({MAX_EXTRAPOLATION:g})",
+        f"deviations; inf for without end ({Recipe.max_extrapolation:g})",
     )
     group.add_argument(
         "--min-coverage",
         type=share,
-        default=0.1,
+        default=Recipe.min_coverage,
         metavar="SHARE",
-        help="rows that the data cover less are flagged (0.1)",
+        help=f"rows that the data cover less are flagged ({Recipe.min_coverage:g})",
     )
     group.add_argument(
         "--box",

@@ -14,7 +14,7 @@ from ._layout import Layout, Request, settle
 from ._parquet import ParquetLog, is_parquet
 from ._text import TextLog
 from ._units import SIGNALS, convert
-from .errors import LogError
+from .errors import LogError, shortened
 
 __all__ = ["LogFile"]
 
@@ -154,7 +154,7 @@ class LogFile:
                     & ~column.isin(self.source.no_value)
                 )
                 if bad.size:
-                    reason = f"{_shortened(column.iloc[bad[0]])} is not a number."
+                    reason = f"{shortened(column.iloc[bad[0]])} is not a number."
                     return self.located(LogError(reason, part, start + int(bad[0])))
             start += len(table)
         return LogError(f"{self.path}: {error}")
@@ -188,7 +188,7 @@ class LogFile:
     def _check_times(self, texts, seconds):
         bad = np.flatnonzero(np.isnan(seconds) & texts.notna().to_numpy())
         if bad.size:
-            reason = f"{_shortened(texts.iloc[bad[0]])} is no time like those before."
+            reason = f"{shortened(texts.iloc[bad[0]])} is no time like those before."
             raise self.located(LogError(reason, "time", self.n_rows + int(bad[0])))
 
     def _check(self, piece, missing):
@@ -233,8 +233,3 @@ def _check_alike(file, first):
             f"{file.path}: the output is in {units[1]}, in {first.path} in {units[0]}; say which "
             "it is (units: output=UNIT)."
         )
-
-
-def _shortened(text):
-    shown = repr(text)
-    return shown if len(shown) <= 60 else f"{shown[:50]}...{shown[-1]}"

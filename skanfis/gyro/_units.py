@@ -7,6 +7,8 @@ import math
 
 import numpy as np
 
+from ._names import unit_in
+
 __all__ = [
     "CANONICAL",
     "SIGNALS",
@@ -36,22 +38,6 @@ _UNITS = {
     "output": {**_RATE, **dict.fromkeys(SIGNALS, 1.0)},
 }
 CANONICAL = {"time": "s", "temperature": "degC", "rate": "deg/s", "output": "deg/s"}
-_SPELLINGS = {
-    "°C": "degC",
-    "C": "degC",
-    "celsius": "degC",
-    "°F": "degF",
-    "F": "degF",
-    "kelvin": "K",
-    "°/s": "deg/s",
-    "dps": "deg/s",
-    "°/h": "deg/h",
-    "deg/hr": "deg/h",
-    "LSB": "counts",
-    "sec": "s",
-    "µs": "us",
-    "hr": "h",
-}
 
 
 def units_of(quantity):
@@ -61,7 +47,7 @@ def units_of(quantity):
 
 def unit_named(quantity, name):
     """The unit's usual name; ValueError where the quantity has no such unit."""
-    unit = _SPELLINGS.get(name, name)
+    _, unit = unit_in(name) or (None, name)
     if unit not in _UNITS[quantity]:
         raise ValueError(
             f"{quantity} has no unit {name!r}: it may be in {', '.join(units_of(quantity))}."

@@ -78,6 +78,50 @@ def main(arguments=None):
 
 
 def _calibrate(options, tell):
+    folder, paths = _where_from_and_to(options)
+    with Staging(folder) as staging:
+        tell(f"reading {_named(paths)}")
+        tasks = find_tasks(options, paths)
+        for task in tasks[: len(tasks) if len(tasks) > 1 or tasks[0].axis else 0]:
+            _refuse_overwriting(folder / task.axis, options)
+        done, left_out = [], []
+        for task in tasks:
+            if task.axis:
+                tell(f"axis {task.axis}: {', '.join(task.columns.values())}")
+            try:
+                reading, inputs = read_task(options, paths, task, tell)
+            except LogError as error:
+                if len(tasks) == 1 or not _did_not_turn(task, error):
+                    raise
+                left_out.append(f"axis {task.axis} is left out: {error}")
+                tell(f"note: {left_out[-1]}")
+                continue
+            recipe = _recipe(options, inputs, reading.units["output"])
+            split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
+            tell(f"inputs: {', '.join(inputs)}")
+            tell(f"check: {split.sentence}")
+            calibration = calibrate(
+                reading.log,
+                split,
+                recipe,
+                tell,
+                reading.name_row,
+                made=reading.made,
+                n_rows=reading.n_rows,
+            )
+            tell("drawing the report")
+            target = staging.path / task.axis
+            target.mkdir(exist_ok=True)
+            _write(calibration, options, paths, target, task.axis)
+            done.append((task, calibration, reading.notes))
+        if not done:
+            raise LogError(f"no axis follows the rate: {'; '.join(left_out)}")
+        staging.publish()
+    _say_what_was_found(done, left_out, folder, tell)
+
+
+def _where_from_and_to(options):
+    """The folder to write to and the logs, once the options are found to make sense."""
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
     for name in ("deviation", "saturate"):
         if getattr(options, name) and not options.c:
@@ -90,27 +134,15 @@ def _calibrate(options, tell):
     _refuse_overwriting(folder, options)
     _require_matplotlib()
     check_different(paths)
-    with Staging(folder) as staging:
-        tell(f"reading {_named(paths)}")
-        tasks = find_tasks(options, paths)
-        for task in tasks[: len(tasks) if len(tasks) > 1 or tasks[0].axis else 0]:
-            _refuse_overwriting(folder / task.axis, options)
-        done, left_out = [], []
-        for task in tasks:
-            if task.axis:
-                tell(f"axis {task.axis}: {', '.join(task.columns.values())}")
-            calibration, notes = _calibration(options, paths, task, tell, len(tasks) > 1)
-            if calibration is None:
-                left_out += notes
-                continue
-            tell("drawing the report")
-            target = staging.path / task.axis
-            target.mkdir(exist_ok=True)
-            _write(calibration, options, paths, target, task.axis)
-            done.append((task, calibration, notes))
-        if not done:
-            raise LogError(f"no axis follows the rate: {'; '.join(left_out)}")
-        staging.publish()
+    return folder, paths
+
+
+def _did_not_turn(task, error):
+    """Whether the table did not turn about an axis that was guessed."""
+    return task.is_guessed and "does not follow the rate" in error.reason
+
+
+def _say_what_was_found(done, left_out, folder, tell):
     for task, calibration, notes in done:
         for message in calibration.warnings:
             tell(f"warning: {message}")
@@ -122,18 +154,12 @@ def _calibrate(options, tell):
     tell("done, but see the warnings" if cautions else "done")
 
 
-def _calibration(options, paths, task, tell, may_skip):
-    """The calibration of one axis, None for one that the table did not turn about; and notes."""
-    try:
-        reading, inputs = read_task(options, paths, task, tell)
-    except LogError as error:
-        if may_skip and task.is_guessed and "does not follow the rate" in error.reason:
-            sentence = f"axis {task.axis} is left out: {error}"
-            tell(f"note: {sentence}")
-            return None, [sentence]
-        raise
-    unit = reading.units["output"]
-    recipe = Recipe(
+def _recipe(options, inputs, unit):
+    """What the options ask for, of a log whose output is in a unit."""
+    for name, *_ in options.box:
+        if name not in inputs:
+            raise UsageError(f"--box: {name!r} is no input; these are {', '.join(inputs)}.")
+    return Recipe(
         inputs=inputs,
         output_unit=unit if unit in SIGNALS else "deg/s",
         scale_factor=options.scale_factor or 1.0,
@@ -146,28 +172,8 @@ def _calibration(options, paths, task, tell, may_skip):
         max_rules=options.max_rules,
         fit_rows=options.fit_rows,
         n_jobs=options.jobs,
-        box=_box(options.box, inputs),
+        box=tuple(options.box),
     )
-    split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
-    tell(f"inputs: {', '.join(inputs)}")
-    tell(f"check: {split.sentence}")
-    calibration = calibrate(
-        reading.log,
-        split,
-        recipe,
-        tell,
-        reading.name_row,
-        made=reading.made,
-        n_rows=reading.n_rows,
-    )
-    return calibration, reading.notes
-
-
-def _box(sides, inputs):
-    for name, *_ in sides:
-        if name not in inputs:
-            raise UsageError(f"--box: {name!r} is no input; these are {', '.join(inputs)}.")
-    return tuple(sides)
 
 
 def _named(paths):

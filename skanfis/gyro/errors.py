@@ -1,6 +1,9 @@
 """LogError: a log from which no compensator should be learnt."""
 
-__all__ = ["LogError"]
+__all__ = ["LogError", "shortened"]
+
+# Of a value in a message.
+_LONGEST_SHOWN = 60
 
 
 class LogError(ValueError):
@@ -32,3 +35,9 @@ class LogError(ValueError):
         place = [] if self.column is None else [f"column {self.column!r}"]
         place += [] if self.row is None else [f"row {self.row}"]
         return f"{', '.join(place)}: {self.reason}" if place else self.reason
+
+
+def shortened(value, show=repr):
+    """A value as a message shows it, its end left out where it is long."""
+    shown = show(value)
+    return shown if len(shown) <= _LONGEST_SHOWN else f"{shown[:50]}...{shown[-1]}"

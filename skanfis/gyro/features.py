@@ -177,12 +177,8 @@ class ThermalLag(_ThermalFilter):
     ----------
     time_constant : float, default=300.0
         Time constant :math:`\tau`, positive, in the unit of ``time`` (s).
-    time : int or str, default=None
-        Column of X that holds the time, by position or name; it must increase within a run. None:
-        the rows are one unit of time apart.
-    run : int or str, default=None
-        Column that tells runs apart, by position or name, of any type; each begins anew. None: all
-        rows are one run.
+    time, run : int or str, default=None
+        Columns of X, as for :class:`ThermalRate`.
 
     Attributes
     ----------

@@ -117,10 +117,8 @@ class RuleActivationDisplay:
 
         Parameters
         ----------
-        colormap : str, default="Blues"
-            Colours of the weights.
-        ax : matplotlib Axes, default=None
-            Where to draw; None makes a figure.
+        colormap, ax
+            As :meth:`from_estimator` takes them.
 
         Returns
         -------

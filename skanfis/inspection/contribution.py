@@ -188,12 +188,8 @@ class RuleContributionDisplay:
 
         Parameters
         ----------
-        max_rules : int, default=6
-            Most rules with a line of their own, 1 or more; the others are drawn as their sum.
-        colormap : str, default="viridis"
-            Colours of the rules.
-        ax : matplotlib Axes, default=None
-            Where to draw; None makes a figure.
+        max_rules, colormap, ax
+            As :meth:`from_estimator` takes them.
 
         Returns
         -------

@@ -103,10 +103,8 @@ class LossCurveDisplay:
 
         Parameters
         ----------
-        ax : matplotlib Axes, default=None
-            Where to draw; None makes a figure.
-        **line_kw : dict
-            For matplotlib's ``plot``.
+        ax, **line_kw
+            As :meth:`from_estimator` takes them.
 
         Returns
         -------

@@ -139,12 +139,8 @@ class MembershipDisplay:
 
         Parameters
         ----------
-        show_before : bool, default=True
-            Whether to draw the memberships before training, dashed.
-        colormap : str, default="viridis"
-            Colours of the terms, from the lowest to the highest.
-        ax : matplotlib Axes or sequence of Axes, default=None
-            Where to draw: None makes a figure; one axes is divided; a sequence has one per input.
+        show_before, colormap, ax
+            As :meth:`from_estimator` takes them.
 
         Returns
         -------

@@ -265,10 +265,8 @@ class ReadabilityDisplay:
 
         Parameters
         ----------
-        colormap : str, default="Blues"
-            Colours of the bands, for truth from 0 to 1.
-        ax : sequence of 2 matplotlib Axes or matplotlib Axes, default=None
-            Where to draw: None makes a figure; one axes is divided.
+        colormap, ax
+            As :meth:`from_estimator` takes them.
 
         Returns
         -------

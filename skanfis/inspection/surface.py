@@ -173,12 +173,8 @@ class ResponseSurfaceDisplay:
 
         Parameters
         ----------
-        plot_method : {"contourf", "pcolormesh"}, default="contourf"
-            Bands with lines between them, or a colour per point.
-        colormap : str, default="viridis"
-            Colours of the prediction.
-        ax : matplotlib Axes, default=None
-            Where to draw; None makes a figure.
+        plot_method, colormap, ax
+            As :meth:`from_estimator` takes them.
 
         Returns
         -------

@@ -130,6 +130,9 @@ def test_parquet_of_small_files_is_read_partition_by_partition(few_are_many, tmp
     assert isinstance(predicted, dd.Series)
     assert predicted.name == "error"
     assert_array_equal(predicted.compute().to_numpy(), model.predict(table[NAMES]))
+    _, deviations = model.predict(lazy[NAMES], return_std=True)
+    expected = model.predict(table[NAMES], return_std=True)[1]
+    assert_array_equal(deviations.compute().to_numpy(), expected)
 
 
 @pytest.mark.parametrize("method", ["predict", "coverage", "in_bounds", "strengths"])

@@ -14,7 +14,7 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import _html
-from skanfis.gyro._calibration import MAX_EXTRAPOLATION, Recipe, calibrate
+from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._dossier import Dossier, LogFile
 from skanfis.gyro._html import Page
 from skanfis.gyro._limits import parse_limit
@@ -236,7 +236,10 @@ def test_physics_shows_its_law(has_time, few_rivals, no_drawing):
     law = calibration.compensator.estimator.base_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
-    assert f"along its tangent, for each input up to {MAX_EXTRAPOLATION:g} of its standard" in text
+    assert (
+        f"along its tangent, for each input up to {Recipe.max_extrapolation:g} of its standard"
+        in text
+    )
     if has_time:
         assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
         # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.

@@ -89,10 +89,8 @@ class AllanDisplay(DisplayInUnit):
 
         Parameters
         ----------
-        rate : array-like of shape (n_rows,)
-            True rate [deg/s].
-        before, after : array-like of shape (n_rows,)
-            Indicated and compensated rate [deg/s], evenly spaced in time within each run.
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s], evenly spaced in time within each run.
         sampling_interval : float
             Time between rows [s].
         run : array-like of shape (n_rows,), default=None

@@ -95,10 +95,8 @@ class ErrorDisplay(DisplayInUnit):
 
         Parameters
         ----------
-        rate : array-like of shape (n_rows,)
-            True rate [deg/s].
-        before, after : array-like of shape (n_rows,)
-            Indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
         position : array-like of shape (n_rows,)
             Time, temperature, or what else to draw the error against.
         position_label : str, default="time [s]"

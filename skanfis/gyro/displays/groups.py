@@ -73,11 +73,9 @@ class GroupResidualDisplay(DisplayInUnit):
 
         Parameters
         ----------
-        rate : array-like of shape (n_rows,)
-            True rate [deg/s].
-        before, after : array-like of shape (n_rows,)
-            Indicated and compensated rate [deg/s], each row compensated by an estimator that had
-            not seen its group. NaN: the compensator refused the row.
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s], each row compensated by an estimator that
+            had not seen its group. NaN: the compensator refused the row.
         groups : array-like of shape (n_rows,)
             Label of the group of each row.
         unit : {"deg/s", "deg/h"}, default="deg/s"

@@ -89,10 +89,8 @@ class HysteresisDisplay(DisplayInUnit):
 
         Parameters
         ----------
-        rate : array-like of shape (n_rows,)
-            True rate [deg/s].
-        before, after : array-like of shape (n_rows,)
-            Indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
         temperature : array-like of shape (n_rows,)
             Temperature [degC].
         temperature_rate : array-like of shape (n_rows,)

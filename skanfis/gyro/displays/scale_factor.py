@@ -85,10 +85,8 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
 
         Parameters
         ----------
-        rate : array-like of shape (n_rows,)
-            True rate [deg/s], of several sizes.
-        before, after : array-like of shape (n_rows,)
-            Indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
         temperature : array-like of shape (n_rows,)
             Temperature [degC].
         n_temperatures : int, default=3

@@ -83,11 +83,9 @@ class ResidualSurfaceDisplay(DisplayInUnit):
 
         Parameters
         ----------
-        rate : array-like of shape (n_rows,)
-            True rate [deg/s].
-        before, after : array-like of shape (n_rows,)
-            Indicated and compensated rate [deg/s]. NaN after: the compensator refused the row,
-            which then counts as none. Before is not drawn.
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s]. NaN after: the compensator refused the
+            row, which then counts as none. Before is not drawn.
         temperature : array-like of shape (n_rows,)
             Temperature [degC].
         n_bins : tuple of two ints, default=(24, 24)

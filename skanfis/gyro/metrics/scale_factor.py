@@ -25,10 +25,8 @@ def scale_factor(rate: ArrayLike, output: ArrayLike) -> float:
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones.
-    output : array-like of shape (n_rows,)
-        Output in any unit.
+    rate, output : array-like of shape (n_rows,)
+        True rate [deg/s], at least two different ones; output in any unit.
 
     Returns
     -------
@@ -55,10 +53,8 @@ def scale_factor_error(rate: ArrayLike, output: ArrayLike, *, nominal: float = 1
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones.
-    output : array-like of shape (n_rows,)
-        Output in any unit.
+    rate, output : array-like of shape (n_rows,)
+        True rate [deg/s], at least two different ones; output in any unit.
     nominal : float, default=1.0
         Nominal scale factor, not zero, in units of the output per deg/s; 1 for an output in deg/s.
 
@@ -92,10 +88,8 @@ def scale_factor_nonlinearity(
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones.
-    output : array-like of shape (n_rows,)
-        Output in any unit.
+    rate, output : array-like of shape (n_rows,)
+        True rate [deg/s], at least two different ones; output in any unit.
     statistic : {"max", "rms"}, default="max"
         The largest deviation, as the standards have it, or the root mean square.
     full_scale : float, default=None
@@ -138,10 +132,9 @@ def scale_factor_asymmetry(rate: ArrayLike, output: ArrayLike) -> float:
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones on each side of zero, zero included.
-    output : array-like of shape (n_rows,)
-        Output in any unit.
+    rate, output : array-like of shape (n_rows,)
+        True rate [deg/s], at least two different ones on each side of zero, zero included; output
+        in any unit.
 
     Returns
     -------
@@ -173,10 +166,8 @@ def scale_factor_repeatability(rate: ArrayLike, output: ArrayLike, run: ArrayLik
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones in every run.
-    output : array-like of shape (n_rows,)
-        Output in any unit.
+    rate, output : array-like of shape (n_rows,)
+        True rate [deg/s], at least two different ones in every run; output in any unit.
     run : array-like of shape (n_rows,)
         Labels of the runs, two or more.
 
@@ -209,10 +200,8 @@ def scale_factor_temperature_sensitivity(
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate [deg/s].
-    output : array-like of shape (n_rows,)
-        Output in any unit.
+    rate, output : array-like of shape (n_rows,)
+        True rate [deg/s], and output in any unit.
     temperature : array-like of shape (n_rows,)
         [degC]
 
