@@ -21,13 +21,7 @@ from .policies import OUT_OF_BOUNDS
 from .solvers import SOLVERS, Solver, VariableProjection
 from .structure import StructureRequest, check_inputs
 
-__all__ = [
-    "SettingsMixin",
-    "found_weights",
-    "given_weights",
-    "solver_of",
-    "structure_request",
-]
+__all__ = ["SettingsMixin", "found_weights", "given_weights", "solver_of", "structure_request"]
 
 
 # Parameters of which a word stands for an object's defaults.

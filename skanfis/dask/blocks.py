@@ -221,9 +221,10 @@ def _numbers(table, what, names, n_columns, shown):
     for place, kind in enumerate(kinds):
         if kind not in "biuf":
             name = shown[place] if place < len(shown) else place
+            dtype = table.dtypes.iloc[place] if hasattr(table, "columns") else table.dtype
             raise ValueError(
-                f"{what} holds no real numbers in column {name!r} (dtype "
-                f"{_dtype(table, place)}): convert or drop it."
+                f"{what} holds no real numbers in column {name!r} (dtype {dtype}): convert or drop "
+                "it."
             )
     array = np.asarray(table, dtype=float)
     if array.ndim == 1:
@@ -236,10 +237,6 @@ def _numbers(table, what, names, n_columns, shown):
 def _kinds(table):
     dtypes = list(table.dtypes) if hasattr(table, "columns") else [table.dtype]
     return ["f" if str(dtype) in ("Float64", "Float32") else dtype.kind for dtype in dtypes]
-
-
-def _dtype(table, place):
-    return table.dtypes.iloc[place] if hasattr(table, "columns") else table.dtype
 
 
 @dataclass(frozen=True, eq=False)

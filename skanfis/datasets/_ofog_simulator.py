@@ -9,13 +9,7 @@ from sklearn.utils import check_random_state
 
 from ._ofog_chamber import thermal_history
 from ._ofog_conditions import given_conditions, rate_table_of, schedule_of
-from ._ofog_population import (
-    check_phase,
-    draw_devices,
-    draw_runs,
-    nominal_device,
-    with_noise,
-)
+from ._ofog_population import check_phase, draw_devices, draw_runs, nominal_device, with_noise
 from ._ofog_presets import PRESETS
 from ._ofog_run import simulate_power_up
 from ._validation import check_choice, check_count, check_real

@@ -20,12 +20,7 @@ def check_real(value, name, *, min_val=None, max_val=None, include_boundaries="b
     """
     _refuse_bool(value, name, "float")
     check_scalar(
-        value,
-        name,
-        Real,
-        min_val=min_val,
-        max_val=max_val,
-        include_boundaries=include_boundaries,
+        value, name, Real, min_val=min_val, max_val=max_val, include_boundaries=include_boundaries
     )
     # NaN passes every comparison of check_scalar, because each of them is false.
     if not isfinite(value):

@@ -129,7 +129,8 @@ class Formula:
             y = y.at_least(numbers.output_low).at_most(numbers.output_high)
         y = y + not_finite
         if self.policy == "nan":
-            y = (_way_out(x, inside) > 0.0).where(np.full((1, 1), np.nan), y)
+            is_out = (x - inside).abs().sum(keep=True) > 0.0
+            y = is_out.where(np.full((1, 1), np.nan), y)
         return y
 
     def _strengths(self, inside, way_out):
@@ -211,11 +212,6 @@ class Formula:
         return np.zeros((1, 1)) if ahead is None else self._weigh(strengths, ahead)
 
 
-def _way_out(x, inside):
-    """How far inputs lie out of the box, in all."""
-    return (x - inside).abs().sum(keep=True)
-
-
 def _indicator(numbers):
     """1 where rule r has term t, (n_terms, n_rules)."""
     n_rules, n_terms = numbers.n_rules, numbers.n_terms
@@ -274,7 +270,8 @@ def _two_sided_gaussian(d, p):
 
 
 def _linear(s):
-    return s, lambda: (s > 0.0).where((s < 1.0).where(*_one_or_zero()), np.zeros((1, 1)))
+    one, zero = np.ones((1, 1)), np.zeros((1, 1))
+    return s, lambda: (s > 0.0).where((s < 1.0).where(one, zero), zero)
 
 
 def _spline(s):
@@ -282,10 +279,6 @@ def _spline(s):
     t = -(s - 1.0)
     low = s < 0.5
     return low.where(s * s * 2.0, -(t * t * 2.0 - 1.0)), lambda: s.at_most(t) * 4.0
-
-
-def _one_or_zero():
-    return np.ones((1, 1)), np.zeros((1, 1))
 
 
 def _flank(profile, s):

@@ -17,6 +17,7 @@ __all__ = [
     "consequents_about",
     "knows_data",
     "premise_text",
+    "premises",
     "readability_in_training",
     "renamed",
     "round_reference",
@@ -64,6 +65,12 @@ def conditions(model):
     return [
         [(int(inputs[t]), int(t)) for t in rule if t >= 0] for rule in model.antecedent.rule_terms
     ]
+
+
+def premises(model):
+    """For every rule its terms by input, and the inputs that some rule looks at."""
+    rules = [dict(rule) for rule in conditions(model)]
+    return rules, sorted({j for rule in rules for j in rule})
 
 
 def premise_text(model, rule_conditions, conjunction=" AND "):

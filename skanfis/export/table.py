@@ -14,6 +14,7 @@ from .rules import (
     conditions,
     consequents_about,
     premise_text,
+    premises,
     warn_if_unreadable,
 )
 
@@ -92,7 +93,11 @@ def rules_table(
     chosen = choose_rules(model, sort_by, max_rules, min_weight)
     reference = model.reference if about == "mean" else 0.0 * model.reference
     consequents = consequents_about(model, reference)
-    columns = {("if", name): terms for name, terms in _terms_by_input(model).items()}
+    by_rule, looked_at = premises(model)
+    columns: dict = {
+        ("if", model.input_names[j]): [model.term_names[r[j]] if j in r else None for r in by_rule]
+        for j in looked_at
+    }
     columns["data", "weight"] = model.rule_weights
     columns["data", "rows"] = model.rule_rows
     for k, output in enumerate(model.output_names):
@@ -100,16 +105,6 @@ def rules_table(
             columns[f"then {output}", name] = consequents[:, i, k]
     table = pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
     return table.iloc[chosen]
-
-
-def _terms_by_input(model):
-    """The name of each rule's term, or None, on every input that some rule looks at."""
-    by_rule = [dict(rule) for rule in conditions(model)]
-    looked_at = sorted({j for rule in by_rule for j in rule})
-    return {
-        model.input_names[j]: [model.term_names[rule[j]] if j in rule else None for rule in by_rule]
-        for j in looked_at
-    }
 
 
 def memberships_table(estimator: Any, *, trained: bool = True) -> Any:

@@ -19,7 +19,7 @@ from .rules import (
     warn_if_unreadable,
 )
 
-__all__ = ["consequent_text", "export_text", "range_text", "rows_text", "term_text"]
+__all__ = ["consequent_text", "count_text", "export_text", "range_text", "rows_text", "term_text"]
 
 # More than these give back no other double.
 _MOST_DIGITS = 17
@@ -128,7 +128,7 @@ def export_text(
     consequents = consequents_about(model, reference)
     told = [_told(consequents[:, :, k], model, precision) for k in range(model.n_outputs)]
     premises = conditions(model)
-    parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
+    parts = [f"{count_text(model.n_rules, 'rule')}, {count_text(model.n_inputs, 'input')}."]
     for r in chosen:
         lines = [_heading(model, r), f"  IF {premise_text(model, premises[r])}"]
         word = "THEN"
@@ -198,10 +198,11 @@ def place(value, precision, resolution):
 
 def rows_text(count):
     """Write "13 rows"; weights make fractions of rows."""
-    return _count(f"{count:.0f}" if count >= 10.0 else f"{count:.2g}", "row")
+    return count_text(f"{count:.0f}" if count >= 10.0 else f"{count:.2g}", "row")
 
 
-def _count(number_of, what):
+def count_text(number_of, what):
+    """Write "1 rule" or "2 rules"."""
     return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")
 
 
@@ -213,7 +214,7 @@ def _heading(model, r):
 
 
 def _what_is_left_out(model, chosen):
-    left_out = _count(model.n_rules - chosen.size, "rule")
+    left_out = count_text(model.n_rules - chosen.size, "rule")
     if not knows_data(model):
         return f"{left_out} left out."
     weight = 1.0 - model.rule_weights[chosen].sum()

@@ -17,13 +17,7 @@ from .displays import (
 from .dwells import clip_dwells, find_dwells, resample_in_temperature
 from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
-from .groups import (
-    check_split,
-    combine_groups,
-    find_rate_levels,
-    group_by_rate_level,
-    group_by_run,
-)
+from .groups import check_split, combine_groups, find_rate_levels, group_by_rate_level, group_by_run
 from .log import read_log
 from .metrics import (
     bias,

@@ -9,12 +9,7 @@ from ..options import LinearExtrapolation
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
-__all__ = [
-    "make_estimator",
-    "make_law",
-    "make_law_and_line",
-    "make_polynomial",
-]
+__all__ = ["make_estimator", "make_law", "make_law_and_line", "make_polynomial"]
 
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
 _ROUNDS = 3

@@ -3,13 +3,13 @@
 import numpy as np
 import pandas as pd
 
-__all__ = ["LostRows", "Splitter", "lost_rows", "name_runs", "split_runs"]
+__all__ = ["FEWEST_ROWS", "LostRows", "Splitter", "lost_rows", "name_runs", "split_runs"]
 
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
 # Shorter pieces are no runs, but a logger that stutters.
-_FEWEST_ROWS = 20
+FEWEST_ROWS = 20
 # Part of a run at whose beginning a clock is again that has been set anew.
 _BEGINNING = 0.1
 # A logger is even if so many of its steps are within a part of the usual one.
@@ -43,7 +43,7 @@ def split_runs(log, max_gap):
     if n_new == 0:
         return None, ""
     lengths = np.diff(np.flatnonzero(begins), append=time.size)
-    if max_gap == "auto" and np.median(lengths) < _FEWEST_ROWS:
+    if max_gap == "auto" and np.median(lengths) < FEWEST_ROWS:
         return None, ""
     number = np.empty(time.size, dtype=int)
     number[order] = np.cumsum(begins) - 1
@@ -96,28 +96,13 @@ def lost_rows(log, n_known):
 
     ``n_known`` is how many are known to have been left out.
     """
-    if "time" not in log or len(log) < _FEWEST_ROWS:
+    if "time" not in log or len(log) < FEWEST_ROWS:
         return ""
     run = log["run"].cat.codes.to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
     order = np.argsort(run, kind="stable")
-    steps = np.diff(log["time"].to_numpy()[order])[np.diff(run[order]) == 0]
-    steps = steps[steps > 0.0]
-    if steps.size == 0:
-        return ""
-    usual = float(np.median(steps))
-    if np.mean(np.abs(steps - usual) < _REGULAR * usual) < _EVEN:
-        return ""  # not even
-    long = steps[steps > _LOST * usual]
-    return _lost(int(np.sum(np.round(long / usual) - 1)) - n_known, long.size, usual)
-
-
-def _lost(n_lost, n_places, usual):
-    if n_lost <= 0:
-        return ""
-    return (
-        f"about {n_lost:,} rows are missing: at {n_places:,} places the time steps by "
-        f"more than {_LOST:g} times its usual {usual:.4g} s"
-    )
+    lost = LostRows()
+    lost.add_steps(np.diff(log["time"].to_numpy()[order])[np.diff(run[order]) == 0])
+    return lost.sentence(n_known)
 
 
 def name_runs(log, number=None):
@@ -216,7 +201,7 @@ class Splitter:
         """Whether the time tells several runs."""
         if self._n_gaps + self._n_restarts == 0:
             return False
-        return self._max_gap != "auto" or np.median(list(self._lengths.values())) >= _FEWEST_ROWS
+        return self._max_gap != "auto" or np.median(list(self._lengths.values())) >= FEWEST_ROWS
 
     @property
     def why(self):
@@ -229,23 +214,30 @@ class LostRows:
 
     def __init__(self):
         self._usual = 0.0
-        self._n_steps = self._n_even = self._n_long = self._n_lost = 0
+        self.n_steps = self._n_even = self._n_long = self._n_lost = 0
 
     def add(self, time, last=None):
         """Times of one run, and the last one before them."""
-        steps = np.diff(time, prepend=time[0] if last is None else last)
+        self.add_steps(np.diff(time, prepend=time[0] if last is None else last))
+
+    def add_steps(self, steps):
+        """Steps of the time within runs."""
         steps = steps[steps > 0.0]
         if steps.size == 0:
             return
         self._usual = self._usual or float(np.median(steps))
         long = steps[steps > _LOST * self._usual]
-        self._n_steps += steps.size
+        self.n_steps += steps.size
         self._n_even += int(np.sum(np.abs(steps - self._usual) < _REGULAR * self._usual))
         self._n_long += long.size
         self._n_lost += int(np.sum(np.round(long / self._usual) - 1))
 
     def sentence(self, n_known):
         """How many rows are missing, in words; empty where none."""
-        if self._n_steps + 1 < _FEWEST_ROWS or self._n_even < _EVEN * self._n_steps:
+        n_lost = self._n_lost - n_known
+        if self._n_even < _EVEN * self.n_steps or n_lost <= 0:
             return ""
-        return _lost(self._n_lost - n_known, self._n_long, self._usual)
+        return (
+            f"about {n_lost:,} rows are missing: at {self._n_long:,} places the time steps by "
+            f"more than {_LOST:g} times its usual {self._usual:.4g} s"
+        )

@@ -11,7 +11,7 @@ import pandas as pd
 from ._checks import check_log
 from ._console import check_device
 from ._layout import COLUMNS
-from ._runs import LostRows, Splitter
+from ._runs import FEWEST_ROWS, LostRows, Splitter
 from ._table import LogFile
 from .errors import LogError
 from .log import Reading
@@ -89,7 +89,7 @@ class LogStream:
 
     def found(self, n_dropped):
         """What the time has told of all files read so far: runs, and rows that are missing."""
-        lost = self._lost.sentence(n_dropped)
+        lost = self._lost.sentence(n_dropped) if self._lost.n_steps + 1 >= FEWEST_ROWS else ""
         split = self._splitter.why if self._splitter is not None and self.is_split else ""
         return [sentence for sentence in (split, lost) if sentence]
 

@@ -19,10 +19,10 @@ from ..export.c.builder import (
     Dialect,
     RulesPart,
     check_arguments,
-    comment,
-    coverage_line,
+    cost_lines,
     header_of,
     index_type,
+    input_lines,
     literals,
     policy_line,
     rejection,
@@ -300,17 +300,9 @@ def _header(composition, dialect, price, part, deviation):
     lines = [
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
         f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
-        f"Per evaluation in range: an arcsine, {price.exponentials} exponentials, "
-        f"{price.logarithms} logarithms, {price.multiply_adds} multiply-adds, {price.divisions} "
-        "divisions.",
-        *coverage_line(price),
-        f"Memory: {price.table_bytes} bytes of tables, {price.stack_bytes} of arrays on the stack.",
+        *cost_lines(price, "an arcsine, "),
         "",
-        "Inputs x, and their range in the training data:",
-    ]
-    box = zip(composition.names, *composition.box, strict=True)
-    lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
-    lines += [
+        *input_lines(composition.names, *composition.box),
         "Outputs y:",
         "  [0] rate, in the unit of the training data",
         "",

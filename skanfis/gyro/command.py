@@ -12,14 +12,7 @@ from ..inspection.labels import printable
 from ._apply import apply
 from ._calibration import Recipe, calibrate
 from ._certain import certain_of
-from ._console import (
-    ExistsError,
-    Progress,
-    UsageError,
-    refuse_existing,
-    say,
-    say_error,
-)
+from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
 from ._dossier import dossier_of
 from ._files import check_different, find_logs
 from ._logs import find_tasks, read_task

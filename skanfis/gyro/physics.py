@@ -65,12 +65,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         Column of X that holds the rate of temperature change (:class:`ThermalRate`), where the
         thermometer lags behind the coil: the law then takes the temperature T plus a lag, which is
         fitted too, times this rate.
-    amplitude_degree : int, default=1
-        Degree of A(T), 0 to 5.
-    sagnac_degree : int, default=1
-        Degree of K(T), 0 to 5.
-    bias_degree : int, default=1
-        Degree of b(T), 0 to 5.
+    amplitude_degree, sagnac_degree, bias_degree : int, default=1
+        Degrees of A(T), K(T) and b(T), 0 to 5.
     fit_offset : bool, default=False
         Whether the output has an offset V0 of its own. It can be told from the bias by the sine's
         curvature only: leave it out unless the rates of the log reach a phase of some 0.3 rad.

@@ -247,13 +247,5 @@ def _without_refused(part, refused):
 
 
 def _count(name, number, in_before):
-    return [
-        name,
-        "",
-        float(number) if in_before else _NAN,
-        _NAN,
-        _NAN,
-        float(number),
-        *2 * [_NAN],
-        "",
-    ]
+    before = float(number) if in_before else _NAN
+    return [name, "", before, _NAN, _NAN, float(number), _NAN, _NAN, ""]

@@ -6,7 +6,7 @@ from numbers import Real
 import numpy as np
 
 from .._validation import position_of
-from ..export.rules import conditions, knows_data
+from ..export.rules import knows_data
 
 __all__ = [
     "COVERED",
@@ -16,7 +16,6 @@ __all__ = [
     "one_axes",
     "panels",
     "position",
-    "premises",
     "terms_text",
 ]
 
@@ -81,12 +80,6 @@ def position(feature, names, what="input"):
         f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
         f"{', '.join(map(repr, names))}."
     )
-
-
-def premises(model):
-    """For every rule its terms by input, and the inputs that some rule looks at."""
-    rules = [dict(rule) for rule in conditions(model)]
-    return rules, sorted({j for rule in rules for j in rule})
 
 
 def terms_text(model, rule, inputs):

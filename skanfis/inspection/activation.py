@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..export import fold, fold_with_rows
-from ..export.rules import knows_data
+from ..export.rules import knows_data, premises
 from ..export.text import rows_text
-from ._common import one_axes, premises
+from ._common import one_axes
 from .labels import as_label
 
 __all__ = ["RuleActivationDisplay"]

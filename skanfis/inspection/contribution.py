@@ -9,6 +9,7 @@ import numpy as np
 
 from .._validation import check_count
 from ..export import fold
+from ..export.rules import premises
 from ..export.table import rule_values
 from ._common import (
     COVERED,
@@ -17,7 +18,6 @@ from ._common import (
     held_row,
     one_axes,
     position,
-    premises,
     terms_text,
 )
 from .labels import as_label

@@ -11,12 +11,12 @@ from ..export.rules import (
     choose_rules,
     consequents_about,
     knows_data,
+    premises,
     readability_in_training,
     round_reference,
 )
-from ..export.text import consequent_text, range_text, term_text
+from ..export.text import consequent_text, count_text, range_text, term_text
 from ..readable import findings_without_rows
-from ._common import premises
 
 __all__ = ["rules_html"]
 
@@ -73,11 +73,12 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     chosen = choose_rules(model, "weight", max_rules, 0.0)
     parts = [
         '<div style="font-family:sans-serif;font-size:90%;margin:0.5em 0">',
-        f"<div><b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}</div>",
+        f"<div><b>{count_text(model.n_rules, 'rule')}</b> on "
+        f"{count_text(model.n_inputs, 'input')}</div>",
         _table(model, chosen, precision),
     ]
     if chosen.size < model.n_rules:
-        left_out = "and " + _count(model.n_rules - chosen.size, "rule")
+        left_out = "and " + count_text(model.n_rules - chosen.size, "rule")
         if knows_data(model):
             weight = max(1.0 - float(model.rule_weights[chosen].sum()), 0.0)
             left_out += f" with {100.0 * weight:.3g} % of the weight"
@@ -92,10 +93,6 @@ def _how_to_read(estimator, model):
     if found is None:
         return "".join(f"<div>{escape(line)}</div>" for line in findings_without_rows(model))
     return found.html()
-
-
-def _count(number_of, what):
-    return f"{number_of} {what}" + ("" if number_of == 1 else "s")
 
 
 def _term_hues(model):

@@ -10,7 +10,10 @@ _JOINERS = "\u200c\u200d"
 
 def printable(text):
     """The text with escapes for what no reader sees: control signs, lone surrogates, line ends."""
-    return "".join(_escaped(sign) if _is_hidden(sign) else sign for sign in str(text))
+    return "".join(
+        sign.encode("unicode_escape").decode("ascii") if _is_hidden(sign) else sign
+        for sign in str(text)
+    )
 
 
 def as_label(name):
@@ -22,7 +25,3 @@ def _is_hidden(sign):
     """Whether it is no sign that a reader sees."""
     category = unicodedata.category(sign)
     return (category[0] == "C" or category in ("Zl", "Zp")) and sign not in _JOINERS
-
-
-def _escaped(sign):
-    return sign.encode("unicode_escape").decode("ascii")

@@ -32,15 +32,7 @@ from .base import Solver
 from .lse import lse
 from .result import SolverResult
 
-__all__ = [
-    "DescentSolver",
-    "Hybrid",
-    "NaturalPremise",
-    "Point",
-    "StepSize",
-    "View",
-    "descend",
-]
+__all__ = ["DescentSolver", "Hybrid", "NaturalPremise", "Point", "StepSize", "View", "descend"]
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.

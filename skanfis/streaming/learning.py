@@ -12,12 +12,7 @@ from .._memory import keeps_freed_memory
 from .._sklearn import fit_context
 from ..model import TSKModel
 from ..options import policy_of
-from ..parameters import (
-    found_weights,
-    given_weights,
-    solver_of,
-    structure_request,
-)
+from ..parameters import found_weights, given_weights, solver_of, structure_request
 from ..readable import readability_of_rows
 from ..solvers import MESSAGES
 from .asked import (

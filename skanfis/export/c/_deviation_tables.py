@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...membership import Trapezoidal, Triangular
+from ...policies import SILENT
 
 __all__ = ["Deviation", "deviation_of", "fitting"]
 
@@ -46,10 +47,6 @@ class Deviation:
         return self.premises.shape[0]
 
 
-def _answers_beyond(model):
-    return model.out_of_bounds in ("clip", "linear")
-
-
 def deviation_of(model, numbers, reach=None, coverage=None):
     """The tables of a model's posterior; ValueError where it has none."""
     posterior = model.posterior
@@ -57,7 +54,7 @@ def deviation_of(model, numbers, reach=None, coverage=None):
         # Says why there is none.
         model.standard_deviation(model.reference[None])
     step = _STEP[numbers.dtype]
-    if numbers.dtype == np.float32 and _answers_beyond(model):
+    if numbers.dtype == np.float32 and model.out_of_bounds not in SILENT:
         step = _step_before_corners(model)
     factor, shift = posterior.consequents.copy(), numbers.reference.astype(float) - model.reference
     by_rule = factor.reshape(len(factor), model.n_rules, -1)

@@ -9,7 +9,7 @@ from ...policies import policy_in_words
 from ._text import comment
 from .status import status_lines
 
-__all__ = ["coverage_line", "header", "header_of", "policy_line"]
+__all__ = ["cost_lines", "header", "header_of", "input_lines", "policy_line"]
 
 # Where the slopes are looked at.
 _ROWS = 256
@@ -63,20 +63,14 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None, declaration
     """The header, whose first comment says what the model is and what it costs."""
     lines = [
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
-        f"Per evaluation in range: {cost.exponentials} exponentials, {cost.logarithms} logarithms, "
-        f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions.",
-        *coverage_line(cost),
-        f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack.",
+        *cost_lines(cost),
         *learner_line(cost),
         *deviation_line(cost),
         "",
-        "Inputs x, and their range in the training data:",
+        *input_lines(model.input_names, numbers.low, numbers.high),
+        "Outputs y, and what they are held within:",
+        *_ranges(model.output_names, *model.output_limits),
     ]
-    box = zip(model.input_names, numbers.low, numbers.high, strict=True)
-    lines += [f"  [{j}] {comment(name)}: {a:.7g} to {b:.7g}" for j, (name, a, b) in enumerate(box)]
-    lines += ["Outputs y, and what they are held within:"]
-    held = zip(model.output_names, *model.output_limits, strict=True)
-    lines += [f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in enumerate(held)]
     if limits is not None:
         ends = zip(model.output_names, limits, strict=True)
         told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in ends)
@@ -91,6 +85,31 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None, declaration
         lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
     return header_of(title, lines, dialect, model.n_inputs, model.n_outputs, declarations)
+
+
+def cost_lines(cost, besides=""):
+    """What an evaluation takes, and the memory; ``besides`` comes first."""
+    yield (
+        f"Per evaluation in range: {besides}{cost.exponentials} exponentials, {cost.logarithms} "
+        f"logarithms, {cost.multiply_adds} multiply-adds, {cost.divisions} divisions."
+    )
+    if cost.coverage_multiply_adds:
+        yield (
+            f"Coverage takes at most {cost.coverage_exponentials} exponentials, "
+            f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
+            "multiply-adds more; where the strongest rule covers the row, a small part of them."
+        )
+    yield f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack."
+
+
+def input_lines(names, low, high):
+    """The inputs, and their range."""
+    return ["Inputs x, and their range in the training data:", *_ranges(names, low, high)]
+
+
+def _ranges(names, low, high):
+    ends = enumerate(zip(names, low, high, strict=True))
+    return [f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in ends]
 
 
 def learner_line(cost):
@@ -116,16 +135,6 @@ def policy_line(model, where):
     """What is answered out of bounds."""
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     return f"{where} {_SILENT.get(model.out_of_bounds, words)}."
-
-
-def coverage_line(cost):
-    """What the coverage takes besides, where it is judged."""
-    if cost.coverage_multiply_adds:
-        yield (
-            f"Coverage takes at most {cost.coverage_exponentials} exponentials, "
-            f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
-            "multiply-adds more; where the strongest rule covers the row, a small part of them."
-        )
 
 
 def precision_lines(model, numbers):

@@ -13,7 +13,7 @@ from ._deviation_test import deviation_test
 from ._dialect import Dialect
 from ._files import check_arguments, write_files
 from ._fragments import FINITE_INPUT, rejection
-from ._header import coverage_line, header_of, policy_line
+from ._header import cost_lines, header_of, input_lines, policy_line
 from ._saturation import read_limits
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ._source import Source
@@ -32,9 +32,10 @@ __all__ = [
     "RulesPart",
     "check_arguments",
     "comment",
-    "coverage_line",
+    "cost_lines",
     "header_of",
     "index_type",
+    "input_lines",
     "literals",
     "policy_line",
     "rejection",

@@ -240,10 +240,7 @@ class CoverageDisplay:
             "in a cell with data": self._is_held().ravel().astype(int),
         }
         edges = dict(zip(self.names, (self.x_edges, self.y_edges), strict=True))
-        return {
-            "points": pd.DataFrame(points),
-            "cells": cells_table(edges, {"rows": self.counts}),
-        }
+        return {"points": pd.DataFrame(points), "cells": cells_table(edges, {"rows": self.counts})}
 
     def _is_held(self):
         """Whether each point lies in a cell with rows, (n_y, n_x)."""

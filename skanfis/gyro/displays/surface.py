@@ -8,14 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from ._base import DisplayInUnit, binned, cells_table, check_rows, mean_by_cell
-from ._style import (
-    NO_DATA,
-    dress,
-    figures,
-    make_axes,
-    mark_decades,
-    symmetric_limit,
-)
+from ._style import NO_DATA, dress, figures, make_axes, mark_decades, symmetric_limit
 
 __all__ = ["ResidualSurfaceDisplay"]
 
