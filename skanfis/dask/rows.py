@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial, reduce
+from operator import methodcaller
 
 import numpy as np
 
@@ -96,15 +97,11 @@ class ClusterRows:
     def sum(self, one_pass, block_rows, map_ordered=map):
         """Sums of a pass over all rows; the workers are the cluster's, not ``map_ordered``."""
         del map_ordered
-        return self.reduce(partial(_sums, one_pass=one_pass, block_rows=block_rows), add_each)
+        return self.reduce(methodcaller("sum", one_pass, block_rows), add_each)
 
 
 def _of_rows(loaded, inputs, targets, of_rows):
     return of_rows(loaded.rows(inputs, targets))
-
-
-def _sums(rows, one_pass, block_rows):
-    return rows.sum(one_pass, block_rows)
 
 
 def add_each(one, other):

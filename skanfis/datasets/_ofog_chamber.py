@@ -72,7 +72,9 @@ def thermal_history(run, schedule):
         coil, thermometer = _follow(run, schedule, on, coil_start, thermometer_start, powered=True)
         equilibrium = on + device.self_heating
         coil_rate = coil_temperature_rate(equilibrium, coil, device.thermal_time)
-        thermometer_rate = _rate_of_thermometer(device, coil, coil_rate, thermometer)
+        thermometer_rate = coil_rate
+        if device.thermometer_lag:
+            thermometer_rate = coil_temperature_rate(coil, thermometer, device.thermometer_lag)
         histories = (on, coil, coil_rate, thermometer, thermometer_rate)
         yield tuple(each[:-1] for each in histories)
         off = _stretch(run, schedule, first + n_on, n_off + 1)
@@ -92,9 +94,3 @@ def _follow(run, schedule, ambient, coil_start, thermometer_start, *, powered):
     equilibrium = ambient + device.self_heating if powered else ambient
     coil = first_order_lag(equilibrium, coil_start, device.thermal_time, interval)
     return coil, first_order_lag(coil, thermometer_start, device.thermometer_lag, interval)
-
-
-def _rate_of_thermometer(device, coil, coil_rate, thermometer):
-    if device.thermometer_lag == 0:
-        return coil_rate
-    return coil_temperature_rate(coil, thermometer, device.thermometer_lag)

@@ -34,8 +34,7 @@ def rules_table(
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
-        scalers are folded into the rules.
+        As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     about : {"origin", "mean"}, default="origin"
         What the constants of the consequents mean. "origin": the textbook form, p0 + p1 x1 + ...;
         "mean": the rule's value at the mean of the training inputs, which keeps more digits where
@@ -113,7 +112,7 @@ def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one.
+        As :func:`skanfis.export.fold` takes it.
     trained : bool, default=True
         Whether to tell the memberships after training, or as they were before it.
 
@@ -154,8 +153,7 @@ def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
-        scalers are folded into the rules.
+        As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     X : array-like of shape (n_samples, n_features)
         Rows to explain, as ``estimator.predict`` takes them.
     min_strength : float, default=0.0

@@ -45,8 +45,7 @@ def export_text(
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
-        scalers are folded into the rules.
+        As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     precision : int, default=4
         Significant digits of the numbers, from 1 to 17. Places on an input's axis get as many more
         as it takes to tell them to this part of the term's width. Slopes whose effect over the

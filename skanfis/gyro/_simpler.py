@@ -1,7 +1,6 @@
 """Compensations that are simpler than rules, held out on the same rows: rules must beat them."""
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -41,40 +40,33 @@ class Simpler:
     missing: str = ""
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """A kind of simple compensation: what is fitted, and what that predicts."""
-
-    name: str
-    make: Callable
-    predicts: str = "error"
-
-
 def simpler_compensations(X, rate, before, folds, rows):
     """Simple compensations from the simplest to the least simple, on the same rows and folds.
 
     ``folds`` are pairs of rows fitted to and rows predicted, ``rows`` those of the final fit.
     """
     yield Simpler(NOTHING, after=before)
-    for kind in _kinds(list(X)):
+    for name, make, predicts in _kinds(list(X)):
         try:
-            yield _fitted(kind, X, rate, before, folds, rows)
+            yield Simpler(name, predicts, *_fitted(make, predicts, X, rate, before, folds, rows))
         except ValueError as error:
             # Of the law alone: no rate changes, or too few rows tell its coefficients.
-            yield Simpler(kind.name, kind.predicts, missing=str(error))
+            yield Simpler(name, predicts, missing=str(error))
 
 
 def _kinds(inputs):
-    yield _Kind("constant", DummyRegressor)
-    yield _Kind("straight line", partial(make_polynomial, 1))
+    """Name, what makes the estimator, and what that predicts."""
+    yield "constant", DummyRegressor, "error"
+    yield "straight line", partial(make_polynomial, 1), "error"
     if "output" in inputs:
-        yield _Kind("arcsine law", partial(make_law, inputs, 1, "linear"), "rate")
-        yield _Kind(LAW_AND_LINE, partial(make_law_and_line, inputs), "rate")
-    yield _Kind("cubic polynomial", partial(make_polynomial, 3))
+        yield "arcsine law", partial(make_law, inputs, 1, "linear"), "rate"
+        yield LAW_AND_LINE, partial(make_law_and_line, inputs), "rate"
+    yield "cubic polynomial", partial(make_polynomial, 3), "error"
 
 
-def _fitted(kind, X, rate, before, folds, rows):
-    target = rate if kind.predicts == "rate" else before - rate
+def _fitted(make, predicts, X, rate, before, folds, rows):
+    """The held-out compensated rate, and the model of all rows."""
+    target = rate if predicts == "rate" else before - rate
     predicted = np.full(len(X), np.nan)
     with warnings.catch_warnings():
         # What it is worth is measured.
@@ -82,13 +74,12 @@ def _fitted(kind, X, rate, before, folds, rows):
         warnings.simplefilter("ignore", ConstantInputWarning)
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         for train, test in folds:
-            predicted[test] = kind.make().fit(X.iloc[train], target[train]).predict(X.iloc[test])
-        model = kind.make().fit(X.iloc[rows], target[rows])
+            predicted[test] = make().fit(X.iloc[train], target[train]).predict(X.iloc[test])
+        model = make().fit(X.iloc[rows], target[rows])
     if not np.isfinite(predicted).all():
         n_lost = np.count_nonzero(~np.isfinite(predicted))
         raise ValueError(f"it has no finite prediction for {n_lost} rows")
-    after = predicted if kind.predicts == "rate" else before - predicted
-    return Simpler(kind.name, kind.predicts, after, model)
+    return (predicted if predicts == "rate" else before - predicted), model
 
 
 def options_for(name, n_inputs):

@@ -73,7 +73,13 @@ def allan_deviation(
     >>> curve["deviation"].iloc[0].round(1)  # doctest: +SKIP
     1.0
     """
-    oadev = _import_oadev()
+    try:
+        from allantools import oadev
+    except ImportError as reason:
+        raise ImportError(
+            "The Allan deviation needs allantools, which is not installed: "
+            "pip install allantools (the extra 'allan'; in a clone pip install '.[allan]')."
+        ) from reason
     error = check_column(error, "error")
     if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
         raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
@@ -211,15 +217,3 @@ def _level(tau, deviation, slope, part):
         if abs(found - slope) <= _SLOPE_TOLERANCE:
             levels.append(np.mean(y[window] - slope * x[window]))
     return float(np.exp(min(levels))) if levels else None
-
-
-def _import_oadev():
-    """``allantools.oadev``, imported when it is needed."""
-    try:
-        from allantools import oadev
-    except ImportError as error:
-        raise ImportError(
-            "The Allan deviation needs allantools, which is not installed: "
-            "pip install allantools (the extra 'allan'; in a clone pip install '.[allan]')."
-        ) from error
-    return oadev

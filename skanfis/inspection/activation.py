@@ -82,8 +82,7 @@ class RuleActivationDisplay:
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
-            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
-            one.
+            As :func:`skanfis.export.fold` takes it.
         X : array-like of shape (n_samples, n_features), default=None
             Rows to count; None is the training data, as the model remembers them.
         colormap : str, default="Blues"

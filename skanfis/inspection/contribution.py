@@ -111,8 +111,7 @@ class RuleContributionDisplay:
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
-            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
-            one.
+            As :func:`skanfis.export.fold` takes it.
         feature : int or str, default=0
             The input to follow over its range in training, by position or name.
         held : dict, default=None

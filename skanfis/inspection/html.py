@@ -34,8 +34,7 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
-        scalers are folded into the rules.
+        As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     max_rules : int, default=10
         Most rules to show; a last line says what was left out.
     precision : int, default=4

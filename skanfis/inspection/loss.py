@@ -66,8 +66,7 @@ class LossCurveDisplay:
         Parameters
         ----------
         estimator : fitted estimator
-            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
-            one.
+            As :func:`skanfis.export.fold` takes it.
         name : str, default=None
             Label of the curve; None is the solver's name.
         ax : matplotlib Axes, default=None

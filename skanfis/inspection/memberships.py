@@ -88,8 +88,7 @@ class MembershipDisplay:
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
-            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
-            one; the memberships are drawn in the units of the pipeline's input.
+            As :func:`skanfis.export.fold` takes it; the units are those of a pipeline's input.
         X : array-like of shape (n_samples, n_features), default=None
             Data whose histogram lies behind the memberships.
         features : sequence of int or str, default=None

@@ -55,8 +55,7 @@ def readability(
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in one;
-        scalers are folded into the rules.
+        As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     X : array-like of shape (n_samples, n_features)
         Rows, as ``estimator.predict`` takes them. They are read block by block, and may be
         memory-mapped. A row outside the training range is taken at the nearest point in it.
@@ -213,8 +212,7 @@ class ReadabilityDisplay:
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
-            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
-            one.
+            As :func:`skanfis.export.fold` takes it.
         X, y, sample_weight : array-like
             As :func:`readability` takes them.
         output : int or str, default=0

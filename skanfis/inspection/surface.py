@@ -97,8 +97,7 @@ class ResponseSurfaceDisplay:
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
-            An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search that ends in
-            one.
+            As :func:`skanfis.export.fold` takes it.
         X : array-like of shape (n_samples, n_features), default=None
             Rows to show as points, wherever they lie on the inputs that are held.
         features : pair of int or str, default=(0, 1)

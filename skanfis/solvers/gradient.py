@@ -61,14 +61,8 @@ class GradientDescent(DescentSolver):
     ----------
     step_size : float, default=0.01
         Length of the first step, in standardised units; positive.
-    error_goal : float, default=None
-        Stop at this root mean square error, in standard deviations of the target; zero or positive.
-        None: all ``max_iter`` epochs are run.
-    tol : float, default=1e-3
-        Stop where the projected gradient is zero for all that ``tol`` can tell. Zero or positive.
-    stiffness : "auto" or float, default="auto"
-        Pull of the premises to their start, zero or positive; see
-        :class:`~skanfis.solvers.VariableProjection`.
+    error_goal, tol, stiffness
+        As for :class:`~skanfis.solvers.Hybrid`.
 
     See Also
     --------

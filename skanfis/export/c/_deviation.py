@@ -39,7 +39,7 @@ from ._deviation_tables import fitting
 from ._families import words_of
 from ._fragments import CENTRE, FINITE_INPUT, INPUTS
 from ._source import Source
-from ._text import literals
+from ._text import literals, loop
 
 __all__ = ["DeviationSource"]
 
@@ -187,12 +187,8 @@ class DeviationSource(HalvesSource):
                 "    }",
             ]
         if self.moves_terms:
-            lines += [
-                "    for (i = 0; i < $NAME_N_INPUTS; ++i) {",
-                "        e[i] = 0.0R;",
-                "    }",
-                "    $name_halves(c, e, half);",
-            ]
+            lines += loop("i", "$NAME_N_INPUTS", ["e[i] = 0.0R;"])
+            lines.append("    $name_halves(c, e, half);")
         else:
             lines.append("    $name_halves(c, half);")
         if self.answers_beyond:
@@ -253,10 +249,6 @@ class DeviationSource(HalvesSource):
             lines.append(f"    $real z[{numbers.n_inputs}];")
         lines += [f"    $int {', '.join(names)};", *self.strengths("l", "w", "")]
         if self.has_slopes:
-            lines += [
-                f"    for (i = 0; i < {numbers.n_inputs}; ++i) {{",
-                "        z[i] = c[i] - $name_reference[i];",
-                "    }",
-            ]
+            lines += loop("i", numbers.n_inputs, ["z[i] = c[i] - $name_reference[i];"])
         values = ", ".join([*self._along.places, "e", *self._along.shares, "sum"])
         return self.write("\n".join([*lines, f"    $name_tangent({values});", "}"]) + "\n")

@@ -13,6 +13,7 @@ import numpy as np
 from ...policies import SILENT
 from ._deviation_code import MOVED, PREMISES, PRODUCTS
 from ._source import Source
+from ._text import loop
 
 __all__ = ["HalvesSource"]
 
@@ -96,16 +97,8 @@ class HalvesSource(Source):
         lines += [self._moved(line) for line in self.strengths("l", "w", "")]
         if found.q:
             if self.has_slopes:
-                lines += [
-                    f"    for (i = 0; i < {numbers.n_inputs}; ++i) {{",
-                    f"        z[i] = {self._from_reference('i')};",
-                    "    }",
-                ]
-            lines += [
-                "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-                "        y[o] = 0.0R;",
-                "    }",
-            ]
+                lines += loop("i", numbers.n_inputs, [f"z[i] = {self._from_reference('i')};"])
+            lines += loop("o", "$NAME_N_OUTPUTS", ["y[o] = 0.0R;"])
         lines += self.over_rules(self._of_rule, tangent=False)
         lines.append(PRODUCTS.strip("\n"))
         if found.q:
@@ -119,22 +112,19 @@ class HalvesSource(Source):
         lines = [f"phi[{n_basis} * r] = {strength};"]
         if self.found.inputs.size:
             at = "$name_deviation_input[m]"
-            lines += [
-                f"for (m = 0; m < {self.found.inputs.size}; ++m) {{",
-                f"    phi[{n_basis} * r + 1 + m] = {strength} * ({self._from_reference(at)});",
-                "}",
-            ]
+            value = f"{strength} * ({self._from_reference(at)})"
+            lines += loop(
+                "m", self.found.inputs.size, [f"phi[{n_basis} * r + 1 + m] = {value};"], ""
+            )
         if not self.found.q:
             return lines
-        return [
-            *lines,
-            "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            f"    $real value = {self.height};",
-            *self.slope_loop(f"value += {self.slope} * z[@];", "    "),
-            f"    h[o][r] = {strength} * value;",
-            "    y[o] += h[o][r];",
-            "}",
+        body = [
+            f"$real value = {self.height};",
+            *self.slope_loop(f"value += {self.slope} * z[@];"),
+            f"h[o][r] = {strength} * value;",
+            "y[o] += h[o][r];",
         ]
+        return [*lines, *loop("o", "$NAME_N_OUTPUTS", body, "")]
 
     def _of_term(self, strength, _):
         numbers = self.numbers
@@ -145,11 +135,7 @@ class HalvesSource(Source):
         at = "$name_rule_terms[r][k]"
         if numbers.rule_terms is None:
             at = f"r * {numbers.terms_per_rule} + k"
-        return [
-            f"for (k = 0; k < {numbers.terms_per_rule}; ++k) {{",
-            f"    t[{at}] += {value};",
-            "}",
-        ]
+        return loop("k", numbers.terms_per_rule, [f"t[{at}] += {value};"], "")
 
     def _from_reference(self, at):
         distance = f"c[{at}] - $name_reference[{at}]"
@@ -168,11 +154,8 @@ class HalvesSource(Source):
             position = f"{terms.start} + i" if terms.start else "i"
             n_parameters = len(terms.family.parameters)
             call = f"$name_{terms.family.name}_by(c[$name_term_input[{position}]], "
-            lines += [
-                f"    for (i = 0; i < {len(terms.constants)}; ++i) {{",
-                f"        {call}$name_terms{k}[i], g + {start} + {n_parameters} * i);",
-                "    }",
-            ]
+            call += f"$name_terms{k}[i], g + {start} + {n_parameters} * i);"
+            lines += loop("i", len(terms.constants), [call])
             start += n_parameters * len(terms.constants)
         return lines
 

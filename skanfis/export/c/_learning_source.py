@@ -286,7 +286,7 @@ class LearningSource(Source):
         def of_rule(strength, _):
             scaled = "(c[@] - $name_reference[@]) * $name_inverse_spread[@]"
             statement = f"phi[{n_basis} * r + 1 + j] = {strength} * ({scaled});"
-            return [f"phi[{n_basis} * r] = {strength};", *self.slope_loop(statement, "")]
+            return [f"phi[{n_basis} * r] = {strength};", *self.slope_loop(statement)]
 
         lines += [*self.over_rules(of_rule, tangent=False), "}"]
         return self.write("\n".join(lines) + "\n")

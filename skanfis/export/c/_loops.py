@@ -4,6 +4,8 @@ A grid normalises each input alone and multiplies the shares in nested loops, so
 exponential per term, not per rule and input.
 """
 
+from ._text import loop
+
 __all__ = ["RuleLoops"]
 
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
@@ -98,11 +100,7 @@ class RuleLoops:
             of_input = f"$name_term_input[{position}]"
             value = f"$name_{terms.family.name}{slope}(c[{of_input}], $name_terms{k}[i])"
             value += f" * e[{of_input}]" if slope else ""
-            lines += [
-                f"    for (i = 0; i < {len(terms.constants)}; ++i) {{",
-                f"        {logarithms}[{position}] = {value};",
-                "    }",
-            ]
+            lines += loop("i", len(terms.constants), [f"{logarithms}[{position}] = {value};"])
         if self.is_grid:
             for start, count in zip(numbers.block_starts, numbers.counts, strict=True):
                 lines += self.finish(_at(logarithms, start), _at("l", start), count, slope)
@@ -112,14 +110,8 @@ class RuleLoops:
             term = "$name_rule_terms[r][k]"
         else:
             term = f"r * {numbers.terms_per_rule} + k"
-        lines += [
-            f"    for (r = 0; r < {numbers.n_rules}; ++r) {{",
-            f"        {rules}[r] = 0.0R;",
-            f"        for (k = 0; k < {numbers.terms_per_rule}; ++k) {{",
-            f"            {rules}[r] += {logarithms}[{term}];",
-            "        }",
-            "    }",
-        ]
+        total = loop("k", numbers.terms_per_rule, [f"{rules}[r] += {logarithms}[{term}];"], "")
+        lines += loop("r", numbers.n_rules, [f"{rules}[r] = 0.0R;", *total])
         return lines + self.finish(rules, "w", numbers.n_rules, slope)
 
     def finish(self, values, shares, count, slope):
@@ -132,8 +124,7 @@ class RuleLoops:
         numbers = self.numbers
         if not self.is_grid:
             change = "s[r]" if tangent else ""
-            inner = [f"        {line}" for line in body("w[r]", change)]
-            return [f"    for (r = 0; r < {numbers.n_rules}; ++r) {{", *inner, "    }"]
+            return loop("r", numbers.n_rules, body("w[r]", change))
         if not numbers.counts:
             change = "0.0R" if tangent else ""
             return ["    r = 0;", *(f"    {line}" for line in body("1.0R", change))]
@@ -156,16 +147,12 @@ class RuleLoops:
             lines.append(" " * depth + "}")
         return lines
 
-    def slope_loop(self, statement, pad):
+    def slope_loop(self, statement):
         """``statement`` for every slope j of a consequent, on input @."""
         if not self.has_slopes:
             return []
         at = "$name_slope_input[j]" if self.selects_slopes else "j"
-        return [
-            f"{pad}for (j = 0; j < {self.numbers.slope_inputs.size}; ++j) {{",
-            f"{pad}    {statement.replace('@', at)}",
-            f"{pad}}}",
-        ]
+        return loop("j", self.numbers.slope_inputs.size, [statement.replace("@", at)], "")
 
 
 def _at(array, start):

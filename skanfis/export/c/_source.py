@@ -24,7 +24,7 @@ from ._fragments import (
     rejection,
 )
 from ._loops import RuleLoops
-from ._text import index_type, literals
+from ._text import index_type, literals, loop
 
 __all__ = ["Source"]
 
@@ -183,9 +183,7 @@ class Source(RuleLoops):
             *self.strengths("l", "w", ""),
             "",
             *self.measure_distance(),
-            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            "        sum[o] = 0.0R;",
-            "    }",
+            *loop("o", "$NAME_N_OUTPUTS", ["sum[o] = 0.0R;"]),
             *self.over_rules(self.add_rule, tangent=False),
             *self.go_on(),
             *self.judge_coverage(),
@@ -263,25 +261,24 @@ class Source(RuleLoops):
         lines = []
         if self.judges_coverage:
             lines += [f"if ({strength} > top) {{", f"    top = {strength};", "    best = r;", "}"]
-        return [
-            *lines,
-            "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            f"    $real f = {self.height};",
-            *self.slope_loop(f"f += {self.slope} * z[@];", "    "),
-            f"    sum[o] += {strength} * f;",
-            "}",
+        body = [
+            f"$real f = {self.height};",
+            *self.slope_loop(f"f += {self.slope} * z[@];"),
+            f"sum[o] += {strength} * f;",
         ]
+        return [*lines, *loop("o", "$NAME_N_OUTPUTS", body, "")]
 
     def measure_distance(self):
         if not self.measures_distance:
             return []
+        distance = [
+            "const $real d = (x[i] - c[i]) * $name_inverse_spread[i];",
+            "distance += d * d;",
+        ]
         return [
             "    if (status != $NAME_IN_RANGE) {",
             "        $real distance = 0.0R;",
-            "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
-            "            const $real d = (x[i] - c[i]) * $name_inverse_spread[i];",
-            "            distance += d * d;",
-            "        }",
+            *loop("i", "$NAME_N_INPUTS", distance, 8 * " "),
             "        beside = $EXP(-0.5R * distance);",
             "    }",
         ]
@@ -351,30 +348,20 @@ class Source(RuleLoops):
         lines.append(f"    $int {', '.join(self.loop_variables(tangent=True))};")
         names = ("s", "") if self.is_grid else ("t", "s")
         lines += ["", *self.strengths(*names, "_slope")]
-        lines += [
-            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            "        change[o] = 0.0R;",
-            "    }",
-        ]
+        lines += loop("o", "$NAME_N_OUTPUTS", ["change[o] = 0.0R;"])
         lines += self.over_rules(self.add_rule_change, tangent=True)
-        lines += [
-            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            "        sum[o] += change[o];",
-            "    }",
-            "}",
-        ]
-        return self.write("\n".join(lines) + "\n")
+        lines += loop("o", "$NAME_N_OUTPUTS", ["sum[o] += change[o];"])
+        return self.write("\n".join([*lines, "}"]) + "\n")
 
     def add_rule_change(self, strength, change):
         along = f"f += {self.slope} * z[@];"
         ahead = f"change_of_f += {self.slope} * e[@];"
-        return [
-            "for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            f"    $real f = {self.height};",
-            *(["    $real change_of_f = 0.0R;"] if self.has_slopes else []),
-            *self.slope_loop(along, "    "),
-            *self.slope_loop(ahead, "    "),
-            f"    change[o] += {strength} * ({change} * f"
+        body = [
+            f"$real f = {self.height};",
+            *(["$real change_of_f = 0.0R;"] if self.has_slopes else []),
+            *self.slope_loop(along),
+            *self.slope_loop(ahead),
+            f"change[o] += {strength} * ({change} * f"
             + (" + change_of_f);" if self.has_slopes else ");"),
-            "}",
         ]
+        return loop("o", "$NAME_N_OUTPUTS", body, "")

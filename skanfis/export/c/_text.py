@@ -12,6 +12,7 @@ __all__ = [
     "index_type",
     "literal",
     "literals",
+    "loop",
 ]
 
 # Of C89, C99, C11, C23 and C++: the files may be compiled as any of them.
@@ -66,6 +67,12 @@ def literals(values, indent=""):
         line += f"{text}, " if line else f" {text}, "
     lines.append(line)
     return f"{indent}{{{f'{chr(10)}{indent} '.join(x.rstrip() for x in lines).rstrip(',')} }}"
+
+
+def loop(index, count, body, pad="    "):
+    """Lines of a loop around those of its body."""
+    head = f"{pad}for ({index} = 0; {index} < {count}; ++{index}) {{"
+    return [head, *(f"{pad}    {line}" for line in body), f"{pad}}}"]
 
 
 def comment(text):

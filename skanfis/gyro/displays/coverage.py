@@ -197,7 +197,7 @@ class CoverageDisplay:
         )
         self.figure_.colorbar(mesh, ax=self.ax_).set_label("coverage where there are data")
         self.ax_.plot(*self.rows.T, ".", color="0.15", markersize=1.5, alpha=0.35, mew=0)
-        x, y = (values[inside] for values, inside in self._box())
+        x, y = self.x[self.inside.any(axis=0)], self.y[self.inside.any(axis=1)]
         if x.size and y.size:
             self.ax_.plot(
                 x[[0, -1, -1, 0, 0]], y[[0, 0, -1, -1, 0]], "--", color="0.15", linewidth=1.2
@@ -255,9 +255,6 @@ class CoverageDisplay:
         n_lines, n_columns = self.counts.shape
         places = np.ix_(np.clip(lines, 0, n_lines - 1), np.clip(columns, 0, n_columns - 1))
         return (self.counts[places] > 0) & within[1][:, None] & within[0][None, :]
-
-    def _box(self):
-        return (self.x, self.inside.any(axis=0)), (self.y, self.inside.any(axis=1))
 
 
 def _values(column, n_points, margin):
