@@ -47,10 +47,8 @@ class RuleActivationDisplay:
 
     Attributes
     ----------
-    figure_ : matplotlib Figure
-        The figure, once drawn.
-    ax_ : matplotlib Axes
-        The axes, once drawn.
+    figure_, ax_ : matplotlib Figure, matplotlib Axes
+        Once drawn.
 
     Examples
     --------

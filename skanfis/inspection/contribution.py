@@ -59,10 +59,8 @@ class RuleContributionDisplay:
 
     Attributes
     ----------
-    figure_ : matplotlib Figure
-        The figure, once drawn.
-    ax_ : matplotlib Axes
-        The axes, once drawn.
+    figure_, ax_ : matplotlib Figure, matplotlib Axes
+        Once drawn.
 
     See Also
     --------

@@ -31,10 +31,8 @@ class LossCurveDisplay:
 
     Attributes
     ----------
-    figure_ : matplotlib Figure
-        The figure, once drawn.
-    ax_ : matplotlib Axes
-        The axes, once drawn.
+    figure_, ax_ : matplotlib Figure, matplotlib Axes
+        Once drawn.
     line_ : matplotlib Line2D
         The curve, once drawn.
     validation_line_ : matplotlib Line2D or None

@@ -47,10 +47,8 @@ class MembershipDisplay:
 
     Attributes
     ----------
-    figure_ : matplotlib Figure
-        The figure, once drawn.
-    axes_ : ndarray of matplotlib Axes of shape (n_inputs,)
-        The panels, once drawn.
+    figure_, axes_ : matplotlib Figure, ndarray of matplotlib Axes of shape (n_inputs,)
+        The figure and its panels, once drawn.
 
     See Also
     --------

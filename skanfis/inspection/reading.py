@@ -166,10 +166,8 @@ class ReadabilityDisplay:
 
     Attributes
     ----------
-    figure_ : matplotlib Figure
-        The figure, once drawn.
-    axes_ : ndarray of matplotlib Axes of shape (2,)
-        The panels, once drawn.
+    figure_, axes_ : matplotlib Figure, ndarray of matplotlib Axes of shape (2,)
+        The figure and its panels, once drawn.
 
     See Also
     --------

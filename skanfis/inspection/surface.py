@@ -45,10 +45,8 @@ class ResponseSurfaceDisplay:
 
     Attributes
     ----------
-    figure_ : matplotlib Figure
-        The figure, once drawn.
-    ax_ : matplotlib Axes
-        The axes, once drawn.
+    figure_, ax_ : matplotlib Figure, matplotlib Axes
+        Once drawn.
     surface_ : matplotlib ContourSet or QuadMesh
         The surface, once drawn.
 

@@ -43,10 +43,8 @@ class AllanDisplay(DisplayInUnit):
 
     Attributes
     ----------
-    ax_ : matplotlib axes
+    figure_, ax_ : matplotlib figure, matplotlib axes
         Once drawn.
-    figure_ : matplotlib figure
-        The figure that it is part of.
 
     See Also
     --------

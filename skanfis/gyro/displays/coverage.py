@@ -53,10 +53,8 @@ class CoverageDisplay:
 
     Attributes
     ----------
-    ax_ : matplotlib axes
+    figure_, ax_ : matplotlib figure, matplotlib axes
         Once drawn.
-    figure_ : matplotlib figure
-        The figure that it is part of.
 
     Examples
     --------

@@ -35,10 +35,8 @@ class GroupResidualDisplay(DisplayInUnit):
 
     Attributes
     ----------
-    ax_ : matplotlib axes
+    figure_, ax_ : matplotlib figure, matplotlib axes
         Once drawn.
-    figure_ : matplotlib figure
-        The figure that it is part of.
 
     Examples
     --------

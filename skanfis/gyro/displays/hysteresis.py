@@ -44,10 +44,8 @@ class HysteresisDisplay(DisplayInUnit):
     ----------
     gap_before_, gap_after_ : float
         Largest distance between the branches [deg/h]; NaN where they never meet at a temperature.
-    axes_ : ndarray of matplotlib axes, of shape (2,)
+    figure_, axes_ : matplotlib figure, ndarray of matplotlib axes of shape (2,)
         Before, after; once drawn.
-    figure_ : matplotlib figure
-        The figure that they are part of.
 
     Examples
     --------

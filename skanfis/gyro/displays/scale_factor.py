@@ -44,10 +44,8 @@ class ScaleFactorErrorDisplay(CompensationDisplay):
 
     Attributes
     ----------
-    axes_ : ndarray of matplotlib axes, of shape (2,)
+    figure_, axes_ : matplotlib figure, ndarray of matplotlib axes of shape (2,)
         Before, after; once drawn.
-    figure_ : matplotlib figure
-        The figure that they are part of.
 
     Examples
     --------

@@ -35,10 +35,8 @@ class ResidualSurfaceDisplay(DisplayInUnit):
 
     Attributes
     ----------
-    axes_ : ndarray of matplotlib axes, of shape (2,)
+    figure_, axes_ : matplotlib figure, ndarray of matplotlib axes of shape (2,)
         Residual, counts; once drawn.
-    figure_ : matplotlib figure
-        The figure that they are part of.
 
     Examples
     --------
