@@ -1,8 +1,9 @@
 """Problems that the defaults have failed on, or must not lose.
 
 Replicated tables against the same with the inputs moved by next to nothing; Friedman's first
-function; simulated cold starts, one left out; a function that saturates, with rows outside; the
-gyro-like surface; 200 inputs. Chosen before anything was fitted, and never changed.
+function; simulated cold starts, one left out, and a run after three; a function that saturates,
+with rows outside; the gyro-like surface; 200 inputs. Chosen before anything was fitted, and never
+changed.
 """
 
 import signal
@@ -19,7 +20,7 @@ from skanfis.datasets import make_ofog
 
 from . import gyro
 from .cases import evaluate, fitted
-from .compensation import cold_starts
+from .compensation import cold_starts, polynomial
 from .readable import readability
 from .report import Measure, Results, Row, Table
 
@@ -28,6 +29,7 @@ __all__ = ["cases", "run"]
 _N_TEST = 2000
 _JITTER = 1e-9
 _AT_REST = ("time", "temperature")
+_RUNS = ("time", "temperature", "output")
 _TURNING = ("output", "temperature", "time", "thermal_rate")
 # Seconds after which a fit is given up.
 _PATIENCE = 120
@@ -129,6 +131,26 @@ def left_out(seed, make_log, inputs, grouped, options):
         "linear": rms(left["linear"]) / floor,
         "rules": float(np.median(rules)),
         "seconds": float(np.median(times)),
+    }
+
+
+# Three runs of a gyro, and a fourth ---------------------------------------------------------------
+
+
+def fourth_run(seed, grouped, options):
+    """RMS of the error in a run after three, over a cubic polynomial's."""
+    log = make_ofog(n_devices=1, n_runs=4, random_state=seed)
+    X, y, run = log[list(_RUNS)].to_numpy(), log["error"].to_numpy(), log["run"].to_numpy()
+    train, test = run < run.max(), run == run.max()
+    model, seconds = fitted(X[train], y[train], options, run[train] if grouped else None)
+    cubic = polynomial(3).fit(X[train], y[train])
+    error, other = (rms(m.predict(X[test]) - y[test]) for m in (model, cubic))
+    return {
+        "ratio": error / other,
+        "error": error,
+        "on the three": rms(model.predict(X[train]) - y[train]),
+        "rules": model.n_rules_,
+        "seconds": seconds,
     }
 
 
@@ -299,6 +321,18 @@ _FEW_ROWS = {
     for n_rows, n_inputs in ((60, 20), (60, 50), (100, 200), (150, 200), (300, 200))
     for n_active in (0, 3)
 }
+_FOURTH_RUN = {
+    f"three runs, a fourth{', groups' if grouped else ''}": Kind(
+        partial(fourth_run, grouped=grouped),
+        range(11, 31),
+        "RMS in the fourth over a cubic's",
+        None,
+        None,
+        "median",
+        (("error", None), ("on the three", None)),
+    )
+    for grouped in (False, True)
+}
 KINDS = {
     **_REPLICATED,
     **_FEW_ROWS,
@@ -332,6 +366,7 @@ KINDS = {
         "median",
         (("seconds", None),),
     ),
+    **_FOURTH_RUN,
     **_COLD_STARTS,
 }
 

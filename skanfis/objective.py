@@ -427,10 +427,17 @@ class SeparableProblem:
     def half(self, evaluation, part):
         """W^-1/2 L^-1 phi of some rows, (n_columns, n_rows), of which squares are leverages."""
         Z, _, _ = self.rows.read(part)
+        return self._half_at(evaluation, Z) / np.sqrt(self._weight)
+
+    def leverage_at(self, evaluation, Z, n_rows):
+        """Leverages of any places (n_inputs, n_places), where the weights are those of n rows."""
+        return np.sum(self._half_at(evaluation, Z) ** 2, axis=0) / n_rows
+
+    def _half_at(self, evaluation, Z):
+        """L^-1 phi of some places."""
         strengths = evaluation.antecedent.strengths(Z)
         design = (strengths[:, None, :] * self._design.basis(Z)).reshape(self.n_columns, -1)
-        found = evaluation.normal.factor.half_solve(self.local.transform_rows(design))
-        return found / np.sqrt(self._weight)
+        return evaluation.normal.factor.half_solve(self.local.transform_rows(design))
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""

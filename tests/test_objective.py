@@ -410,6 +410,9 @@ def test_leverage_and_mean_squares_are_those_of_the_dense_design(name):
     hat = phi @ np.linalg.solve(matrix.T @ matrix, phi.T) / case.rows.total_weight
     part = slice(3, 40)
     assert_allclose(case.problem.leverage(evaluation, part), np.diag(hat)[part], rtol=1e-8)
+    Z, _, _ = case.rows.read(part)
+    anywhere = case.problem.leverage_at(evaluation, Z, case.rows.total_weight)
+    assert_allclose(anywhere, np.diag(hat)[part], rtol=1e-8)
     squares = (case.dense.y - phi @ evaluation.coefficients) ** 2
     found = case.problem.mean_squares(evaluation)
     assert_allclose(found, case.dense.weight @ squares, rtol=1e-9)

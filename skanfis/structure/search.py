@@ -18,7 +18,8 @@ Scattered rules come in a short sequence of numbers.
 
 Rows that come in groups, runs of an instrument say, are more alike within a group than any
 criterion on the same rows can know. Where the groups are given, the score is instead the error of
-short trainings on the groups that are left out, a fifth of them at a time.
+short trainings on the groups that are left out, a fifth of them at a time. Where they are not, a
+candidate is out of the running that knows next to nothing between the rows (``between``).
 
 Beyond two thousand rows, one thousand in groups, the candidates see representative rows only: the
 search then takes no longer, whatever the number of rows.
@@ -39,6 +40,7 @@ from ..evidence import FREE
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
+from .between import is_known_between, leverage_between, places_between
 from .candidate import Candidate
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
@@ -155,6 +157,7 @@ class StructureSearch:
         most = _MOST_ROWS if rows.groups is None else _MOST_ROWS_IN_GROUPS
         self.sample = search_sample(rows, most)
         self.spacing = Spacing(self.sample)
+        self.places = places_between(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.n_all = effective_weight(rows)
         self.parent: Tuned | None = None  # of the grids that are tried
@@ -175,7 +178,7 @@ class StructureSearch:
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
             loose = replace(best, is_loose=True)
-            if max(best.counts) > 1 and self._tuned(best).is_beaten_loosely(self._tuned(loose)):
+            if max(best.counts) > 1 and self._is_beaten_loosely(best, loose):
                 best = self._grow_grid(loose)
         self.parent = None
         if partition != "grid" and self.inputs.size:
@@ -186,6 +189,10 @@ class StructureSearch:
             for family in self.other_families:
                 best = self._better(best, replace(best, family=family))
         return best
+
+    def _is_beaten_loosely(self, best, loose):
+        is_beaten = self._tuned(best).is_beaten_loosely(self._tuned(loose))
+        return is_beaten and np.isfinite(self._score(loose))
 
     def _grow_grid(self, best):
         self._score(best)
@@ -235,7 +242,12 @@ class StructureSearch:
             for candidate in candidates
             if not self._is_too_many(candidate, self.sample.n_rows)
         }
-        return sorted(self.untrained, key=lambda c: self._expected(self.untrained[c]))
+        return sorted(self.untrained, key=lambda c: self._promise(self.untrained[c]))
+
+    def _promise(self, tuned):
+        """What goes first: rules that the rows tell, and among these the least expected error."""
+        is_told = bool(self.folds) or is_known_between(tuned, self.places)
+        return not is_told, self._expected(tuned)
 
     @staticmethod
     def _with_one_more(candidate, j):
@@ -361,6 +373,8 @@ class StructureSearch:
             return self._held_out_score(candidate)
         tuned = self._tuned(candidate)
         if has_idle_term(self.sample, tuned.evaluation.antecedent):
+            return np.inf
+        if not is_known_between(tuned, self.places):
             return np.inf
         # What it would have cost is the least that rules which hold are worth.
         error = (HOLDING if tuned.is_apart else 1.0) * self._expected(tuned)
@@ -490,6 +504,7 @@ class StructureSearch:
                 found = self.found[candidate]
                 line["expected_error"] = float(np.sqrt(self._expected(found)))
                 line["log_evidence"] = float(-0.5 * found.score)
+                line["leverage_between"] = leverage_between(found, self.places)
                 for key in ("agreement", "alpha", "stiffness"):
                     line[key] = float(getattr(found.penalty, key))
             if self.folds:

@@ -149,7 +149,16 @@ def test_candidates_are_listed_from_the_best(monkeypatch, rng):
     assert min(chosen) <= 1.01 * errors[0]
 
 
-KEYS = {"structure", "n_mfs", "expected_error", "log_evidence", "agreement", "alpha", "stiffness"}
+KEYS = {
+    "structure",
+    "n_mfs",
+    "expected_error",
+    "log_evidence",
+    "leverage_between",
+    "agreement",
+    "alpha",
+    "stiffness",
+}
 
 
 def test_log_evidence_is_that_of_a_linear_model_averaged_out(rng):

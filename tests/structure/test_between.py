@@ -1,0 +1,99 @@
+"""What is known between the rows, by the dense design and by curves with gaps between them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.spatial.distance import pdist, squareform
+
+from skanfis import ANFISRegressor
+from skanfis.data import StandardisedData
+from skanfis.membership import Gaussian
+from skanfis.structure.between import is_known_between, leverage_between, places_between
+from skanfis.structure.candidate import Candidate
+from skanfis.structure.search import StructureSearch
+
+
+def rows_of(X, y):
+    return StandardisedData.of(X, y[:, None])
+
+
+def three_runs(rng, temperatures):
+    """Time, temperature and target of instruments that warm up by 6 degrees, each from its own."""
+    time = np.tile(np.linspace(0.0, 1.0, 60), len(temperatures))
+    start = np.repeat(temperatures, 60)
+    temperature = start + 6.0 * (1.0 - np.exp(-3.0 * time)) + 0.05 * rng.standard_normal(time.size)
+    truth = 0.01 * (temperature - 20.0) ** 2 + np.exp(-4.0 * time)
+    return np.column_stack([time, temperature]), truth + 1e-4 * rng.standard_normal(time.size)
+
+
+def test_places_are_half_way_to_one_of_the_nearer_half(rng):
+    X = rng.standard_normal((40, 3))
+    rows = rows_of(X, X[:, 0])
+    Z = rows.X
+    distance = squareform(pdist(Z))
+    middle = 0.5 * (Z[:, None] + Z)
+    places = places_between(rows)
+    assert places.shape == (3, 40)
+    owners = set()
+    for place in places.T:
+        one, other = np.unravel_index(np.argmin(np.abs(middle - place).sum(axis=2)), distance.shape)
+        assert_allclose(middle[one, other], place, atol=1e-12)
+        ranks = [np.sum(distance[a] < distance[a, b]) for a, b in ((one, other), (other, one))]
+        assert min(ranks) <= 20
+        owners |= {int(one), int(other)}
+    assert len(owners) > 30
+
+
+def test_leverage_is_that_of_the_dense_design(rng):
+    X = rng.uniform(-1, 1, (80, 2))
+    found = StructureSearch(
+        rows_of(X, np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(80)),
+        [Gaussian] * 2,
+        1,
+        np.arange(2),
+        np.arange(2),
+        0,
+        {},
+        overlap=0.6,
+    )
+    tuned, places = found._tuned(Candidate((3, 1))), found.places
+
+    def design(Z):
+        strengths = tuned.evaluation.antecedent.strengths(Z)
+        local = tuned.problem.local
+        own = (Z[None] - local.center[:, :, None]) / local.spread[:, :, None]
+        basis = np.concatenate([np.ones((3, 1, Z.shape[1])), own], axis=1)
+        return (strengths[:, None] * basis).reshape(9, -1)
+
+    phi, penalty = (
+        design(np.ascontiguousarray(found.sample.X.T)),
+        tuned.problem.penalty_matrix(tuned.evaluation.normal.disagreement),
+    )
+    at = design(places)
+    matrix = phi @ phi.T + 80 * penalty
+    expected = np.mean(np.sum(at * np.linalg.solve(matrix, at), axis=0))
+    assert_allclose(leverage_between(tuned, places), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("temperatures", "is_known"), [((0.0, 25.0, 50.0), False), (np.linspace(0.0, 50.0, 30), True)]
+)
+def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatures, is_known):
+    X, y = three_runs(rng, temperatures)
+    found = StructureSearch(
+        rows_of(X, y), [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6
+    )
+    assert is_known_between(found._tuned(Candidate((4, 3))), found.places) is is_known
+    assert is_known_between(found._tuned(Candidate((1, 1))), found.places)
+    assert bool(np.isfinite(found._score(Candidate((4, 3))))) is is_known
+
+
+def test_what_is_chosen_is_told_by_the_rows(rng):
+    X, y = three_runs(rng, (0.0, 25.0, 50.0))
+    model = ANFISRegressor().fit(X, y)
+    chosen = model.structures_[0]
+    assert model.n_rules_ > 1
+    assert chosen["leverage_between"] <= 1.0
+    assert max(c["leverage_between"] for c in model.structures_) > 1.0
+    # With groups, those that are left out decide.
+    assert ANFISRegressor().fit(X, y, groups=np.repeat([0, 1, 2], 60)).n_rules_ >= 1
