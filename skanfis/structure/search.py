@@ -40,7 +40,7 @@ from ..evidence import FREE
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
-from .between import is_known_between, leverage_between, places_between
+from .between import is_known, leverage_between, places_between
 from .candidate import Candidate
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
@@ -165,6 +165,7 @@ class StructureSearch:
         self.untrained: dict[Candidate, Tuned] = {}  # of this round
         self.begun: dict[Candidate, Tuned] = {}
         self.scores: dict[Candidate, float] = {}
+        self.leverages: dict[Candidate, float] = {}
         self.max_rules = max_rules
         self.folds = (split or _folds)(self.sample.groups)
 
@@ -246,7 +247,7 @@ class StructureSearch:
 
     def _promise(self, tuned):
         """What goes first: rules that the rows tell, and among these the least expected error."""
-        is_told = bool(self.folds) or is_known_between(tuned, self.places)
+        is_told = bool(self.folds) or is_known(leverage_between(tuned, self.places))
         return not is_told, self._expected(tuned)
 
     @staticmethod
@@ -372,9 +373,10 @@ class StructureSearch:
         if self.folds:
             return self._held_out_score(candidate)
         tuned = self._tuned(candidate)
-        if has_idle_term(self.sample, tuned.evaluation.antecedent):
+        self.leverages[candidate] = leverage_between(tuned, self.places)
+        if not is_known(self.leverages[candidate]):
             return np.inf
-        if not is_known_between(tuned, self.places):
+        if has_idle_term(self.sample, tuned.evaluation.antecedent):
             return np.inf
         # What it would have cost is the least that rules which hold are worth.
         error = (HOLDING if tuned.is_apart else 1.0) * self._expected(tuned)
@@ -504,9 +506,10 @@ class StructureSearch:
                 found = self.found[candidate]
                 line["expected_error"] = float(np.sqrt(self._expected(found)))
                 line["log_evidence"] = float(-0.5 * found.score)
-                line["leverage_between"] = leverage_between(found, self.places)
                 for key in ("agreement", "alpha", "stiffness"):
                     line[key] = float(getattr(found.penalty, key))
+            if candidate in self.leverages:
+                line["leverage_between"] = self.leverages[candidate]
             if self.folds:
                 line["held_out_error"] = float(self.scores[candidate])
             lines.append(line)
