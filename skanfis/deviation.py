@@ -7,11 +7,13 @@ steps, taken in double precision before anything is rounded.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from math import prod
 
 import numpy as np
 
 from .consequent import rule_outputs
-from .quadratic import QuadraticForm
+from .quadratic import QuadraticForm, row_products, summed_with
 
 __all__ = ["DerivativeRows", "DeviationTables", "inner_products", "points_of_range"]
 
@@ -100,6 +102,40 @@ class DeviationTables:
         found = self._by_basis[k] @ row.strengths
         return found.reshape(row.basis.shape[0], -1, found.shape[1])
 
+    @cached_property
+    def _factors(self):
+        """Where the shares of every factor are."""
+        edges = np.cumsum([0, *self.form.counts[:-1]]).tolist()
+        return [slice(*ends) for ends in pairwise(edges)]
+
+    @cached_property
+    def _n_formed(self):
+        """Of how many factors shares are multiplied with the basis: fewest numbers are formed."""
+        *counts, n_basis = self.form.counts
+        n_halves = self.joint.shape[1]
+        n_numbers = [
+            n_basis * prod(counts[:n]) + n_halves * prod(counts[n:]) for n in range(len(counts) + 1)
+        ]
+        return int(np.argmin(n_numbers))
+
+    @cached_property
+    def _by_formed(self):
+        """Of ``joint`` what these products take, (n_outputs, n_halves * n_left, n_products)."""
+        n_outputs, n_halves, _ = self.joint.shape
+        *counts, n_basis = self.form.counts
+        formed, left = prod(counts[: self._n_formed]), prod(counts[self._n_formed :])
+        consequents = self.joint[:, :, self.n_premises :]
+        by_share = consequents.reshape(n_outputs, n_halves, formed, left, n_basis)
+        by_share = by_share.transpose(0, 1, 3, 2, 4)
+        return by_share.reshape(n_outputs, n_halves * left, formed * n_basis)
+
+    def of_design(self, k, shares, basis):
+        """What ``joint`` makes of the design of shares and basis, which is not formed."""
+        groups, n = [shares[own] for own in self._factors], self._n_formed
+        return summed_with(
+            self._by_formed[k] @ row_products([*groups[:n], basis], basis), groups[n:]
+        )
+
     def add_premises(self, k, changes, half):
         """Add what ``joint`` makes of derivatives by the premises to a half, in place."""
         half += self.joint[k][:, : self.n_premises] @ changes.astype(self.dtype, copy=False)
@@ -169,7 +205,7 @@ class DerivativeRows:
             outputs.append(output)
             if is_learnt:
                 by_term.append(antecedent.term_sensitivity(by_rule, output, shares))
-        basis_rows[1:] /= model.spread[inputs, None]
+        basis_rows[1:] *= 1.0 / model.spread[inputs, None]
         return cls(strengths, shares, basis_rows, np.stack(outputs), by_term, gradients)
 
     @classmethod
@@ -224,15 +260,16 @@ class DerivativeRows:
         np.multiply(strengths[:, None], self.basis[1:].astype(dtype), out=by_rule[:, 1:])
         by_rule[:, 1:] += other.strengths.astype(dtype)[:, None] * slopes
 
-    def changes(self, k, unit):
+    def changes(self, k, unit, dtype=np.float64):
         """Derivatives of output k by the antecedent's parameters, (n_parameters, n_rows).
 
-        In units of ``unit``.
+        In units of ``unit``, in some precision.
         """
-        by_term, parts, term = self.by_term[k] / unit[k], [], 0
+        by_term, parts, term = (self.by_term[k] / unit[k]).astype(dtype, copy=False), [], 0
         for gradient in self.gradients:
             own = by_term[term : term + gradient.shape[1]]
-            parts.append((gradient * own).reshape(-1, own.shape[1]))
+            own_gradient = gradient.astype(dtype, copy=False)
+            parts.append((own_gradient * own).reshape(-1, own.shape[1]))
             term += own.shape[0]
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
 

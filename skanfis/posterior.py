@@ -245,21 +245,21 @@ class Posterior:
         return self._within(model, Z, self._tables(model, exact))
 
     def _within(self, model, Z, tables):
-        row = self._row(model, Z)
-        narrow = row.astype(tables.dtype)
-        square = tables.form.values(narrow.shares, narrow.basis)
+        row, unit = self._row(model, Z), tables.unit
+        shares, basis = (one.astype(tables.dtype, copy=False) for one in (row.shares, row.basis))
+        square = tables.form.values(shares, basis)
         np.maximum(square, 0.0, out=square)
         square += 1.0
-        unit = tables.unit
-        found = (self.noise[:, None] / unit) ** 2 * square
+        noise = (self.noise[:, None] / unit) ** 2
+        found = noise * square
         if tables.joint.shape[1]:
             for k in range(len(unit)):
-                half = np.einsum("bqn,bn->qn", tables.by_basis(k, narrow), narrow.basis)
+                half = tables.of_design(k, shares, basis)
                 if tables.n_premises:
-                    tables.add_premises(k, row.changes(k, unit), half)
+                    tables.add_premises(k, row.changes(k, unit, tables.dtype), half)
                 found[k] += tables.signed(half, half)
         # Never below the noise, whatever rounding leaves of what is known.
-        np.maximum(found, (self.noise[:, None] / unit) ** 2, out=found)
+        np.maximum(found, noise, out=found)
         return row.outputs, np.sqrt(found) * unit
 
     def row_of(self, model, Z, outputs, parts):

@@ -26,7 +26,7 @@ from scipy import linalg
 
 from .gram import pair_index
 
-__all__ = ["QuadraticForm"]
+__all__ = ["QuadraticForm", "row_products", "summed_with"]
 
 # Pairs of a factor are compared at so many points for each of them at least, or all are kept.
 _POINTS_PER_PAIR = 2
@@ -80,9 +80,18 @@ class QuadraticForm:
             return replace(self, table=self.table.astype(dtype))
 
     def values(self, shares, basis_rows):
-        """Phi' A phi of every row, (n_rows,) or (n_forms, n_rows); shares (n_shares, n_rows)."""
-        *groups, last = self._groups(shares, basis_rows)
-        return np.einsum("bn,...bn->...n", last, self._along(groups, basis_rows))
+        """Phi' A phi of every row, (n_rows,) or (n_forms, n_rows); shares (n_shares, n_rows).
+
+        Products are formed of one side of the table; with the groups of the other it is summed up
+        one by one, which costs less than to form their products. Of several forms products are
+        formed once, and sums for each: the longer side is the one formed then.
+        """
+        groups = self._groups(shares, basis_rows)
+        formed, summed, table = groups[self.split :], groups[: self.split], self.table
+        n_summed, n_formed = table.shape[-2:]
+        if (n_summed < n_formed) == (table.ndim == 2):
+            formed, summed, table = summed, formed, np.swapaxes(table, -1, -2)
+        return summed_with(table @ row_products(formed, basis_rows), summed)[..., 0, :]
 
     def products(self, shares, basis_rows, others):
         """Phi' A phi, phi' A psi and psi' A psi of every row, (3, n_rows).
@@ -103,10 +112,10 @@ class QuadraticForm:
         First with those along its rows, then with the others: their products with the pairs of
         basis functions need not be formed.
         """
-        along = np.swapaxes(self.table, -1, -2) @ _products(groups[: self.split], like)
+        along = np.swapaxes(self.table, -1, -2) @ row_products(groups[: self.split], like)
         if self.split == len(groups):
             return along
-        middle = _products(groups[self.split :], like)
+        middle = row_products(groups[self.split :], like)
         along = along.reshape(*along.shape[:-2], len(middle), -1, like.shape[1])
         return np.einsum("...mbn,mn->...bn", along, middle)
 
@@ -120,7 +129,7 @@ class QuadraticForm:
         for k, group in enumerate(groups[:-1]):
             if _POINTS_PER_PAIR * len(group) > basis_rows.shape[1]:
                 continue
-            rest = _products(groups[:k] + groups[k + 1 :], basis_rows)
+            rest = row_products(groups[:k] + groups[k + 1 :], basis_rows)
             first = np.moveaxis(table, k, 0)
             weights = np.abs(first.reshape(len(group), -1) @ rest).max(axis=1)
             kept, combined = _spanning(group, weights, tol)
@@ -159,12 +168,23 @@ def _pair_products(functions, runs):
     return products
 
 
-def _products(groups, like):
+def row_products(groups, like):
     """Products of one row of each group, all combinations, the last group's row fastest."""
     result = groups[0] if groups else np.ones((1, like.shape[1]), like.dtype)
     for group in groups[1:]:
         result = (result[:, None, :] * group).reshape(-1, like.shape[1])
     return result
+
+
+def summed_with(values, groups):
+    """Sums over products of one row of each group, times values (..., n * n_products, n_rows).
+
+    One group after the other: the products are not formed. (..., n, n_rows) are left.
+    """
+    for group in reversed(groups):
+        by_group = values.reshape(*values.shape[:-2], -1, *group.shape)
+        values = np.einsum("...mgn,gn->...mn", by_group, group)
+    return values
 
 
 def _spanning(functions, weights, tol):
