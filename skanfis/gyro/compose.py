@@ -116,7 +116,13 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         router = MetadataRouter(owner=type(self).__name__)
         return router.add(base=base, residual=residual, method_mapping=to_both)
 
-    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
+    ) -> Self:
         """Fit the base, then the residual model.
 
         Parameters
@@ -126,9 +132,14 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,)
             Target.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, given to both parts. To a Pipeline they are given for its last step. With
-            ``sklearn.set_config(enable_metadata_routing=True)``, they go where the parts request
-            them.
+            Weights, given to both parts.
+        groups : array-like of shape (n_samples,), default=None
+            The run, device or day that each row belongs to, given to every part whose ``fit`` takes
+            groups, and to a search for its splitter: an ANFISRegressor then chooses its structure
+            by runs left out.
+
+        To a Pipeline both are given for its last step. With
+        ``sklearn.set_config(enable_metadata_routing=True)`` they go where the parts request them.
 
         Returns
         -------
@@ -138,20 +149,20 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         ------
         ValueError
             If ``n_rounds`` is less than 1, if the base has no finite prediction for some training
-            row, or if a part takes no weights.
+            row, if a part takes no weights, or if neither takes groups.
         """
         check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
         # Each part checks X for itself, here and in predict; only its columns are taken note of.
         validate_data(self, X, skip_check_array=True)
         target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
         base, residual = self._unfitted()
-        weights = self._weights_by_part(base, residual, sample_weight)
+        given = self._given_by_part(base, residual, sample_weight, groups)
         learnt = np.zeros(target.size)
         for _ in range(self.n_rounds):
-            self.base_ = clone(base).fit(X, target - learnt, **weights.base)
+            self.base_ = clone(base).fit(X, target - learnt, **given.base)
             left = target - self.base_.predict(X)
             _check_answered(left)
-            self.residual_ = clone(residual).fit(X, left, **weights.residual)
+            self.residual_ = clone(residual).fit(X, left, **given.residual)
             learnt = self.residual_.predict(X)
         return self
 
@@ -228,17 +239,22 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         """What the parts that have ``method`` answer."""
         return [ask(part, method, X) for part in self._parts() if hasattr(_last_step(part), method)]
 
-    def _weights_by_part(self, base, residual, sample_weight):
+    def _given_by_part(self, base, residual, sample_weight, groups):
         """Keyword arguments of each part's fit."""
-        if sample_weight is None:
-            return Bunch(base={}, residual={})
-        if get_config()["enable_metadata_routing"]:
-            routed = process_routing(self, "fit", sample_weight=sample_weight)
+        given = {"sample_weight": sample_weight, "groups": groups}
+        given = {name: value for name, value in given.items() if value is not None}
+        if given and get_config()["enable_metadata_routing"]:
+            routed = process_routing(self, "fit", **given)
             return Bunch(base=routed.base.fit, residual=routed.residual.fit)
-        return Bunch(
-            base=_weight_argument(base, "base", sample_weight),
-            residual=_weight_argument(residual, "residual", sample_weight),
-        )
+        parts = Bunch(base=base, residual=residual)
+        for role, part in parts.items():
+            if "sample_weight" in given and not _takes(part, "sample_weight"):
+                raise ValueError(f"sample_weight was given, but {role}={part!r} takes no weights.")
+        if "groups" in given and not any(_takes(part, "groups") for part in parts.values()):
+            raise ValueError(
+                f"groups was given, but neither base={base!r} nor residual={residual!r} takes any."
+            )
+        return Bunch(**{role: _arguments(part, given) for role, part in parts.items()})
 
 
 def _check_answered(left):
@@ -255,9 +271,14 @@ def _last_step(estimator):
     return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
 
 
-def _weight_argument(estimator, role, sample_weight):
+def _takes(estimator, name):
+    """Whether the fit of what predicts in the end takes an argument."""
     last = _last_step(estimator)
-    if not has_fit_parameter(last, "sample_weight"):
-        raise ValueError(f"sample_weight was given, but {role}={estimator!r} takes no weights.")
+    # A search takes groups for its splitter, by ``**params``.
+    return has_fit_parameter(last, name) or (name == "groups" and hasattr(last, "refit"))
+
+
+def _arguments(estimator, given):
+    """What of the given ones the estimator's fit takes, by the names that it goes by there."""
     step = f"{estimator.steps[-1][0]}__" if isinstance(estimator, Pipeline) else ""
-    return {f"{step}sample_weight": sample_weight}
+    return {f"{step}{name}": value for name, value in given.items() if _takes(estimator, name)}

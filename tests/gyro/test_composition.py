@@ -9,8 +9,8 @@ import sklearn
 from sklearn.base import clone
 from sklearn.compose import make_column_transformer
 from sklearn.dummy import DummyRegressor
-from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GridSearchCV, KFold
+from sklearn.linear_model import LinearRegression, Ridge
+from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
@@ -131,6 +131,43 @@ def test_weights_go_where_they_are_requested(rng):
     np.testing.assert_allclose(model.base_.coef_, LinearRegression().fit(x, y).coef_)
     left = y - model.base_.predict(x)
     assert model.residual_.constant_.item() == pytest.approx(np.average(left, weights=weights))
+
+
+def shifted_runs(rng):
+    """A line, and runs of two inputs that are off by so much each: rules would learn them."""
+    run = np.repeat(np.arange(12), 12)
+    x = np.column_stack([rng.uniform(-1, 1, run.size), rng.uniform(-1, 1, 12)[run]])
+    return x, 3 * x[:, 0] + rng.normal(size=12)[run] + 0.05 * rng.normal(size=run.size), run
+
+
+def test_groups_reach_the_part_that_chooses_by_them():
+    x, y, run = shifted_runs(np.random.default_rng(0))
+    part = make_pipeline(StandardScaler(), ANFISRegressor())
+    model = ResidualRegressor(LinearRegression(), part)
+    n_rules = [model.fit(x, y, groups=g).residual_[-1].n_rules_ for g in (None, run)]
+    # Rows of one run tell of each other; another run knows nothing of them.
+    assert n_rules[0] > 3
+    assert n_rules[1] == 1
+    alone = clone(part).fit(x, y - model.base_.predict(x), anfisregressor__groups=run)
+    np.testing.assert_array_equal(model.residual_.predict(x), alone.predict(x))
+
+
+@pytest.mark.parametrize("routing", [False, True])
+def test_groups_reach_a_search_for_its_splitter(rng, routing):
+    x, y, run = shifted_runs(rng)
+    search = GridSearchCV(Ridge(), {"alpha": [0.1, 100.0]}, cv=LeaveOneGroupOut())
+    with sklearn.config_context(enable_metadata_routing=routing):
+        model = ResidualRegressor(LinearRegression(), search).fit(x, y, groups=run)
+        alone = clone(search).fit(x, y - model.base_.predict(x), groups=run)
+    found, expected = (one.cv_results_["mean_test_score"] for one in (model.residual_, alone))
+    assert len(set(found)) == 2
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_groups_that_no_part_takes_are_refused(rng):
+    x, y, run = shifted_runs(rng)
+    with pytest.raises(ValueError, match=r"groups was given, but neither base=Ridge.* takes any"):
+        ResidualRegressor(Ridge(), LinearRegression()).fit(x, y, groups=run)
 
 
 @pytest.mark.parametrize("scaled", [False, True])
