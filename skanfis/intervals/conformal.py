@@ -14,6 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
+from ._answering import answering, held_at_the_edge
 from ._quantiles import (
     check_level,
     cross_bounds,
@@ -46,7 +47,9 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     estimator : regressor, default=None
-        What predicts; a Pipeline or a search, for example. None is ``ANFISRegressor()``.
+        What predicts; a Pipeline or a search, for example. None is ``ANFISRegressor()``. One with
+        ``out_of_bounds="raise"`` refuses new rows beyond the range of its training; rows held out
+        are not refused, but count as with "clip".
     method : {"folds", "cross", "split", "loo"}, default="folds"
         Which rows give the scores. "folds": every row, by a model of the folds without it; the
         intervals are about the model of all rows, as wide as its own deviation says. Near what is
@@ -227,7 +230,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             fraction, seed = float(self.calibration_fraction), self._seed()
             training, held_out = one_part(regressor, len(targets), numbers, fraction, seed)
             self.estimator_ = data.fitted(regressor, training)
-            scores = self._scorer.held_out(self.estimator_, data, held_out)
+            with answering(self.estimator_):
+                scores = self._scorer.held_out(self.estimator_, data, held_out)
         else:
             self.estimator_ = data.fitted(regressor)
             if self.method == "loo":
@@ -353,9 +357,10 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """Scores of every row by the models of the folds without it."""
         found = folds(self.cv, data.targets, groups, self._seed())
         regressor = self._regressor()
-        self.estimators_ = Parallel(n_jobs=self.n_jobs)(
+        fitted = Parallel(n_jobs=self.n_jobs)(
             delayed(data.fitted)(regressor, training) for training, _ in found
         )
+        self.estimators_ = [held_at_the_edge(one) for one in fitted]
         self._folds = [held_out for _, held_out in found]
         scores = np.empty(data.targets.reshape(len(data.targets), -1).shape)
         for estimator, held_out in zip(self.estimators_, self._folds, strict=True):

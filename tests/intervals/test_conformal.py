@@ -249,6 +249,32 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert (np.diff(upper - lower) > 0.0).all()
 
 
+def refusing(inside, policy):
+    """Rules with a policy, alone or inside of something; the search looks at rows it has seen."""
+    rules = ANFISRegressor(**QUICK, out_of_bounds=policy)
+    if inside == "search":
+        return GridSearchCV(rules, {"alpha": [0.01]}, cv=[(np.arange(20), np.arange(20))])
+    return rules if inside == "alone" else make_pipeline(StandardScaler(), rules)
+
+
+@pytest.mark.parametrize(
+    ("inside", "method"), [("alone", "cross"), ("pipeline", "split"), ("search", "folds")]
+)
+def test_of_a_model_that_refuses_rows_those_held_out_count_as_at_the_edge(method, inside):
+    """Some row is the largest, and beyond the range of the model of the folds without it."""
+    X, y = bent(np.random.default_rng(5), 60)
+    middle, found = np.linspace(-0.5, 0.5, 5)[:, None], {}
+    for policy in ("clip", "raise"):
+        model = ConformalRegressor(
+            refusing(inside, policy), method=method, cv=3, calibration_fraction=0.5
+        ).fit(X, y)
+        found[policy] = [model.scores_, *model.predict_interval(middle)]
+    for one, other in zip(*found.values(), strict=True):
+        assert_array_equal(one, other)
+    with pytest.raises(ValueError, match="X lies outside the training data"):
+        model.predict_interval([[9.0]])
+
+
 def test_what_a_search_finds_says_how_sure_it_is():
     """By the best of its candidates, whose own intervals they are, within a Pipeline too."""
     rng = np.random.default_rng(12)
