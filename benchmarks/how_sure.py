@@ -6,7 +6,8 @@ by so few runs the mean coverage of one gyro is uncertain by 4 %. Beside the dev
 for normal, and the intervals of ``ConformalRegressor``, a Gaussian process (of at most 400 rows)
 and gradient boosting of two quantiles, conformalised (Romano, Patterson and Candes 2019). Of "run",
 the default where runs are given, 90 % of a new run's rows are to be covered with a probability of
-90 %; of the others 90 % of rows on average. Coverages are of rows that
+90 %; of the others 90 % of rows on average. Beside the runs that an interval leaves short stands
+how many are to be expected, new runs being like the old (``new_runs``). Coverages are of rows that
 nothing has seen. Widths are beside one another at equal coverage: each method's intervals are
 stretched or shrunk about their centres until they cover 90 % of these rows.
 """
@@ -25,6 +26,7 @@ from skanfis.intervals import ConformalRegressor
 from . import battery, real_sets, structure
 from .cases import evaluate, geometric_mean
 from .compensation import with_thermal_rate
+from .new_runs import expected_short, run_scores, scores_of_rows
 from .random_functions import make_data
 from .report import Measure, Results, Row, Table
 
@@ -108,8 +110,10 @@ def parts(case):
 
 
 def intervals(X, y, groups, new):
-    """Lower and upper bound by each method, seconds, and bounds by each request of whole runs."""
-    found, seconds, asked = {}, {}, {}
+    """Lower and upper bound by each method, seconds, bounds by each request of whole runs, and the
+    regressor of intervals by folds that gave these.
+    """
+    found, seconds, asked, by_folds = {}, {}, {}, None
 
     def add(name, bounds):
         start = process_time()
@@ -145,6 +149,7 @@ def intervals(X, y, groups, new):
     if groups is not None:
         add("run", lambda: kept[0].predict_interval(new, COVERAGE))
         asked = {request: kept[0].predict_interval(new, *request) for request in _REQUESTS}
+        by_folds = kept[0]
     # Of the same fits.
     add("cross", lambda: kept[0].set_params(method="cross").predict_interval(new, COVERAGE, None))
     add("split", lambda: conformal("split"))
@@ -152,7 +157,7 @@ def intervals(X, y, groups, new):
         add("loo", lambda: conformal("loo"))
     add("Gaussian process", gaussian_process)
     add("quantile boosting", lambda: quantile_boosting(X, y, groups, new))
-    return found, seconds, asked
+    return found, seconds, asked, by_folds
 
 
 def quantile_boosting(X, y, groups, new):
@@ -184,9 +189,15 @@ def measure(case, options):
     for X, y, groups, new, truth, test_groups in parts(case):
         n_rows, n_inputs = X.shape
         spreads.append(np.std(truth))
-        found, seconds, asked = intervals(X, y, groups, new)
+        found, seconds, asked, by_folds = intervals(X, y, groups, new)
+        if asked:
+            scores = scores_of_rows(by_folds, X, y, groups, new, truth)
         requests = [
-            (*request, *_of_runs(low, high, truth, test_groups))
+            (
+                *request,
+                *_of_runs(low, high, truth, test_groups),
+                *_by_chance(*request, *scores, groups, test_groups),
+            )
             for request, (low, high) in asked.items()
         ]
         for name, (low, high) in found.items():
@@ -232,17 +243,35 @@ def _of_runs(low, high, truth, groups):
     return float(np.mean(inside)), int(sum(of_run < COVERAGE)), int(sum(of_run < 0.8)), width
 
 
+def _by_chance(coverage, confidence, old, new, groups, test_groups):
+    """How many runs are to be expected below 90 and 80 %; nothing where rows are asked for."""
+    if confidence is None:
+        return None, None
+    parts = (coverage, COVERAGE), (coverage, 0.8)
+    return tuple(
+        expected_short(
+            [run_scores(old, groups, part) for part in pair],
+            [run_scores(new, test_groups, part) for part in pair],
+            confidence,
+        )
+        for pair in parts
+    )
+
+
 def requested(found):
     """What each request of whole runs gives, over all cold starts."""
     by_request = zip(*[one["requests"] for one in found if one["requests"]], strict=True)
     lines = []
     for own in by_request:
         coverage, confidence = own[0][:2]
-        _, _, covered, short, far, widths = zip(*own, strict=True)
-        lines.append([coverage, confidence or "", np.mean(covered), sum(short), sum(far), widths])
+        _, _, covered, short, far, widths, *chance = zip(*own, strict=True)
+        expected = ["" if confidence is None else round(sum(one), 1) for one in chance]
+        counts = [sum(short), expected[0], sum(far), expected[1]]
+        lines.append([coverage, confidence or "", np.mean(covered), *counts, widths])
     for line in lines[::-1]:
         line[-1] = geometric_mean(np.divide(line[-1], lines[0][-1]))
-    head = ["of a run's rows", "with probability", "covered", "below 90 %", "below 80 %", "width"]
+    head = ["of a run's rows", "with probability", "covered"]
+    head += ["below 90 %", "expected", "below 80 %", "expected", "width"]
     return Table("How sure: requests of whole runs, by folds", head, lines)
 
 
