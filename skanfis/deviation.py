@@ -15,10 +15,13 @@ import numpy as np
 from .consequent import rule_outputs
 from .quadratic import QuadraticForm, row_products, summed_with
 
-__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "points_of_range"]
+__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "points_of_range", "rulers"]
 
 # What a form in fewer products may leave out, in squares of the noise.
 _SHORTENED = 4e-6
+# Widths of a term that ways out of the range are measured by at the most, and the logarithm of the
+# part of the largest membership that a term has at an edge where it still counts.
+_WIDEST, _TRACE = 4.0, -40.0
 # Of a term its middle and so many widths to either side, in so many points.
 _WIDTHS, _POINTS_PER_TERM = 4.0, 65
 
@@ -40,6 +43,31 @@ def points_of_range(model, n_points, rng):
     return np.stack(points)
 
 
+def rulers(model):
+    """What ways out of the range are measured by, below every input and above it, (2, n_inputs).
+
+    Its standard deviation; less at an edge where memberships change while an outlier makes the
+    deviation much longer than they are wide.
+    """
+    antecedent, found = model.antecedent, np.tile(model.spread, (2, 1))
+    widths = [np.empty(0)]
+    for group in antecedent.groups:
+        natural = group.family.natural(group.theta)
+        kinds = np.array([parameter.kind for parameter in group.family.parameters])
+        widths.append(natural[kinds == "log_width"].min(axis=0, initial=np.inf))
+    width, edges = np.concatenate(widths), np.stack([model.minimum, model.maximum], axis=1)
+    with np.errstate(all="ignore"):
+        log_mu = antecedent.log_memberships(edges)
+    for j in np.unique(antecedent.term_inputs):
+        own = np.flatnonzero(antecedent.term_inputs == j)
+        for end, of_terms in enumerate(log_mu[own].T):
+            alive = own[of_terms > of_terms.max() + _TRACE]
+            # A single one has all of the share, and keeps it.
+            if alive.size > 1:
+                found[end, j] = min(found[end, j], _WIDEST * width[alive].min())
+    return found
+
+
 def _about_terms(antecedent, j):
     """Points about all terms of an input, within ``_WIDTHS`` of their widths."""
     found = [np.empty(0)]
@@ -58,7 +86,7 @@ class DeviationTables:
     ``factor`` is F, ``form`` the quadratic form of F' F; ``joint`` is T beside
     -B_k F, and under them Q_k times the whole half, whose squares are taken off: (n_outputs,
     n_displacements + n_pinned, n_premises + n_columns). ``unit`` is a power of two near the noise
-    of every output, (n_outputs, 1), in which squares stay finite.
+    of every output, (n_outputs, 1), in which squares stay finite; ``rulers`` measure ways out.
     """
 
     form: QuadraticForm
@@ -66,6 +94,7 @@ class DeviationTables:
     joint: np.ndarray
     unit: np.ndarray
     n_added: int
+    rulers: np.ndarray
 
     @property
     def n_premises(self):
@@ -172,7 +201,7 @@ class DeviationTables:
             pinned[:, premises.shape[1] :] += of_factor * (posterior.noise[k] / one)
             joint.append(np.vstack([own, pinned]))
         form = QuadraticForm.of(factor.T @ factor, counts, widths.size)
-        return cls(form, factor, np.stack(joint), unit, n_added)
+        return cls(form, factor, np.stack(joint), unit, n_added, rulers(model))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,9 @@
 r"""Rows out of the range: products of what is known at its edge and of what that changes by.
 
 With h the half of a row at the nearest point of the range (see ``posterior``), and e what h changes
-by over a standard deviation of the way from there, what is asked for is h' h, h' e and e' e. Where
-few inputs leave the range, far fewer products do than in general.
+by over a standard deviation of the way from there (beside an outlier a shorter ruler, see
+``deviation``), what is asked for is h' h, h' e and e' e. Where few inputs leave the range, far
+fewer products do than in general.
 
 *On a line.* Rows that leave it along inputs without terms, any number of them: their shares stay as
 they are, and the basis changes by the way's own direction. The quadratic form of the range serves
@@ -38,7 +39,7 @@ from .quadratic import QuadraticForm
 
 __all__ = ["STEP", "Face", "nodes", "on_faces", "products_off_faces", "products_on_line"]
 
-# Derivatives along a way out of the box, by differences over this part of a standard deviation.
+# Derivatives along a way out of the box, by differences over this part of what measures it.
 # They are taken inside: terms may have a corner on the edge.
 STEP = 2.0**-14
 # Rows of a block on one face, from which on its tables are worth their while.
@@ -197,7 +198,7 @@ class Face:
         """Products of h with itself, of h with e, of e with itself, (3, n_outputs, n_rows).
 
         ``row`` is at the edge, where what varies is what it is at a step inside; ``directions``
-        (n_away, n_rows) of the way out, in standard deviations, are of length one.
+        (n_away, n_rows) of the way out, by its rulers, are of length one.
         """
         dtype, n_rows = self.joint.dtype, row.basis.shape[1]
         kept = [row.shares[part] for part in self.shares]

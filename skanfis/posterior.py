@@ -277,8 +277,9 @@ class Posterior:
         there, (n_inputs, n_rows), and ``unfollowed`` (n_outputs, n_rows) what the prediction leaves
         out of the tangent.
         """
-        length = np.sqrt(np.sum((way / model.spread[:, None]) ** 2, axis=0))
         tables = self._tables(model, exact)
+        below, above = tables.rulers[:, :, None]
+        length = np.sqrt(np.sum((way / np.where(way < 0.0, below, above)) ** 2, axis=0))
         found = np.empty((3, self.noise.size, Z.shape[1]))
         left = np.full(Z.shape[1], True)
         for away, rows in on_faces(way, model.antecedent, self.consequents.shape[0]):
@@ -289,8 +290,8 @@ class Posterior:
                 found[:, :, part] = products_on_line(self, model, tables, some, ways)
             else:
                 face, inputs = self._face(model, tables, away), [j for j, _ in away]
-                directions = np.abs(way[inputs][:, part]) / model.spread[inputs, None]
-                directions /= length[part]
+                by = [tables.rulers[int(side > 0), j] for j, side in away]
+                directions = np.abs(way[inputs][:, part]) / np.array(by)[:, None] / length[part]
                 found[:, :, part] = face.products(self.noise, some, directions)
             left[rows] = False
         if left.any():
@@ -311,12 +312,12 @@ class Posterior:
         key = away, at.tobytes(), tables.dtype
         face = known.get(key)
         if face is None:
+            double = self._tables(model, exact=True)
             inputs, inside = [j for j, _ in away], nodes(len(away))[0]
-            steps = STEP * model.spread[inputs] * [side for _, side in away]
+            steps = np.array([STEP * side * double.rulers[int(side > 0), j] for j, side in away])
             points = np.tile(at[:, None], len(inside))
             points[inputs] -= steps[:, None] * inside.T
             rows = [self._row(model, np.ascontiguousarray(one[:, None])) for one in points.T]
-            double = self._tables(model, exact=True)
             face = Face.of(model, double, self.inputs, inputs, rows)
             if tables is not double:
                 face = self._quickest_face(model, face, inputs, at)

@@ -18,7 +18,8 @@ def test_sides_of_a_design_that_is_not_formed_are_those_of_the_dense_one(counts,
         design = (design[:, None] * factor).reshape(-1, 20)
     joint = rng.standard_normal((2, n_halves, n_premises + len(design)))
     form = QuadraticForm.of(np.eye(len(design)), counts, n_basis)
-    tables = DeviationTables(form, np.eye(len(design)), joint, np.ones((2, 1)), n_halves)
+    unit, rulers = np.ones((2, 1)), np.ones((2, 2))
+    tables = DeviationTables(form, np.eye(len(design)), joint, unit, n_halves, rulers)
     given = np.vstack([np.empty((0, 20)), *shares]), basis
     for k, one in enumerate(joint):
         assert_allclose(tables.of_design(k, *given), one[:, n_premises:] @ design, atol=1e-12)

@@ -11,7 +11,9 @@ __all__ = ["FixedPoint", "OutputLimits", "Wishes"]
 
 @dataclass(frozen=True)
 class OutputLimits:
-    """Limits that no prediction may pass.
+    """Limits that no prediction passes in the range of the training data.
+
+    Nor any beyond it with ``out_of_bounds="clip"``; along the tangents of "linear" some may.
 
     Parameters
     ----------

@@ -227,3 +227,38 @@ def test_cost_counts_the_tables():
     numbers = 18 * 19 // 2 + 10 * 10 + 10 * 18 + 3
     assert sure.table_bytes - plain.table_bytes == 8 * numbers + 10 + 2
     assert plain.deviation_multiply_adds == 0 < sure.deviation_multiply_adds
+
+
+@needs_compiler
+def test_beside_a_row_far_off_and_of_an_output_that_never_changed(tmp_path):
+    """Below all others the deviation grows by terms far narrower than the standard deviation."""
+    X, y = surface(n_outputs=2)
+    X[0, 0] += 3e7
+    y[:, 1] = 4.0
+    model = quick(policy="clip").fit(X, y)
+    rows = around(X[1:])
+    rows[:, 0] = np.minimum(rows[:, 0], X[1:, 0].max())
+    code = export_c(model, name="m", deviation=True, min_coverage=None)
+    found = answers([code], rows, tmp_path, 2)[0]
+    expected = model.predict(rows, return_std=True)[1]
+    outside = rows[:, 0] < X[:, 0].min()
+    assert outside.sum() > 20
+    assert (expected[outside, 0] > 2.0 * model.noise_std_[0]).any()
+    np.testing.assert_allclose(found[:, 0], expected[:, 0], rtol=1e-4)
+    np.testing.assert_allclose(found[:, 1], 0.0, atol=1e-6)
+    with pytest.raises(ValueError, match="no digit of it in the range, which of 'x0'"):
+        export_c(model, name="m", deviation=True, dtype="float")
+
+
+@needs_compiler
+def test_in_single_precision_the_self_test_knows_how_far_terms_are_from_a_row_far_off(tmp_path):
+    """A logarithm of a membership of thousands takes more digits off than a usual one."""
+    rng = np.random.default_rng(100)
+    X = rng.uniform(-1.0, 1.0, (150, 2))
+    y = np.sin(3.0 * X[:, 0]) + X[:, 0] * X[:, 1] + 0.05 * rng.normal(size=150)
+    X[0, 0] = 30.0
+    model = ANFISRegressor([3, 2]).fit(X, y)
+    rows = around(X[1:], dtype=np.float32)
+    code = export_c(model, name="m", deviation=True, min_coverage=None, dtype="float")
+    found = answers([code], rows, tmp_path, 1)[0][:, 0]
+    np.testing.assert_allclose(found, model.predict(rows, return_std=True)[1], rtol=0.02)

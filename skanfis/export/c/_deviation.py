@@ -76,6 +76,13 @@ class DeviationSource(HalvesSource):
             self.found.step, _OF_SLOPE[dtype], _AT_EDGE[dtype], by_distance=self.moves_terms
         )
 
+    @property
+    def measure(self):
+        """What the way out along input i is measured by, inverted."""
+        if self.found.rulers is None:
+            return "$name_inverse_spread[i]"
+        return "$name_inverse_ruler[x[i] < c[i] ? 0 : 1][i]"
+
     def declarations(self):
         text = self.write(DECLARATION)
         if self.found.reach is not None:
@@ -99,7 +106,9 @@ class DeviationSource(HalvesSource):
         if found.pinned.size:
             tables["pinned"] = found.pinned
         tables = {name: fitting(values, numbers.dtype) for name, values in tables.items()}
-        if self.answers_beyond and not self.judges_coverage:
+        if self.answers_beyond and found.rulers is not None:
+            tables["inverse_ruler"] = fitting(1.0 / found.rulers, numbers.dtype)
+        elif self.answers_beyond and not self.judges_coverage:
             tables["inverse_spread"] = numbers.inverse_spread
         if found.inputs.size and not (self.has_slopes or self.judges_coverage):
             tables["reference"] = numbers.reference
@@ -194,6 +203,7 @@ class DeviationSource(HalvesSource):
         if self.answers_beyond:
             inside = (BY_DISTANCE if self.moves_terms else TO_POINT).strip("\n")
             beyond = BEYOND.replace("$inside", inside)
+            beyond = beyond.replace("$measure", self.measure)
             lines.append(beyond.replace("$unfollowed", self.unfollowed()).strip("\n"))
         lines.append(SUM.replace("$growth", GROWTH if self.answers_beyond else "").strip("\n"))
         step = self.dialect.number(self.found.step)

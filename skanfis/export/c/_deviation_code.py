@@ -163,7 +163,7 @@ BEYOND = """
         static const $real at_edge[$n_steps] = { $at_edge };
         $real length = 0.0R, top = 0.0R, part;
         for (i = 0; i < $NAME_N_INPUTS; ++i) {
-            e[i] = (x[i] - c[i]) * $name_inverse_spread[i];
+            e[i] = (x[i] - c[i]) * $measure;
             top = e[i] > top ? e[i] : -e[i] > top ? -e[i] : top;
         }
         for (i = 0; i < $NAME_N_INPUTS && top > 0.0R; ++i) {

@@ -24,7 +24,7 @@ __all__ = ["Differences", "deviation_rounding", "longer_steps"]
 
 # In eps: of shares, products and tables together.
 _ROUNDINGS = 16.0
-_DOUBLE = np.finfo(float).eps
+_DOUBLE, _TINY = np.finfo(float).eps, np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -44,12 +44,13 @@ class Differences:
 
 def longer_steps(model, X, wanted, differences: Differences):
     """Deviations (n_rows, n_outputs) by these differences but for rounding; wanted in the range."""
-    tables, (near, way, length) = DeviationTables.of(model.posterior, model), _way(model, X)
+    tables = DeviationTables.of(model.posterior, model)
+    near, way, length, ruler = _way(model, tables, X)
     outside, found = length > 0.0, wanted.copy()
     if not outside.any():
         return found
     near, way, length = near[:, outside], way[:, outside], length[outside]
-    step = differences.step * model.spread[:, None] * way / length
+    step = differences.step * ruler[:, outside] * way / length
     for k, (unit,) in enumerate(tables.unit):
         points = [
             _Halves(model, tables, near - place * step, k)
@@ -69,32 +70,39 @@ def longer_steps(model, X, wanted, differences: Differences):
 
 def deviation_rounding(model, X, wanted, dtype, differences: Differences):
     """What deviations ``wanted`` (n_rows, n_outputs) of rows X may be off by, of the same shape."""
-    tables, (near, way, length) = DeviationTables.of(model.posterior, model), _way(model, X)
+    tables = DeviationTables.of(model.posterior, model)
+    near, way, length, ruler = _way(model, tables, X)
     found, left = [], _left_out(model, X)
     for k, (unit,) in enumerate(tables.unit):
         at = _Halves(model, tables, near, k)
         off = at.rounding(dtype) * differences.growth(length)
         along = np.zeros_like(length)
         for j in np.flatnonzero(way.any(axis=1)):
-            slope = _slope(model, tables, near, k, j, way[j], differences.step)
+            step = differences.step * ruler[j]
+            change = _change(model, tables, near, k, j, step * np.sign(way[j]))
+            slope = change / differences.step
             along += np.abs(way[j]) * slope
             if not differences.by_distance:
-                digits = _DOUBLE * np.abs(near[j]) / (differences.step * model.spread[j])
+                digits = _DOUBLE * np.abs(near[j]) / step
                 off += np.where(way[j] != 0.0, 4.0 * digits * length * slope, 0.0)
         whole = _length(at.values) + along
         off += _ROUNDINGS * np.finfo(dtype).eps * whole
-        table = (_length(at.sizes[0]) * (1.0 + length)) ** 2 * unit / wanted[:, k]
-        off += _ROUNDINGS * _DOUBLE * table
-        off *= unit * np.maximum(whole * unit / wanted[:, k], 1.0)
+        # Of a square, which a root makes more of where there is nothing beside it.
+        table = np.sqrt(_ROUNDINGS * _DOUBLE) * _length(at.sizes[0]) * (1.0 + length)
+        right = wanted[:, k] / unit
+        off += table**2 / np.maximum(right, np.maximum(table, _TINY))
+        off *= unit * np.maximum(whole / np.where(right > 0.0, right, np.inf), 1.0)
         found.append(off + at.rounding_of_tangent(model, left.T, k, dtype))
     return np.stack(found, axis=1)
 
 
-def _way(model, X):
-    """Nearest points in the range, the way from there in deviations, and its length."""
+def _way(model, tables, X):
+    """Nearest points in the range, the way from there, its length, and what measures it."""
     near = np.clip(X.T, model.minimum[:, None], model.maximum[:, None])
-    way = (X.T - near) / model.spread[:, None]
-    return near, way, _length(way)
+    below, above = tables.rulers[:, :, None]
+    ruler = np.where(near > X.T, below, above)
+    way = (X.T - near) / ruler
+    return near, way, _length(way), ruler
 
 
 def _left_out(model, X):
@@ -103,13 +111,13 @@ def _left_out(model, X):
     return way - model.way_out(X) if model.out_of_bounds == "linear" else way
 
 
-def _slope(model, tables, near, k, j, way, step):
-    """How fast h changes along one input, in deviations, (n_rows,)."""
+def _change(model, tables, near, k, j, step):
+    """How much h changes from two steps inside to one along one input, (n_rows,)."""
     points = [near.copy(), near.copy()]
     for inside, point in enumerate(points, start=1):
-        point[j] -= inside * step * np.sign(way) * model.spread[j]
+        point[j] -= inside * step
     first, second = (_Halves(model, tables, point, k).values for point in points)
-    return _length(first - second) / step
+    return _length(first - second)
 
 
 class _Halves:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...deviation import rulers
 from ...membership import Trapezoidal, Triangular
 from ...policies import SILENT
 
@@ -32,7 +33,8 @@ class Deviation:
     cross: np.ndarray
     terms: np.ndarray
     pinned: np.ndarray  # times [u, v]; what is known of the output and taken off
-    step: float  # by which differences go out of the range, in standard deviations of the inputs
+    step: float  # by which differences go out of the range, in what measures the way there
+    rulers: np.ndarray | None  # these, below and above every input; None: standard deviations
     reach: np.ndarray | None = None
     coverage: float | None = None
 
@@ -53,9 +55,9 @@ def deviation_of(model, numbers, reach=None, coverage=None):
     if posterior is None:
         # Says why there is none.
         model.standard_deviation(model.reference[None])
-    step = _STEP[numbers.dtype]
+    step, measures = _STEP[numbers.dtype], rulers(model)
     if numbers.dtype == np.float32 and model.out_of_bounds not in SILENT:
-        step = _step_before_corners(model)
+        step = _step_before_corners(model, measures)
     factor, shift = posterior.consequents.copy(), numbers.reference.astype(float) - model.reference
     by_rule = factor.reshape(len(factor), model.n_rules, -1)
     by_rule[:, :, 0] += by_rule[:, :, 1:] @ shift[posterior.inputs]
@@ -80,12 +82,13 @@ def deviation_of(model, numbers, reach=None, coverage=None):
         np.concatenate([[], *terms]).astype(int),
         _pinned(posterior, unit),
         step,
+        None if (measures == model.spread).all() else measures,
         reach,
         coverage,
     )
 
 
-def _step_before_corners(model):
+def _step_before_corners(model, measures):
     """The longest step, a power of two, of which three meet no corner of a flank inside an edge."""
     nearest, name = np.inf, ""
     for group in model.antecedent.groups:
@@ -96,8 +99,9 @@ def _step_before_corners(model):
         shoulders = numbers[0] - half, numbers[0] + half
         corners = np.stack([shoulders[0] - numbers[1], *shoulders, shoulders[1] + numbers[2]])
         for j, own in zip(group.inputs, corners.T, strict=True):
-            for inside in (model.maximum[j] - own, own - model.minimum[j]):
-                ahead = inside / model.spread[j]
+            insides = own - model.minimum[j], model.maximum[j] - own
+            for inside, measure in zip(insides, measures[:, j], strict=True):
+                ahead = inside / measure
                 ahead = ahead[ahead > 0.0].min(initial=np.inf)
                 if ahead < nearest:
                     nearest, name = ahead, model.input_names[j]

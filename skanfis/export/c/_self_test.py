@@ -14,6 +14,9 @@ ROWS = 32
 # As part of the size of what is summed: what the algorithm loses, and no more.
 TOLERANCE = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}
 
+# Logarithms of memberships that this takes in, and the share from which on a term counts.
+_USUAL, _FIRES = 32.0, 1e-6
+
 _CODE = """
 #ifdef $NAME_SELF_TEST
 
@@ -124,7 +127,16 @@ def known_answers(model, numbers, min_coverage, bits, limits=None):
         y = np.clip(y, *limits.T.astype(float))
     y = np.where((status[chosen] & bits["NO_OUTPUT"]).astype(bool)[:, None], 0.0, y)
     tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z[chosen], y)
+    tolerance *= max(_largest_logarithm(model, Z[chosen]) / _USUAL, 1.0)
     return X[chosen], y.astype(numbers.dtype), status[chosen], tolerance.astype(numbers.dtype)
+
+
+def _largest_logarithm(model, X):
+    """Of a membership by which some rule fires; what it is rounded by a share is off by."""
+    inside = np.ascontiguousarray(np.clip(X, model.minimum, model.maximum).T)
+    log_mu = model.antecedent.log_memberships(inside)
+    shares = model.antecedent.sum_over_rules(model.antecedent.strengths(inside))
+    return np.abs(log_mu[shares > _FIRES]).max(initial=0.0)
 
 
 def size_of_sum(model, X, y):
