@@ -38,7 +38,7 @@ from .target import TargetRange
 __all__ = ["TSKModel"]
 
 # Bytes that the intermediate results of one block of rows may take.
-_BLOCK_BYTES = 2**21
+_BLOCK_BYTES = 2**22
 
 
 @dataclass(frozen=True, eq=False, repr=False)
