@@ -93,7 +93,7 @@ class _Exchange:
         self.problem, self.in_user_units, self.n_boxes = problem, in_user_units, 0
         # That outputs are held on top is monotone: what rules keep, predictions do.
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
-        self.held = Held(self.model, problem, wishes, _FIRST_MARGIN)
+        self.held = Held(replace(model, target=None), problem, wishes, _FIRST_MARGIN)
         self.is_known = all(is_known(group.family) for group in model.antecedent.groups)
         low, high = model.minimum, model.maximum
         rows = problem.rows.sample or problem.rows

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..consequent import NormalFactor
 from ..model import TSKModel
+from ..policies import SILENT
 from .program import InfeasibleError, nearest
 from .wishes import Wishes
 
@@ -77,7 +78,8 @@ class Held:
     Parameters
     ----------
     model : TSKModel
-        In the user's units; its range is where points lie.
+        In the user's units; its range is where demands are held, and its policy says what it
+        predicts at fixed points beyond.
     problem : SeparableProblem
     wishes : Wishes
     margin : float
@@ -86,10 +88,23 @@ class Held:
 
     def __init__(self, model: TSKModel, problem, wishes: Wishes, margin: float):
         self.model, self.problem, self.wishes = model, problem, wishes
+        self._check_points()
         self.demands, self.margin = demands(wishes, model), margin
         # Of each demand, points in standardised inputs: where a slope ends, and where it begins.
         nothing = np.empty((0, model.n_inputs))
         self.after, self.before = ([nothing] * len(self.demands) for _ in range(2))
+
+    def _check_points(self):
+        """Raise ValueError where a value is asked for and nothing is predicted."""
+        model, points = self.model, self.wishes.points
+        beyond = points[~model.in_bounds(points)]
+        if len(beyond) and model.out_of_bounds in SILENT:
+            raise ValueError(
+                f"constraints has a FixedPoint at {beyond[0]}, where a model with "
+                f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
+                f"{model.describe_out_of_bounds(beyond)} Fix a point in the range, add a row of "
+                "data there, or use out_of_bounds='linear' or 'clip'."
+            )
 
     @property
     def n_rows(self):
@@ -131,7 +146,7 @@ class Held:
         columns = self._columns(evaluation.antecedent)
         normal, problem = evaluation.normal, self.problem
         local, targets = normal.coefficients.copy(), problem.rows.targets
-        equal = self._in_local(self._at(columns, self.standardised(self.wishes.points)))
+        equal = self._in_local(self._at_points(columns))
         values = (self.wishes.values - targets.offset) / targets.scale
         places = range(len(self.demands)) if chosen is None else chosen
         known, met, active = [], [], np.zeros(len(self.demands), dtype=int)
@@ -155,8 +170,12 @@ class Held:
     def _known(self, places, is_active, active):
         """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
         inputs, found, start = self.problem.rows.inputs, [], 0
-        if len(self.wishes.points):
-            found.append((self.wishes.points, None))
+        model, points = self.model, self.wishes.points
+        if model.out_of_bounds == "linear":
+            # Beyond, a tangent is known, which is more than a value: it is not counted.
+            points = points[model.in_bounds(points)]
+        if len(points):
+            found.append((np.clip(points, model.minimum, model.maximum), None))
         for p in places:
             chosen = is_active[start : start + len(self.after[p])]
             start, active[p] = start + chosen.size, chosen.sum()
@@ -211,6 +230,13 @@ class Held:
             out_of_bounds="clip",
             output_names=tuple(map(str, range(problem.n_columns))),
         )
+
+    def _at_points(self, columns):
+        """The same at fixed points, by the policy where they lie beyond the range."""
+        if not len(self.wishes.points):
+            return np.empty((0, self.problem.n_columns))
+        own = columns.with_out_of_bounds(self.model.out_of_bounds, self.model.max_extrapolation)
+        return own.predict(self.standardised(self.wishes.points))
 
     def _at(self, columns, Z):
         """Columns of the design at points, (n_points, n_columns)."""

@@ -43,7 +43,8 @@ class FixedPoint:
     Parameters
     ----------
     x : array-like of shape (n_features,) or dict
-        The point, in the units of X; or by the inputs' names.
+        The point, in the units of X; or by the inputs' names. Beyond the range of the training data
+        it holds by ``out_of_bounds``: of the tangent with "linear", of the edge with "clip".
     y : float or array-like of shape (n_outputs,)
         What is predicted there.
 

@@ -19,6 +19,7 @@ from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
 from skanfis.membership import Gaussian
+from skanfis.options import LinearExtrapolation
 from skanfis.solvers import GradientDescent, VariableProjection
 
 QUICK = {
@@ -196,6 +197,30 @@ def test_points_are_met_and_rows_weigh(rng):
     weighted = ANFISRegressor(**params).fit(X, y, sample_weight=weight)
     repeated = ANFISRegressor(**params).fit(np.repeat(X, weight, 0), np.repeat(y, weight))
     assert_allclose(weighted.predict(X), repeated.predict(X), atol=1e-6)
+
+
+@pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
+def test_points_beyond_the_range_are_met_by_the_policy(rng, policy):
+    """Zero rate of a campaign that began at some: what is predicted there, not at the edge."""
+    X, _, y = planted(rng)
+    points = np.stack([X.max(axis=0), X.min(axis=0)]) + np.array([[0.4, -0.3], [0.0, -0.1]])
+    known = [FixedPoint(point, value) for point, value in zip(points, (0.2, -0.1), strict=True)]
+    params = QUICK | {"out_of_bounds": policy}
+    held = ANFISRegressor(**params, constraints=known).fit(X, y)
+    free = ANFISRegressor(**params).fit(X, y)
+    assert_allclose(held.predict(points), [0.2, -0.1], atol=1e-9)
+    std = held.model_.standard_deviation(np.clip(points, X.min(axis=0), X.max(axis=0)))[:, 0]
+    assert (std[0] < held.noise_std_ * (1.0 + 1e-9)) == (policy == "clip")
+    # Two numbers of 27 are given away.
+    assert held.score(X, y) > free.score(X, y) - (0.3 if policy == "clip" else 0.1)
+
+
+@pytest.mark.parametrize("policy", ["nan", "raise"])
+def test_points_where_nothing_is_predicted_are_refused(rng, policy):
+    X, _, y = planted(rng)
+    held = ANFISRegressor(**QUICK, out_of_bounds=policy, constraints=[FixedPoint([0.0, 9.0], 0.0)])
+    with pytest.raises(ValueError, match=r"FixedPoint at \[0. 9.\].* predicts nothing: .*'x1'"):
+        held.fit(X, y)
 
 
 def test_units_do_not_matter(rng):
