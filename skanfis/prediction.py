@@ -51,8 +51,9 @@ class PredictsMixin:
             noise, the consequents and, by Laplace's method, the premises, in the target's units. It
             is that of the rows' common noise; it takes the structure and the weights of the penalty
             for known. Outside the training range it grows with the distance, whatever the policy;
-            where the prediction is NaN, so is it. It is right to five digits;
-            ``model_.standard_deviation(X)`` gives it in double precision, in twice the time.
+            where the prediction is NaN, so is it. It is right to about five digits, beyond the
+            range to three or four; ``model_.standard_deviation(X)`` gives it in double precision,
+            in twice the time.
 
         Returns
         -------
