@@ -107,7 +107,7 @@ class Dense:
             total -= (len(y) - 1.0) * np.log(2.0 * np.pi)
         return total
 
-    def by_summing(self, variance, n_steps=21):
+    def by_summing(self, variance, n_steps):
         """The same of one output, by the trapezoidal rule over all consequents, one by one."""
         y, half = self.y[:, 0], 0.5 / variance
 
@@ -176,8 +176,8 @@ class TestAtGivenPremises:
             dense = Dense(rows, antecedent, order, penalty)
             assert_allclose(dense.phi @ dense.height, 1.0, rtol=1e-12)
             assert_allclose(dense.roots @ dense.height, 0.0, atol=1e-12)
-            steps = 15 if n_rules * (order + 1) == 4 else 41
-            expected, variance = dense.at_its_noise(partial(dense.by_summing, n_steps=steps))
+            # Steps of one deviation: the trapezoidal rule is off by exp(-2 pi^2), 3e-9.
+            expected, variance = dense.at_its_noise(partial(dense.by_summing, n_steps=15))
             assert_allclose(in_full(found), expected, atol=1e-6)
             assert_allclose(found.noise_variance, variance, rtol=1e-4)
 
@@ -306,7 +306,7 @@ def slope_of(function, penalty, key, step=1e-3):
 
 
 class TestReestimated:
-    @pytest.mark.parametrize("seed", range(12))
+    @pytest.mark.parametrize("seed", range(6))
     def test_no_step_lowers_the_evidence_and_the_last_is_stationary(self, seed):
         at, penalty = at_fixed_premises(seed)
         before = at(penalty).minus_twice_log
@@ -585,7 +585,7 @@ class TestWholeFits:
         assert (np.diff(counts) > 0.5).all()
 
     @pytest.mark.theory
-    @pytest.mark.parametrize("seed", range(3))
+    @pytest.mark.parametrize("seed", range(2))
     def test_the_noisier_the_simpler_the_structure(self, seed):
         rules, parameters = [], []
         for noise in (0.3, 2.0, 20.0):
