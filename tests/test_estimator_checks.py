@@ -8,6 +8,8 @@ from skanfis import ANFISRegressor
 from skanfis.options import EarlyStopping
 from skanfis.solvers import VariableProjection
 
+from .quick import with_few_candidates
+
 # The checks fit a few random rows, constant columns among them, and predict others. skanfis says
 # what is wrong with that; to the checks, and under this project's settings, a warning is an error.
 pytestmark = [
@@ -41,6 +43,14 @@ ESTIMATORS = {
 
 def name_of(check):
     return getattr(check, "func", check).__name__
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_candidates():
+    # Nor does a check ask which structure is found.
+    with pytest.MonkeyPatch.context() as patch:
+        with_few_candidates(patch)
+        yield
 
 
 # Not parametrize_with_checks: scikit-learn 1.6 hands pytest a generator, of which pytest 9 warns.
