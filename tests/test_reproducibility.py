@@ -11,14 +11,14 @@ from skanfis import ANFISRegressor
 from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 SETTINGS = {
+    # Grids, and clusters by k-means.
     "default": {},
-    "grid": {"partition": "grid"},
     "grid of a given size": {"n_mfs": [2, 3, 1]},
     "subtractive": {"partition": "subtractive"},
     "fcm": {"partition": "fcm"},
     "clusterer": {"partition": KMeans(4, random_state=0)},
-    "hybrid": {"n_mfs": 2, "solver": Hybrid(tol=1e-2), "max_iter": 20},
-    "gradient": {"n_mfs": 2, "solver": GradientDescent(tol=1e-2), "max_iter": 20},
+    "hybrid": {"n_mfs": 2, "solver": Hybrid(tol=1e-2), "max_iter": 5},
+    "gradient": {"n_mfs": 2, "solver": GradientDescent(tol=1e-2), "max_iter": 5},
     "lse": {"n_mfs": 2, "solver": "lse"},
     "huber": {"n_mfs": 2, "loss": "huber"},
     "early stopping": {"n_mfs": 3, "early_stopping": True},
@@ -29,8 +29,6 @@ SETTINGS = {
         "solver": VariableProjection(tol=1e-2, stiffness=1e-3),
     },
 }
-# Enough for several chunks of rows, so that workers have something to share.
-N_ROWS = 9_000
 
 
 def data(n_rows):
@@ -39,7 +37,7 @@ def data(n_rows):
     return X, np.sin(X[:, 0]) + 1e-2 * X[:, 1] * X[:, 0] + 0.1 * g.normal(size=n_rows)
 
 
-def digest(name, n_rows=150, **more):
+def digest(name, n_rows=100, **more):
     """What a fit is, in short."""
     X, y = data(n_rows)
     model = ANFISRegressor(**({"solver": VariableProjection(tol=1e-2)} | SETTINGS[name] | more))
@@ -60,6 +58,11 @@ def test_nothing_fitted_before_matters(name, fresh_process):
 
 
 @pytest.mark.parametrize("name", ["default", pytest.param("huber", marks=pytest.mark.theory)])
-def test_number_of_workers_does_not_matter(name):
-    settings = {"max_iter": 3}
-    assert digest(name, N_ROWS, n_jobs=2, **settings) == digest(name, N_ROWS, **settings)
+def test_number_of_workers_does_not_matter(name, monkeypatch):
+    # Here, because fresh_process.py imports this file by itself.
+    from .quick import with_few_candidates
+
+    with_few_candidates(monkeypatch)
+    # Enough for several chunks of rows, so that workers have something to share.
+    settings = {"n_rows": 9_000, "max_iter": 3}
+    assert digest(name, n_jobs=2, **settings) == digest(name, **settings)

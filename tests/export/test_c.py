@@ -66,22 +66,28 @@ def expected_outputs(model, X, status, std):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("dtype", "std", "every", "flags"),
+    ("dtype", "std", "part", "flags"),
     [
-        pytest.param("double", "c99", 1, [], id="double"),
-        pytest.param("float", "c99", 1, [], id="float", marks=pytest.mark.theory),
-        pytest.param("double", "c99", 2, SANITIZE, id="double sane", marks=pytest.mark.theory),
-        # Differs by its exp and log alone.
-        pytest.param("double", "c89", 4, SANITIZE, id="double c89", marks=pytest.mark.theory),
-        pytest.param("float", "c89", 4, SANITIZE, id="float c89", marks=pytest.mark.theory),
+        pytest.param("double", "c99", slice(None), [], id="double"),
+        pytest.param("float", "c99", slice(None), [], id="float", marks=pytest.mark.theory),
+        # C89 differs by its exp and log alone: three of four models are met by the sanitizers.
+        pytest.param(
+            "double", "c99", slice(0, None, 4), SANITIZE, id="double sane", marks=pytest.mark.theory
+        ),
+        pytest.param(
+            "double", "c89", slice(1, None, 4), SANITIZE, id="double c89", marks=pytest.mark.theory
+        ),
+        pytest.param(
+            "float", "c89", slice(2, None, 4), SANITIZE, id="float c89", marks=pytest.mark.theory
+        ),
     ],
 )
-def test_every_model_answers_as_predict(dtype, std, every, flags, tmp_path, capsys):
+def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path, capsys):
     tolerance = 1e-5 if dtype == "float" else 1e-12
     X = rows(np.float32 if dtype == "float" else np.float64)
     # Each family four times in a row, each time on another partition.
-    first = 2 * (dtype == "float")
-    cases = [case for i, case in enumerate(FEWEST) if (i + i // 4 - first) % every == 0]
+    turned = sorted(range(len(FEWEST)), key=lambda i: (i // 4, (i + i // 4) % 4))
+    cases = [FEWEST[i] for i in turned[part]]
     codes = [
         export_c(case.model, name=f"m{i}", dtype=dtype, std=std, min_coverage=MIN_COVERAGE)
         for i, case in enumerate(cases)
@@ -341,8 +347,8 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 def test_functions_of_the_library_are_called_as_often_as_reported(case, tmp_path):
     model = case.model.with_out_of_bounds("clip")
     code = export_c(model, tmp_path / "m", min_coverage=None)
-    assert counted_calls(tmp_path)[2] == 0
-    counted = counted_calls(tmp_path)[:2]
+    *counted, roots = counted_calls(tmp_path)
+    assert roots == 0
     reported = [code.cost.exponentials, code.cost.logarithms]
     flat = any(name in case.label for name in ("triang", "trapez", "_shaped"))
     if flat:
