@@ -320,8 +320,8 @@ def test_terms_of_an_input_stay_in_order():
 
 
 def test_max_iter_reached_is_said():
+    solver = VariableProjection(tol=1e-9, stiffness=1e-3)
     with pytest.warns(ConvergenceWarning, match=r"max_iter=2: .* increase max_iter") as caught:
-        solver = VariableProjection(tol=1e-9, stiffness=1e-3)
         model = ANFISRegressor(**SHORT | {"max_iter": 2, "solver": solver}).fit(X, Y)
     assert model.n_iter_ == 2
     assert "max_iter" in model.status_

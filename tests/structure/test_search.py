@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
 from sklearn.datasets import make_friedman1
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import LeaveOneOut, cross_val_predict
@@ -77,8 +78,8 @@ def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
 
 
 def test_expected_error_of_the_linear_model_is_that_of_rows_left_out(rng):
-    X = inputs(rng)
-    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(400)
+    X = inputs(rng, 150)
+    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(150)
     model = ANFISRegressor(
         partition="grid", agreement=0.0, alpha=0.0, solver=VariableProjection(stiffness=0.0)
     ).fit(X, y)
@@ -105,14 +106,13 @@ def test_expected_error_is_that_on_new_rows(rng):
 def test_what_is_given_is_not_searched_for(rng):
     X = inputs(rng)
     y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
-    model = ANFISRegressor(alpha=3e-5).fit(X, y)
+    model = ANFISRegressor(partition="grid", alpha=3e-5).fit(X, y)
     assert (model.alpha_, model.slope_alpha_) == (3e-5, 3e-5)
     assert {c["alpha"] for c in model.structures_} == {3e-5}
     assert len({c["stiffness"] for c in model.structures_}) > 1
     assert len({c["agreement"] for c in model.structures_}) > 1
-    model = ANFISRegressor(
-        agreement=0.3, alpha=3e-5, solver=VariableProjection(stiffness=0.01)
-    ).fit(X, y)
+    solver = VariableProjection(stiffness=0.01)
+    model = ANFISRegressor(partition="grid", agreement=0.3, alpha=3e-5, solver=solver).fit(X, y)
     assert (model.agreement_, model.alpha_, model.stiffness_) == (0.3, 3e-5, 0.01)
     assert {c["stiffness"] for c in model.structures_} == {0.01}
     assert {c["agreement"] for c in model.structures_} == {0.3}
@@ -189,11 +189,11 @@ def test_log_evidence_is_that_of_a_linear_model_averaged_out(rng):
 # The search over both goes through the one over grids.
 @pytest.mark.parametrize("partition", ["auto", "fcm"])
 def test_more_noise_never_gives_more_rules(rng, partition):
-    X = inputs(rng, 300, 2)
-    truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(300)
+    X = inputs(rng, 200, 2)
+    truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(200)
     found = [
         ANFISRegressor(partition=partition).fit(X, truth + s * noise).n_rules_
-        for s in (0.02, 1.0, 30.0)
+        for s in ((0.02, 1.0, 30.0) if partition == "auto" else (0.1, 30.0))
     ]
     assert found == sorted(found, reverse=True)
     assert found[0] > 3
@@ -204,7 +204,7 @@ def test_repeated_rows_are_weighted_rows(rng):
     X = inputs(rng, 120)
     y = np.sin(3.0 * X[:, 0]) + 0.5 * rng.standard_normal(120)
     times = rng.integers(1, 4, 120)
-    often, heavy = ANFISRegressor(), ANFISRegressor()
+    often, heavy = (ANFISRegressor(partition="grid") for _ in range(2))
     often.fit(np.repeat(X, times, axis=0), np.repeat(y, times))
     heavy.fit(X, y, sample_weight=times)
     for one, other in zip(often.structures_, heavy.structures_, strict=True):
@@ -311,8 +311,8 @@ def test_a_grid_starts_from_where_the_terms_of_its_parent_are(rng):
 
 
 def test_no_more_terms_than_values(rng):
-    X = np.column_stack([rng.integers(0, 2, 400), rng.integers(0, 3, 400), rng.uniform(size=400)])
-    y = np.sin(9.0 * X[:, 2]) + 2.0 * X[:, 0] * X[:, 1] ** 2 + 0.05 * rng.standard_normal(400)
+    X = np.column_stack([rng.integers(0, 2, 200), rng.integers(0, 3, 200), rng.uniform(size=200)])
+    y = np.sin(9.0 * X[:, 2]) + 2.0 * X[:, 0] * X[:, 1] ** 2 + 0.05 * rng.standard_normal(200)
     model = ANFISRegressor(partition="grid", order=0).fit(X, y)
     tried = [
         [int(c) for c in line["structure"].removeprefix("grid [").removesuffix("]").split(",")]
@@ -323,7 +323,6 @@ def test_no_more_terms_than_values(rng):
 
 DRAWS = {
     "lognormal": lambda g, shape: g.lognormal(size=shape),
-    "t3": lambda g, shape: g.standard_t(3, size=shape),
     "clusters": lambda g, shape: (
         g.choice([-4.0, 0.0, 3.0], size=shape) + 0.2 * g.standard_normal(shape)
     ),
@@ -331,14 +330,13 @@ DRAWS = {
 }
 
 
-@pytest.mark.parametrize("partition", ["auto"])
 @pytest.mark.parametrize("draw", DRAWS)
-def test_terms_of_a_default_fit_mean_something(rng, draw, partition):
+def test_terms_of_a_default_fit_mean_something(rng, draw):
     X = DRAWS[draw](rng, (300, 3))
     scale = X.std(axis=0)
     y = np.tanh(2.0 * X[:, 0] / scale[0]) + 0.5 * np.sin(2.0 * X[:, 1] / scale[1])
     y += 0.1 * rng.standard_normal(300)
-    model = ANFISRegressor(partition=partition).fit(X, y)
+    model = ANFISRegressor().fit(X, y)
     terms = model.memberships_
     assert len(terms) > 1
     for j in range(3):
@@ -363,12 +361,12 @@ def test_too_few_rows_for_anything_but_a_line(rng):
 
 def test_noise_free_data_get_next_to_no_penalty():
     X, y = make_jang_three_input()
-    model = ANFISRegressor(partition="grid").fit(X, y)
+    model = ANFISRegressor(partition="grid", solver=VariableProjection(tol=1e-2)).fit(X, y)
     assert model.alpha_ <= 1e-6
     assert model.score(X, y) > 0.9999
 
 
-def runs(n_runs=6, n_rows=120, seed=0):
+def runs(n_runs=6, n_rows=90, seed=0):
     """Runs of an instrument: each has a bias of its own, which a wiggle in the run's input fits."""
     g = np.random.default_rng(seed)
     run = np.repeat(np.arange(n_runs), n_rows)
@@ -416,7 +414,8 @@ def test_score_of_groups_is_that_of_trainings_without_them():
 
 def test_a_single_group_says_nothing():
     X, y, run = runs(2)
-    one, none = (ANFISRegressor().fit(X, y, groups=g) for g in (np.zeros(run.size), None))
+    grid = ANFISRegressor(partition="grid")
+    one, none = (clone(grid).fit(X, y, groups=g) for g in (np.zeros(run.size), None))
     assert_array_equal(one.predict(X), none.predict(X))
 
 
@@ -428,7 +427,7 @@ def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_star
     assert model.memberships_ == model.initial_memberships_
 
 
-def piecewise_linear(rng, n_rows=600):
+def piecewise_linear(rng, n_rows=300):
     """Straight between five points."""
     X = rng.uniform(-1.0, 1.0, (n_rows, 1))
     knots = np.linspace(-1.0, 1.0, 5)
