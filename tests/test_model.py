@@ -316,7 +316,7 @@ def test_gradient_is_that_of_the_textbook_formula(frozen, rng):
 @pytest.mark.parametrize("limit", [0.0, 0.3, 2.0, np.inf])
 def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rng, limit):
     frozen = frozen.with_out_of_bounds("linear", limit)
-    X = around(frozen, rng, 500)
+    X = around(frozen, rng, 100)
     nearest = X.clip(frozen.minimum, frozen.maximum)
     way, reach = X - nearest, limit * frozen.spread
     way = np.where(way > reach, reach, np.where(way < -reach, -reach, way))

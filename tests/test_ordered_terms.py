@@ -146,7 +146,7 @@ def test_neighbours_can_be_told_apart_anywhere_in_the_box(family, places, overla
     truth = on_flanks if family.name in {"s_shaped", "z_shaped"} else crossing
     widths = kind_of(antecedent) == "log_width"
     highest = []
-    for displacement in in_the_box(premise, rng, 25):
+    for displacement in in_the_box(premise, rng, 10):
         # With all widths at their most too: between, terms are narrower.
         for x in (displacement, np.where(widths, premise.upper, displacement)):
             (own,) = terms(antecedent, premise.parameters(x)).values()

@@ -115,7 +115,7 @@ def test_an_optimiser_finds_nothing_beyond():
 @pytest.mark.parametrize("n_mfs", [[1, 6, 6], [4, 3, 3]])
 def test_a_gyro_like_model_takes_few_boxes(n_mfs):
     rng = np.random.default_rng(0)
-    X = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (500, 3))
+    X = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (150, 3))
     y = 0.05 * np.exp(-X[:, 0] / 600.0) - 4e-4 * X[:, 2] * (X[:, 1] - 20.0)
     model = ANFISRegressor(
         n_mfs=n_mfs, max_iter=3, solver=VariableProjection(tol=1.0), agreement=0.01, alpha=0.01
