@@ -31,7 +31,7 @@ from skanfis.membership import MEMBERSHIPS
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 from skanfis.solvers import SOLVERS, Hybrid
 
-from ..quick import quick
+from ..quick import quick, with_few_candidates
 from .fis_files import BY_HAND
 
 ESTIMATORS = {
@@ -67,7 +67,9 @@ pytestmark = pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceW
 def fitted(name):
     estimator = ESTIMATORS[name]
     short = {name: 5 for name in estimator.get_params() if name.endswith("regressor__max_iter")}
-    return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
+    with pytest.MonkeyPatch.context() as patch:
+        with_few_candidates(patch)
+        return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
 
 
 def learning():
