@@ -159,14 +159,6 @@ def test_gradient_is_exact_far_from_the_optimum(case):
     assert_all_close(linearisation.gradient, expected, 1e-10)
 
 
-@pytest.mark.theory
-def test_gradient_is_that_of_its_own_cost(case):
-    _, linearisation = case.at_point()
-    numeric = oracles.central_difference(lambda p: case.problem.evaluate(p).cost, case.point, 1e-3)
-    # A row at a bell's centre, where |x - c|^(2b) has no high derivatives, limits the order.
-    assert_all_close(linearisation.gradient, numeric, 1e-6)
-
-
 def test_gauss_newton_is_the_schur_complement(case):
     _, linearisation = case.at_point()
     expected = case.dense.gauss_newton(case.point)
