@@ -112,8 +112,7 @@ def two_bells(rows, alpha=0.0):
 
 class TestAgainstTheTranscription:
     @pytest.mark.theory
-    @pytest.mark.parametrize("step_size", [0.01, 0.1])
-    @pytest.mark.parametrize("raw", [True, False])
+    @pytest.mark.parametrize(("step_size", "raw"), [(0.01, True), (0.1, False)])
     def test_three_input_problem(self, step_size, raw):
         X, y = make_jang_three_input()
         rows = in_raw_units(X, y) if raw else StandardisedData.of(X, y[:, None])

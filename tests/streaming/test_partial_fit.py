@@ -63,12 +63,17 @@ def difference(one, other, X):
     return np.max(np.abs(found - expected) / expected.std(axis=0))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.fixture(scope="module", params=KINDS)
+def whole_and_settings(request, premises):
+    """One fit of all rows."""
+    settings = {"partition": premises, "solver": "lse", **KINDS[request.param]}
+    return ANFISRegressor(**settings).fit(*surface()), settings
+
+
 @pytest.mark.parametrize("chunking", CHUNKINGS)
-def test_any_chunks_equal_one_fit(premises, kind, chunking):
+def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
     X, y = surface()
-    settings = {"partition": premises, "solver": "lse", **KINDS[kind]}
-    whole = ANFISRegressor(**settings).fit(X, y)
+    whole, settings = whole_and_settings
     model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS[chunking])
     assert difference(model, whole, X) < EXACT
     assert (model.agreement_, model.alpha_) == (whole.agreement_, whole.alpha_)
