@@ -232,7 +232,6 @@ def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
 
 ESTIMATORS = {
     "rules": ResidualRegressor(residual=ANFISRegressor(n_mfs=1, alpha=0.01, max_iter=5)),
-    "plain": ResidualRegressor(LinearRegression(), LinearRegression()),
 }
 
 

@@ -17,7 +17,7 @@ from skanfis.inspection.reading import _bands
 from skanfis.readable import measures
 
 from ..export.rule_bases import MODELS, rows_of
-from .drawing import A_GRID, ALL, drawn, plt
+from .drawing import A_GRID, EACH, drawn, plt
 
 TWO_OUTPUTS = MODELS["scattered, order 1, 2 outputs"]
 
@@ -131,7 +131,7 @@ def test_errors_name_the_row_and_the_column(monkeypatch):
         readability(None, X)
 
 
-@ALL
+@EACH
 def test_display_shows_what_was_measured(model):
     X = rows_of(model, 1.3)
     display = drawn(ReadabilityDisplay.from_estimator(model, X, output=-1, n_points=11))

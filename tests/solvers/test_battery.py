@@ -72,8 +72,7 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
 @pytest.mark.theory
 @every_solver
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("n_outputs", [1, 2])
-@pytest.mark.parametrize("agreement", [0.0, 0.2])
+@pytest.mark.parametrize(("n_outputs", "agreement"), [(1, 0.2), (2, 0.0)])
 def test_result_is_what_it_says(name, kind, n_outputs, agreement):
     rows, premise = noisy(kind, n_outputs=n_outputs)
     result = solve(name, rows, premise, agreement=agreement)
