@@ -269,7 +269,7 @@ class Hybrid(DescentSolver):
     >>> from skanfis.solvers import Hybrid
     >>> X, y = make_jang_sinc()
     >>> model = ANFISRegressor(n_mfs=2, solver=Hybrid(), max_iter=20, out_of_bounds="clip")
-    >>> search = GridSearchCV(model, {"solver__step_size": [0.001, 0.1]}, cv=3).fit(X, y)
+    >>> search = GridSearchCV(model, {"solver__step_size": [0.001, 0.1]}, cv=2).fit(X, y)
     >>> search.best_params_
     {'solver__step_size': 0.1}
     """
