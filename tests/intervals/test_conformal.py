@@ -200,7 +200,7 @@ def test_by_group_covers_new_groups_where_by_row_does_not(method):
     """Every run has an offset of its own: rows of a known run say nothing of a new one."""
     rng = np.random.default_rng(6)
     by_row, by_group, by_run = [], [], []
-    for _ in range(12):
+    for _ in range(8):
         run = np.repeat(np.arange(60), rng.integers(3, 12, size=60))
         y = rng.normal(size=60)[run] + 0.1 * rng.normal(size=run.size)
         X, known = np.zeros((run.size, 1)), run < 12

@@ -14,6 +14,8 @@ from skanfis.solvers import VariableProjection
 from skanfis.structure.request import _labeller
 from skanfis.training import fit
 
+from ..quick import quick
+
 
 def data(n_rows=120, n_inputs=2):
     rng = np.random.default_rng(0)
@@ -143,7 +145,7 @@ def test_clusters_are_sought_in_standardised_inputs_and_target():
 
 def test_clusterer_itself_is_left_as_it_was():
     clusterer = KMeans(n_clusters=3, n_init=1, random_state=0)
-    model = ANFISRegressor(partition=clusterer, solver=VariableProjection(tol=0.1)).fit(*data())
+    model = quick(partition=clusterer).fit(*data())
     assert model.partition is clusterer
     assert not hasattr(clusterer, "labels_")
     assert model.n_rules_ == 3
@@ -152,11 +154,9 @@ def test_clusterer_itself_is_left_as_it_was():
 def test_pipeline_is_a_clusterer_too():
     X, y = data()
     kmeans = KMeans(n_clusters=3, n_init=1, random_state=0)
-    alone = ANFISRegressor(partition=kmeans, solver=VariableProjection(tol=0.1)).fit(X, y)
+    alone = quick(partition=kmeans).fit(X, y)
     # On standardised data a scaler does nothing, but for rounding.
-    scaled = ANFISRegressor(
-        partition=make_pipeline(StandardScaler(), kmeans), solver=VariableProjection(tol=0.1)
-    ).fit(X, y)
+    scaled = quick(partition=make_pipeline(StandardScaler(), kmeans)).fit(X, y)
     assert_allclose(scaled.predict(X), alone.predict(X), rtol=0, atol=1e-8)
 
 
@@ -215,6 +215,6 @@ def test_data_are_not_written_to():
     X, y = data()
     weight = np.linspace(0.0, 1.0, len(y))
     before = X.copy(), y.copy(), weight.copy()
-    ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5)).fit(X, y, weight).predict(X[1:] / 2)
+    quick().fit(X, y, weight).predict(X[1:] / 2)
     for array, copy in zip((X, y, weight), before, strict=True):
         assert_array_equal(array, copy)

@@ -55,7 +55,7 @@ def test_verbose_writes_a_line_per_iteration(capsys):
     )
     assert len(lines) == 1 + model.n_iter_
     assert f"iteration {model.n_iter_}: loss {model.loss_curve_[-1]:.6g}" in lines[-1]
-    ANFISRegressor(n_mfs=3).fit(X, Y)
+    quick().fit(X, Y)
     assert capsys.readouterr().out == ""
 
 
@@ -68,20 +68,20 @@ def test_verbose_tells_of_searches(capsys):
 class TestCallbacks:
     def test_every_iteration_is_told_with_a_usable_model(self):
         seen = Recorder()
-        model = ANFISRegressor(n_mfs=3).set_callbacks(seen).fit(X, Y)
+        model = quick(n_mfs=3).set_callbacks(seen).fit(X, Y)
         assert seen.tasks == ["iteration"] * model.n_iter_ + ["fit"]
         assert_allclose(seen.errors[:-1], model.loss_curve_[1:], rtol=1e-6)
         assert seen.max_subtasks == 500
         assert seen.torn_down
 
     def test_wish_to_stop_is_honoured(self):
-        model = ANFISRegressor(n_mfs=3).set_callbacks(Recorder(most=1)).fit(X, Y)
+        model = quick(n_mfs=3).set_callbacks(Recorder(most=1)).fit(X, Y)
         assert model.n_iter_ == 1
         assert "callback asked for the end" in model.status_
 
     def test_weights_are_passed_on(self):
         seen = Recorder()
-        ANFISRegressor(n_mfs=2).set_callbacks(seen).fit(X, Y, sample_weight=np.full(len(Y), 2.0))
+        quick().set_callbacks(seen).fit(X, Y, sample_weight=np.full(len(Y), 2.0))
         assert_array_equal(seen.metadata["sample_weight"], 2.0)
 
     def test_they_do_not_change_the_model(self):
@@ -127,14 +127,14 @@ def interrupt_after(monkeypatch, n_iter):
 
 class TestInterrupt:
     def test_estimator_is_as_before(self, monkeypatch):
-        model = ANFISRegressor(n_mfs=2, verbose=True).fit(X, Y)
+        model = quick(verbose=True).fit(X, Y)
         before = model.predict(X)
         interrupt_after(monkeypatch, 1)
         with pytest.raises(KeyboardInterrupt):
             model.set_params(n_mfs=3).fit(X, Y)
         assert_array_equal(model.predict(X), before)
         with pytest.raises(KeyboardInterrupt):
-            ANFISRegressor(n_mfs=3, verbose=True).fit(X, Y)
+            quick(n_mfs=3, verbose=True).fit(X, Y)
 
 
 @needs_callbacks
@@ -148,7 +148,7 @@ def test_callbacks_are_given_the_data_as_they_were_given(settings):
             fitted_estimator.predict(X)
 
     seen = Data()
-    model = ANFISRegressor(n_mfs=2, **settings)
+    model = quick(**settings)
     model.set_callbacks(seen).fit(frame, Y, sample_weight=np.arange(len(Y)))
     assert seen.tasks
     assert all(seen.tasks)
