@@ -162,16 +162,23 @@ def trained():
 @needs_compiler
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
-    ("dtype", "tolerance", "flags"), [("double", 1e-12, SANITIZE), ("float", 1e-5, [])]
+    ("dtype", "tolerance", "flags", "kinds"),
+    [
+        ("double", 1e-12, [], list(TRAINED)),
+        ("float", 1e-5, [], list(TRAINED)),
+        # Those whose text has least in common with that of the list above.
+        ("double", 1e-12, SANITIZE, ["scaled target", "one cluster", "constant", "scheduled"]),
+    ],
+    ids=["double", "float", "double sane"],
 )
-def test_trained_models_answer_as_predict(dtype, tolerance, flags, tmp_path):
-    estimators = trained()
+def test_trained_models_answer_as_predict(dtype, tolerance, flags, kinds, tmp_path):
+    estimators = {kind: trained()[kind] for kind in kinds}
     Z = around(surface()[0], np.float32 if dtype == "float" else float)
     codes = [
         export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
         for place, estimator in enumerate(estimators.values())
     ]
-    n_outputs = [2 - place % 2 for place in range(len(codes))]
+    n_outputs = [fold(estimator).n_outputs for estimator in estimators.values()]
     answers = evaluate_all(codes, Z, tmp_path, "c99", n_outputs, flags)
     for (kind, estimator), (found, status) in zip(estimators.items(), answers, strict=True):
         wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
