@@ -28,15 +28,13 @@ pytestmark = [
 # of them, and through which is chance.
 ESTIMATORS = {
     "default": ANFISRegressor(),
-    "clusters": ANFISRegressor(
+    "clusters, rows held out": ANFISRegressor(
         partition=KMeans(n_clusters=2, n_init=1, random_state=0),
         agreement=0.1,
         alpha=0.01,
         solver=VariableProjection(stiffness=1e-3),
+        early_stopping=EarlyStopping(validation_fraction=0.3),
         max_iter=5,
-    ),
-    "rows held out": ANFISRegressor(
-        n_mfs=1, early_stopping=EarlyStopping(validation_fraction=0.3), alpha=0.01, max_iter=5
     ),
 }
 

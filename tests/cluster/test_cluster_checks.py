@@ -13,7 +13,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:Only:sklearn.exceptions.Converge
 
 ESTIMATORS = [
     cluster.SubtractiveClustering(),
-    cluster.SubtractiveClustering(radius=0.3, max_clusters=3),
     cluster.FuzzyCMeans(),
     cluster.FuzzyCMeans(n_clusters=2, m="auto", n_init=1),
 ]
