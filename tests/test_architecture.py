@@ -186,12 +186,21 @@ def violations(source, module):
     if layer not in TABLE:
         return [f"{module} is in no layer: give {layer!r} a place in the table"]
     tree = ast.parse(source)
-    lazy = {node for function in functions(tree) for node in ast.walk(function)}
+    lazy = {
+        node
+        for function in functions(tree)
+        for node in ast.walk(function)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    }
     found = []
     for node in ast.walk(tree):
         for name in imported_names(node, module):
             found += forbidden_import(name, layer, is_lazy=node in lazy)
-        if is_private_sklearn(dotted(node)) and layer != DOOR_TO_PRIVATE_SKLEARN:
+        if (
+            isinstance(node, ast.Attribute)
+            and is_private_sklearn(dotted(node))
+            and layer != DOOR_TO_PRIVATE_SKLEARN
+        ):
             found.append(f"{dotted(node)} is private")
         if isinstance(node, ast.Call) and dotted(node.func) == "print":
             found.append("print")

@@ -36,14 +36,14 @@ from .fis_files import BY_HAND
 
 ESTIMATORS = {
     "auto": ANFISRegressor(),
-    "grid": ANFISRegressor(n_mfs=2),
+    "grid": quick(),
     "subtractive": ANFISRegressor(partition="subtractive"),
     "fcm": ANFISRegressor(partition="fcm"),
-    "own subtractive": ANFISRegressor(partition=SubtractiveClustering(radius=0.6)),
-    "own fcm": ANFISRegressor(partition=FuzzyCMeans(3)),
-    "clusterer": ANFISRegressor(partition=KMeans(3, random_state=0)),
-    "model": ANFISRegressor(partition=parse_fis(BY_HAND)),
-    "pipeline": make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)),
+    "own subtractive": quick(partition=SubtractiveClustering(radius=0.6)),
+    "own fcm": quick(partition=FuzzyCMeans(3)),
+    "clusterer": quick(partition=KMeans(3, random_state=0)),
+    "model": quick(partition=parse_fis(BY_HAND)),
+    "pipeline": make_pipeline(StandardScaler(), quick()),
     "words as objects": quick(
         solver=Hybrid(),
         loss=Huber(),
