@@ -60,7 +60,7 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
     path = tmp_path / "log.csv"
     kind(log).to_csv(path, index=False)
     tables, said = [], []
-    for rows in (100_000, 97):
+    for rows in (100_000, 197):
         monkeypatch.setattr(_table, "_ROWS", rows)
         target = tmp_path / f"rates{rows}.csv"
         assert main(["--apply", str(model), str(path), "--output", str(target)]) == 0
