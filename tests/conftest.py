@@ -1,6 +1,7 @@
 """What all tests share, and that they leave nothing behind."""
 
 import gc
+import json
 import sys
 from pathlib import Path
 
@@ -40,11 +41,19 @@ def pytest_collection_finish(session):
 
 
 @pytest.fixture(scope="session")
-def fresh_process(tmp_path_factory):
-    """What ``fresh_process.py`` saw, by the names of its functions."""
+def fresh_process(tmp_path_factory, request):
+    """What ``fresh_process.py`` saw, by the names of its functions; once for all workers."""
     from .fresh_process import in_a_fresh_process
 
-    return in_a_fresh_process(tmp_path_factory.mktemp("fresh"))
+    folder = tmp_path_factory.getbasetemp()
+    if hasattr(request.config, "workerinput"):
+        folder = folder.parent
+    seen = folder / "fresh_process.json"
+    if not seen.is_file():
+        own = tmp_path_factory.mktemp("fresh")
+        (own / "seen").write_text(json.dumps(in_a_fresh_process(own)), encoding="utf-8")
+        (own / "seen").replace(seen)
+    return json.loads(seen.read_text(encoding="utf-8"))
 
 
 @pytest.fixture
