@@ -111,14 +111,14 @@ format: $(DEV)/.installed
 	$(DEV)/bin/ruff check --fix
 	$(DEV)/bin/ruff format
 
-# What README, the pages and the examples print is compared at the newest dependencies. So is theory:
-# whether formulas hold case by case, compiled code answers as Python does, and what is learnt is
-# true. No version of a library decides it, and what is left reaches every line of the package that
-# all tests reach. MARKS= runs all of it.
+# What README, the pages, the docstrings and the examples print is compared at the newest
+# dependencies. So is theory: whether formulas hold case by case, compiled code answers as Python
+# does, and what is learnt is true. No version of a library decides it, and what is left reaches
+# every line of the package that all tests reach. MARKS= runs all of tests/.
 MARKS ?= not page and (floors or not theory)
 test-floors: $(FLOORS)/.installed
 	@echo "The floors:" $$(cat $(FLOORS)/floors.txt)
-	$(call pytest,$(FLOORS)) -m "$(MARKS)"
+	$(call pytest,$(FLOORS)) tests -m "$(MARKS)"
 
 wheel: $(DEV)/.installed
 	rm -rf dist

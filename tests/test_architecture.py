@@ -285,6 +285,7 @@ def module_name(path):
 SOURCES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
 
 
+@pytest.mark.theory
 def test_every_module_keeps_to_its_layer():
     found = [
         f"{module}: {violation}"
@@ -353,6 +354,7 @@ def test_checker_lets_pass(module, source):
     assert violations(source, module) == []
 
 
+@pytest.mark.theory
 def test_what_is_shared_is_used_and_not_by_the_gyro_wing():
     layers = {name: set() for name in SHARED}
     for module, path in SOURCES.items():

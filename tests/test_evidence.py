@@ -149,6 +149,7 @@ def log_integral(logarithm, n_variables, n_steps):
 
 
 class TestAtGivenPremises:
+    @pytest.mark.theory
     @pytest.mark.parametrize("n_rules", [1, 2, 3])
     @pytest.mark.parametrize("order", [0, 1])
     @pytest.mark.parametrize("n_outputs", [1, 2])
@@ -306,6 +307,7 @@ def slope_of(function, penalty, key, step=1e-3):
 
 
 class TestReestimated:
+    @pytest.mark.theory
     @pytest.mark.parametrize("seed", range(6))
     def test_no_step_lowers_the_evidence_and_the_last_is_stationary(self, seed):
         at, penalty = at_fixed_premises(seed)
@@ -597,6 +599,7 @@ class TestWholeFits:
         assert rules[2] == 1 < rules[0]
         assert (np.diff(parameters) < 0.0).all()
 
+    @pytest.mark.theory
     def test_repeated_rows_and_whole_weights_are_the_same_fit(self):
         X, y = surface(80, 0.2)
         times = np.random.default_rng(1).integers(1, 4, 80)

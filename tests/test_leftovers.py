@@ -22,6 +22,7 @@ CHANGES = '(ROOT / "README.md").rename(ROOT / "never.json")'
 BUILDS = '(ROOT / "dist").mkdir()'
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize(
     ("action", "told"),
     [(CHANGES, ["left behind: never.json", "gone: README.md"]), (BUILDS, [])],

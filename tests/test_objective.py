@@ -152,6 +152,7 @@ def test_masses_are_the_weight_on_which_rules_fire(case):
     assert_allclose(found, expected @ case.dense.weight, rtol=1e-11, atol=1e-15)
 
 
+@pytest.mark.theory
 def test_gradient_is_exact_far_from_the_optimum(case):
     _, linearisation = case.at_point()
     expected = case.dense.gradient(case.point)
@@ -228,6 +229,7 @@ def test_dead_rule_lies_on_the_line_of_the_others():
     assert_allclose(found[1], line, rtol=1e-9)
 
 
+@pytest.mark.theory
 def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     whole = arrays(*case.at_point())
     many_small_chunks(monkeypatch)

@@ -90,6 +90,7 @@ def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt,
     return noise, noise * np.sqrt(1.0 + model)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("is_learnt", [False, True], ids=["fixed premises", "with the premises"])
 @pytest.mark.parametrize("kind", ["grid", "scattered", "table, one slope", "order 0"])
 def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt):

@@ -656,6 +656,7 @@ def test_cross_val_score_scores_every_fold():
     assert scores.min() > 0.99
 
 
+@pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_grid_search_over_runs_left_out():
     # Three terms are too few on the first input, and needless on the second.

@@ -73,6 +73,7 @@ def test_two_rules_of_order_zero_are_a_sigmoid():
     assert monotonicity(replace(model, coefficients=-model.coefficients), "time") == -1
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("number", [3, 26, 78, 130, 152])
 def test_bounds_are_tight(number):
     model = CASES[number].model.with_out_of_bounds("linear", 0.4)

@@ -75,6 +75,7 @@ SETTINGS = [
 
 
 class TestOracle:
+    @pytest.mark.theory
     @pytest.mark.parametrize("setting", SETTINGS)
     @pytest.mark.parametrize("seed", range(4))
     def test_centers_and_potentials_are_those_of_the_paper(self, setting, seed):
@@ -86,6 +87,7 @@ class TestOracle:
             assert_array_equal(found.cluster_centers_, X[centers])
             assert_allclose(found.potentials_, peaks, rtol=1e-9)
 
+    @pytest.mark.theory
     def test_settings_take_every_branch_of_the_paper(self):
         counts = {"clear": 0, "far": 0, "near": 0}
         for seed in range(4):

@@ -196,6 +196,7 @@ def test_seed_fixes_the_experiment_whatever_the_noise_and_the_devices():
     assert not nominal["warm_up"].any()
 
 
+@pytest.mark.theory
 def test_angle_random_walk_of_a_mean_falls_with_the_root_of_time():
     # The mean over a time t has the deviation N / sqrt(t).
     noise = make_ofog(

@@ -228,6 +228,7 @@ def test_what_are_no_limits_is_refused(saturate, message):
         export_c(estimator, name="m", saturate=saturate)
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_single_precision_bears_an_offset(tmp_path):
     # Time stamps: a float has steps of 128 there, the inputs a range of 3e6.
@@ -243,6 +244,7 @@ def test_single_precision_bears_an_offset(tmp_path):
     assert (status == STATUS["IN_RANGE"]).all()
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_row_that_is_not_finite_gets_no_answer(tmp_path):
     X, y = surface()
@@ -260,6 +262,7 @@ def test_row_that_is_not_finite_gets_no_answer(tmp_path):
         np.testing.assert_allclose(found[1::2], model.predict(X[:9]), rtol=1e-10)
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_largest_numbers_are_answered(tmp_path):
     X, y = surface()
@@ -277,6 +280,7 @@ def test_largest_numbers_are_answered(tmp_path):
         assert (status[:n_rows] == STATUS["OUT_OF_RANGE"] + STATUS["UNCOVERED"]).all()
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_constant_and_lone_columns(tmp_path):
     X, y = surface()
@@ -320,6 +324,7 @@ def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
 # What is promised of the files.
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("dtype", ["float", "double"])
 @pytest.mark.parametrize("kind", ["grid", "rule table"])
@@ -615,6 +620,7 @@ def test_limit_of_zero_is_clip_and_the_header_says_the_limit():
         assert ("m_reach" in code.source) is (limit == 0.25)
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("dtype", ["double", "float"])
 def test_rows_on_a_thin_diagonal_are_covered_and_its_corners_are_not(dtype, tmp_path):

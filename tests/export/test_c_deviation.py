@@ -124,6 +124,7 @@ def test_deviations_are_those_of_python(std, tmp_path):
             assert off < tolerance, (i, dtype, off)
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_columns_far_from_the_origin_lose_no_digits(tmp_path):
     """A step inside is a hundredth of a deviation, and of floats out there the spacing is more."""

@@ -209,6 +209,7 @@ def test_every_kind_compiles_and_passes_its_own_test(dtype, std, settings, tmp_p
     assert not found.status.any()
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_rows_that_are_not_learnt(model, tmp_path):
     X, t = rows(20)

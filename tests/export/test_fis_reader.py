@@ -306,6 +306,7 @@ def test_long_series_end_early(part):
         parse_fis(f"[System]\n[Rules]\n{part}" if part[0] == "1" else f"[System]\n{part}")
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize(
     "line",
     [
@@ -389,6 +390,7 @@ def test_training_goes_on_from_a_file_and_back(rules, tmp_path, rng):
     assert_allclose(again.predict(X), estimator.predict(X), atol=1e-4 * np.ptp(y))
 
 
+@pytest.mark.theory
 def test_many_constants_beside_many_inputs_take_little_memory():
     # As slopes of zero they would be 160 MB.
     constants = "\n".join(f"MF{k + 1}='r':'constant',[1]" for k in range(10_000))

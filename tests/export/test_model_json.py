@@ -308,6 +308,7 @@ def test_what_could_not_be_read_is_not_written():
         export_json(wide)
 
 
+@pytest.mark.theory
 def test_small_damage_is_never_anything_but_a_value_error(rng):
     text = export_json(A_GRID)
     for _ in range(2000):

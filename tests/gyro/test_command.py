@@ -214,6 +214,7 @@ def test_physics_and_policy(tmp_path, log, capsys):
         np.testing.assert_allclose(y[:, 0], applied["rate_compensated"], rtol=1e-12, atol=1e-10)
 
 
+@pytest.mark.theory
 @pytest.mark.usefixtures("no_report")
 def test_at_rest(tmp_path, capsys):
     log = simulated(n_runs=3, rates=[0.0], profile="ramps")

@@ -162,6 +162,7 @@ def test_every_fold_was_new_to_its_model(calibration):
     np.testing.assert_allclose(calibration.after[test], expected, rtol=1e-9)
 
 
+@pytest.mark.theory
 def test_the_same_log_gives_the_same_report(page, calibration, dossier, monkeypatch):
     # To paint takes longer than all else: the first two pictures are painted again.
     painted, (first, second, *others) = iter(PNG.findall(page)), PNG.findall(page)
@@ -200,6 +201,7 @@ def timeless(physics):
     return calibration_of(log, ("temperature", "output"), terms=(2, 2), physics=physics, **options)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("physics", [False, True])
 def test_says_whether_the_rules_can_be_read(physics, few_rivals, no_drawing):
     calibration = timeless(physics)

@@ -41,6 +41,7 @@ def test_neighbours_of_a_start_cross_at_its_overlap(family, overlap):
     assert_allclose(found[:2], expected, rtol=1e-8)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
 def test_crossings_of_uneven_terms_are_those_of_a_dense_grid(family):
     rng = np.random.default_rng(0)
@@ -113,6 +114,7 @@ def test_neighbours_of_two_families():
     assert_allclose(crossings(antecedent), expected, atol=1e-5)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 def test_greatest_truth_in_the_box_is_that_of_a_dense_grid(model):
     Z = model.minimum[:, None] + (model.maximum - model.minimum)[:, None] * np.linspace(0, 1, DENSE)

@@ -46,12 +46,14 @@ class TestJointGradient:
         assert joint.evaluation.coefficients is coefficients
         assert_array_equal(joint.evaluation.antecedent.parameters, case.point)
 
+    @pytest.mark.theory
     def test_gradient_by_premises(self, case):
         coefficients = any_coefficients(case)
         found = case.problem.joint(case.point, coefficients).premises
         expected = oracles.complex_step(lambda p: case.dense.cost_at(p, coefficients), case.point)
         assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
+    @pytest.mark.theory
     def test_gradient_by_coefficients(self, case):
         coefficients = any_coefficients(case)
         found = case.problem.joint(case.point, coefficients).coefficients
@@ -91,6 +93,7 @@ def problem_of(kind="grid", seed=0, penalty=AGREEING, order=1):
     return SeparableProblem(rows, premise.antecedent, order, penalty), premise
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("kind", ["one input", "grid", "bells", "scattered"])
 @pytest.mark.parametrize("order", [0, 1])
 def test_short_steps_only_go_down(kind, order):
@@ -140,6 +143,7 @@ def test_consequents_are_solved_for_once():
     assert len(calls) == 1
 
 
+@pytest.mark.theory
 def test_given_time_it_comes_near_the_optimum():
     # Order 0 and one input: a small problem, on which even this gets somewhere.
     rows = oracles.bumpy_rows(np.random.default_rng(0), n_inputs=1)

@@ -241,6 +241,7 @@ class TestNaturalPremise:
             moved = self.numbers(premise, natural.move(x, step))
             assert_allclose(moved, self.numbers(premise, x) + step, rtol=1e-12, atol=1e-13)
 
+    @pytest.mark.theory
     def test_slope_is_the_derivative_by_the_numbers(self, kind, rng):
         premise = without_edges(premise_of(kind))
         natural = NaturalPremise(premise)

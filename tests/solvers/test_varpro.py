@@ -308,6 +308,7 @@ def solve(rows, premise, alpha=1e-8, agreement=0.0, **settings):
 
 
 class TestOnRuleBases:
+    @pytest.mark.theory
     @pytest.mark.parametrize("seed", range(4))
     @pytest.mark.parametrize("kind", ["one input", "grid", "bells", "two families", "scattered"])
     def test_planted_model_is_recovered(self, kind, seed):

@@ -54,6 +54,7 @@ def known(request, data):
 
 
 class TestImported:
+    @pytest.mark.theory
     @pytest.mark.filterwarnings("ignore:.*max_iter was reached")
     def test_short_fits_one_after_another_go_on(self, data):
         settings = {"solver": VariableProjection(tol=1e-9), "max_iter": 3}
@@ -87,6 +88,7 @@ class TestImported:
         again = ANFISRegressor(partition=known, solver="lse").fit(X, y)
         assert_allclose(model.predict(X), 3.0 * again.predict(X) - 1.0, atol=1e-8)
 
+    @pytest.mark.theory
     def test_training_goes_on_from_there(self, data, known):
         # With weights that are given nothing moves before the training does.
         solver = VariableProjection(stiffness=1e-4)
@@ -96,6 +98,7 @@ class TestImported:
         assert_allclose(model.loss_curve_[0], first.loss_curve_[-1], rtol=0.02)
         assert model.loss_curve_[-1] <= model.loss_curve_[0]
 
+    @pytest.mark.theory
     def test_weights_are_found_for_imported_rules_too(self, data, known):
         model = ANFISRegressor(partition=known.model_).fit(*data)
         for name in ("agreement_", "alpha_", "stiffness_"):
@@ -168,6 +171,7 @@ def test_named_clusterings_find_rules_that_generalise(partition):
     assert np.sqrt(np.mean((model.predict(X[300:]) - y[300:]) ** 2)) < 1.4
 
 
+@pytest.mark.theory
 def test_radius_of_clusters_is_reported_and_is_that_of_the_clusterer(data):
     X, y = (part[:150] for part in data)
     found = ANFISRegressor(partition="subtractive").fit(X, y)

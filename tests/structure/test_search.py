@@ -359,6 +359,7 @@ def test_too_few_rows_for_anything_but_a_line(rng):
     assert_allclose(model.predict([[0.5], [2.5]]), [2.0, 6.0], rtol=1e-2)
 
 
+@pytest.mark.floors
 def test_noise_free_data_get_next_to_no_penalty():
     X, y = (part[::2] for part in make_jang_three_input())
     model = ANFISRegressor(partition="grid", solver=VariableProjection(tol=1e-2)).fit(X, y)
@@ -487,6 +488,7 @@ def test_only_candidates_that_may_still_lead_are_trained_out(rng):
     assert alone.found[other].score == turned_once
 
 
+@pytest.mark.floors
 @pytest.mark.parametrize("clustering", ["k-means", "fcm"])
 def test_no_more_clusters_than_rows_are_tried(rng, clustering):
     X = inputs(rng, 12, 1)

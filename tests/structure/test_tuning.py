@@ -140,6 +140,7 @@ def test_rules_that_compensate_are_worth_a_fifth_of_the_error(monkeypatch, rng):
     assert start.expected_error < held.expected_error / tuning.HOLDING
 
 
+@pytest.mark.theory
 def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
     """Of noise on 150 inputs, nothing is learnt from 100 rows."""
     X, y = rng.normal(size=(100, 150)), rng.normal(size=(100, 1))

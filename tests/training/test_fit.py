@@ -53,6 +53,7 @@ def test_premises_are_held_until_no_term_is_idle_unless_it_is_given_how_much(mon
     assert next(answers, None) is (None if given is None else False)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("n_mfs", ["auto", 5])
 def test_rules_hold_one_by_one_where_that_is_cheap(n_mfs):
     """A dip and a rise: rules that cancel one another fit them, and so do rules that agree more."""
@@ -182,6 +183,7 @@ def test_weights_given_are_obeyed():
     assert model.stiffness_ > 0.0
 
 
+@pytest.mark.theory
 def test_automatic_weights_count_rows_by_weight_and_not_distinct_ones():
     X, y = data(60)
     y = y + 0.3 * np.random.default_rng(1).normal(size=60)

@@ -48,6 +48,7 @@ def test_threshold_is_where_the_docs_say():
     assert (sampling.MANY_ROWS, sampling.SAMPLE_ROWS) == (100_000, 20_000)
 
 
+@pytest.mark.theory
 def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeypatch):
     X, y = noisy_surface()
     quick = ANFISRegressor(n_mfs=3).fit(X, y)
