@@ -17,13 +17,14 @@ from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
 from .clusters import clustered_antecedent
+from .given import tuned_start
 from .grid import Spacing, grid_antecedent
 from .imported import imported_antecedent
 from .sample import ENOUGH_ROWS, SampleSize, effective_weight
 from .search import SEARCHED, StructureSearch
 from .size import GridSize, RuleBaseSize, term_counts
 from .start import Start
-from .tuning import scaled, tuned_start
+from .tuning import scaled
 
 __all__ = ["OVERLAP", "StructureRequest", "report_constant"]
 

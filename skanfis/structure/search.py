@@ -31,22 +31,20 @@ from functools import reduce
 from math import prod
 
 import numpy as np
-from sklearn.cluster import KMeans
 from sklearn.model_selection import GroupKFold
 
-from ..cluster import FuzzyCMeans, SubtractiveClustering
 from ..data import StandardisedData
 from ..evidence import FREE
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
 from .between import is_known, leverage_between, places_between
-from .candidate import Candidate
-from .clusters import clustered_antecedent
-from .grid import Spacing, grid_antecedent
+from .candidate import MOST_RULES, Candidate, RuleBases
+from .grid import Spacing
 from .held_out import held_out_loss
 from .readable_terms import has_idle_term
 from .sample import effective_weight, search_sample, unit_scale
+from .screening import residual_asks_for
 from .start import Start
 from .tuning import (
     FIRST_PENALTY,
@@ -74,8 +72,7 @@ _MOST_ROWS, _MOST_ROWS_IN_GROUPS = 2000, 1000
 _MOST_COLUMNS = 256
 _RULES_OF_MANY = 3
 _MOST_OF_MANY = 1000
-# More rules nobody reads, nor more names for one input.
-_MOST_RULES = 36
+# More names for one input nobody reads.
 _MOST_TERMS = 6
 # After each round, so many inputs stay in the running for a further term.
 _MOST_GROWING = 8
@@ -146,7 +143,7 @@ class StructureSearch:
         max_rules: int | None = None,
         split: Callable | None = None,
     ):
-        self.rows, self.families, self.order, self.seed = rows, families, order, seed
+        self.rows, self.order = rows, order
         self.consequent_inputs = consequent_inputs
         self.overlap, self.other_families = overlap, other_families
         self.free = [key for key in FREE if key not in fixed]
@@ -157,6 +154,7 @@ class StructureSearch:
         most = _MOST_ROWS if rows.groups is None else _MOST_ROWS_IN_GROUPS
         self.sample = search_sample(rows, most)
         self.spacing = Spacing(self.sample)
+        self.rule_bases = RuleBases(families, self.inputs, self.spacing, overlap, seed)
         self.places = places_between(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.n_all = effective_weight(rows)
@@ -212,29 +210,12 @@ class StructureSearch:
             self.first = replace(self.first, slope=self._tuned(best).penalty.slope)
 
     def _screened(self, linear):
-        """Inputs that are worth a try: all, or those whose terms the residual asks for most.
-
-        With w the share of the upper of two terms on an input, and r the residual of the linear
-        model, the statistic is the sum over basis functions b of (sum s w b r)^2 / sum s (w b)^2.
-        """
+        """Inputs that are worth a try: all, or those whose terms the linear model asks for most."""
         if self.inputs.size <= _MOST_UNSCREENED:
             return list(self.inputs)
-        tuned, sample = self._tuned(linear), self.sample
-        weight = sample.sample_weight
         centers = np.array([self.spacing.centers(j, 2) for j in self.inputs])
-        distance = np.diff(centers, axis=1).ravel()
-        # Two Gaussians that cross at 0.6: the log of their ratio has this slope.
-        slope = -8.0 * np.log(self.overlap) / distance
-        shares = 1.0 / (1.0 + np.exp(-slope * (sample.X[:, self.inputs] - centers.mean(axis=1))))
-        shares -= np.average(shares, axis=0, weights=weight)
-        basis = np.column_stack([np.ones(sample.n_rows), sample.X[:, self.consequent_inputs]])
-        scale = (basis**2).T @ (weight[:, None] * shares**2)
-        statistic = np.zeros(self.inputs.size)
-        for part, residual, own in tuned.problem.residuals(tuned.evaluation):
-            for one in residual:
-                along = basis[part].T @ (shares[part] * (own * one)[:, None])
-                statistic += np.sum(along**2 / np.maximum(scale, np.finfo(float).tiny), axis=0)
-        return [int(j) for j in self.inputs[np.argsort(-statistic, kind="stable")[:_MOST_GROWING]]]
+        asked = residual_asks_for(self._tuned(linear), self.inputs, centers, self.overlap)
+        return [int(j) for j in self.inputs[np.argsort(-asked, kind="stable")[:_MOST_GROWING]]]
 
     def _promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
@@ -272,7 +253,7 @@ class StructureSearch:
         return (
             max(candidate.counts) <= _MOST_TERMS
             and all(c == 1 or c <= self.spacing.n_values(j) for j, c in enumerate(candidate.counts))
-            and n_rules <= (self.max_rules or _MOST_RULES)
+            and n_rules <= (self.max_rules or MOST_RULES)
             and n_columns <= self._most_columns
         )
 
@@ -336,30 +317,6 @@ class StructureSearch:
                 if is_behind and candidate in self.begun:
                     self.found[candidate] = self.begun.pop(candidate)
         return min(candidates, key=self._score)
-
-    def _antecedent(self, candidate, rows):
-        families = self.families
-        if candidate.family is not None:
-            families = [candidate.family] * len(families)
-        if candidate.counts is None:
-            clusterer = self._clusterer(candidate, rows.y.shape[1])
-            return clustered_antecedent(
-                families,
-                rows,
-                lambda t, w: clusterer.fit(t, sample_weight=w).labels_,
-                self.inputs,
-                candidate.clustering == "k-means",
-            )
-        return grid_antecedent(families, candidate.counts, self.spacing, self.overlap)
-
-    def _clusterer(self, candidate, n_outputs):
-        if candidate.clustering == "subtractive":
-            # Distances grow with the root of the columns' number.
-            radius = candidate.size * np.sqrt(0.5 * (self.inputs.size + n_outputs))
-            return SubtractiveClustering(radius=radius, max_clusters=_MOST_RULES)
-        if candidate.clustering == "fcm":
-            return FuzzyCMeans(candidate.size, m="auto", random_state=self.seed)
-        return KMeans(candidate.size, n_init=1, random_state=self.seed)
 
     def _score(self, candidate):
         """N log of the expected error, or the error on groups left out."""
@@ -442,7 +399,7 @@ class StructureSearch:
         if begun is None:
             problem = SeparableProblem(
                 rows,
-                self._antecedent(candidate, rows),
+                self.rule_bases.of(candidate, rows),
                 self.order,
                 self.first,
                 consequent_inputs=self.consequent_inputs,

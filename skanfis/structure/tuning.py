@@ -10,8 +10,8 @@ The weights come first, at the premises of the start: from weights that are far 
 steps of the premises would go where no evidence leads back from. Data without noise are the other
 case: what the premises of the start leave would be taken for noise. So there is a second way in,
 *loose*, in which the premises come first and the weights are next to nothing. It is taken where
-half of the noise is gone, and the evidence is for it; of rules that are given, the error to be
-expected on new rows.
+half of the noise is gone, and the evidence is for it; of rules that are given (``given``), the
+error to be expected on new rows.
 """
 
 from dataclasses import dataclass, replace
@@ -19,10 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..antecedent import Antecedent
-from ..data import StandardisedData
 from ..evidence import (
-    FREE,
     PRIOR_DISPLACEMENT,
     Laplace,
     extrapolated,
@@ -35,30 +32,28 @@ from ..objective import Evaluation, SeparableProblem
 from ..penalty import GREATEST_ALONE, Penalty
 from ..premise import Premise
 from ..solvers.varpro import varpro
-from .readable_terms import has_idle_term, has_twin_terms
-from .sample import effective_weight, search_sample
-from .start import Start
 
 __all__ = [
     "ARRIVING",
     "FIRST_PENALTY",
     "FIRST_STEPS",
     "HOLDING",
+    "LESS_NOISE",
+    "MOST_COLUMNS",
+    "MOST_TURNS",
     "ROWS_EACH",
     "WORTHWHILE",
     "Tuned",
+    "held",
     "held_for_nothing",
     "is_affordable",
     "more_agreement",
     "scaled",
     "settled",
     "tune",
-    "tuned_start",
     "with_premises",
 ]
 
-# The weights of rules that are given are found on at most so many representative rows.
-_MOST_ROWS = 1000
 # In the middle of what data of every kind ask for; from there the first steps find their way.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Loose: what rounding errors need.
@@ -67,18 +62,14 @@ _LOOSE = 1e-12
 _LOOSE_ITERATIONS = 25
 # Of the noise's variance, what a loose training must bring it down to: rules that compensate one
 # another are the price, and not to be paid for less.
-_LESS_NOISE = 0.5
-# The same where terms are freed beyond all reading: only for data that are next to exact. And of
-# the error, where they are freed, and can be read nevertheless.
-_LEAST_NOISE = 0.01
-_LESS_ERROR = 0.1
+LESS_NOISE = 0.5
 # Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
 # lead from the start to any end.
 FIRST_STEPS = 5
 # Where no premises follow, the weights arrive: most of them within ten.
 ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
-_MOST_COLUMNS = 512
+MOST_COLUMNS = 512
 _FEW_STEPS, _FEW_TURNS = 3, 2
 # Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone.
 ROWS_EACH = 2.0
@@ -88,7 +79,7 @@ _MOST_EFFECTIVE = 0.5
 # finished while the other moves: what is left is done in the training that follows.
 _STEPS = 2
 _ITERATIONS = 4
-_MOST_TURNS = 8
+MOST_TURNS = 8
 _TOLERANCE = 1e-3
 # What a larger or freer model must gain in -2 log p: less is "not worth more than a bare mention"
 # (Kass and Raftery 1995).
@@ -155,62 +146,22 @@ class Tuned:
         left_out = self.problem.leave_one_out_error(self.evaluation, n_rows)
         return with_premises(left_out, share)
 
-    def is_beaten_loosely(self, loose, part=_LESS_NOISE):
+    @property
+    def priced_error(self):
+        """The error to be expected, and what rules are worth that hold where these do not."""
+        return (HOLDING if self.is_apart else 1.0) * self.expected_error
+
+    def is_beaten_loosely(self, loose, part=LESS_NOISE):
         """Whether a loose training has found what this one took for noise, down to a part of it."""
         noise, other = self.posterior.noise_variance, loose.posterior.noise_variance
         return other < part * noise and loose.score < self.score - WORTHWHILE
 
 
-def _priced(tuned):
-    """The error to be expected, and what rules are worth that hold where these do not."""
-    return (HOLDING if tuned.is_apart else 1.0) * tuned.expected_error
-
-
-def _may_be_free(problem: SeparableProblem) -> bool:
-    """Whether there are premises, and rows enough: any freedom passes through hardly more rows."""
-    n_columns, n_rows = problem.n_columns, problem.rows.n_rows
-    return (
-        problem.antecedent.parameters.size > 0
-        and n_columns <= _MOST_COLUMNS
-        and n_rows >= ROWS_EACH * n_columns
-    )
-
-
-def _freed(bounded: Tuned, premise: Premise, free, n_rows: float) -> Tuned | None:
-    """The same with terms that have no bounds, where that is worth it.
-
-    Freedom is worth nine tenths of the squared error if the terms can still be told apart, and next
-    to all of the noise if not.
-    """
-    problem = bounded.problem
-    freed = _freely(problem, premise, free, n_rows)
-    if bounded.is_beaten_loosely(freed, _LEAST_NOISE):
-        return freed
-    if freed.expected_error < _LESS_ERROR * _priced(bounded):
-        freed = _held(freed, premise, free, n_rows)
-        rows, antecedent = problem.rows, freed.evaluation.antecedent
-        is_read = not has_idle_term(rows, antecedent) and not has_twin_terms(rows, antecedent)
-        if is_read and _priced(freed) < _LESS_ERROR * _priced(bounded):
-            return freed
-    return None
-
-
-def _freely(problem, premise, free, n_rows) -> Tuned:
-    """Rules that may compensate one another."""
-    return tune(problem, premise, free, n_rows, is_loose=True, has_least=False, is_last=False)
-
-
-def _held(tuned, premise, free, n_rows) -> Tuned:
+def held(tuned, premise, free, n_rows) -> Tuned:
     """The same with rules that hold one by one, if that is cheap and agreement is free."""
     if "agreement" not in free:
         return tuned
     return _together(tuned, _Weights(tuned.problem, n_rows), premise, free)
-
-
-def _premise(problem, is_free=False):
-    """What moves of a problem's rules, within the box of its rows."""
-    low, high = problem.rows.inputs.minimum, problem.rows.inputs.maximum
-    return Premise.of(problem.antecedent, low, high, is_free)
 
 
 def with_premises(left_out, share):
@@ -269,7 +220,7 @@ def tune(
     premise: Premise,
     free,
     n_rows: float,
-    turns=_MOST_TURNS,
+    turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
     displacement=None,
     is_loose=False,
@@ -306,7 +257,7 @@ def tune(
         Whether no turns follow; then the rules are made to hold one by one.
     """
     steps_a_turn = _STEPS
-    if problem.n_columns > _MOST_COLUMNS:
+    if problem.n_columns > MOST_COLUMNS:
         first_steps, turns, steps_a_turn = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
@@ -424,61 +375,6 @@ def more_agreement(
 def is_affordable(held: Evaluation, apart: Evaluation) -> bool:
     """Whether rules that hold one by one cost no more of the error than they are worth."""
     return held.mean_squared_error <= HOLDING * apart.mean_squared_error
-
-
-def tuned_start(
-    antecedent: Antecedent,
-    rows: StandardisedData,
-    order,
-    consequent_inputs,
-    weights,
-    premises_move,
-    is_compared=False,
-    is_noisy=False,
-) -> Start:
-    """A start from rules that are given, with the weights that are not given found on the rows.
-
-    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``;
-    ``is_compared`` says that the error to be expected is wanted even where all of them are given,
-    ``is_noisy`` that what remains of the target is noise, and loose trainings would look in vain.
-    """
-    free = [key for key in FREE if key not in weights]
-    penalty = replace(FIRST_PENALTY, **weights)
-    if not premises_move:
-        free = [key for key in free if key != "stiffness"]
-        penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
-    if not free and not is_compared:
-        return Start(antecedent, penalty)
-    sample = search_sample(rows, _MOST_ROWS)
-    problem = SeparableProblem(
-        sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
-    )
-    n_sample = effective_weight(sample)
-    premise, is_free = _premise(problem), False
-    turns = _MOST_TURNS if premises_move else 0
-    first_steps = FIRST_STEPS if premises_move else ARRIVING
-    best = tune(problem, premise, free, n_sample, turns, first_steps)
-    if premises_move and _may_be_free(problem) and not is_noisy:
-        loose = _freely(problem, premise, free, n_sample)
-        if loose.posterior.noise_variance < _LESS_NOISE * best.posterior.noise_variance:
-            loose = _held(loose, premise, free, n_sample)
-            best = loose if _priced(loose) < _priced(best) else best
-        anywhere = _premise(problem, is_free=True)
-        freed = _freed(best, anywhere, free, n_sample)
-        if freed is not None:
-            best, premise, is_free = freed, anywhere, True
-    if premises_move:
-        best = held_for_nothing(best, premise, free, n_sample, effective_weight(rows))
-    penalty = scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held)
-    return Start(
-        antecedent,
-        penalty,
-        settled(best.displacement),
-        is_free,
-        best.is_apart,
-        best.is_held,
-        expected_error=best.expected_error,
-    )
 
 
 def settled(displacement):

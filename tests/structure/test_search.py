@@ -300,7 +300,7 @@ def test_a_grid_starts_from_where_the_terms_of_its_parent_are(rng):
     rows = StandardisedData.of(X, y)
     found = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6)
     found.parent = found._train(Candidate((3, 2)), found.sample)
-    child = found._antecedent(Candidate((3, 3)), found.sample)
+    child = found.rule_bases.of(Candidate((3, 3)), found.sample)
     premise = Premise.of(child, found.sample.inputs.minimum, found.sample.inputs.maximum)
     started = child.with_parameters(premise.parameters(found._inherited(child, premise)))
     before, (own,), (start,) = found.parent.evaluation.antecedent, started.groups, child.groups

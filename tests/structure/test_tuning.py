@@ -15,16 +15,6 @@ from skanfis.premise import Premise
 from skanfis.structure import Spacing, grid_antecedent, tuning
 
 
-@pytest.fixture
-def two_rules(rng):
-    """A problem of 100 rows, and its premise."""
-    x = rng.uniform(-1.0, 1.0, (100, 1))
-    rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.1 * rng.normal(size=(100, 1)))
-    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
-    return problem, Premise.of(antecedent, *rows.inputs.box)
-
-
 def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
     # n kappa / sigma^2 x0^2 = 1; but where they come first, next to nothing holds them.
     monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
@@ -52,16 +42,6 @@ def test_premises_start_where_they_are_told_to(two_rules):
     assert found.evaluation.cost == costs[0] != costs[1]
 
 
-def test_nothing_is_computed_where_no_weight_is_to_be_found(monkeypatch, two_rules):
-    # Premises that stay where they are have no stiffness.
-    monkeypatch.setattr(tuning, "search_sample", None)
-    antecedent, rows = two_rules[0].antecedent, two_rules[0].rows
-    given = {"agreement": 0.1, "alpha": 0.01, "slope": 0.02}
-    start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), given, premises_move=False)
-    assert start.antecedent is antecedent
-    assert start.penalty == Penalty(**given, stiffness=0.0)
-
-
 def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
     problem, premise = two_rules
     monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
@@ -73,71 +53,14 @@ def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
             name,
             lambda *args, name=name, whole=whole, **more: made.append(name) or whole(*args, **more),
         )
-    monkeypatch.setattr(tuning, "_MOST_COLUMNS", problem.n_columns - 1)
+    monkeypatch.setattr(tuning, "MOST_COLUMNS", problem.n_columns - 1)
     tuning.tune(problem, premise, FREE, 100.0)
     # Three before the premises move; then the premises, and the weights, twice.
     assert made == 3 * ["reestimated"] + 2 * ["varpro", "reestimated"]
     made.clear()
-    monkeypatch.setattr(tuning, "_MOST_COLUMNS", problem.n_columns)
+    monkeypatch.setattr(tuning, "MOST_COLUMNS", problem.n_columns)
     tuning.tune(problem, premise, FREE, 100.0, turns=1)
     assert made == 5 * ["reestimated"] + ["varpro"] + 2 * ["reestimated"]
-
-
-def test_a_kink_that_was_taken_for_noise_is_found_with_the_premises_first(monkeypatch, rng):
-    x = rng.uniform(-1.0, 1.0, (150, 1))
-    rows = StandardisedData.of(x, np.abs(x) + 1e-3 * rng.normal(size=(150, 1)))
-    antecedent = grid_antecedent([Gaussian], [3], Spacing(rows), 0.6)
-
-    def found():
-        return tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
-
-    start = found()
-    # Now there is nothing but the way in that finds the weights first.
-    monkeypatch.setattr(tuning, "ROWS_EACH", np.inf)
-    assert start.expected_error < 0.3 * found().expected_error
-
-
-def test_where_data_are_exact_nothing_holds_the_rules_together(rng):
-    x = rng.uniform(-1.0, 1.0, (120, 1))
-    rows = StandardisedData.of(x, np.sin(6.0 * x))
-    antecedent = grid_antecedent([Gaussian], [4], Spacing(rows), 0.6)
-    start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
-    # The least that rules would pay which are to be read: n_columns sigma^2 / n over two squared.
-    assert start.penalty.agreement < 0.1 * 8 * start.expected_error / 120 / 2.0**2
-
-
-def test_terms_are_freed_for_a_step_and_can_be_read(rng):
-    x = rng.uniform(-1.0, 1.0, (300, 1))
-    rows = StandardisedData.of(x, (x > 0.2) + 0.01 * rng.normal(size=x.shape))
-    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
-    start = tuning.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
-    assert start.is_free
-    assert not start.is_apart
-    premise = Premise.of(antecedent, *rows.inputs.box, is_free=True)
-    low, high = antecedent.with_parameters(premise.parameters(start.displacement)).groups[0].theta.T
-    # They cross where the step is, and the one gives way to the other within a twentieth.
-    z = rows.inputs.apply(np.array([[0.15, 0.25]]), np.empty((1, 2)))[0]
-    difference = [-0.5 * ((z - c) / np.exp(w)) ** 2 for c, w in (low, high)]
-    assert (np.sign(difference[0] - difference[1]) == [1.0, -1.0]).all()
-    # No more than what two rows next to the step come to, which may be taken for the other side's.
-    assert start.expected_error < 2.0 / 300 / np.var(x > 0.2)
-
-
-def test_rules_that_compensate_are_worth_a_fifth_of_the_error(monkeypatch, rng):
-    """A product, of which the rules of a grid are hyperbolic: none holds without the others."""
-    X = rng.uniform(-1.0, 1.0, (300, 2))
-    rows = StandardisedData.of(X, X.prod(axis=1, keepdims=True) + 1e-4 * rng.normal(size=(300, 1)))
-    antecedent = grid_antecedent(2 * [Gaussian], [2, 2], Spacing(rows), 0.6)
-
-    def found():
-        return tuning.tuned_start(antecedent, rows, 1, np.arange(2), {}, premises_move=True)
-
-    start = found()
-    # Without the way in that nothing holds together.
-    monkeypatch.setattr(tuning, "ROWS_EACH", np.inf)
-    held = found()
-    assert start.is_apart
-    assert start.expected_error < held.expected_error / tuning.HOLDING
 
 
 @pytest.mark.theory
