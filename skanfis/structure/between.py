@@ -20,13 +20,15 @@ __all__ = ["is_known", "leverage_between", "places_between"]
 
 _MOST_PLACES = 200
 _SEED = 0
-# Of so many others the nearest: between rows far apart lies what hardly any new row comes to.
-_OTHERS = 3
+# Of so many others the nearest: between rows far apart, as those of two clusters, lies what hardly
+# any new row comes to. With three, 48 functions of clustered inputs had 11 % more error in the
+# mean, with ten 1.8 %, with twenty 0.5 %.
+_OTHERS = 20
 _MOST_LEVERAGE = 1.0
 
 
 def places_between(rows: StandardisedData) -> np.ndarray:
-    """Places half-way between rows and the nearest of three others, (n_inputs, n_places)."""
+    """Places half-way between rows and the nearest of twenty others, (n_inputs, n_places)."""
     rng, X, n_rows = np.random.default_rng(_SEED), rows.X, rows.n_rows
     own = rng.permutation(n_rows)[:_MOST_PLACES]
     others = (own[:, None] + rng.integers(1, max(n_rows, 2), (own.size, _OTHERS))) % n_rows
