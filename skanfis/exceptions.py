@@ -155,9 +155,11 @@ class SplitLeakWarning(UserWarning):
 
 
 class UnderdeterminedWarning(UserWarning):
-    """There are more consequent parameters than distinct training rows.
+    """The training rows do not tell so many rules.
 
-    From ``fit``. Take fewer rules, or ``order=0``, and judge the model on rows held out.
+    From ``fit``: there are more consequent parameters than distinct training rows, or half-way
+    between rows less is known than a single row there would tell, as where they lie on a few
+    curves. Take fewer rules, or ``order=0``, and judge the model on rows held out.
 
     Examples
     --------

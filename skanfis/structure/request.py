@@ -16,6 +16,7 @@ from ..evidence import FREE
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
+from .between import is_known
 from .clusters import clustered_antecedent
 from .given import tuned_start
 from .grid import Spacing, grid_antecedent
@@ -101,16 +102,19 @@ class StructureRequest:
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
-            self._warn_if_underdetermined(antecedent.n_rules, rows, size)
-            return replace(self._tuned(antecedent, rows, is_compared=False), term_names=names)
+            warned = self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+            start = self._tuned(antecedent, rows, is_compared=False)
+            _warn_if_unknown_between(start, warned)
+            return replace(start, term_names=names)
         antecedent = self._antecedent(self.families, rows)
-        self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+        warned = self._warn_if_underdetermined(antecedent.n_rules, rows, size)
         is_compared = bool(self.other_families)
         best = self._tuned(antecedent, rows, is_compared)
         for family in self.other_families:
             antecedent = self._antecedent([family] * len(self.families), rows)
             other = self._tuned(antecedent, rows, is_compared)
             best = other if other.expected_error < best.expected_error else best
+        _warn_if_unknown_between(best, warned)
         return best
 
     def _antecedent(self, families, rows):
@@ -195,13 +199,14 @@ class StructureRequest:
         return counts
 
     def _warn_if_underdetermined(self, n_rules, rows, size):
-        """Warn where there is less than one distinct row per consequent parameter."""
+        """Warn where there is less than one distinct row per consequent parameter; whether so."""
         n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
         n_columns = n_rules * n_basis
         n_distinct = size.n_distinct_inputs
         if n_distinct == ENOUGH_ROWS < n_columns:
             n_distinct = SampleSize.of(rows, n_columns).n_distinct_inputs
-        if n_columns > n_distinct:
+        is_underdetermined = n_columns > n_distinct
+        if is_underdetermined:
             warn_user(
                 f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
                 f"parameters for {n_distinct} distinct training rows: most of what the model says "
@@ -209,6 +214,21 @@ class StructureRequest:
                 "fewer rules.",
                 UnderdeterminedWarning,
             )
+        return is_underdetermined
+
+
+def _warn_if_unknown_between(start, is_warned_already):
+    """Warn where rules that are given say between the rows what no row tells."""
+    if is_warned_already or is_known(start.leverage_between):
+        return
+    warn_user(
+        "Half-way between training rows the rules are less certain than a single row there would "
+        f"make them (mean leverage {start.leverage_between:.3g}, at most 1 on a row): rows on a few "
+        "curves, as those of a few runs, or too few, or beside one that is far off, do not tell so "
+        "many terms. Give terms to fewer inputs (n_mfs, premise_features), or leave the "
+        "structure to the default; judge the model on whole runs or groups held out.",
+        UnderdeterminedWarning,
+    )
 
 
 def _memory_limit():

@@ -7,6 +7,7 @@ from scipy.spatial.distance import pdist, squareform
 
 from skanfis import ANFISRegressor
 from skanfis.data import StandardisedData
+from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.membership import Gaussian
 from skanfis.structure.between import leverage_between, places_between
 from skanfis.structure.candidate import Candidate
@@ -93,6 +94,20 @@ def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatur
     )
     assert np.isfinite(found._score(Candidate((1, 1))))
     assert bool(np.isfinite(found._score(Candidate((4, 3))))) is is_known
+
+
+def test_rules_that_are_given_come_with_a_warning(rng):
+    X, y = three_runs(rng, (0.0, 25.0, 50.0))
+    with pytest.warns(UnderdeterminedWarning, match="Half-way between training rows .*n_mfs"):
+        ANFISRegressor([4, 3]).fit(X, y)
+    # Once, where there are fewer rows than consequents.
+    with pytest.warns(UnderdeterminedWarning) as raised:
+        ANFISRegressor([6, 4]).fit(X[::3], y[::3])
+    assert len(raised) == 1
+    assert "72 consequent parameters for 60" in str(raised[0].message)
+    ANFISRegressor([1, 3]).fit(X, y)
+    X, y = three_runs(rng, np.linspace(0.0, 50.0, 30))
+    ANFISRegressor([4, 3]).fit(X, y)
 
 
 def test_what_is_chosen_is_told_by_the_rows(rng):

@@ -56,7 +56,7 @@ class ErrorDisplay(DisplayInUnit):
     >>> from skanfis.gyro import ErrorDisplay
     >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
     >>> X, old = log[["time", "temperature", "output"]], log["run"] < 3
-    >>> model = ANFISRegressor([2, 2, 2], out_of_bounds="nan")
+    >>> model = ANFISRegressor([1, 2, 3], out_of_bounds="nan")
     >>> model = model.fit(X[old], log["error"][old])
     >>> display = ErrorDisplay.from_estimator(
     ...     model, X, log["rate"], position="temperature", position_label="temperature [°C]"
