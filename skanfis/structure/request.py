@@ -223,10 +223,10 @@ def _warn_if_unknown_between(start, is_warned_already):
         return
     warn_user(
         "Half-way between training rows the rules are less certain than a single row there would "
-        f"make them (mean leverage {start.leverage_between:.3g}, at most 1 on a row): rows on a few "
+        f"make them (mean leverage {start.leverage_between:.3g}, at most 1 on a row): rows on few "
         "curves, as those of a few runs, or too few, or beside one that is far off, do not tell so "
-        "many terms. Give terms to fewer inputs (n_mfs, premise_features), or leave the "
-        "structure to the default; judge the model on whole runs or groups held out.",
+        "many terms. Give terms to fewer inputs (n_mfs, premise_features), or leave the structure "
+        "to the default; judge the model on whole runs or groups held out.",
         UnderdeterminedWarning,
     )
 
