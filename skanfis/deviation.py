@@ -15,32 +15,11 @@ import numpy as np
 from .consequent import rule_outputs
 from .quadratic import QuadraticForm, row_products, summed_with
 
-__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "points_of_range", "rulers"]
+__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "rulers"]
 
-# What a form in fewer products may leave out, in squares of the noise.
-_SHORTENED = 4e-6
 # Widths of a term that ways out of the range are measured by at the most, and the logarithm of the
 # part of the largest membership that a term has at an edge where it still counts.
 _WIDEST, _TRACE = 4.0, -40.0
-# Of a term its middle and so many widths to either side, in so many points.
-_WIDTHS, _POINTS_PER_TERM = 4.0, 65
-
-
-def points_of_range(model, n_points, rng):
-    """Points all over the box, and as many where terms change, (n_inputs, n_points).
-
-    Of every input alone they are spread evenly; inputs go together at random. Where the box is much
-    wider than the terms, which outliers make it, the even ones say next to nothing of these.
-    """
-    half, points = n_points // 2, []
-    for j, (low, high) in enumerate(zip(model.minimum, model.maximum, strict=True)):
-        even = np.linspace(low, high, n_points)
-        near = _about_terms(model.antecedent, j)
-        if near.size:
-            near = np.sort(np.clip(near, low, high))
-            even[::2] = near[np.linspace(0, near.size - 1, n_points - half).astype(int)]
-        points.append(rng.permutation(even))
-    return np.stack(points)
 
 
 def rulers(model):
@@ -68,17 +47,6 @@ def rulers(model):
     return found
 
 
-def _about_terms(antecedent, j):
-    """Points about all terms of an input, within ``_WIDTHS`` of their widths."""
-    found = [np.empty(0)]
-    for group in antecedent.groups:
-        natural = group.family.natural(group.theta[:, group.inputs == j])
-        kinds = np.array([parameter.kind for parameter in group.family.parameters])
-        width = _WIDTHS * natural[kinds == "log_width"].sum(axis=0)
-        found.append(np.linspace(natural[0] - width, natural[0] + width, _POINTS_PER_TERM).ravel())
-    return np.concatenate(found)
-
-
 @dataclass(frozen=True, eq=False)
 class DeviationTables:
     """F and B_k F for inputs in standard deviations: squares of others might be beyond floats.
@@ -87,6 +55,7 @@ class DeviationTables:
     -B_k F, and under them Q_k times the whole half, whose squares are taken off: (n_outputs,
     n_displacements + n_pinned, n_premises + n_columns). ``unit`` is a power of two near the noise
     of every output, (n_outputs, 1), in which squares stay finite; ``rulers`` measure ways out.
+    ``constant`` (n_outputs, 1) is the mean of what halves that are left out add.
     """
 
     form: QuadraticForm
@@ -95,15 +64,39 @@ class DeviationTables:
     unit: np.ndarray
     n_added: int
     rulers: np.ndarray
+    constant: np.ndarray
 
     @property
     def n_premises(self):
         """Derivatives by premises that ``joint`` takes, none where these were not learnt."""
         return self.joint.shape[2] - self.factor.shape[1]
 
-    def shortened(self, shares, basis_rows):
-        """The same with a form in fewer products, for rows all over the range."""
-        return replace(self, form=self.form.shortened(shares, basis_rows, _SHORTENED))
+    def without_weak_halves(self, row, weights, tol):
+        """The same with fewer halves for every output, rotated so that the last count least.
+
+        Of rows all over the range, squares of what is left out are within ``tol`` over ``weights``
+        (n_outputs, n_rows) of their mean, which is the constant.
+        """
+        n, found = self.n_added, []
+        if not n:
+            return self
+        for k, weight in enumerate(weights):
+            half = self.of_design(k, row.shares, row.basis)
+            if self.n_premises:
+                self.add_premises(k, row.changes(k, self.unit), half)
+            half = half[:n]
+            turn = np.linalg.svd(half * np.sqrt(weight), full_matrices=False)[0].T
+            left = np.cumsum(((turn @ half) ** 2)[::-1], axis=0)[::-1]
+            mean = np.average(left, axis=1, weights=weight)
+            wrong = (np.abs(left - mean[:, None]) * weight).max(axis=1)
+            found.append((turn, np.append(mean, 0.0), np.flatnonzero(wrong > tol)))
+        n_kept = max(int(counts.max(initial=-1)) + 1 for _, _, counts in found)
+        joint = [
+            np.vstack([turn[:n_kept] @ joint[:n], joint[n:]])
+            for joint, (turn, _, _) in zip(self.joint, found, strict=True)
+        ]
+        constant = np.array([[mean[n_kept]] for _, mean, _ in found])
+        return replace(self, joint=np.stack(joint), n_added=n_kept, constant=constant)
 
     def signed(self, one, other):
         """Inner products of ``joint`` times rows: those added less those taken off, (n_rows,)."""
@@ -182,6 +175,7 @@ class DeviationTables:
                 form=self.form.astype(dtype),
                 factor=self.factor.astype(dtype),
                 joint=self.joint.astype(dtype),
+                constant=self.constant.astype(dtype),
             )
 
     @classmethod
@@ -201,7 +195,8 @@ class DeviationTables:
             pinned[:, premises.shape[1] :] += of_factor * (posterior.noise[k] / one)
             joint.append(np.vstack([own, pinned]))
         form = QuadraticForm.of(factor.T @ factor, counts, widths.size)
-        return cls(form, factor, np.stack(joint), unit, n_added, rulers(model))
+        none = np.zeros(unit.shape)
+        return cls(form, factor, np.stack(joint), unit, n_added, rulers(model), none)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,8 +292,8 @@ class DerivativeRows:
         by_term, parts, term = (self.by_term[k] / unit[k]).astype(dtype, copy=False), [], 0
         for gradient in self.gradients:
             own = by_term[term : term + gradient.shape[1]]
-            own_gradient = gradient.astype(dtype, copy=False)
-            parts.append((own_gradient * own).reshape(-1, own.shape[1]))
+            part = np.multiply(gradient, own, dtype=dtype, casting="same_kind")
+            parts.append(part.reshape(-1, own.shape[1]))
             term += own.shape[0]
         return np.concatenate(parts) if len(parts) > 1 else parts[0]
 

@@ -196,7 +196,7 @@ class TSKModel:
     def predict_with_deviation(self, X, inside=None, exact=False) -> tuple[np.ndarray, np.ndarray]:
         """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
 
-        Deviations are right to five digits, or, if ``exact``, in double precision.
+        Deviations are right to a thousandth, or, if ``exact``, in double precision.
         """
         posterior = self.posterior
         if posterior is None:

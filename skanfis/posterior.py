@@ -39,10 +39,17 @@ from scipy.special import ndtr
 
 from .antecedent import Antecedent
 from .consequent import NormalFactor
-from .deviation import DerivativeRows, DeviationTables, points_of_range
+from .deviation import DerivativeRows, DeviationTables
 from .faces import STEP, Face, nodes, on_faces, products_off_faces, products_on_line
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
+from .shortest import (
+    N_COMPARED,
+    SINGLE_DIGITS,
+    points_of_range,
+    shortest_tables,
+    single_tables,
+)
 
 __all__ = ["MOST_PARAMETERS", "Posterior", "effective_premises"]
 
@@ -52,15 +59,10 @@ MOST_PARAMETERS = 2000
 _LEAST_FREEDOM = 1.0
 # Of what is known at points that lie close together, what says nothing new.
 _DEPENDENT = 1e-7
-# Single precision takes half the time. It is used where it gives this part of a deviation, at so
-# many points of the range; of a deviation nobody knows as much.
-_DIGITS, _N_COMPARED = 1e-5, 512
 # Standard deviations beyond an edge at which they are compared.
 _LENGTHS = (0.0, 0.3, 3.0, 100.0)
 # Faces whose tables are kept: of three inputs there are 26.
 _MOST_FACES = 64
-# Points of the range at which products are found that others make up for.
-_N_EVEN = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,9 +242,10 @@ class Posterior:
         """Outputs and their deviations, each (n_outputs, n_rows), at rows Z (n_inputs, n_rows).
 
         u is not formed: u' u is the sum of moments of ``gram``, of which there are fewer. Outputs
-        are those of the consequents' own inputs. ``exact`` is in double precision throughout.
+        are those of the consequents' own inputs. ``exact`` is in double precision throughout; else
+        deviations are right to ``shortest.DIGITS``.
         """
-        return self._within(model, Z, self._tables(model, exact))
+        return self._within(model, Z, self._double(model) if exact else self._shortest(model))
 
     def _within(self, model, Z, tables):
         row, unit = self._row(model, Z), tables.unit
@@ -251,7 +254,7 @@ class Posterior:
         np.maximum(square, 0.0, out=square)
         square += 1.0
         noise = (self.noise[:, None] / unit) ** 2
-        found = noise * square
+        found = noise * square + tables.constant
         if tables.joint.shape[1]:
             for k in range(len(unit)):
                 half = tables.of_design(k, shares, basis)
@@ -327,18 +330,18 @@ class Posterior:
         return face
 
     def _quickest_face(self, model, face, inputs, at):
-        """The same in single precision where deviations are right to ``_DIGITS`` by it."""
+        """The same in single precision where deviations are right to ``SINGLE_DIGITS`` by it."""
         rng = np.random.default_rng(0)
-        Z = points_of_range(model, _N_COMPARED, rng)
+        Z = points_of_range(model, N_COMPARED, rng)
         Z[inputs] = at[inputs, None]
-        ways = np.abs(rng.normal(size=(len(inputs), _N_COMPARED)))
+        ways = np.abs(rng.normal(size=(len(inputs), N_COMPARED)))
         ways /= np.sqrt(np.sum(ways**2, axis=0))
         row, single = self._row(model, Z), face.astype(np.float32)
         right, found = (one.products(self.noise, row, ways) for one in (face, single))
         for length in _LENGTHS:
             squares = [self._square(one, length, face.unit) for one in (right, found)]
             # A part of a square is twice that of its root.
-            if not (np.abs(squares[1] - squares[0]) <= 2.0 * _DIGITS * squares[0]).all():
+            if not (np.abs(squares[1] - squares[0]) <= 2.0 * SINGLE_DIGITS * squares[0]).all():
                 return face
         return single
 
@@ -350,32 +353,41 @@ class Posterior:
         return np.maximum(square, noise, out=square)
 
     def _tables(self, model, exact):
-        """What rows are multiplied with, found once; in fewer digits where they will do."""
-        known, box = self.__dict__.setdefault("_tables_of", {}), (model.minimum, model.maximum)
-        key = b"".join(end.tobytes() for end in box)
-        found = known.get(key)
-        if found is None:
-            double = DeviationTables.of(self, model)
-            found = double, self._quickest(model, double)
-            known.clear()
-            known[key] = found
-        return found[0 if exact else 1]
+        """What rows out of the range are multiplied with."""
+        return self._double(model) if exact else self._single(model)
 
-    def _quickest(self, model, double):
-        """The quickest tables by which deviations are right to ``_DIGITS`` in the range."""
-        if not np.isfinite(model.maximum - model.minimum).all():
-            return double
-        rng = np.random.default_rng(0)
-        with np.errstate(all="ignore"):
-            row = self._row(model, points_of_range(model, _N_EVEN, rng))
-            Z = points_of_range(model, _N_COMPARED, rng)
-            right = self._within(model, Z, double)[1]
-            for tables in (double.shortened(row.shares, row.basis), double):
-                single = tables.astype(np.float32)
-                wrong = np.abs(self._within(model, Z, single)[1] - right)
-                if (wrong <= _DIGITS * right).all():
-                    return single
-        return double
+    def _double(self, model):
+        return self._once(model, "double", lambda: DeviationTables.of(self, model))
+
+    def _single(self, model):
+        """What rows out of the range are multiplied with where few digits are asked for."""
+        return self._once(model, "single", lambda: single_tables(*self._finding(model)))
+
+    def _shortest(self, model):
+        """What rows in the range are multiplied with."""
+        return self._once(
+            model, "shortest", lambda: shortest_tables(self.noise, *self._finding(model))
+        )
+
+    def _finding(self, model):
+        """The model, its tables in double precision, rows and deviations as they are compared."""
+        return (
+            model,
+            self._double(model),
+            lambda Z: self._row(model, Z),
+            lambda Z, tables: self._within(model, Z, tables)[1],
+        )
+
+    def _once(self, model, name, find):
+        """Tables of a model with this range, found when they are first asked for."""
+        known = self.__dict__.setdefault("_tables_of", {})
+        box = model.minimum.tobytes() + model.maximum.tobytes()
+        if box not in known:
+            known.clear()
+            known[box] = {}
+        if name not in known[box]:
+            known[box][name] = find()
+        return known[box][name]
 
     def _row(self, model, Z):
         return DerivativeRows.of(model, Z, self.inputs, self.premises.shape[0] > 0)

@@ -51,9 +51,10 @@ class PredictsMixin:
             noise, the consequents and, by Laplace's method, the premises, in the target's units. It
             is that of the rows' common noise; it takes the structure and the weights of the penalty
             for known. Outside the training range it grows with the distance, whatever the policy;
-            where the prediction is NaN, so is it. It is right to about five digits, beyond the
-            range to three or four; ``model_.standard_deviation(X)`` gives it in double precision,
-            in twice the time.
+            where the prediction is NaN, so is it. It is right to a thousandth, mostly to one part
+            in ten thousand, which is far better than the noise is known; beyond the range to three
+            or four digits. ``model_.standard_deviation(X)`` gives it in double precision, in about
+            twice the time.
 
         Returns
         -------

@@ -14,6 +14,12 @@ shares are near polynomials of a low degree. An interpolative decomposition (a Q
 column pivoting, Cheng et al. 2005) picks those that are kept and writes the others as their
 combinations, which are folded into T: 6 x 6 terms need about 12 x 12 of their 21 x 21 pairs. What
 is left out is measured in units of the form itself, at points spread evenly over the range.
+
+Where four digits are enough, fewer combinations of the pairs do than there are pairs to keep. Of
+pairs g(x) of one factor, and what the table and the others make of them, c, values are g' c. With
+g = R' q, q orthonormal at the points, the left singular vectors U of R c, weighted as the values'
+errors count, say which functions U' q the values need most: a higher-order singular value
+decomposition (De Lathauwer et al. 2000), in the metric of the values.
 """
 
 from dataclasses import dataclass, replace
@@ -38,13 +44,16 @@ class QuadraticForm:
 
     ``counts`` are the functions of every factor; ``pairs`` holds for each factor the two columns of
     each pair, (2, n_kept); ``table`` has those of the first ``split`` factors along its rows, of
-    the others along its columns; of several forms a table each.
+    the others along its columns; of several forms a table each. ``turns`` are the combinations of
+    each factor's pairs that the table is over, (n_functions, n_kept), or None of the pairs
+    themselves.
     """
 
     counts: tuple[int, ...]
     pairs: tuple[np.ndarray, ...]
     table: np.ndarray
     split: int
+    turns: tuple[np.ndarray | None, ...]
 
     @classmethod
     def of(cls, matrix, counts, n_basis):
@@ -62,12 +71,12 @@ class QuadraticForm:
         return cls._of_table(lengths, pairs, table)
 
     @classmethod
-    def _of_table(cls, counts, pairs, table):
+    def _of_table(cls, counts, pairs, table, turns=None):
         """With rows and columns shared out so that fewest products are formed."""
         sizes = table.shape
         split = min(range(len(sizes)), key=lambda k: prod(sizes[:k]) + prod(sizes[k:]))
         table = np.ascontiguousarray(table).reshape(prod(sizes[:split]), -1)
-        return cls(counts, tuple(pairs), table, split)
+        return cls(counts, tuple(pairs), table, split, tuple(turns or [None] * len(counts)))
 
     @classmethod
     def stack(cls, forms):
@@ -77,7 +86,8 @@ class QuadraticForm:
     def astype(self, dtype):
         """The same in another precision."""
         with np.errstate(over="ignore", under="ignore"):
-            return replace(self, table=self.table.astype(dtype))
+            turns = tuple(None if turn is None else turn.astype(dtype) for turn in self.turns)
+            return replace(self, table=self.table.astype(dtype), turns=turns)
 
     def values(self, shares, basis_rows):
         """Phi' A phi of every row, (n_rows,) or (n_forms, n_rows); shares (n_shares, n_rows).
@@ -137,12 +147,36 @@ class QuadraticForm:
             groups[k], pairs[k] = group[kept], pairs[k][:, kept]
         return self._of_table(self.counts, pairs, table)
 
+    def turned(self, shares, basis_rows, weights, tol):
+        """The same up to ``tol`` for every factor, in fewer combinations of the pairs.
+
+        Root mean square of the values' errors times ``weights`` (n_rows,), at given rows that lie
+        all over the range; where forming the combinations costs less than it saves.
+        """
+        groups, turns = self._groups(shares, basis_rows), list(self.turns)
+        table = self.table.reshape([len(group) for group in groups])
+        for k, group in enumerate(groups[:-1]):
+            n_pairs, n_others = len(group), table.size // len(group)
+            if _POINTS_PER_PAIR * n_pairs > basis_rows.shape[1]:
+                continue
+            rest = row_products(groups[:k] + groups[k + 1 :], basis_rows)
+            first = np.moveaxis(table, k, 0)
+            turn, back = _turned(group, first.reshape(n_pairs, -1) @ rest * weights, tol)
+            if len(turn) * (n_pairs + n_others) < n_pairs * n_others:
+                table = np.moveaxis(np.tensordot(back, first, axes=(0, 0)), 0, k)
+                groups[k], turns[k] = turn @ group, turn
+        return self._of_table(self.counts, self.pairs, table, turns)
+
     def _groups(self, shares, basis_rows):
         groups, start = [], 0
         for count, runs in zip(self.counts[:-1], self._runs[:-1], strict=True):
             groups.append(_pair_products(shares[start : start + count], runs))
             start += count
-        return [*groups, _pair_products(basis_rows, self._runs[-1])]
+        groups.append(_pair_products(basis_rows, self._runs[-1]))
+        return [
+            one if turn is None else turn @ one
+            for one, turn in zip(groups, self.turns, strict=True)
+        ]
 
     @cached_property
     def _runs(self):
@@ -211,3 +245,20 @@ def _spanning(functions, weights, tol):
         back = (solved * weights[order[:n_kept], None] / weights[dropped]).T
         combined[dropped] = back[:, place]
     return kept, combined
+
+
+def _turned(functions, factors, tol):
+    """Combinations of functions (n, n_points), (n_kept, n), and all by these, (n, n_kept).
+
+    Of sums of the functions times ``factors`` (n, n_points), at other points, as much is left out
+    as leaves their root mean square within ``tol``.
+    """
+    root_n = np.sqrt(functions.shape[1])
+    left, sizes, _ = np.linalg.svd(functions / root_n, full_matrices=False)
+    is_there = sizes > np.finfo(float).eps * len(functions) * sizes[0]
+    left, sizes = left[:, is_there], sizes[is_there]
+    scaled = (sizes[:, None] * left.T) @ factors / root_n
+    turn, parts, _ = np.linalg.svd(scaled, full_matrices=False)
+    rest = np.sqrt(np.cumsum(parts[::-1] ** 2)[::-1])
+    turn = turn[:, : max(int(np.count_nonzero(rest > tol)), 1)]
+    return (turn.T / sizes) @ left.T, (left * sizes) @ turn

@@ -31,6 +31,7 @@ KERNEL = [
     "naming",
     "support",
     "deviation",
+    "shortest",
     "faces",
     "posterior",
     "policies",

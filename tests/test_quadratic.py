@@ -1,5 +1,7 @@
 """Quadratic forms of rows of the design: against the dense product, and with pairs left out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -57,3 +59,24 @@ def test_of_scattered_rules_with_more_pairs_than_points_all_are_kept():
     short = form.shortened(shares, np.ones((1, 20)), 1.0)
     assert (short.table == form.table).all()
     assert_allclose(short.values(shares, np.ones((1, 20))), np.sum(shares**2, axis=0))
+
+
+def test_turned_form_takes_what_the_weighted_values_need():
+    """A table over three functions of six pairs, which no choice of pairs spans."""
+    rng, n = np.random.default_rng(3), 400
+    shares = rng.dirichlet(np.ones(3), n).T
+    basis = np.vstack([np.ones(n), rng.normal(size=(7, n))])
+    mix = rng.normal(size=(6, 3)) @ rng.normal(size=(3, 36))
+    full = QuadraticForm.of(np.eye(24), (3,), 8)
+    form = replace(full, table=mix + 1e-4 * rng.normal(size=mix.shape))
+    weights = rng.uniform(0.5, 1.0, n)
+    short = form.turned(shares, basis, weights, 0.05)
+    assert short.table.size == 3 * 36 < form.table.size
+    wrong = short.values(shares, basis) - form.values(shares, basis)
+    assert 0.0 < np.sqrt(np.mean((wrong * weights) ** 2)) < 0.05
+    same = form.turned(shares, basis, weights, 0.0)
+    assert same.table.size == form.table.size
+    single = short.astype(np.float32)
+    narrow = single.values(shares.astype(np.float32), basis.astype(np.float32))
+    assert narrow.dtype == np.float32
+    assert_allclose(narrow, short.values(shares, basis), rtol=1e-3, atol=1e-3)
