@@ -9,10 +9,10 @@ fewer products do than in general.
 they are, and the basis changes by the way's own direction. The quadratic form of the range serves
 for all three products.
 
-*On a face.* Rows that leave it along up to three inputs, one of them with terms, and no other: at
-the edge the shares of these and their basis functions are the same numbers for all of them. With
-chi the products of the other inputs' shares and basis functions, and a how many steps inside a row
-is along each input that it leaves the range by, the design there is
+*On a face.* Rows that leave it along up to three inputs with terms: at the edge the shares of these
+and their basis functions are the same numbers for all of them. With chi the products of the other
+inputs' shares and basis functions, and a how many steps inside a row is along each input with terms
+that it leaves the range by, the design there is
 
     phi = K(a) chi ,    K(a) = sum_m c_m(a) K_m ,
 
@@ -20,7 +20,9 @@ by Newton's interpolation of the second order: a step is so short that the third
 Along one input the two points asked for are those that are interpolated. The matrices K_m are found
 once for every face: of 6 x 6 terms on three inputs chi has 18 entries and phi 144. So are outputs
 and the derivatives by the edge's own terms; those by others' terms take their shares too. Quadratic
-forms of F K_m are by pairs of chi's factors (see ``quadratic``).
+forms of F K_m are by pairs of chi's factors (see ``quadratic``). Of rows that leave the range along
+inputs without terms as well, chi changes by their basis functions: by K_0 chi(way), K_0 at a step
+inside along every one of the inputs with terms. What K differs from that is second order.
 
 *Elsewhere* the design is formed at one step inside and at two.
 """
@@ -46,9 +48,9 @@ STEP = 2.0**-14
 _ENOUGH = 64
 # Columns of the design up to which there are any: they are kept, half a megabyte of each face.
 _MOST_COLUMNS = 512
-# Inputs that rows of a face leave the range by: of more there are few rows on each.
+# Inputs with terms that rows of a face leave the range by: of more there are few rows on each.
 _MOST_AWAY = 3
-# Inputs of a block up to which their sides make one number, exactly.
+# Inputs with terms of a block up to which their sides make one number, exactly.
 _MOST_SIDES = 32
 
 
@@ -59,16 +61,18 @@ def on_faces(way, antecedent: Antecedent, n_columns):
     """
     outside = way != 0.0
     with_terms = np.unique(np.concatenate([[], *(g.inputs for g in antecedent.groups)])).astype(int)
-    n_with_terms = outside[with_terms].sum(axis=0)
-    rows = np.flatnonzero(n_with_terms == 0)
+    n_away = outside[with_terms].sum(axis=0)
+    rows = np.flatnonzero(n_away == 0)
     if rows.size:
         yield None, rows
-    used = np.flatnonzero(outside.any(axis=1))
+    used = with_terms[outside[with_terms].any(axis=1)]
     if n_columns > _MOST_COLUMNS or None in antecedent.share_inputs or used.size > _MOST_SIDES:
         return
-    rows = np.flatnonzero((n_with_terms > 0) & (outside.sum(axis=0) <= _MOST_AWAY))
+    rows = np.flatnonzero((n_away > 0) & (n_away <= _MOST_AWAY))
     sides = np.sign(way[used][:, rows])
-    numbers = 3.0 ** np.arange(used.size) @ sides
+    # Of rows that stay in the range along all others fewer products are asked for.
+    leaves_others = outside[:, rows].sum(axis=0) > n_away[rows]
+    numbers = 3.0 ** np.arange(used.size + 1) @ np.vstack([sides, leaves_others])
     while rows.size >= _ENOUGH:
         own = numbers == numbers[0]
         if np.count_nonzero(own) >= _ENOUGH:
@@ -104,13 +108,17 @@ def _newton(at):
 def _weights_of_parts(directions, dtype):
     """Of a face's parts a step along directions (n_away, n_rows), and what it changes by.
 
-    None along one input, where these are the parts themselves.
+    None along one input and no other, where these are the parts themselves.
     """
     if len(directions) == 1:
-        return None
-    once, twice = (_newton(k * directions - 1.0) for k in (1.0, 2.0))
-    change = once - twice
-    change[0] = 0.0
+        (way,) = directions
+        if (way == 1.0).all():
+            return None
+        once, change = np.stack([np.ones_like(way), 1.0 - way]), np.stack([0.0 * way, way])
+    else:
+        once, twice = (_newton(k * directions - 1.0) for k in (1.0, 2.0))
+        change = once - twice
+        change[0] = 0.0
     return once.astype(dtype), change.astype(dtype)
 
 
@@ -128,6 +136,8 @@ class Face:
         Of every group the terms of inputs that vary, among the group's and among all.
     forms : QuadraticForm
         Those of K_m' F' F K_n, m <= n.
+    between : QuadraticForm
+        Those of K_m' F' F K_0, m > 0, between chi and that of another basis.
     by_term : ndarray of shape (n_outputs, n_parts, n_terms + 1, n_varying)
         Of chi: what the rules of each term that varies add up to, and the output.
     joint : ndarray of shape (n_outputs, n_parts, n_halves, n_varying)
@@ -143,6 +153,7 @@ class Face:
     basis: np.ndarray
     terms: list[tuple[np.ndarray, np.ndarray]]
     forms: QuadraticForm
+    between: QuadraticForm
     by_term: np.ndarray
     joint: np.ndarray
     own: np.ndarray
@@ -166,9 +177,11 @@ class Face:
         matrices = np.tensordot(differences, np.stack(at_points), axes=1)
         shares = [part for part, is_fixed in zip(parts, place, strict=True) if not is_fixed]
         counts, forms = [part.stop - part.start for part in shares], []
-        for one, other in combinations_with_replacement(tables.factor @ matrices, 2):
+        halves = tables.factor @ matrices
+        for one, other in combinations_with_replacement(halves, 2):
             across = one.T @ other
             forms.append(QuadraticForm.of(0.5 * (across + across.T), counts, varying.size))
+        between = [QuadraticForm.between(h.T @ halves[0], counts, varying.size) for h in halves[1:]]
         terms, start = [], 0
         for group in antecedent.groups:
             own = np.flatnonzero(~np.isin(group.inputs, away))
@@ -182,6 +195,7 @@ class Face:
             varying,
             terms,
             QuadraticForm.stack(forms),
+            QuadraticForm.stack(between),
             by_term,
             joint,
             own,
@@ -192,27 +206,36 @@ class Face:
     def astype(self, dtype):
         """The same in another precision."""
         arrays = {name: getattr(self, name).astype(dtype) for name in ("by_term", "joint", "own")}
-        return replace(self, **arrays, forms=self.forms.astype(dtype))
+        forms = {name: getattr(self, name).astype(dtype) for name in ("forms", "between")}
+        return replace(self, **arrays, **forms)
 
-    def products(self, noise, row, directions):
+    def products(self, noise, row, directions, ways=None):
         """Products of h with itself, of h with e, of e with itself, (3, n_outputs, n_rows).
 
         ``row`` is at the edge, where what varies is what it is at a step inside; ``directions``
-        (n_away, n_rows) of the way out, by its rulers, are of length one.
+        (n_away, n_rows) of the way out are by its rulers. ``ways`` (n_basis, n_rows) are those of
+        the basis functions, of inputs that have no terms, or None where there are none. Together
+        they are of length one.
         """
         dtype, n_rows = self.joint.dtype, row.basis.shape[1]
         kept = [row.shares[part] for part in self.shares]
         shares = np.concatenate(kept or [np.empty((0, n_rows))]).astype(dtype, copy=False)
-        basis = row.basis[self.basis].astype(dtype)
+        shifts = None if ways is None else STEP * ways[self.basis]
+        basis = row.basis[self.basis] if shifts is None else row.basis[self.basis] - shifts
+        basis = basis.astype(dtype)
         weights = _weights_of_parts(directions, dtype)
         squares = _squares(weights, self.forms.values(shares, basis))
+        if shifts is not None:
+            shifts = shifts.astype(dtype)
+            self._add_shifts(squares, weights, shares, basis, shifts)
         found = (noise[:, None] / self.unit) ** 2 * squares[:, None]
         if self.joint.shape[2]:
             chi = self._chi(shares, basis)
+            turned = None if shifts is None else self._chi(shares, shifts)
             for k in range(len(self.joint)):
-                half, change = _weighed(weights, np.tensordot(self.joint[k], chi, axes=1))
+                half, change = _sides(self.joint[k], chi, turned, weights)
                 if self.own.shape[2]:
-                    self._add_own(k, row, chi, weights, (half, change))
+                    self._add_own(k, row, chi, turned, weights, (half, change))
                 found[:, k] += signed_products(half, change, self.n_added)
         near, both, change = found
         return np.stack([near + 2.0 * both + change, (both + change) / STEP, change / STEP**2])
@@ -223,11 +246,20 @@ class Face:
         n_rows = basis.shape[1]
         return reduce(lambda a, b: (a[:, None] * b).reshape(-1, n_rows), factors)
 
-    def _add_own(self, k, row, chi, weights, both):
+    def _add_shifts(self, squares, weights, shares, basis, shifts):
+        """Add what the change of the basis functions adds to ``_squares``, in place."""
+        edge = replace(self.forms, table=self.forms.table[0])
+        _, both, change = edge.products(shares, basis, shifts)
+        of_parts = np.ones((1, basis.shape[1]), basis.dtype) if weights is None else weights[1][1:]
+        between = self.between.summed_between(of_parts, shares, basis, shifts)
+        squares[1] += both
+        squares[2] += 2.0 * between + change
+
+    def _add_own(self, k, row, chi, turned, weights, both):
         """What derivatives by the terms that vary add, at one step inside and to the change."""
         of_terms = np.concatenate([own for _, own in self.terms])
         shares = row.shares[of_terms].astype(chi.dtype)
-        sums = _weighed(weights, np.tensordot(self.by_term[k], chi, axes=1))
+        sums = _sides(self.by_term[k], chi, turned, weights)
         for own_sums, part in zip(sums, both, strict=True):
             by_term = own_sums[:-1] - shares * own_sums[-1]
             start, changes = 0, []
@@ -252,11 +284,19 @@ def _squares(weights, values):
     )
 
 
-def _weighed(weights, parts):
-    """Of parts (n_parts, n, n_rows) what they are at one step inside, and its change."""
+def _sides(matrices, chi, turned, weights):
+    """What matrices (n_parts, n, n_varying) make of chi at one step inside, and its change.
+
+    ``turned`` is what chi itself changes by, or None.
+    """
+    parts = np.tensordot(matrices, chi, axes=1)
     if weights is None:
-        return list(parts)
-    return [np.einsum("mn,mqn->qn", one, parts) for one in weights]
+        half, change = parts
+    else:
+        half, change = (np.einsum("mn,mqn->qn", one, parts) for one in weights)
+    if turned is not None:
+        change += matrices[0] @ turned
+    return half, change
 
 
 def _from_varying(row, parts, place, inputs, away):

@@ -40,16 +40,10 @@ from scipy.special import ndtr
 from .antecedent import Antecedent
 from .consequent import NormalFactor
 from .deviation import DerivativeRows, DeviationTables
-from .faces import STEP, Face, nodes, on_faces, products_off_faces, products_on_line
 from .objective import Evaluation, SeparableProblem
+from .outside import Outside
 from .premise import Premise
-from .shortest import (
-    N_COMPARED,
-    SINGLE_DIGITS,
-    points_of_range,
-    shortest_tables,
-    single_tables,
-)
+from .shortest import shortest_tables, single_tables
 
 __all__ = ["MOST_PARAMETERS", "Posterior", "effective_premises"]
 
@@ -59,10 +53,6 @@ MOST_PARAMETERS = 2000
 _LEAST_FREEDOM = 1.0
 # Of what is known at points that lie close together, what says nothing new.
 _DEPENDENT = 1e-7
-# Standard deviations beyond an edge at which they are compared.
-_LENGTHS = (0.0, 0.3, 3.0, 100.0)
-# Faces whose tables are kept: of three inputs there are 26.
-_MOST_FACES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +217,7 @@ class Posterior:
     def _half(self, model, X, k):
         """H of output k at points X (n_points, n_inputs), a column each, in units of its noise."""
         Z = np.ascontiguousarray(X.T, dtype=float)
-        row, tables = self._row(model, Z), self._tables(model, exact=True)
+        row, tables = self._row(model, Z), self._double(model)
         design = np.empty((self.consequents.shape[0], Z.shape[1]))
         row.design(design)
         u = tables.factor @ design * (self.noise[k] / tables.unit[k])
@@ -280,88 +270,16 @@ class Posterior:
         there, (n_inputs, n_rows), and ``unfollowed`` (n_outputs, n_rows) what the prediction leaves
         out of the tangent.
         """
-        tables = self._tables(model, exact)
-        below, above = tables.rulers[:, :, None]
-        length = np.sqrt(np.sum((way / np.where(way < 0.0, below, above)) ** 2, axis=0))
-        found = np.empty((3, self.noise.size, Z.shape[1]))
-        left = np.full(Z.shape[1], True)
-        for away, rows in on_faces(way, model.antecedent, self.consequents.shape[0]):
-            part = slice(None) if rows.size == left.size else rows
-            some = row.part(part)
-            if away is None:
-                ways = way[:, part] / (length[part] * model.spread[:, None])
-                found[:, :, part] = products_on_line(self, model, tables, some, ways)
-            else:
-                face, inputs = self._face(model, tables, away), [j for j, _ in away]
-                by = [tables.rulers[int(side > 0), j] for j, side in away]
-                directions = np.abs(way[inputs][:, part]) / np.array(by)[:, None] / length[part]
-                found[:, :, part] = face.products(self.noise, some, directions)
-            left[rows] = False
-        if left.any():
-            part = slice(None) if left.all() else left
-            step = way[:, part] * (STEP / np.maximum(length[part], np.finfo(float).tiny))
-            once, twice = (self._row(model, Z[:, part] - k * step) for k in (1, 2))
-            found[:, :, part] = products_off_faces(self.noise, tables, once, twice)
-        unit = tables.unit
-        square = self._square(found, length, unit)
-        return np.sqrt(square + (unfollowed / unit) ** 2) * unit
-
-    def _face(self, model, tables, away):
-        """What rows beyond the ends of some inputs, (input, side) each, are multiplied with."""
-        known = self.__dict__.setdefault("_faces", {})
-        at = model.minimum.copy()
-        for j, side in away:
-            at[j] = (model.maximum if side > 0 else model.minimum)[j]
-        key = away, at.tobytes(), tables.dtype
-        face = known.get(key)
-        if face is None:
-            double = self._tables(model, exact=True)
-            inputs, inside = [j for j, _ in away], nodes(len(away))[0]
-            steps = np.array([STEP * side * double.rulers[int(side > 0), j] for j, side in away])
-            points = np.tile(at[:, None], len(inside))
-            points[inputs] -= steps[:, None] * inside.T
-            rows = [self._row(model, np.ascontiguousarray(one[:, None])) for one in points.T]
-            face = Face.of(model, double, self.inputs, inputs, rows)
-            if tables is not double:
-                face = self._quickest_face(model, face, inputs, at)
-            if len(known) >= _MOST_FACES:
-                known.clear()
-            known[key] = face
-        return face
-
-    def _quickest_face(self, model, face, inputs, at):
-        """The same in single precision where deviations are right to ``SINGLE_DIGITS`` by it."""
-        rng = np.random.default_rng(0)
-        Z = points_of_range(model, N_COMPARED, rng)
-        Z[inputs] = at[inputs, None]
-        ways = np.abs(rng.normal(size=(len(inputs), N_COMPARED)))
-        ways /= np.sqrt(np.sum(ways**2, axis=0))
-        row, single = self._row(model, Z), face.astype(np.float32)
-        right, found = (one.products(self.noise, row, ways) for one in (face, single))
-        for length in _LENGTHS:
-            squares = [self._square(one, length, face.unit) for one in (right, found)]
-            # A part of a square is twice that of its root.
-            if not (np.abs(squares[1] - squares[0]) <= 2.0 * SINGLE_DIGITS * squares[0]).all():
-                return face
-        return single
-
-    def _square(self, products, length, unit):
-        """The tangent's variance, with the noise, so many standard deviations on the way."""
-        (near, both, change), noise = products, (self.noise[:, None] / unit) ** 2
-        square = noise + near + 2.0 * np.maximum(both * length, 0.0)
-        square += np.maximum(change, 0.0) * length**2
-        return np.maximum(square, noise, out=square)
-
-    def _tables(self, model, exact):
-        """What rows out of the range are multiplied with."""
-        return self._double(model) if exact else self._single(model)
+        double = self._double(model)
+        tables, faces = double, self.__dict__.setdefault("_faces", {})
+        if not exact:
+            tables = self._once(model, "single", lambda: single_tables(*self._finding(model)))
+        outside = Outside(self, model, tables, double, lambda Z: self._row(model, Z), faces)
+        square = outside.squares(row, Z, way)
+        return np.sqrt(square + (unfollowed / tables.unit) ** 2) * tables.unit
 
     def _double(self, model):
         return self._once(model, "double", lambda: DeviationTables.of(self, model))
-
-    def _single(self, model):
-        """What rows out of the range are multiplied with where few digits are asked for."""
-        return self._once(model, "single", lambda: single_tables(*self._finding(model)))
 
     def _shortest(self, model):
         """What rows in the range are multiplied with."""

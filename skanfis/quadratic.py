@@ -59,16 +59,15 @@ class QuadraticForm:
     def of(cls, matrix, counts, n_basis):
         """Of a symmetric matrix (n_columns, n_columns), for shares and basis functions."""
         lengths = (*counts, n_basis)
-        n = len(lengths)
-        table = matrix.reshape(*lengths, *lengths)
-        table = table.transpose([axis for k in range(n) for axis in (k, n + k)])
-        table = table.reshape([length**2 for length in lengths])
-        for k, length in enumerate(lengths):
-            summed = np.zeros((length * (length + 1) // 2, *np.delete(table.shape, k)))
-            np.add.at(summed, pair_index(length).ravel(), np.moveaxis(table, k, 0))
-            table = np.moveaxis(summed, 0, k)
         pairs = [np.stack(np.triu_indices(length)) for length in lengths]
-        return cls._of_table(lengths, pairs, table)
+        return cls._of_table(lengths, pairs, _paired(matrix, lengths, lengths))
+
+    @classmethod
+    def between(cls, matrix, counts, n_basis):
+        """Of phi' A psi, A any matrix: psi has the same shares and another basis."""
+        pairs = [np.stack(np.triu_indices(length)) for length in counts]
+        pairs.append(np.indices((n_basis, n_basis)).reshape(2, -1))
+        return cls._of_table((*counts, n_basis), pairs, _paired(matrix, (*counts, n_basis), counts))
 
     @classmethod
     def _of_table(cls, counts, pairs, table, turns=None):
@@ -115,6 +114,16 @@ class QuadraticForm:
         both = 0.5 * (own[0] * other[1] + own[1] * other[0])
         rights = own[0] * own[1], both, other[0] * other[1]
         return np.stack([np.einsum("bn,bn->n", right, along) for right in rights])
+
+    def summed_between(self, weights, shares, basis_rows, others):
+        """Of several forms ``between`` rows the weighted sum phi' A psi, (n_rows,).
+
+        ``weights`` (n_forms, n_rows) of every form.
+        """
+        *groups, _ = self._groups(shares, basis_rows)
+        formed = row_products([weights, *groups], basis_rows)
+        pairs = row_products([basis_rows, others], basis_rows)
+        return np.einsum("bn,bn->n", pairs, self.table.reshape(len(formed), -1).T @ formed)
 
     def _along(self, groups, like):
         """The table summed with the groups of shares: of each pair of basis functions the factor.
@@ -182,6 +191,23 @@ class QuadraticForm:
     def _runs(self):
         """Pairs of every factor, those of one function with consecutive others together."""
         return [_runs_of(*own) for own in self.pairs]
+
+
+def _paired(matrix, lengths, symmetric):
+    """A matrix (n_columns, n_columns) as a table over pairs of every factor's functions.
+
+    Of the first factors, as many as are in ``symmetric``, pairs that differ in their order alone
+    are one.
+    """
+    n = len(lengths)
+    table = matrix.reshape(*lengths, *lengths)
+    table = table.transpose([axis for k in range(n) for axis in (k, n + k)])
+    table = table.reshape([length**2 for length in lengths])
+    for k, length in enumerate(symmetric):
+        summed = np.zeros((length * (length + 1) // 2, *np.delete(table.shape, k)))
+        np.add.at(summed, pair_index(length).ravel(), np.moveaxis(table, k, 0))
+        table = np.moveaxis(summed, 0, k)
+    return table
 
 
 def _runs_of(first, second):

@@ -33,6 +33,7 @@ KERNEL = [
     "deviation",
     "shortest",
     "faces",
+    "outside",
     "posterior",
     "policies",
     "target",

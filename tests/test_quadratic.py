@@ -80,3 +80,19 @@ def test_turned_form_takes_what_the_weighted_values_need():
     narrow = single.values(shares.astype(np.float32), basis.astype(np.float32))
     assert narrow.dtype == np.float32
     assert_allclose(narrow, short.values(shares, basis), rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("counts", [(6, 2), (4,), ()])
+def test_weighted_sum_of_bilinear_forms_is_that_of_the_dense_designs(counts):
+    rng, n = np.random.default_rng(4), 30
+    shares = [rng.dirichlet(np.ones(count), n).T for count in counts]
+    basis, others = rng.normal(size=(2, 3, n))
+    strengths = np.ones((1, n))
+    for share in shares:
+        strengths = (strengths[:, None] * share).reshape(-1, n)
+    phi, psi = ((strengths[:, None] * one).reshape(-1, n) for one in (basis, others))
+    matrices, weights = rng.normal(size=(2, len(phi), len(phi))), rng.normal(size=(2, n))
+    form = QuadraticForm.stack([QuadraticForm.between(one, counts, 3) for one in matrices])
+    found = form.summed_between(weights, np.vstack([np.empty((0, n)), *shares]), basis, others)
+    expected = np.einsum("mn,in,mij,jn->n", weights, phi, matrices, psi)
+    assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
