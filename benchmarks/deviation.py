@@ -34,6 +34,9 @@ def _measured(n_rows, n_mfs):
     # Along two inputs with terms.
     several = new.copy()
     several[:, 1:3] = 1.3
+    # Along every one; and along any, by half a standard deviation of noise.
+    every = np.full_like(new, 1.3)
+    mixed = new + 0.5 * X.std(axis=0) * rng.standard_normal(new.shape)
     seconds = side_by_side(
         {
             "plain": lambda: model.predict(new),
@@ -42,17 +45,24 @@ def _measured(n_rows, n_mfs):
             "std beyond": lambda: model.predict(beyond, return_std=True),
             "plain several": lambda: model.predict(several),
             "std several": lambda: model.predict(several, return_std=True),
+            "plain every": lambda: model.predict(every),
+            "std every": lambda: model.predict(every, return_std=True),
+            "plain mixed": lambda: model.predict(mixed),
+            "std mixed": lambda: model.predict(mixed, return_std=True),
         },
         _ROUNDS,
     )
-    inside = seconds["std"] / seconds["plain"]
-    outside = seconds["std beyond"] / seconds["plain beyond"]
-    corner = seconds["std several"] / seconds["plain several"]
+    over = {
+        where: seconds[f"std{where}"] / seconds[f"plain{where}"]
+        for where in ("", " beyond", " several", " every", " mixed")
+    }
     work = f"deviation of {n_rows:,} rows, {len(n_mfs)} inputs, {model.n_rules_} rules"
     measures = [
-        Measure("in range, over plain", inside, "x", 4.0),
+        Measure("in range, over plain", over[""], "x", 4.0),
         Measure("a row", seconds["std"] / n_rows * 1e6, "µs"),
-        Measure("out of range along one input, over plain", outside, "x", 4.0),
-        Measure("along two", corner, "x", 4.0),
+        Measure("out of range along one input, over plain", over[" beyond"], "x", 4.0),
+        Measure("along two", over[" several"], "x", 4.0),
+        Measure("along all", over[" every"], "x", 4.0),
+        Measure("along any, noise", over[" mixed"], "x", 6.0),
     ]
     return Row(f"{work} ({' x '.join(str(n) for n in n_mfs if n > 1)})", measures)

@@ -37,9 +37,17 @@ from scipy.linalg import blas
 from .antecedent import Antecedent
 from .deviation import inner_products
 from .gram import pair_index
-from .quadratic import QuadraticForm
+from .quadratic import QuadraticForm, row_products
 
-__all__ = ["STEP", "Face", "nodes", "on_faces", "products_off_faces", "products_on_line"]
+__all__ = [
+    "STEP",
+    "Face",
+    "nodes",
+    "on_faces",
+    "products_off_faces",
+    "products_on_line",
+    "sorted_by_face",
+]
 
 # Derivatives along a way out of the box, by differences over this part of what measures it.
 # They are taken inside: terms may have a corner on the edge.
@@ -52,35 +60,62 @@ _MOST_COLUMNS = 512
 _MOST_AWAY = 3
 # Inputs with terms of a block up to which their sides make one number, exactly.
 _MOST_SIDES = 32
+# Those that rows are sorted by: their sides make a number of 16 bits.
+_MOST_SORTED = 9
+
+
+def sorted_by_face(X, antecedent: Antecedent, minimum, maximum):
+    """An order of rows X (n_rows, n_inputs) out of the range, those on one face together.
+
+    Blocks of such rows have few faces, each of many rows.
+    """
+    if None in antecedent.share_inputs:
+        return np.arange(len(X))
+    used = _inputs_with_terms(antecedent)[:_MOST_SORTED]
+    numbers = np.zeros(len(X), dtype=np.int16)
+    for column, low, high in zip(X[:, used].T.copy(), minimum[used], maximum[used], strict=True):
+        numbers *= 3
+        numbers += column > high
+        numbers -= column < low
+    if (numbers == numbers[0]).all():
+        return np.arange(len(X))
+    return np.argsort(numbers, kind="stable")
 
 
 def on_faces(way, antecedent: Antecedent, n_columns):
-    """Rows on a line (None, rows), and on each face ((input, side), ...), if they are enough.
+    """Rows on a line, (None, rows, ...), and on each face, (((input, side), ...), rows, others).
 
-    ``way`` (n_inputs, n_rows) leads from the range to the rows; of a design of ``n_columns``.
+    ``others`` is whether these rows leave the range along inputs without terms too. Rows are those
+    of faces on which there are enough. ``way`` (n_inputs, n_rows) leads from the range to the rows;
+    of a design of ``n_columns``.
     """
-    outside = way != 0.0
-    with_terms = np.unique(np.concatenate([[], *(g.inputs for g in antecedent.groups)])).astype(int)
-    n_away = outside[with_terms].sum(axis=0)
+    with_terms = _inputs_with_terms(antecedent)
+    ways = way[with_terms]
+    outside = ways != 0.0
+    n_away = outside.sum(axis=0)
     rows = np.flatnonzero(n_away == 0)
     if rows.size:
-        yield None, rows
-    used = with_terms[outside[with_terms].any(axis=1)]
+        yield None, rows, True
+    used = np.flatnonzero(outside.any(axis=1))
     if n_columns > _MOST_COLUMNS or None in antecedent.share_inputs or used.size > _MOST_SIDES:
         return
     rows = np.flatnonzero((n_away > 0) & (n_away <= _MOST_AWAY))
-    sides = np.sign(way[used][:, rows])
+    sides = np.sign(ways[used][:, rows])
     # Of rows that stay in the range along all others fewer products are asked for.
-    leaves_others = outside[:, rows].sum(axis=0) > n_away[rows]
-    numbers = 3.0 ** np.arange(used.size + 1) @ np.vstack([sides, leaves_others])
+    others = np.delete(way, with_terms, axis=0).any(axis=0)[rows]
+    numbers = 3.0 ** np.arange(used.size) @ sides + 3.0**used.size * others
     while rows.size >= _ENOUGH:
         own = numbers == numbers[0]
         if np.count_nonzero(own) >= _ENOUGH:
-            away = zip(used.tolist(), sides[:, 0].astype(int).tolist(), strict=True)
-            yield tuple((j, side) for j, side in away if side), rows[own]
+            away = zip(with_terms[used].tolist(), sides[:, 0].astype(int).tolist(), strict=True)
+            yield tuple((j, side) for j, side in away if side), rows[own], bool(others[0])
         if own.all():
             return
-        rows, sides, numbers = rows[~own], sides[:, ~own], numbers[~own]
+        rows, sides, others, numbers = rows[~own], sides[:, ~own], others[~own], numbers[~own]
+
+
+def _inputs_with_terms(antecedent):
+    return np.unique(np.concatenate([[], *(g.inputs for g in antecedent.groups)])).astype(int)
 
 
 def nodes(n_away):
@@ -289,10 +324,14 @@ def _sides(matrices, chi, turned, weights):
 
     ``turned`` is what chi itself changes by, or None.
     """
-    parts = np.tensordot(matrices, chi, axes=1)
+    n_parts, n, n_varying = matrices.shape
     if weights is None:
-        half, change = parts
+        half, change = np.tensordot(matrices, chi, axes=1)
+    elif n > n_varying:
+        flat = matrices.transpose(1, 0, 2).reshape(n, n_parts * n_varying)
+        half, change = (flat @ row_products([one, chi], chi) for one in weights)
     else:
+        parts = np.tensordot(matrices, chi, axes=1)
         half, change = (np.einsum("mn,mqn->qn", one, parts) for one in weights)
     if turned is not None:
         change += matrices[0] @ turned

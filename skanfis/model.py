@@ -29,6 +29,7 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
+from .faces import sorted_by_face
 from .naming import default_output_names, default_term_names
 from .policies import MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
 from .posterior import MOST_PARAMETERS, Posterior
@@ -231,7 +232,9 @@ class TSKModel:
         if inside.any():
             found[inside] = self._by_block(X[inside], within, 2 * n_outputs)
         if self.out_of_bounds != "nan":
-            found[~inside] = self._by_block(X[~inside], beyond, 2 * n_outputs, self._n_slopes)
+            rows = np.flatnonzero(~inside)
+            rows = rows[sorted_by_face(X[rows], self.antecedent, self.minimum, self.maximum)]
+            found[rows] = self._by_block(X[rows], beyond, 2 * n_outputs, self._n_slopes)
         return found[:, :n_outputs], found[:, n_outputs:]
 
     def gradient(self, X) -> np.ndarray:

@@ -60,20 +60,18 @@ class Outside:
         length = np.sqrt(np.sum((way / np.where(way < 0.0, below, above)) ** 2, axis=0))
         found = np.empty((3, noise.size, Z.shape[1]))
         left = np.full(Z.shape[1], True)
-        for away, rows in on_faces(way, model.antecedent, self.posterior.consequents.shape[0]):
+        n_columns = self.posterior.consequents.shape[0]
+        for away, rows, leaves_others in on_faces(way, model.antecedent, n_columns):
+            if away and leaves_others and tables is self.double:
+                # To all digits these are found as those elsewhere are.
+                continue
             part = slice(None) if rows.size == left.size else rows
             some, some_way = row.part(part), way[:, part] / length[part]
             if away is None:
                 ways = some_way / model.spread[:, None]
                 found[:, :, part] = products_on_line(self.posterior, model, tables, some, ways)
             else:
-                inputs = [j for j, _ in away]
-                others = some_way.copy()
-                others[inputs] = 0.0
-                if self.tables is self.double and others.any():
-                    # To all digits these are found as those elsewhere are.
-                    continue
-                found[:, :, part] = self._on_face(away, some, some_way[inputs], others)
+                found[:, :, part] = self._on_face(away, some, some_way, leaves_others)
             left[rows] = False
         if left.any():
             part = slice(None) if left.all() else left
@@ -82,18 +80,15 @@ class Outside:
             found[:, :, part] = products_off_faces(noise, tables, once, twice)
         return self._square(found, length)
 
-    def _on_face(self, away, row, way, others):
-        """Products of rows on a face: the way along its own inputs and along all others.
-
-        Together they are of length one by the rulers; others have no terms.
-        """
+    def _on_face(self, away, row, way, leaves_others):
+        """Products of rows on a face, ``way`` of length one by the rulers."""
+        inputs, own = [j for j, _ in away], self.posterior.inputs
         by = np.array([self.tables.rulers[int(side > 0), j] for j, side in away])
-        ways, own = None, self.posterior.inputs
-        if others.any():
+        directions, ways = np.abs(way[inputs]) / by[:, None], None
+        if leaves_others:
             ways = np.zeros(row.basis.shape)
             if self.model.order == 1:
-                np.divide(others[own], self.model.spread[own, None], out=ways[1:])
-        directions = np.abs(way) / by[:, None]
+                np.divide(way[own], self.model.spread[own, None], out=ways[1:])
         return self._face(away).products(self.posterior.noise, row, directions, ways)
 
     def _face(self, away):
