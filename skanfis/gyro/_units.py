@@ -47,8 +47,8 @@ def units_of(quantity):
 
 def unit_named(quantity, name):
     """The unit's usual name; ValueError where the quantity has no such unit."""
-    _, unit = unit_in(name) or (None, name)
-    if unit not in _UNITS[quantity]:
+    _, unit = unit_in(str(name)) or (None, name)
+    if not isinstance(name, str) or unit not in _UNITS[quantity]:
         raise ValueError(
             f"{quantity} has no unit {name!r}: it may be in {', '.join(units_of(quantity))}."
         )

@@ -125,6 +125,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     ) -> Self:
         """Fit the base, then the residual model.
 
+        To a Pipeline weights and groups are given for its last step. With
+        ``sklearn.set_config(enable_metadata_routing=True)`` they go where the parts request them.
+
         Parameters
         ----------
         X : array-like of shape (n_samples, n_features)
@@ -137,9 +140,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
             The run, device or day that each row belongs to, given to every part whose ``fit`` takes
             groups, and to a search for its splitter: an ANFISRegressor then chooses its structure
             by runs left out.
-
-        To a Pipeline both are given for its last step. With
-        ``sklearn.set_config(enable_metadata_routing=True)`` they go where the parts request them.
 
         Returns
         -------

@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 
 from ..export import last_step
+from ..model import TSKModel
 from ._common import one_axes
 from .labels import as_label
 
@@ -64,7 +65,7 @@ class LossCurveDisplay:
         Parameters
         ----------
         estimator : fitted estimator
-            As :func:`skanfis.export.fold` takes it.
+            As :func:`skanfis.export.last_step` takes it; a model alone remembers no training.
         name : str, default=None
             Label of the curve; None is the solver's name.
         ax : matplotlib Axes, default=None
@@ -83,7 +84,7 @@ class LossCurveDisplay:
         ImportError
             Without matplotlib.
         """
-        last = last_step(estimator)
+        last = estimator if isinstance(estimator, TSKModel) else last_step(estimator)
         loss = getattr(last, "loss_curve_", None)
         if loss is None:
             raise TypeError(f"{type(last).__name__} has not been trained here: no loss_curve_.")

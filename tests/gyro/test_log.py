@@ -181,6 +181,7 @@ def test_files_with_different_columns_are_refused(tmp_path, log):
         ({"columns": {"speed": "v"}}, "columns: there is no 'speed'"),
         ({"units": {"run": "s"}}, "units: there is no 'run'"),
         ({"units": {"time": "deg/s"}}, "time has no unit 'deg/s'.* s, ms"),
+        ({"units": {"time": 1}}, "time has no unit 1: it may be in s, ms"),
         ({"require": ["speed"]}, "require: there is no 'speed'"),
         ({"separator": ""}, "separator='' must be one character"),
         ({"separator": "(("}, r"separator='\(\(' must be one character"),

@@ -30,7 +30,7 @@ def test_losses_share_axes():
 
 
 def test_a_model_alone_has_no_loss_curve():
-    with pytest.raises(TypeError, match="estimator must be a fitted ANFIS estimator"):
+    with pytest.raises(TypeError, match="TSKModel has not been trained here"):
         LossCurveDisplay.from_estimator(A_GRID)
 
 
