@@ -81,10 +81,10 @@ MembershipDisplay.from_estimator(model, X_train)
 # -----------------
 #
 # Where the strongest rule alone says what all say together, points lie on the diagonal. Here they
-# do not: two lines, blended along the inductance, make a product of frequency and inductance, and
-# neither line stands for anything alone. The model says so itself, and has warned above. Its
-# predictions are as good as they were; but read the picture of the response below, not the rules.
-# :doc:`/reading_rules` says what may be believed of a rule, and when.
+# lie near it: each rule is a plane that holds where its terms are true, and only between two of
+# them, at impedances around 500, is what one says alone far off. Where rules mean nothing alone, the
+# report says so, and ``export_text`` warns. :doc:`/reading_rules` says what may be believed of a
+# rule, and when.
 
 print(model[-1].readability_)
 ReadabilityDisplay.from_estimator(model, X_train, y_train)
@@ -111,9 +111,9 @@ ResponseSurfaceDisplay.from_estimator(model, X_train, features=["frequency", "in
 # --------------------------
 #
 # Mostly not: structure and penalties come from the data. A search is for what you would rather
-# have, terms on the frequency for instance, if that costs little. ``n_mfs`` is in the order of the
-# columns behind the encoder, whose own come first. A search says nothing of rows that its folds
-# leave out of range; the model that it keeps does.
+# have, terms on the frequency alone for instance, if that costs little. ``n_mfs`` is in the order
+# of the columns behind the encoder, whose own come first. A search says nothing of rows that its
+# folds leave out of range; the model that it keeps does.
 
 search = GridSearchCV(
     model,
