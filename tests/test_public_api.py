@@ -81,6 +81,15 @@ def test_docstring_is_complete(name):
     assert ">>> " in found["Examples"]
 
 
+@pytest.mark.parametrize("name", public_names())
+def test_methods_tell_the_parameters_that_they_have(name):
+    for method, function in inspect.getmembers(resolve(name), inspect.isfunction):
+        found = sections(function.__doc__)
+        if function.__module__.startswith("skanfis") and "Parameters" in found:
+            own = list(inspect.signature(function).parameters)[1:]
+            assert described(found["Parameters"]) == own, method
+
+
 def test_api_page_lists_every_public_name():
     assert set(public_names()) <= set(listed_on_api_page())
 
