@@ -355,12 +355,25 @@ def _premises(problem, premise, evaluation):
     identity = np.eye(premise.size)
     transposed, hessian = premise.pull_back(x, identity, raw.gauss_newton)
     stiffness = problem.penalty.stiffness
-    factor = NormalFactor(hessian + stiffness * identity)
-    inverse = factor.half_solve(identity)
-    n_determined = premise.size - stiffness * float(np.sum(inverse**2))
+    try:
+        inverse = NormalFactor(hessian + stiffness * identity).half_solve(identity)
+    except FloatingPointError:
+        inverse = _of_what_is_told(hessian, stiffness)
+    n_determined = len(inverse) - stiffness * float(np.sum(inverse**2))
     premises = inverse @ transposed
     cross = np.stack([premises @ half.T for half in raw.cross])
     return premises, cross, n_determined
+
+
+def _of_what_is_told(hessian, stiffness):
+    """R^-1 of the directions in which a Gauss-Newton matrix is more than rounding.
+
+    It has no negative eigenvalue but for what rounding leaves of large numbers, as beside a row so
+    far off that a rule is its own. Directions of no more than the most negative one are held.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
+    told = values > -values[0]
+    return vectors[:, told].T / np.sqrt(values[told] + stiffness)[:, None]
 
 
 def _units(antecedent: Antecedent, scale):

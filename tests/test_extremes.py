@@ -104,3 +104,27 @@ def test_what_floats_hold_is_learnt(x_scale, y_scale):
     X, y = table()
     found = ANFISRegressor(**SHORT).fit(X * x_scale, y * y_scale).predict(X * x_scale)
     assert_allclose(found / y_scale, plain_predictions(), rtol=0, atol=1e-6 * np.ptp(y))
+
+
+@pytest.mark.parametrize(
+    ("value", "settings"),
+    [
+        (1e8, {"n_mfs": 2}),
+        (1e12, {"n_mfs": 3, "order": 0}),
+        (1e17, {}),
+        (1e7, {"n_mfs": 2, "solver": VariableProjection(stiffness=0.0)}),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
+def test_deviations_beside_a_value_that_is_a_mistake(value, settings):
+    # A rule is that row's own: what its terms may do is a difference of squares of 1e25 and more.
+    rng = np.random.default_rng(0)
+    X = np.column_stack([rng.normal(size=200), rng.integers(0, 5, 200)])
+    y = np.sin(2.0 * X[:, 0]) + 0.3 * X[:, 1] + 0.05 * rng.normal(size=200)
+    X[3, 0] = value
+    model = ANFISRegressor(**settings).fit(X, y)
+    prediction, deviation = model.predict(np.delete(X, 3, axis=0), return_std=True)
+    left = np.sqrt(np.mean((prediction - np.delete(y, 3)) ** 2))
+    assert_allclose(model.noise_std_, left, rtol=0.2)
+    assert (model.noise_std_ < deviation).all()
+    assert deviation.max() < 1.5 * left
