@@ -156,7 +156,9 @@ def _place(path, header, name, taken=()):
 
 def _no_column(part, name, header):
     found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
-    close = [part] if part in header else difflib.get_close_matches(name, header, n=1, cutoff=0.4)
+    # Columns that are called as another part are that.
+    free = [other for other in header if other.strip().casefold() not in COLUMNS]
+    close = [part] if part in header else difflib.get_close_matches(name, free, n=1, cutoff=0.4)
     advice = f"{part}={close[0]}" if close else f"{part}=NAME"
     return (
         f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "

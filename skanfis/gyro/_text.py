@@ -234,7 +234,7 @@ class TextLog:
             with self._body() as file:
                 return pd.read_csv(file, dtype=every, nrows=n_rows, **self._options())
         except (ValueError, pd.errors.ParserError) as error:
-            raise LogError(f"{self.path}: is no table: {error}") from error
+            raise LogError(f"{self.path}: is no table: {str(error).strip()}") from error
 
     def pieces(self, kinds, n_rows):
         """Tables of so many rows: columns by their places; ``kinds`` is float or str by place.
@@ -255,7 +255,7 @@ class TextLog:
             except pd.errors.EmptyDataError:
                 return
             except pd.errors.ParserError as error:
-                raise LogError(f"{self.path}: is no table: {error}") from error
+                raise LogError(f"{self.path}: is no table: {str(error).strip()}") from error
             except UnicodeError as error:
                 raise self._no_text() from error
 

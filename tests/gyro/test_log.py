@@ -97,6 +97,7 @@ def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
     [
         ("", {}, r"log.csv: is empty"),
         ("temp,output,rate\n1,2,3\n", {}, "no column 'temperature' .* temperature=temp"),
+        ("run,output,rate\n1,2,3\n", {}, "no column 'temperature' .* temperature=NAME"),
         ("temperature,output,rate\n1,2,3\n1,2,x\n", {}, r"line 3, column 'rate': 'x' is not a num"),
         ("temperature,output,rate\n1,2,3\n\n1,,3\n", {}, r"line 4, column 'output': .* missing"),
         ("T,output,rate\n1,2,3\n,2,3\n", CALLED_T, r"line 3, column 'T' \(temperature\)"),
