@@ -82,9 +82,9 @@ MembershipDisplay.from_estimator(model, X_train)
 #
 # Where the strongest rule alone says what all say together, points lie on the diagonal. Here they
 # lie near it: each rule is a plane that holds where its terms are true, and only between two of
-# them, at impedances around 500, is what one says alone far off. Where rules mean nothing alone, the
-# report says so, and ``export_text`` warns. :doc:`/reading_rules` says what may be believed of a
-# rule, and when.
+# them, at impedances around 500, is what one says alone far off. Where rules mean nothing alone,
+# the report says so, and ``export_text`` warns. :doc:`/reading_rules` says what may be believed of
+# a rule, and when.
 
 print(model[-1].readability_)
 ReadabilityDisplay.from_estimator(model, X_train, y_train)
