@@ -169,10 +169,10 @@ class ANFISRegressor(
         The candidates that were compared where the structure was chosen by itself, best first:
         "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
         on new rows like these, "log_evidence", "agreement", "alpha", "stiffness"; without groups
-        "leverage_between" (above one, less is known half-way between rows than a single row there
-        would tell, and the candidate is out of the running); with groups "held_out_error", which
-        then decides. Both errors are in standard deviations of the target. Empty where the
-        structure was given.
+        "unknown_between", the part of places half-way between rows at which a single row would tell
+        more than all do (above 0.05 the candidate is out of the running); with groups
+        "held_out_error", which then decides. Both errors are in standard deviations of the target.
+        Empty where the structure was given.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y: what remains of
         the residual after the effective number of parameters. None where

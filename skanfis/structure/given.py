@@ -12,7 +12,7 @@ from ..data import StandardisedData
 from ..evidence import FREE
 from ..objective import SeparableProblem
 from ..premise import Premise
-from .between import leverage_between, places_between
+from .between import places_between, unknown_between
 from .readable_terms import has_idle_term, has_twin_terms
 from .sample import effective_weight, search_sample
 from .start import Start
@@ -95,7 +95,7 @@ def tuned_start(
         best.is_apart,
         best.is_held,
         expected_error=best.expected_error,
-        leverage_between=leverage_between(best, places_between(sample)),
+        unknown_between=unknown_between(best, places_between(sample)),
     )
 
 

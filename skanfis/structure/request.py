@@ -16,7 +16,7 @@ from ..evidence import FREE
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..membership import Membership
 from ..model import TSKModel
-from .between import is_known
+from .between import is_told
 from .clusters import clustered_antecedent
 from .given import tuned_start
 from .grid import Spacing, grid_antecedent
@@ -219,14 +219,14 @@ class StructureRequest:
 
 def _warn_if_unknown_between(start, is_warned_already):
     """Warn where rules that are given say between the rows what no row tells."""
-    if is_warned_already or is_known(start.leverage_between):
+    if is_warned_already or is_told(start.unknown_between):
         return
     warn_user(
-        "Half-way between training rows the rules are less certain than a single row there would "
-        f"make them (mean leverage {start.leverage_between:.3g}, at most 1 on a row): rows on few "
-        "curves, as those of a few runs, or too few, or beside one that is far off, do not tell so "
-        "many terms. Give terms to fewer inputs (n_mfs, premise_features), or leave the structure "
-        "to the default; judge the model on whole runs or groups held out.",
+        f"At {start.unknown_between:.0%} of places half-way between training rows the rules are "
+        "less certain than a single row there would make them: rows on few curves, as those of a "
+        "few runs, or too few, do not tell so many terms. Give terms to fewer inputs (n_mfs, "
+        "premise_features), or leave the structure to the default; judge the model on whole runs "
+        "or groups held out.",
         UnderdeterminedWarning,
     )
 

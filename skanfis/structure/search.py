@@ -19,7 +19,7 @@ Scattered rules come in a short sequence of numbers.
 Rows that come in groups, runs of an instrument say, are more alike within a group than any
 criterion on the same rows can know. Where the groups are given, the score is instead the error of
 short trainings on the groups that are left out, a fifth of them at a time. Where they are not, a
-candidate is out of the running that knows next to nothing between the rows (``between``).
+candidate is out of the running that the rows do not tell between them (``between``).
 
 Beyond two thousand rows, one thousand in groups, the candidates see representative rows only: the
 search then takes no longer, whatever the number of rows.
@@ -38,7 +38,7 @@ from ..evidence import FREE
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
-from .between import is_known, leverage_between, places_between
+from .between import is_told, places_between, unknown_between
 from .candidate import MOST_RULES, Candidate, RuleBases
 from .grid import Spacing
 from .held_out import held_out_loss
@@ -163,7 +163,7 @@ class StructureSearch:
         self.untrained: dict[Candidate, Tuned] = {}  # of this round
         self.begun: dict[Candidate, Tuned] = {}
         self.scores: dict[Candidate, float] = {}
-        self.leverages: dict[Candidate, float] = {}
+        self.unknown: dict[Candidate, float] = {}
         self.max_rules = max_rules
         self.folds = (split or _folds)(self.sample.groups)
 
@@ -228,8 +228,8 @@ class StructureSearch:
 
     def _promise(self, tuned):
         """What goes first: rules that the rows tell, and among these the least expected error."""
-        is_told = bool(self.folds) or is_known(leverage_between(tuned, self.places))
-        return not is_told, self._expected(tuned)
+        are_told = bool(self.folds) or is_told(unknown_between(tuned, self.places))
+        return not are_told, self._expected(tuned)
 
     @staticmethod
     def _with_one_more(candidate, j):
@@ -330,8 +330,8 @@ class StructureSearch:
         if self.folds:
             return self._held_out_score(candidate)
         tuned = self._tuned(candidate)
-        self.leverages[candidate] = leverage_between(tuned, self.places)
-        if not is_known(self.leverages[candidate]):
+        self.unknown[candidate] = unknown_between(tuned, self.places)
+        if not is_told(self.unknown[candidate]):
             return np.inf
         if has_idle_term(self.sample, tuned.evaluation.antecedent):
             return np.inf
@@ -465,8 +465,8 @@ class StructureSearch:
                 line["log_evidence"] = float(-0.5 * found.score)
                 for key in ("agreement", "alpha", "stiffness"):
                     line[key] = float(getattr(found.penalty, key))
-            if candidate in self.leverages:
-                line["leverage_between"] = self.leverages[candidate]
+            if candidate in self.unknown:
+                line["unknown_between"] = self.unknown[candidate]
             if self.folds:
                 line["held_out_error"] = float(self.scores[candidate])
             lines.append(line)

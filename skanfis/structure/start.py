@@ -24,4 +24,4 @@ class Start:
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
     expected_error: float = np.nan  # mean square on new rows, as far as it was sought
-    leverage_between: float = 0.0  # what is known between the rows (see ``between``), if sought
+    unknown_between: float = 0.0  # part of the places between the rows (see ``between``)

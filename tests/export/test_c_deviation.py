@@ -252,7 +252,6 @@ def test_beside_a_row_far_off_and_of_an_output_that_never_changed(tmp_path):
 
 
 @needs_compiler
-@pytest.mark.filterwarnings("ignore:Half-way between:skanfis.exceptions.UnderdeterminedWarning")
 def test_in_single_precision_the_self_test_knows_how_far_terms_are_from_a_row_far_off(tmp_path):
     """A logarithm of a membership of thousands takes more digits off than a usual one."""
     rng = np.random.default_rng(100)

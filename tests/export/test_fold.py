@@ -306,7 +306,6 @@ def mixed(n_rows=200):
         ({"handle_unknown": "ignore", "sparse_output": False}, None),
     ],
 )
-@pytest.mark.filterwarnings("ignore:Half-way between:skanfis.exceptions.UnderdeterminedWarning")
 def test_one_hot_encoded_columns_are_inputs(options, fibres):
     X, y = mixed()
     encode = make_pipeline(OneHotEncoder(**options), StandardScaler(with_mean=False))

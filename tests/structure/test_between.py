@@ -9,13 +9,15 @@ from skanfis import ANFISRegressor
 from skanfis.data import StandardisedData
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.membership import Gaussian
-from skanfis.structure.between import leverage_between, places_between
+from skanfis.structure.between import places_between, unknown_between
 from skanfis.structure.candidate import Candidate
 from skanfis.structure.search import StructureSearch
 
+THREE = (0.0, 10.0, 50.0)
 
-def rows_of(X, y):
-    return StandardisedData.of(X, y[:, None])
+
+def rows_of(X, y, sample_weight=None):
+    return StandardisedData.of(X, y[:, None], sample_weight)
 
 
 def three_runs(rng, temperatures):
@@ -53,39 +55,48 @@ def test_there_are_places_between_any_number_of_rows(rng, n_rows):
     assert np.isfinite(places).all()
 
 
+def test_rows_come_as_often_as_they_count(rng):
+    X = rng.standard_normal((60, 1))
+    weight = np.where(np.arange(60) % 2, 1.0, 1e-300)
+    weight[1] = 30.0
+    rows = rows_of(X, X[:, 0], weight)
+    heavy = rows.X[1::2, 0]
+    middle = 0.5 * (heavy[:, None] + heavy)
+    middle[np.diag_indices(30)] = np.inf  # no row is half-way to itself
+    (places,) = places_between(rows)
+    assert_allclose(np.abs(middle.ravel() - places[:, None]).min(axis=1), 0.0, atol=1e-12)
+    of_heaviest = np.abs(middle[0] - places[:, None]).min(axis=1) < 1e-12
+    assert 28 <= of_heaviest.sum() < 60
+
+
 def test_leverage_is_that_of_the_dense_design(rng):
-    X = rng.uniform(-1, 1, (80, 2))
+    X, y = three_runs(rng, THREE)
     found = StructureSearch(
-        rows_of(X, np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(80)),
-        [Gaussian] * 2,
-        1,
-        np.arange(2),
-        np.arange(2),
-        0,
-        {},
-        overlap=0.6,
+        rows_of(X, y), [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6
     )
-    tuned, places = found._tuned(Candidate((3, 1))), found.places
+    tuned, places = found._tuned(Candidate((3, 3))), found.places
 
     def design(Z):
         strengths = tuned.evaluation.antecedent.strengths(Z)
         local = tuned.problem.local
         own = (Z[None] - local.center[:, :, None]) / local.spread[:, :, None]
-        basis = np.concatenate([np.ones((3, 1, Z.shape[1])), own], axis=1)
-        return (strengths[:, None] * basis).reshape(9, -1)
+        basis = np.concatenate([np.ones((9, 1, Z.shape[1])), own], axis=1)
+        return (strengths[:, None] * basis).reshape(27, -1)
 
     phi, penalty = (
         design(np.ascontiguousarray(found.sample.X.T)),
         tuned.problem.penalty_matrix(tuned.evaluation.normal.disagreement),
     )
     at = design(places)
-    matrix = phi @ phi.T + 80 * penalty
-    expected = np.mean(np.sum(at * np.linalg.solve(matrix, at), axis=0))
-    assert_allclose(leverage_between(tuned, places), expected, rtol=1e-6)
+    expected = np.sum(at * np.linalg.solve(phi @ phi.T + 180 * penalty, at), axis=0)
+    problem = tuned.problem
+    leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), places, 180)
+    assert_allclose(leverage, expected, rtol=1e-4)
+    assert unknown_between(tuned, places) == np.mean(expected > 1.0) > 0.05
 
 
 @pytest.mark.parametrize(
-    ("temperatures", "is_known"), [((0.0, 25.0, 50.0), False), (np.linspace(0.0, 50.0, 30), True)]
+    ("temperatures", "is_known"), [(THREE, False), (np.linspace(0.0, 50.0, 30), True)]
 )
 def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatures, is_known):
     X, y = three_runs(rng, temperatures)
@@ -97,8 +108,8 @@ def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatur
 
 
 def test_rules_that_are_given_come_with_a_warning(rng):
-    X, y = three_runs(rng, (0.0, 25.0, 50.0))
-    with pytest.warns(UnderdeterminedWarning, match="Half-way between training rows .*n_mfs"):
+    X, y = three_runs(rng, THREE)
+    with pytest.warns(UnderdeterminedWarning, match=r"At \d+% of places half-way .*n_mfs"):
         ANFISRegressor([4, 3]).fit(X, y)
     # Once, where there are fewer rows than consequents.
     with pytest.warns(UnderdeterminedWarning) as raised:
@@ -111,12 +122,28 @@ def test_rules_that_are_given_come_with_a_warning(rng):
 
 
 def test_what_is_chosen_is_told_by_the_rows(rng):
-    X, y = three_runs(rng, (0.0, 25.0, 50.0))
+    X, y = three_runs(rng, THREE)
     model = ANFISRegressor().fit(X, y)
     chosen = model.structures_[0]
     assert model.n_rules_ > 1
-    assert chosen["leverage_between"] <= 1.0
-    assert model.structures_[-1]["leverage_between"] > 1.0
+    assert chosen["unknown_between"] <= 0.05
+    assert model.structures_[-1]["unknown_between"] > 0.05
     # With groups, those that are left out decide.
     model.fit(X, y, groups=np.repeat([0, 1, 2], 60))
-    assert not any("leverage_between" in c for c in model.structures_)
+    assert not any("unknown_between" in c for c in model.structures_)
+
+
+def test_a_row_far_off_is_no_reason_to_refuse_rules(rng):
+    # Nor to warn: half-way to it next to nothing is known, and everywhere else all.
+    X = rng.standard_normal((80, 2))
+    X[0] = [30.0, 6.0]
+    y = np.sin(1.5 * X[:, 0]) + 0.3 * np.cos(2.0 * X[:, 1]) + 0.02 * rng.standard_normal(80)
+    rows = rows_of(X, y)
+    found = StructureSearch(rows, [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6)
+    tuned = found._tuned(Candidate((4, 2)))
+    problem = tuned.problem
+    leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), found.places, 80)
+    assert leverage.mean() > 1.0
+    assert np.quantile(leverage, 0.95) < 0.5
+    assert np.isfinite(found._score(Candidate((4, 2))))
+    ANFISRegressor([4, 2]).fit(X, y)
