@@ -22,6 +22,7 @@ ON_REQUEST = (
     "blow_ups",
     "how_sure",
     "small_problems",
+    "between",
     "start",
     "peers",
     "fuzz_fis",
@@ -55,7 +56,9 @@ def parse():
         metavar="N",
         help="large_data, workers: rows on the cluster (0: none); long_logs: rows of a log",
     )
-    many = parser.add_argument_group("real_sets, battery, blow_ups, small_problems, how_sure")
+    many = parser.add_argument_group(
+        "real_sets, battery, blow_ups, small_problems, between, how_sure"
+    )
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")

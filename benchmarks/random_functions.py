@@ -1,4 +1,4 @@
-"""Random functions of inputs of many distributions: what the battery and the blow-ups are made of.
+"""Random functions of inputs of many distributions: what several benchmarks are made of.
 
 Everything is drawn from a case's own seed. A function acts on standardised inputs, by medians and
 quartiles so that heavy tails stay heavy, and on some of them only where there are several. Inputs
@@ -121,6 +121,21 @@ def lognormal(rng, n, d):
     return rng.lognormal(0, 1, (n, d))
 
 
+def one_far(rng, n, d):
+    return _far(rng, normal(rng, n, d), 1)
+
+
+def three_far(rng, n, d):
+    return _far(rng, normal(rng, n, d), 3)
+
+
+def _far(rng, X, n_far):
+    """The first rows, which are trained on, thirty deviations off in directions of their own."""
+    directions = rng.standard_normal((n_far, X.shape[1]))
+    X[:n_far] = 30.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return X
+
+
 INPUTS = {
     "uniform": uniform,
     "normal": normal,
@@ -129,6 +144,8 @@ INPUTS = {
     "integer": integer,
     "t3": t3,
     "lognormal": lognormal,
+    "one far": one_far,
+    "three far": three_far,
 }
 
 # Functions ------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""How wide the terms of a grid start: the measurement behind ``structure.request._OVERLAP``."""
+"""How wide the terms of a grid start: the measurement behind ``structure.request.OVERLAP``."""
 
 from unittest.mock import patch
 
@@ -18,7 +18,7 @@ _SEEDS = range(10)
 def run(options):
     lines = []
     for overlap in _OVERLAPS:
-        with patch.object(start, "_OVERLAP", overlap):
+        with patch.object(start, "OVERLAP", overlap):
             lines += [[overlap, *line] for line in figures()]
     lines.sort(key=lambda line: line[1:3])
     head = ["overlap", "problem", "mf", "error, train", "error, check", "iterations"]
