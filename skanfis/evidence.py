@@ -28,16 +28,27 @@ each weight being multiplied by the ratio of the right side to the left. nu and 
 the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
 to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this
 takes no pass over the rows: for any weights, beta is one solve away.
+
+The pulls alpha_c on the components of the departures are weights like the others, but few
+departures may tell of one. What is expected beforehand is that they are alike: the logarithm of
+each is normally distributed about their mean, with the standard deviation s = log 5, which adds
+sum_c (log alpha_c / alpha)^2 / s^2 to -2 log p, alpha their geometric mean. The step of one is then
+that at which, what is paid growing with it and what is determined staying,
+
+    paid exp(t) - determined + 2 (log alpha_c / alpha + t) / s^2 = 0 ,
+
+which for s without end is the ratio above, and else a value of Wright's omega.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import wrightomega
 
 from .consequent import NormalFactor
 from .objective import NormalEquations
-from .penalty import CommonLine, Penalty
+from .penalty import WEIGHTS, CommonLine, Penalty
 
 __all__ = [
     "FREE",
@@ -53,20 +64,26 @@ __all__ = [
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
 # Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
-_SMALLEST = {"agreement": 1e-12, "alpha": 1e-12, "slope": 1e-12, "stiffness": 1e-10}
-_LARGEST = {"agreement": 1.0, "alpha": 1e4, "slope": 1e4, "stiffness": 1e4}
+_SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
+_LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
+_AGREEMENT, _SLOPE, _STIFFNESS = range(len(WEIGHTS))
 # The premises' weight has a prior of its own, as if so many displacements of such a size had been
 # seen before: a fifth of a spacing is what a term is expected to move.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
+# The pulls on components of the departures are expected to be within a factor of five of their
+# mean, as one standard deviation s: 1 / s^2.
+_LIKENESS = 1.0 / np.log(5.0) ** 2
 # Least weights where there are fewer distinct rows than this per consequent.
 _UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
-_LARGEST_STEP = 100.0
+_LONGEST_STEP = np.log(100.0)
 # Successive steps of a weight are alike from this ratio on; next to one, all the way is open.
 _ALIKE, _MOST_ALIKE = 0.5, 0.99
+# Below all weights: a logarithm can be taken of it.
+_NOTHING = 1e-30
 # What changes a weight by less leaves its second digit as it is.
 _SETTLED = 5e-3
 # The target of a fit that is exact to rounding has no more digits than this, squared.
@@ -88,10 +105,12 @@ class Laplace:
         Those that vary.
     determinants : float
         log |M| - log |P|+ + log R.
-    paid : dict of str to float
-        For each part of the penalty, beta' tau P beta (or kappa |x|^2).
-    parts : dict of str to ndarray
-        Matrices of those of the consequents.
+    paid : ndarray of shape (3 + n_components,)
+        Of each part of the penalty, in the order of ``Penalty.weights``, beta' tau P beta (or
+        kappa |x|^2).
+    disagreement : ndarray of shape (n_columns, n_columns)
+    line : CommonLine
+        These two make the penalty.
     prior, factor : NormalFactor
         Of P, its null space joined in at P's own size, and of M.
     curvature : ndarray of shape (n_displacements,)
@@ -105,8 +124,9 @@ class Laplace:
     twice_cost: float
     n_outputs: int
     determinants: float
-    paid: dict
-    parts: dict
+    paid: np.ndarray
+    disagreement: np.ndarray
+    line: CommonLine
     prior: NormalFactor
     factor: NormalFactor
     curvature: np.ndarray
@@ -119,26 +139,30 @@ class Laplace:
         These and ``held_after`` take as long as all the rest, and are seldom asked of the last of
         several posteriors.
         """
-        found = self._traces(self.prior)
-        if self.curvature.size:
-            found["stiffness"] = float(self.curvature.size)
-        return found
+        return self._held(self.prior, float(self.curvature.size))
 
     @cached_property
     def held_after(self):
         """The same in the posterior: how many parameters each part holds."""
-        found = self._traces(self.factor)
-        if self.curvature.size:
-            stiffness = self.penalty.stiffness
-            # Without stiffness nothing is held, not even where there is no curvature either.
-            held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
-            found["stiffness"] = float(held)
+        stiffness = self.penalty.stiffness
+        # Without stiffness nothing is held, not even where there is no curvature either.
+        held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
+        return self._held(self.factor, held)
+
+    def _held(self, factor, by_stiffness):
+        found = self.penalty.weights(self.line.n_components)
+        traces, by_component = factor.traces(
+            [self.disagreement, self.line.slopes], self.line.departures
+        )
+        found[[_AGREEMENT, _SLOPE]] *= traces
+        found[3:] *= by_component
+        found[_STIFFNESS] = by_stiffness
         return found
 
-    def _traces(self, factor):
-        weights = _weighted(self.penalty)
-        traces = factor.traces(self.parts.values())
-        return {key: weights[key] * one for key, one in zip(self.parts, traces, strict=True)}
+    @property
+    def n_held(self):
+        """How many parameters the whole penalty holds."""
+        return float(np.sum(self.held_after))
 
     @property
     def freedom(self):
@@ -160,6 +184,8 @@ class Laplace:
     def minus_twice_log(self):
         """-2 log p, up to a constant of the data."""
         consequents = self.freedom * np.log(self.twice_cost) + self.n_outputs * self.determinants
+        if self.penalty.pulls:
+            consequents += _LIKENESS * float(np.sum(np.log(self.penalty.pulls) ** 2))
         if self.curvature.size == 0 or self.penalty.stiffness == 0.0:
             return consequents
         expected = self.prior_precision
@@ -172,20 +198,12 @@ class Laplace:
     @property
     def n_effective(self):
         """Effective number of all parameters: of consequents, what the penalty leaves free."""
-        return self.n_columns + self.curvature.size - sum(self.held_after.values())
+        return self.n_columns + self.curvature.size - self.n_held
 
     @property
     def n_effective_premises(self):
         """Effective number of the displacements: of each, the part that the data decide on."""
-        return self.curvature.size - self.held_after["stiffness"] if self.curvature.size else 0.0
-
-
-def _weighted(penalty):
-    return {"agreement": penalty.agreement, "alpha": penalty.alpha, "slope": penalty.rho}
-
-
-def _all_weights(penalty):
-    return {**_weighted(penalty), "stiffness": penalty.stiffness}
+        return self.curvature.size - float(self.held_after[_STIFFNESS])
 
 
 def laplace(
@@ -205,11 +223,8 @@ def laplace(
     ``n_outputs`` are those that vary, if not all do: a constant target says nothing about the noise
     of another.
     """
-    parts = {"agreement": normal.disagreement, "alpha": line.own, "slope": line.slopes}
-    weights = _weighted(penalty)
-    matrix = np.zeros_like(normal.gram)
-    for key, part in parts.items():
-        matrix += weights[key] * part
+    matrix = penalty.agreement * normal.disagreement
+    matrix += line.pull(penalty)
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     # ``matrix`` takes on the factor's shift.
@@ -217,30 +232,30 @@ def laplace(
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
-    paid = {
-        key: weights[key] * float(np.sum(solved * (part @ solved))) for key, part in parts.items()
-    }
-    curvature = np.empty(0) if curvature is None else curvature
-    if curvature.size:
-        paid["stiffness"] = penalty.stiffness * float(displacement @ displacement)
-    of_displacements = paid.get("stiffness", 0.0)
+    has_premises = curvature is not None and curvature.size
+    paid = penalty.weights(line.n_components)
+    paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
+    paid[_SLOPE] *= np.vdot(solved, line.slopes @ solved)
+    paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
+    paid[3:] *= line.departures.squares(solved)
     return Laplace(
         penalty,
         n_rows,
-        max(error + float(np.sum(solved * (matrix @ solved))) + of_displacements, _LEAST_ERROR),
+        max(error + float(np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]), _LEAST_ERROR),
         normal.coefficients.shape[1] if n_outputs is None else n_outputs,
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
         paid,
-        parts,
+        normal.disagreement,
+        line,
         prior,
         factor,
-        curvature,
+        curvature if has_premises else np.empty(0),
         matrix.shape[0],
     )
 
 
 def least_weights(posterior: Laplace, n_rules, n_distinct):
-    """Weights below which the prior expects what no rule that can be read does.
+    """The penalty below whose weights the prior expects what no rule that can be read does.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
@@ -252,32 +267,61 @@ def least_weights(posterior: Laplace, n_rules, n_distinct):
     """
     rows_each = n_distinct / posterior.n_columns
     least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
-    weights = dict.fromkeys(("agreement", "alpha", "slope"), least)
-    if n_rules > 1:
-        noise = posterior.noise_variance / posterior.n_rows
-        weights["agreement"] = max(least, posterior.n_columns * noise / _FAR**2)
-        weights["alpha"] = max(least, noise / _FAR**2)
-    return weights
+    if n_rules == 1:
+        return Penalty(least, least, least)
+    noise = posterior.noise_variance / posterior.n_rows
+    agreement = max(least, posterior.n_columns * noise / _FAR**2)
+    return Penalty(agreement, max(least, noise / _FAR**2), least)
 
 
 def reestimated(posterior: Laplace, free, least=None):
     """The penalty after one step of every free weight, none below ``least``."""
-    weights = _all_weights(posterior.penalty)
-    for key, paid in posterior.paid.items():
-        before, after = posterior.held_before[key], posterior.held_after[key]
-        if key not in free or before <= 0.0:
-            continue
-        outputs = 1 if key == "stiffness" else posterior.n_outputs
-        determined = outputs * max(before - after, 0.0)
-        cost = posterior.n_rows / posterior.noise_variance * paid
-        if key == "stiffness":
-            determined += _PRIOR_NUMBER
-            cost += _PRIOR_NUMBER * posterior.prior_precision
-        ratio = (determined + 1e-12) / (cost + 1e-12)
-        ratio = min(max(ratio, 1.0 / _LARGEST_STEP), _LARGEST_STEP)
-        smallest = max(_SMALLEST[key], 0.0 if least is None else least.get(key, 0.0))
-        weights[key] = min(max(weights[key] * ratio, smallest), _LARGEST[key])
-    return replace(posterior.penalty, **weights)
+    now = posterior.penalty.weights(posterior.line.n_components)
+    before, outputs = posterior.held_before, np.full(now.size, posterior.n_outputs)
+    outputs[_STIFFNESS] = 1
+    determined = outputs * np.maximum(before - posterior.held_after, 0.0)
+    # What next to nothing is paid for may come out negative.
+    cost = posterior.n_rows / posterior.noise_variance * np.maximum(posterior.paid, 0.0)
+    if posterior.curvature.size:
+        determined[_STIFFNESS] += _PRIOR_NUMBER
+        cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
+    step = np.log((determined + 1e-12) / (cost + 1e-12))
+    if now.size > len(WEIGHTS) + 1:
+        pulls = np.array(posterior.penalty.pulls or 1.0)
+        step[3:] = _step_to_likeness(cost[3:], determined[3:], pulls)
+    moves = _is_free(free, now.size) & (before > 0.0)
+    moves[3:] = moves[3:].any()
+    ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
+    return _limited(posterior.penalty, now * ratio, moves, now, least)
+
+
+def _step_to_likeness(cost, determined, pulls):
+    """The root t of cost e^t - determined + 2 (log pulls + t) / s^2, for every component.
+
+    With z = determined s^2 / 2 - log pulls, t = z - omega(z + log(cost s^2 / 2)).
+    """
+    z = determined / (2.0 * _LIKENESS) - np.log(pulls)
+    return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
+
+
+def _is_free(free, size):
+    """Of a row of weights, which of them may be found."""
+    found = np.full(size, "alpha" in free)
+    found[:3] = [key in free for key in WEIGHTS]
+    return found
+
+
+def _limited(penalty, weights, moves, others, least):
+    """The penalty of weights within their limits where they move, and of others where not."""
+    n_components = weights.size - len(WEIGHTS)
+    low, high = (limits.weights(n_components) for limits in (_SMALLEST, _LARGEST))
+    if least is not None:
+        low = np.maximum(low, least.weights(n_components))
+    found = np.where(moves, np.minimum(np.maximum(weights, low), high), others)
+    if moves[3:].any():
+        return Penalty.of_weights(found)
+    single = dict(zip(WEIGHTS, found.tolist(), strict=False))
+    return replace(penalty, **single)
 
 
 def extrapolated(before, now, after, free, least):
@@ -290,21 +334,25 @@ def extrapolated(before, now, after, free, least):
     """
     if before is None:
         return after
-    weights = [_all_weights(penalty) for penalty in (before, now, after)]
-    found = {}
-    for key in free:
-        first, second, third = (np.log(max(w[key], _SMALLEST[key])) for w in weights)
-        step, last = third - second, second - first
-        if step * last <= 0.0 or step / last < _ALIKE:
-            continue
-        ratio = min(step / last, _MOST_ALIKE)
-        jump = np.clip(step / (1.0 - ratio), -np.log(_LARGEST_STEP), np.log(_LARGEST_STEP))
-        smallest = max(_SMALLEST[key], least.get(key, 0.0))
-        found[key] = min(max(float(np.exp(second + jump)), smallest), _LARGEST[key])
-    return replace(after, **found)
+    weights = _rows_of(before, now, after)
+    first, second, third = np.log(np.maximum(weights, _NOTHING))
+    step, last = third - second, second - first
+    moves = _is_free(free, step.size)
+    moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
+    if not moves.any():
+        return after
+    ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
+    jump = np.clip(step / (1.0 - ratio), -_LONGEST_STEP, _LONGEST_STEP)
+    return _limited(after, np.exp(second + jump), moves, weights[2], least)
 
 
 def is_settled(penalty, after):
     """Whether no weight changes in its second digit."""
-    now, then = _all_weights(penalty), _all_weights(after)
-    return all(abs(then[key] - now[key]) <= _SETTLED * now[key] for key in FREE)
+    now, then = _rows_of(penalty, after)
+    return bool((np.abs(then - now) <= _SETTLED * now).all())
+
+
+def _rows_of(*penalties):
+    """Weights of some penalties of the same rules, a row each."""
+    n_components = max(len(penalty.pulls) for penalty in penalties) or 1
+    return np.array([penalty.weights(n_components) for penalty in penalties])

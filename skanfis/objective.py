@@ -38,6 +38,7 @@ Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in 
 import copy
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -179,7 +180,9 @@ class SeparableProblem:
         gram = self._sums_at_start[0]
         self.on_sample: SeparableProblem | None = None
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
-        self._common_line = CommonLine(self.local, self._extent(antecedent))
+        self._common_line = CommonLine(
+            self.local, self._extent(antecedent), antecedent, self.consequent_inputs
+        )
 
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
@@ -197,6 +200,7 @@ class SeparableProblem:
         """Return the same problem with another penalty; no pass over the rows."""
         other = copy.copy(self)
         other.penalty = penalty
+        other.__dict__.pop("_pull", None)
         return other
 
     def on_all(self, rows):
@@ -218,11 +222,11 @@ class SeparableProblem:
 
     def penalty_matrix(self, disagreement):
         """P in the local basis, where Q is ``disagreement``."""
-        line, penalty = self._common_line, self.penalty
-        matrix = penalty.agreement * disagreement
-        matrix += penalty.alpha * line.own
-        matrix += penalty.rho * line.slopes
-        return matrix
+        return self.penalty.agreement * disagreement + self._pull
+
+    @cached_property
+    def _pull(self):
+        return self._common_line.pull(self.penalty)
 
     def _rows_of_block(self, antecedent):
         values_per_row = (
@@ -328,12 +332,12 @@ class SeparableProblem:
 
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
-        antecedent, line = self.antecedent.with_parameters(parameters), self._common_line
+        antecedent = self.antecedent.with_parameters(parameters)
         premises, slope, square, apart, masses = self._sum(
             JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
         )
         local = self.local.to_local(coefficients)
-        pull = self.penalty.alpha * (line.own @ local) + self.penalty.rho * (line.slopes @ local)
+        pull = self._pull @ local
         cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
         return JointGradient(
             Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None),

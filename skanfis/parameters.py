@@ -14,6 +14,7 @@ from sklearn.utils import check_random_state
 from ._sklearn import HasMethods, Hidden, Interval, StrOptions
 from ._validation import feature_indices
 from .constraints import FixedPoint, OutputLimits
+from .departures import components_of
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, TRIED_FAMILIES, membership_families
 from .model import TSKModel
 from .options import EarlyStopping, Huber, LinearExtrapolation
@@ -21,7 +22,14 @@ from .policies import OUT_OF_BOUNDS
 from .solvers import SOLVERS, Solver, VariableProjection
 from .structure import StructureRequest, check_inputs
 
-__all__ = ["SettingsMixin", "found_weights", "given_weights", "solver_of", "structure_request"]
+__all__ = [
+    "SettingsMixin",
+    "found_weights",
+    "given_weights",
+    "keep_weights",
+    "solver_of",
+    "structure_request",
+]
 
 
 # Parameters of which a word stands for an object's defaults.
@@ -149,13 +157,25 @@ def given_weights(estimator):
 
 
 def found_weights(estimator):
-    """The weights of the penalty that training has used, by the same names."""
+    """The weights of the penalty that training has used, by their names in ``Penalty``."""
     return {
         "agreement": estimator.agreement_,
         "alpha": estimator.alpha_,
         "slope": estimator.slope_alpha_,
         "stiffness": estimator.stiffness_,
+        "pulls": tuple(estimator.pulls_.values()),
     }
+
+
+def keep_weights(estimator, penalty, antecedent, consequent_inputs):
+    """Set the attributes that say which weights on the consequents of these rules were used."""
+    estimator.agreement_, estimator.alpha_ = penalty.agreement, penalty.alpha
+    estimator.slope_alpha_, estimator.pulls_ = penalty.rho, {}
+    if penalty.pulls:
+        names = estimator.model_.input_names
+        components = components_of(antecedent, consequent_inputs)
+        inputs = [tuple(names[j] for j in one) for one in components]
+        estimator.pulls_ = dict(zip(inputs, penalty.pulls, strict=True))
 
 
 def _imported(estimator, names):

@@ -14,7 +14,7 @@ from ._threads import one_blas_thread
 from .fitted_rules import TellsOfRulesMixin
 from .membership import Membership
 from .options import EarlyStopping, Huber, LinearExtrapolation
-from .parameters import SettingsMixin, structure_request
+from .parameters import SettingsMixin, keep_weights, structure_request
 from .prediction import PredictsMixin
 from .readable import readability_of_rows
 from .row_checks import ChecksRowsMixin
@@ -119,8 +119,9 @@ class ANFISRegressor(
         Ridge penalty on the consequents, zero or positive, in standard deviations of inputs and
         target: alpha / 2 times the squares of each rule's departure from the rules' common line, in
         its value at its own centre and in its slopes, and of the slopes of that line. Of a single
-        rule it is scikit-learn's ``Ridge``. "auto": departures and common line have a weight each,
-        found by the evidence. At zero, a ridge at the level of rounding errors remains.
+        rule it is scikit-learn's ``Ridge``. "auto": the common line has a weight, and so has each
+        component of the departures, what concerns one input alone and what two together; the
+        evidence finds them. At zero, a ridge at the level of rounding errors remains.
     max_iter : int, default=500
         Most iterations (epochs). With 0, premises stay as they start.
     early_stopping : bool or EarlyStopping, default=False
@@ -165,6 +166,12 @@ class ANFISRegressor(
         Why the solver stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
         The values used; ``slope_alpha_`` is that on the slopes of the rules' common line.
+    pulls_ : dict of tuple of str to float
+        For the inputs that a component of the departures concerns, its weight in ``alpha_``, which
+        is their geometric mean: ``("time",)`` is how the output bends with time alone, ``("time",
+        "temperature")`` how that changes with temperature, ``()`` the rest. The larger, the less
+        of it the data show. Of scattered rules, ``()`` are their values and ``("time",)`` their
+        slopes. Empty where alpha is given, or no rules departed.
     structures_ : list of dict
         The candidates that were compared where the structure was chosen by itself, best first:
         "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
@@ -373,10 +380,10 @@ class ANFISRegressor(
         self.loss_curve_ = fitted.result.loss_curve
         self.status_ = fitted.result.message
         self._tell_noise()
-        penalty = fitted.start.penalty
-        self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
-        self.slope_alpha_, self.stiffness_ = penalty.rho, penalty.stiffness
-        self.structures_ = fitted.start.candidates
+        start = fitted.start
+        keep_weights(self, start.penalty, start.antecedent, request.consequent_inputs)
+        self.stiffness_ = start.penalty.stiffness
+        self.structures_ = start.candidates
         self.redundant_rules_ = fitted.redundant_rules
         self.constraints_ = fitted.constraints
         self.robust_weights_ = fitted.robust_weights

@@ -145,8 +145,40 @@ def dense_design(antecedent, parameters, Z, order, inputs=None):
     return np.array(columns).T
 
 
+def departure_projectors(antecedent, slope_inputs):
+    """For the inputs that a part of the departures concerns, its projector; () for the rest.
+
+    As the analysis of variance is taught: what varies along some axes of the grid is what means
+    along the others leave, less the means along these.
+    """
+    functions = [(), *((j,) for j in slope_inputs)]
+    found = {}
+    is_grid = isinstance(antecedent, GridAntecedent)
+    if is_grid:
+        inputs = [int(antecedent.term_inputs[column[0]]) for column in antecedent.rule_terms.T]
+        counts = antecedent.counts
+        by_axes = []
+        for varies in np.ndindex(*(2,) * len(counts)):
+            projector = np.eye(1)
+            for m, one in zip(counts, varies, strict=True):
+                mean = np.full((m, m), 1.0 / m)
+                projector = np.kron(projector, np.eye(m) - mean if one else mean)
+            by_axes.append(({j for j, one in zip(inputs, varies, strict=True) if one}, projector))
+    else:
+        inputs, by_axes = [], [(set(), np.eye(antecedent.n_rules))]
+    for varying, projector in by_axes:
+        for i, function in enumerate(functions):
+            concerned = tuple(sorted(varying.union(function)))
+            is_common = is_grid and not varying and not set(function) <= set(inputs)
+            key = () if len(concerned) > 2 or is_common else concerned
+            own = np.zeros((len(functions), len(functions)))
+            own[i, i] = 1.0
+            found[key] = found.get(key, 0.0) + np.kron(projector, own)
+    return found
+
+
 class DenseProblem:
-    """min_beta 1/2 [MSE + lambda V + alpha sum |delta_r|^2 + rho |slopes|^2], in one piece.
+    """min_beta 1/2 [MSE + lambda V + sum alpha_c |delta_c|^2 + rho |slopes|^2], in one piece.
 
     Everything is a sum of squares of :meth:`residuals`, which are written down from the definitions
     in ``skanfis.penalty``: no row sums of Gram matrices, no projections.
@@ -214,10 +246,22 @@ class DenseProblem:
         parts = [
             phi,
             np.sqrt(self.penalty.agreement) * apart.reshape(-1, n_columns),
-            np.sqrt(self.penalty.alpha) * (values - self.line @ to_line),
+            self._pulled(values - self.line @ to_line),
             np.sqrt(self.penalty.rho) * to_line[1:],
         ]
         return np.vstack(parts)
+
+    def _pulled(self, departures):
+        """Departures of all rules, each part times the root of its pull."""
+        alpha, pulls = self.penalty.alpha, self.penalty.pulls
+        if not pulls:
+            return np.sqrt(alpha) * departures
+        inputs = np.arange(len(self.Z)) if self.inputs is None else self.inputs
+        projectors = departure_projectors(self.antecedent, inputs.tolist() if self.order else [])
+        # One input, two, the rest.
+        keys = sorted(projectors, key=lambda key: (len(key) or 99, key))
+        parts = zip(pulls, keys, strict=True)
+        return sum(np.sqrt(alpha * pull) * projectors[key] @ departures for pull, key in parts)
 
     def right_side(self, n_residuals):
         """b, (n_residuals, n_outputs)."""

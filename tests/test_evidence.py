@@ -1,6 +1,6 @@
 """The evidence against integrals: sums over grids, the normal distribution's own, quadrature."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import partial
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy import integrate, optimize, special, stats
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.data import StandardisedData
+from skanfis.departures import components_of
 from skanfis.evidence import (
     PRIOR_DISPLACEMENT,
     extrapolated,
@@ -21,7 +22,7 @@ from skanfis.evidence import (
 )
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
-from skanfis.penalty import Penalty
+from skanfis.penalty import WEIGHTS, Penalty
 from skanfis.premise import Premise
 
 from . import oracles
@@ -35,6 +36,8 @@ PENALTIES = [
     Penalty(agreement=0.0, alpha=1.0, slope=1e-4),
     Penalty(agreement=1.0, alpha=1e-5),
 ]
+# Pulls of components are expected to be within this factor of one another, as one deviation.
+LIKENESS = np.log(5.0)
 
 
 def rules(rng, n_rules):
@@ -57,7 +60,18 @@ def posterior(rows, antecedent, order, penalty, at=FIRST, n_rows=None):
 
 def n_effective(found):
     """Effective number of parameters, consequents of one output and premises."""
-    return found.n_columns + found.curvature.size - sum(found.held_after.values())
+    return found.n_columns + found.curvature.size - found.held_after.sum()
+
+
+def with_pulls(penalty, antecedent, consequent_inputs, g):
+    """The penalty with a pull for every component, whose geometric mean is one."""
+    logs = g.normal(size=len(components_of(antecedent, consequent_inputs)))
+    return replace(penalty, pulls=tuple(np.exp(logs - logs.mean()).tolist()))
+
+
+def prior_of_pulls(penalty):
+    """Minus twice the logarithm of the prior of the pulls, but for a constant."""
+    return np.sum(np.log(penalty.pulls) ** 2) / LIKENESS**2 if penalty.pulls else 0.0
 
 
 def in_full(found):
@@ -226,6 +240,23 @@ class TestAtGivenPremises:
             found = posterior(rows, antecedent, 1, penalty)
             assert_allclose(n_effective(found), np.trace(hat), rtol=1e-7)
 
+    @pytest.mark.parametrize("order", [0, 1])
+    @pytest.mark.parametrize("is_grid", [True, False])
+    def test_so_it_is_with_a_pull_for_every_component(self, order, is_grid):
+        g = np.random.default_rng(6)
+        rows = oracles.bumpy_rows(g, 25, 2, 2)
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [3, 2])
+        if not is_grid:
+            antecedent = oracles.random_scattered(g, Gaussian, 4, [0, 1])
+        for plain in PENALTIES:
+            penalty = with_pulls(plain, antecedent, np.arange(2 * order), g)
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+            expected += prior_of_pulls(penalty)
+            assert_allclose(in_full(found), expected, atol=1e-6)
+            assert_allclose(found.noise_variance, variance, rtol=1e-5)
+
 
 class TestLimits:
     def alike(self, n_rules):
@@ -293,7 +324,8 @@ def at_fixed_premises(seed):
             **premises,
         )
 
-    return at, Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
+    penalty = Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
+    return at, with_pulls(penalty, antecedent, problem.consequent_inputs, g)
 
 
 def slope_of(function, penalty, key, step=1e-3):
@@ -304,6 +336,20 @@ def slope_of(function, penalty, key, step=1e-3):
         for side in (1.0, -1.0)
     ]
     return (ends[0] - ends[1]) / (2.0 * step)
+
+
+def slopes_of_pulls(function, penalty, step=1e-3):
+    """Derivatives by the logarithms of what every component is pulled by."""
+    slopes, alphas = [], penalty.alpha * np.array(penalty.pulls)
+    for k in range(alphas.size):
+        ends = []
+        for side in (1.0, -1.0):
+            moved = alphas.copy()
+            moved[k] *= np.exp(side * step)
+            alpha = np.exp(np.log(moved).mean())
+            ends.append(function(replace(penalty, alpha=alpha, pulls=tuple(moved / alpha))))
+        slopes.append((ends[0] - ends[1]) / (2.0 * step))
+    return np.array(slopes)
 
 
 class TestReestimated:
@@ -321,8 +367,29 @@ class TestReestimated:
             slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
             # At an edge the evidence may rise still, but not by anything.
             assert abs(slope) < 1e-3
+        if penalty.pulls:
+            assert np.abs(slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty)).max() < 1e-3
 
-    @pytest.mark.parametrize("key", CONSEQUENTS)
+    @pytest.mark.parametrize("seed", [1, 2, 4, 8])
+    def test_step_of_the_pulls_is_where_what_is_paid_for_them_is_made_good(self, seed):
+        at, penalty = at_fixed_premises(seed)
+        now, stepped = at(penalty), reestimated(at(penalty), ["alpha"])
+        cost = now.n_rows / now.noise_variance * now.paid[3:]
+        determined = now.n_outputs * (now.held_before - now.held_after)[3:]
+        pulls = np.log(penalty.pulls)
+        slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty)
+        # The prior has a part in it, 2 log(pull) / s^2, whose mean is zero.
+        assert_allclose(cost - determined + 2.0 * pulls / LIKENESS**2, slopes, rtol=1e-4, atol=1e-5)
+        before = penalty.alpha * np.array(penalty.pulls)
+        after = stepped.alpha * np.array(stepped.pulls)
+        assert_allclose(np.exp(np.log(stepped.pulls).sum()), 1.0, rtol=1e-12)
+        step = np.log(after / before)
+        left = cost * np.exp(step) - determined + 2.0 * (pulls + step) / LIKENESS**2
+        moved = np.abs(step) < np.log(100.0) - 1e-9
+        assert_allclose(left[moved], 0.0, atol=1e-8 * max(cost.max(), 1.0))
+        assert moved.sum() > moved.size // 2
+
+    @pytest.mark.parametrize("key", ["agreement", "slope"])
     @pytest.mark.parametrize("seed", [1, 2, 8])
     def test_step_is_up_the_evidence_and_by_its_derivative(self, seed, key):
         # d(-2 log p) / d log tau is what is paid less what is determined: their ratio is the step.
@@ -331,8 +398,9 @@ class TestReestimated:
         now = at(penalty)
         stepped = reestimated(now, [key])
         ratio = getattr(stepped, key) / getattr(penalty, key)
-        cost = now.n_rows / now.noise_variance * now.paid[key]
-        determined = now.n_outputs * (now.held_before[key] - now.held_after[key])
+        place = WEIGHTS.index(key)
+        cost = now.n_rows / now.noise_variance * now.paid[place]
+        determined = now.n_outputs * (now.held_before - now.held_after)[place]
         slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
         assert_allclose(cost - determined, slope, rtol=1e-4, atol=1e-5)
         assert_allclose(ratio, np.clip(determined / cost, 0.01, 100.0), rtol=1e-6)
@@ -342,24 +410,36 @@ class TestReestimated:
         at, penalty = at_fixed_premises(1)
         found = at(penalty)
         free = reestimated(found, CONSEQUENTS)
-        for key in CONSEQUENTS:
-            least = {key: 2.0 * getattr(free, key)}
-            held = reestimated(found, CONSEQUENTS, least)
+        none = Penalty(slope=0.0)
+        for key in ("agreement", "slope"):
+            least = {key: 1.5 * getattr(free, key)}
+            held = reestimated(found, CONSEQUENTS, replace(none, **least))
             assert held == replace(free, **least)
+        # Of the pulls every one is held.
+        alphas = free.weights(len(free.pulls))[3:]
+        held = reestimated(found, CONSEQUENTS, replace(none, alpha=np.median(alphas)))
+        expected = np.maximum(alphas, np.median(alphas))
+        assert_allclose(held.weights(alphas.size)[3:], expected, rtol=1e-12)
         # Where nothing is paid at all, the weight rises as far as a step goes.
-        risen = reestimated(replace(found, paid=found.paid | {"alpha": 0.0}), ["alpha"])
-        assert_allclose(risen.alpha, 100.0 * penalty.alpha, rtol=1e-12)
+        paid = found.paid.copy()
+        paid[WEIGHTS.index("slope")] = 0.0
+        risen = reestimated(replace(found, paid=paid), ["slope"])
+        assert_allclose(risen.slope, 100.0 * penalty.rho, rtol=1e-12)
 
     def test_it_is_where_the_evidence_is_largest(self):
-        at, penalty = at_fixed_premises(14)
+        at, penalty = at_fixed_premises(12)
         for _ in range(300):
             penalty = reestimated(at(penalty), CONSEQUENTS)
         found = at(penalty).minus_twice_log
 
         def function(logs):
-            return at(Penalty(*np.exp(np.clip(logs, -27.0, 9.0)))).minus_twice_log
+            agreement, slope, *alphas = np.exp(np.clip(logs, -27.0, 9.0))
+            alpha = np.exp(np.log(alphas).mean())
+            pulls = tuple(np.array(alphas) / alpha)
+            return at(Penalty(agreement, alpha, slope, pulls=pulls)).minus_twice_log
 
-        start = np.log([penalty.agreement, penalty.alpha, penalty.rho])
+        weights = np.delete(penalty.weights(len(penalty.pulls)), WEIGHTS.index("stiffness"))
+        start = np.log(weights)
         around = optimize.minimize(
             function, start + 0.5, method="Nelder-Mead", options={"maxiter": 2000}
         )
@@ -390,16 +470,12 @@ def test_least_weights_are_those_at_which_rules_are_as_far_apart_as_a_target(row
     found = at(penalty)
     # Of the prior: a disagreement, and a rule's departure from the line, of two deviations squared.
     departure = found.noise_variance / found.n_rows / 4.0
-    expected = {
-        "agreement": max(found.n_columns * departure, least),
-        "alpha": max(departure, least),
-        "slope": least,
-    }
+    expected = [max(found.n_columns * departure, least), max(departure, least), least]
     assert departure > 1e-4
     n_distinct = rows_each * found.n_columns
-    assert least_weights(found, 4, n_distinct) == pytest.approx(expected, rel=1e-12)
+    assert_allclose(astuple(least_weights(found, 4, n_distinct))[:3], expected, rtol=1e-12)
     # A single rule agrees with itself.
-    assert least_weights(found, 1, n_distinct) == dict.fromkeys(CONSEQUENTS, least)
+    assert least_weights(found, 1, n_distinct) == Penalty(least, least, least)
 
 
 STEPS = np.array([-0.01, 0.0, 0.01])
@@ -416,22 +492,22 @@ class TestExtrapolated:
 
     @pytest.mark.parametrize("ratio", [0.55, 0.7])
     def test_a_geometric_sequence_is_taken_to_its_limit(self, ratio):
-        found = extrapolated(*self.steps(ratio, limit=0.05), ("agreement", "alpha"), {})
+        found = extrapolated(*self.steps(ratio, limit=0.05), ("agreement", "alpha"), None)
         assert_allclose(found.agreement, 0.05, rtol=1e-12)
         assert found.alpha == 1.0
 
     @pytest.mark.parametrize("ratio", [0.45, -0.9])
     def test_steps_that_are_not_alike_are_left(self, ratio):
         before, now, after = self.steps(ratio)
-        assert extrapolated(before, now, after, ("agreement",), {}) == after
-        assert extrapolated(None, now, after, ("agreement",), {}) == after
+        assert extrapolated(before, now, after, ("agreement",), None) == after
+        assert extrapolated(None, now, after, ("agreement",), None) == after
 
     def test_a_long_way_is_a_hundredfold_and_within_limits(self):
         before, now, after = (Penalty(agreement=a, alpha=1.0) for a in (1e-4, 2e-4, 4e-4))
-        assert_allclose(extrapolated(before, now, after, ("agreement",), {}).agreement, 2e-2)
-        downward = extrapolated(after, now, before, ("agreement",), {"agreement": 1e-5})
+        assert_allclose(extrapolated(before, now, after, ("agreement",), None).agreement, 2e-2)
+        downward = extrapolated(after, now, before, ("agreement",), Penalty(1e-5, slope=0.0))
         assert downward.agreement == 1e-5
-        assert extrapolated(before, now, after, (), {}) == after
+        assert extrapolated(before, now, after, (), None) == after
 
     def test_settled_is_what_changes_by_less_than_half_a_hundredth(self):
         penalty = Penalty(agreement=1.0, alpha=2.0, slope=3.0, stiffness=4.0)

@@ -154,7 +154,9 @@ class TestCommonLine:
         line = model.problem(Penalty()).common_line
         local = model.problem(Penalty()).local.to_local(model.flat)
         departures, common = self.parts(model)
-        found = [np.sum(local * (matrix @ local)) for matrix in (line.own, line.slopes)]
+        found = [
+            np.sum(local * (matrix @ local)) for matrix in (line.departures.together, line.slopes)
+        ]
         assert_allclose(found, [np.sum(departures**2), np.sum(common[1:] ** 2)], rtol=1e-10)
 
     @ON_ALL
@@ -164,7 +166,7 @@ class TestCommonLine:
         model.beta[:] = model.beta[0]
         problem = model.problem(Penalty())
         local = problem.local.to_local(model.flat)
-        paid = np.sum(local * (problem.common_line.own @ local))
+        paid = np.sum(local * (problem.common_line.departures.together @ local))
         assert_allclose(paid, 0.0, atol=1e-12)
         paid = np.sum(local * (problem.common_line.slopes @ local))
         assert_allclose(paid, np.sum(model.beta[0, 1:] ** 2), rtol=1e-10, atol=1e-14)
@@ -224,7 +226,9 @@ class TestCommonLine:
         model = Model("grid", 0)
         line = model.problem(Penalty()).common_line
         beta = model.beta[:, 0, 0]
-        assert_allclose(beta @ line.own @ beta, np.sum((beta - beta.mean()) ** 2), rtol=1e-12)
+        assert_allclose(
+            beta @ line.departures.together @ beta, np.sum((beta - beta.mean()) ** 2), rtol=1e-12
+        )
         assert_allclose(line.slopes, 0.0, atol=1e-30)
 
     def test_extent_is_the_unit_of_a_departing_slope(self):
@@ -232,15 +236,16 @@ class TestCommonLine:
         # ends. One slope changed by t of two rules departs by half of it each, and so do values.
         model = Model("scattered", 1)
         problem = model.problem(Penalty())
-        wide = CommonLine(problem.local, 10.0 * np.ones((4, 2)))
-        narrow = CommonLine(problem.local, np.ones((4, 2)))
+        rules = model.antecedent, np.arange(2)
+        wide = CommonLine(problem.local, 10.0 * np.ones((4, 2)), *rules)
+        narrow = CommonLine(problem.local, np.ones((4, 2)), *rules)
         model.beta[:] = 0.0
         model.beta[0, 1], model.beta[1, 1] = 1.0, -1.0
         centers = problem.local.center
         # No values at the centers: departures of slopes alone, whose mean is zero.
         model.beta[:, 0] = -np.sum(centers * model.beta[:, 1:, 0], axis=1)[:, None]
         local = problem.local.to_local(model.flat)
-        paid = [np.sum(local * (line.own @ local)) for line in (narrow, wide)]
+        paid = [np.sum(local * (line.departures.together @ local)) for line in (narrow, wide)]
         assert_allclose(paid, [2.0, 200.0], rtol=1e-10)
 
 

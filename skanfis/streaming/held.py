@@ -57,7 +57,7 @@ class HeldProblem:
         inputs, own = moments.inputs, moments.consequent_inputs
         center = inputs.offset[own] + inputs.scale[own] * self.local.center
         extent = np.maximum(farthest.distance(center) / inputs.scale[own], 1.0)
-        self.common_line = CommonLine(self.local, extent)
+        self.common_line = CommonLine(self.local, extent, antecedent, own)
 
     def with_penalty(self, penalty: Penalty):
         """Return the same problem with another penalty."""
@@ -67,11 +67,11 @@ class HeldProblem:
 
     def evaluate(self, _=None):
         """Cost and coefficients, as ``SeparableProblem.evaluate`` without a reference."""
-        line, n_rules = self.common_line, self.antecedent.n_rules
+        n_rules = self.antecedent.n_rules
         gram = self.local.transform_gram(self._gram)
         apart = self.local.transform_gram(disagreement_matrix(self._gram, n_rules))
         penalty = self.penalty.agreement * apart
-        penalty += self.penalty.alpha * line.own + self.penalty.rho * line.slopes
+        penalty += self.common_line.pull(self.penalty)
         factor = NormalFactor(gram + penalty)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         slope = self.local.transform_rows(self._slope.copy())

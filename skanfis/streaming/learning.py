@@ -12,7 +12,13 @@ from .._memory import keeps_freed_memory
 from .._sklearn import fit_context
 from ..model import TSKModel
 from ..options import policy_of
-from ..parameters import found_weights, given_weights, solver_of, structure_request
+from ..parameters import (
+    found_weights,
+    given_weights,
+    keep_weights,
+    solver_of,
+    structure_request,
+)
 from ..readable import readability_of_rows
 from ..solvers import MESSAGES
 from .asked import (
@@ -181,7 +187,7 @@ class LearnsFromChunksMixin:
             self._learn_from(stream)
             self.readability_ = readability_of_rows(self.model_, data.X, data.y, weight)
         else:
-            stream = stream.starting_from(self.agreement_, self.alpha_, self.slope_alpha_)
+            stream = stream.starting_from(found_weights(self))
             if stream.n_rows < data.X.shape[0]:
                 self._learn_from(stream)
         return stream
@@ -194,9 +200,8 @@ class LearnsFromChunksMixin:
         self.n_iter_ = 1
         self.loss_curve_ = np.full(2, solved.mean_squared_error)
         self.status_ = MESSAGES["no_premise"]
-        penalty = solved.penalty
-        self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
-        self.slope_alpha_ = penalty.rho
+        consequent_inputs = stream.moments.consequent_inputs
+        keep_weights(self, solved.penalty, stream.base.antecedent, consequent_inputs)
         self.redundant_rules_ = solved.redundant_rules
         self._tell_noise()
 

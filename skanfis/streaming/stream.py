@@ -30,6 +30,8 @@ __all__ = ["Solved", "Stream"]
 
 # The weights of the penalty that premises which stay have.
 _FREE = ("agreement", "alpha", "slope")
+# All that a penalty on consequents is made of.
+_OF_CONSEQUENTS = (*_FREE, "pulls")
 # Distinct rows per consequent that are counted: beyond, nothing asks for their number.
 _ROWS_EACH = 2
 # Weights of a fit that this part of the least falls short of were found without a least.
@@ -111,14 +113,14 @@ class Stream:
             rows.n_rows,
         )
 
-    def starting_from(self, agreement, alpha, slope):
-        """The same rows, for which a fit has found these weights of the penalty."""
-        found = Penalty(agreement, alpha, slope)
+    def starting_from(self, weights):
+        """The same rows, for which a fit has found these weights, by their names in ``Penalty``."""
+        found = Penalty(**{key: weights[key] for key in _OF_CONSEQUENTS})
         stream = replace(self, first=found, first_rows=self.moments.effective_weight)
-        problem, evaluation, penalty = stream._solve(stream._weights(found))
+        problem, evaluation, penalty = stream._solve(weights)
         posterior = stream._posterior(problem, evaluation, penalty)
         n_distinct = problem.rows.n_rows
-        least = least_weights(posterior, problem.antecedent.n_rules, n_distinct)["agreement"]
+        least = least_weights(posterior, problem.antecedent.n_rules, n_distinct).agreement
         # Data next to exact: what is left of them must not be taken for noise afterwards.
         return replace(stream, is_free=found.agreement < _FAR_BELOW * least)
 
@@ -183,7 +185,9 @@ class Stream:
 
     def _solve(self, weights):
         free = [key for key in _FREE if key not in weights]
-        given = {key: value for key, value in weights.items() if key in _FREE}
+        given = {key: value for key, value in weights.items() if key in _OF_CONSEQUENTS}
+        if "alpha" in given:
+            given.setdefault("pulls", ())
         penalty = replace(self._first_penalty(), **given, stiffness=0.0)
         antecedent, n_distinct = self.base.antecedent, int(self.distinct.counts[0])
         problem = HeldProblem(self.moments, self.farthest, antecedent, penalty, n_distinct)
@@ -218,16 +222,12 @@ class Stream:
             n_outputs=max(int(np.count_nonzero(~targets.is_constant)), 1),
         )
 
-    @staticmethod
-    def _weights(penalty):
-        return {"agreement": penalty.agreement, "alpha": penalty.alpha, "slope": penalty.rho}
-
     def _first_penalty(self):
         """The weights of a few rows fall with their number."""
         if self.first_rows is None:
             return self.first
         ratio = self.first_rows / self.moments.effective_weight
-        return Penalty(**{key: ratio * value for key, value in self._weights(self.first).items()})
+        return scaled(self.first, _FREE, ratio)
 
     def _model(self, problem, evaluation):
         moments = self.moments

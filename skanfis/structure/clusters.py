@@ -7,10 +7,12 @@ times sqrt(d), for the distance from the centre grows as sqrt(d) in d inputs and
 otherwise hardly overlap.
 """
 
+from functools import cache
 from itertools import pairwise
 from math import sqrt
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ..data import StandardisedData
@@ -23,6 +25,8 @@ _SMALLEST_WIDTH = 0.1
 # Terms that cross above this at the start are one term: training may bring them closer still, and
 # above 0.9 nobody could tell them apart.
 _HIGHEST_CROSSING = 0.85
+# Beyond so many widths terms of a family of one's own never part.
+_FARTHEST = 1e6
 # Widths go with the number of inputs that tell clusters apart, and that with the widths: a bound,
 # should they go to and fro.
 _MOST_TURNS = 4
@@ -119,7 +123,7 @@ def _merged(family, centers, widths, masses):
     order = np.argsort(centers, kind="stable").tolist()
     terms = [(centers[r], widths[r] ** 2, masses[r], [r]) for r in order]
     distances = [_distance(*pair) for pair in pairwise(terms)]
-    while distances and _crossing(family, min(distances)) > _HIGHEST_CROSSING:
+    while distances and min(distances) < _closest(family):
         k = distances.index(min(distances))
         terms[k : k + 2] = [_joined(*terms[k : k + 2])]
         first = max(k - 1, 0)
@@ -146,10 +150,22 @@ def _distance(one, other):
     return (other[0] - one[0]) / (sqrt(one[1]) + sqrt(other[1]))
 
 
-def _crossing(family, distance):
-    """Where two terms at this distance cross: as many of its own widths away from either.
+@cache
+def _closest(family):
+    """The distance at which two terms cross just low enough: as many of its own widths from each.
 
     Of terms that rise or fall for good, how true the one is there that is the less true.
     """
     theta = family.from_center_and_width(np.zeros(1), np.ones(1))
-    return min(family.value(np.array([[side]]), theta)[0, 0] for side in (-distance, distance))
+
+    def crossing(distance):
+        return min(family.value(np.array([[side]]), theta)[0, 0] for side in (-distance, distance))
+
+    if crossing(0.0) <= _HIGHEST_CROSSING:
+        return 0.0
+    far = 1.0
+    while crossing(far) > _HIGHEST_CROSSING and far < _FARTHEST:
+        far *= 2.0
+    if crossing(far) > _HIGHEST_CROSSING:
+        return np.inf
+    return brentq(lambda distance: crossing(distance) - _HIGHEST_CROSSING, 0.0, far)

@@ -16,6 +16,7 @@ error to be expected on new rows.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -186,7 +187,7 @@ class _Weights:
         """
         posterior, before = self._posterior(evaluation, x, penalty, curvature), None
         for left in reversed(range(steps)):
-            least = {}
+            least = None
             if self.has_least:
                 least = least_weights(posterior, self.n_rules, self.n_distinct)
             plain = reestimated(posterior, free, least)
@@ -271,7 +272,8 @@ def tune(
             evaluation = problem.evaluate(premise.parameters(x))
         penalty = problem.penalty
         if is_loose:
-            penalty = replace(penalty, **dict.fromkeys(free, _LOOSE))
+            loose: dict[str, Any] = dict.fromkeys(free, _LOOSE)
+            penalty = replace(penalty, **loose)
         posterior = weights.improved(evaluation, x, penalty, 0 if is_loose else first_steps, free)
         penalty = posterior.penalty
         if premise.size == 0 or turns == 0:
@@ -394,4 +396,6 @@ def scaled(penalty: Penalty, free, ratio, is_held=False):
         "slope": penalty.rho,
         "stiffness": penalty.stiffness,
     }
-    return replace(penalty, **{key: float(f"{own[key] * ratio:.3g}") for key in free})
+    pulls = tuple(float(f"{pull:.3g}") for pull in penalty.pulls)
+    weights = {key: float(f"{own[key] * ratio:.3g}") for key in free}
+    return replace(penalty, **weights, pulls=pulls)

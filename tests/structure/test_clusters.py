@@ -11,7 +11,7 @@ from skanfis.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.solvers import VariableProjection
 from skanfis.structure import SampleSize, clustered_antecedent, representative_rows
-from skanfis.structure.clusters import _HIGHEST_CROSSING, _crossing, _distance
+from skanfis.structure.clusters import _HIGHEST_CROSSING, _closest, _distance
 from skanfis.structure.sample import effective_weight, search_sample
 
 from .. import oracles
@@ -432,9 +432,10 @@ TWO_SIDED = [family for name, family in MEMBERSHIPS.items() if name not in ("s_s
 @pytest.mark.parametrize("family", TWO_SIDED, ids=lambda family: family.name)
 def test_two_terms_cross_where_both_are_truest(family):
     # By looking everywhere between them; of widths that differ, too.
-    for distance, width in ((0.5, 1.0), (1.5, 0.4), (0.1, 3.0), (4.0, 1.0)):
+    for width in (1.0, 0.4, 3.0):
+        distance = _closest(family) * (1.0 + width)
         theta = family.from_center_and_width(np.array([0.0, distance]), np.array([1.0, width]))
         between = np.linspace(0.0, distance, 20_001)[:, None]
         truths = [family.value(between, theta[:, [side]]) for side in (0, 1)]
-        apart = _distance((0.0, 1.0), (distance, width**2))
-        assert_allclose(_crossing(family, apart), np.minimum(*truths).max(), atol=1e-3)
+        assert_allclose(_distance((0.0, 1.0), (distance, width**2)), _closest(family))
+        assert_allclose(np.minimum(*truths).max(), _HIGHEST_CROSSING, atol=1e-3)

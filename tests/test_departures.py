@@ -1,0 +1,162 @@
+"""Parts of the departures: against means and differences, and functions whose parts are known."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.antecedent import GridAntecedent
+from skanfis.data import StandardisedData
+from skanfis.departures import components_of
+from skanfis.membership import Bell, Gaussian
+from skanfis.objective import SeparableProblem
+from skanfis.penalty import Penalty
+
+from . import oracles
+
+CASES = {
+    # Rules, order, and the inputs of the consequents, of three.
+    "grid": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2], [0, 2]), 1, [0, 1, 2]),
+    "grid of three": (lambda g: oracles.random_grid(g, [Bell] * 3, [2, 3, 2]), 1, [0, 1, 2]),
+    "one input, slopes of others": (lambda g: oracles.random_grid(g, [Gaussian], [4], [1]), 1, [0]),
+    "constants": (lambda g: oracles.random_grid(g, [Gaussian] * 3, [2, 2, 3]), 0, []),
+    "one rule": (lambda g: GridAntecedent((), counts=()), 1, [0, 1, 2]),
+    "scattered": (lambda g: oracles.random_scattered(g, Gaussian, 4, [0, 1]), 1, [0, 2]),
+    "table": (lambda g: oracles.random_table(g, inputs=2), 1, [0, 1, 2]),
+}
+ON_ALL = pytest.mark.parametrize("case", CASES)
+
+
+class Problem:
+    def __init__(self, case):
+        g = np.random.default_rng(7)
+        build, order, inputs = CASES[case]
+        self.antecedent, self.inputs = build(g), np.array(inputs, dtype=int)
+        self.rows = oracles.bumpy_rows(g, 80, 3, 2, True)
+        self.components = components_of(self.antecedent, self.inputs)
+        pulls = tuple(10.0 ** g.uniform(-2.0, 2.0, len(self.components)))
+        self.penalty = Penalty(agreement=0.01, alpha=0.02, slope=0.1, pulls=pulls)
+        arguments = (self.rows, self.antecedent, order, self.penalty)
+        self.problem = SeparableProblem(*arguments, consequent_inputs=self.inputs)
+        self.dense = oracles.DenseProblem(*arguments, consequent_inputs=self.inputs)
+        self.departures = self.problem.common_line.departures
+
+
+@ON_ALL
+class TestComponents:
+    def test_they_are_those_of_means_and_differences(self, case):
+        one = Problem(case)
+        values = np.zeros((one.problem.n_columns,) * 2)
+        for r, block in enumerate(one.dense.blocks):
+            own = slice(r * len(block), (r + 1) * len(block))
+            values[own, own] = block
+        to_line, *_ = np.linalg.lstsq(one.dense.line, values, rcond=None)
+        departures = values - one.dense.line @ to_line
+        parts = oracles.departure_projectors(one.antecedent, one.inputs.tolist())
+        assert set(one.components) == set(parts)
+        g = np.random.default_rng(0)
+        beta = g.normal(size=(one.problem.n_columns, 2))
+        local = one.problem.local.to_local(beta)
+        expected = [np.sum((parts[key] @ departures @ beta) ** 2) for key in one.components]
+        assert_allclose(one.departures.squares(local), expected, rtol=1e-9, atol=1e-12)
+        # All of them together are all that there is.
+        assert_allclose(sum(expected), np.sum((departures @ beta) ** 2), rtol=1e-10, atol=1e-14)
+        together = np.sum(local * (one.departures.together @ local))
+        assert_allclose(together, sum(expected), rtol=1e-9, atol=1e-12)
+
+    def test_cost_and_solution_are_those_of_the_dense_problem(self, case):
+        one = Problem(case)
+        parameters = one.antecedent.parameters
+        found = one.problem.evaluate(parameters)
+        assert_allclose(found.cost, one.dense.cost(parameters), rtol=1e-9)
+        # At any consequents, as the solvers by gradients have it.
+        g = np.random.default_rng(1)
+        beta = g.normal(size=(one.problem.n_columns, 2))
+        joint = one.problem.joint(parameters, beta)
+        residuals = one.dense.residual_matrix(parameters)
+        right = one.dense.right_side(len(residuals))
+        expected = 0.5 * np.sum((residuals @ beta - right) ** 2)
+        assert_allclose(joint.evaluation.cost, expected, rtol=1e-10)
+        assert_allclose(joint.coefficients, residuals.T @ (residuals @ beta - right), rtol=1e-8)
+
+    def test_traces_are_sums_over_unit_vectors(self, case):
+        one = Problem(case)
+        n, g = one.problem.n_columns, np.random.default_rng(2)
+        root = g.normal(size=(n, n))
+        # Columns of a root of M^-1 are directions whose squares add up.
+        expected = one.departures.squares(root)
+        assert_allclose(one.departures.traces(root @ root.T), expected, rtol=1e-9, atol=1e-12)
+        assert_allclose(one.departures.products(root, root), expected, rtol=1e-12)
+        # Of signs and what solves them, as for large matrices: all signs give it exactly.
+        assert_allclose(one.departures.products(root @ root.T, np.eye(n)), expected, rtol=1e-9)
+
+    def test_weights_of_one_are_no_weights(self, case):
+        one = Problem(case)
+        equal = one.departures.pulled(np.full(len(one.components), 0.3))
+        assert_allclose(equal, 0.3 * one.departures.together, atol=1e-12)
+
+
+def of_a_function(value, slopes):
+    """Squares of every component of rules that follow a function; rows are a grid, evenly."""
+    levels = np.linspace(-1.0, 1.0, 9)
+    X = np.stack(np.meshgrid(levels, levels, levels, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = StandardisedData.of(X, X[:, :1])
+    centers = [np.array([-1.0, 0.2, 1.1]), np.array([-0.9, 0.8])]
+    thetas = [Gaussian.start(c, np.ones(c.size), 0.6) for c in centers]
+    antecedent = GridAntecedent.build([Gaussian] * 2, [0, 1], thetas)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty())
+    center = problem.local.center
+    local = np.column_stack([value(*center.T), *slopes(*center.T)])
+    local[:, 1:] *= problem.local.spread
+    departures = problem.common_line.departures
+    squares = departures.squares(local.reshape(-1, 1))
+    return dict(zip(departures.components, squares, strict=True))
+
+
+class TestKnownFunctions:
+    """Rules that are the tangents of a function at their centres."""
+
+    def only(self, squares, *concerned, atol=1e-20):
+        total = sum(squares.values())
+        for key, square in squares.items():
+            assert square > 1e-3 * total if key in concerned else square < atol * total, key
+
+    def test_a_sum_of_functions_of_one_input_each(self):
+        squares = of_a_function(
+            lambda x, y, z: np.sin(2.0 * x) + y**2 + 3.0 * z,
+            lambda x, y, z: [2.0 * np.cos(2.0 * x), 2.0 * y, np.full_like(z, 3.0)],
+        )
+        self.only(squares, (0,), (1,))
+
+    def test_a_product_of_two_inputs_with_terms(self):
+        squares = of_a_function(lambda x, y, z: x * y, lambda x, y, z: [y, x, 0.0 * z])
+        # Where terms are not in the middle, x * y has a part in x alone: that of the mean of y.
+        assert squares[0, 1] > 10.0 * (squares[0,] + squares[1,])
+        assert squares[()] + squares[0, 2] + squares[1, 2] < 1e-20 * squares[0, 1]
+
+    def test_a_slope_by_an_input_without_terms_that_changes(self):
+        # Such as a scale factor that depends on temperature.
+        squares = of_a_function(
+            lambda x, y, z: z * np.exp(x), lambda x, y, z: [z * np.exp(x), 0.0 * y, np.exp(x)]
+        )
+        # How far a rule stands for rows, the unit of its slopes, may depend on more.
+        self.only(squares, (0, 2), atol=1e-4)
+
+    def test_what_concerns_three_inputs_is_the_rest(self):
+        def slope(x, y):
+            return (x - x.mean()) * (y - y.mean())
+
+        squares = of_a_function(
+            lambda x, y, z: 0.0 * x, lambda x, y, z: [0.0 * x, 0.0 * y, slope(x, y)]
+        )
+        self.only(squares, (), atol=1e-4)
+
+
+def test_names_of_components():
+    g = np.random.default_rng(0)
+    grid = oracles.random_grid(g, [Gaussian] * 2, [3, 2], [0, 2])
+    found = components_of(grid, np.arange(3))
+    assert found == [(0,), (2,), (0, 1), (0, 2), (1, 2), ()]
+    assert components_of(grid, np.arange(0)) == [(0,), (2,), (0, 2), ()]
+    scattered = oracles.random_scattered(g, Gaussian, 4, [0, 1])
+    assert components_of(scattered, np.array([0, 2])) == [(0,), (2,), ()]
+    assert components_of(GridAntecedent((), counts=()), np.arange(3)) == [()]
