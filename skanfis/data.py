@@ -55,6 +55,11 @@ class Scale:
         """Which columns never change."""
         return self.minimum == self.maximum
 
+    def varying(self, columns):
+        """Some columns as a list, with None in place of those that never change."""
+        is_constant = self.is_constant
+        return [None if is_constant[j] else int(j) for j in columns]
+
     @property
     def box(self):
         """Lowest and highest values, standardised."""

@@ -26,7 +26,7 @@ from scipy import linalg
 
 from .antecedent import Antecedent
 
-__all__ = ["Departures", "components_of"]
+__all__ = ["Departures"]
 
 # Beyond pairs nobody tells one interaction from another.
 _MOST_INPUTS = 2
@@ -42,8 +42,9 @@ class Departures:
     orthonormal, along : ndarray of shape (n_columns, n_basis)
         Q and A.
     antecedent : Antecedent
-    consequent_inputs : ndarray of shape (n_basis - 1,)
-        The inputs that the slopes are by.
+    slopes : list of (int or None)
+        The input that each function of the basis but the first is a slope by; None where it is
+        constant, and there is nothing to learn.
 
     Attributes
     ----------
@@ -51,11 +52,11 @@ class Departures:
         The inputs that each component concerns; () for the rest.
     """
 
-    def __init__(self, scale, orthonormal, along, antecedent: Antecedent, consequent_inputs):
+    def __init__(self, scale, orthonormal, along, antecedent: Antecedent, slopes):
         self._scale, self._orthonormal, self._along = scale, orthonormal, along
         self._counts = antecedent.grid_counts
-        inputs = _inputs_of_departures(antecedent, consequent_inputs)
-        self.components = _in_order(inputs)
+        inputs = _inputs_of_departures(antecedent, slopes)
+        self.components = sorted(set(inputs), key=lambda own: (own == (), len(own), own))
         place = {own: k for k, own in enumerate(self.components)}
         self._component = np.array([place[own] for own in inputs])
 
@@ -97,20 +98,11 @@ class Departures:
         return np.bincount(self._component, values, len(self.components))
 
 
-def components_of(antecedent, consequent_inputs):
-    """The inputs that each component of the departures concerns, in order; () for the rest."""
-    return _in_order(_inputs_of_departures(antecedent, consequent_inputs))
-
-
-def _in_order(inputs):
-    return sorted(set(inputs), key=lambda own: (own == (), len(own), own))
-
-
-def _inputs_of_departures(antecedent, consequent_inputs):
+def _inputs_of_departures(antecedent, slopes):
     """The inputs that each row of D concerns."""
-    functions = [(), *((int(j),) for j in consequent_inputs)]
     if antecedent.grid_counts is None:
-        return functions * antecedent.n_rules
+        return [(), *(() if j is None else (j,) for j in slopes)] * antecedent.n_rules
+    functions = [(), *((j,) for j in slopes)]
     axes = [int(j) for j in antecedent.share_inputs]
     contrasts = product(*map(range, antecedent.grid_counts))
     return [_concerned(axes, one, by) for one in contrasts for by in functions]
@@ -118,6 +110,8 @@ def _inputs_of_departures(antecedent, consequent_inputs):
 
 def _concerned(axes, contrast, by):
     """The inputs that a contrast along some axes concerns, in a value, (), or a slope, (j,)."""
+    if None in by:
+        return ()
     along = {j for j, varies in zip(axes, contrast, strict=True) if varies}
     inputs = along.union(by)
     # A slope by an input without terms, the same for all rules, is the line's but for rounding.

@@ -180,9 +180,8 @@ class SeparableProblem:
         gram = self._sums_at_start[0]
         self.on_sample: SeparableProblem | None = None
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
-        self._common_line = CommonLine(
-            self.local, self._extent(antecedent), antecedent, self.consequent_inputs
-        )
+        slopes = rows.inputs.varying(self.consequent_inputs)
+        self._common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
 
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""

@@ -14,7 +14,6 @@ from sklearn.utils import check_random_state
 from ._sklearn import HasMethods, Hidden, Interval, StrOptions
 from ._validation import feature_indices
 from .constraints import FixedPoint, OutputLimits
-from .departures import components_of
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, TRIED_FAMILIES, membership_families
 from .model import TSKModel
 from .options import EarlyStopping, Huber, LinearExtrapolation
@@ -163,19 +162,18 @@ def found_weights(estimator):
         "alpha": estimator.alpha_,
         "slope": estimator.slope_alpha_,
         "stiffness": estimator.stiffness_,
-        "pulls": tuple(estimator.pulls_.values()),
+        "pulls": tuple(component["pull"] for component in estimator.pulls_),
     }
 
 
-def keep_weights(estimator, penalty, antecedent, consequent_inputs):
-    """Set the attributes that say which weights on the consequents of these rules were used."""
+def keep_weights(estimator, penalty, components):
+    """Set the attributes that say which weights on the consequents were used."""
     estimator.agreement_, estimator.alpha_ = penalty.agreement, penalty.alpha
-    estimator.slope_alpha_, estimator.pulls_ = penalty.rho, {}
-    if penalty.pulls:
-        names = estimator.model_.input_names
-        components = components_of(antecedent, consequent_inputs)
-        inputs = [tuple(names[j] for j in one) for one in components]
-        estimator.pulls_ = dict(zip(inputs, penalty.pulls, strict=True))
+    estimator.slope_alpha_, names = penalty.rho, estimator.model_.input_names
+    estimator.pulls_ = [
+        {"inputs": [names[j] for j in component], "pull": pull}
+        for component, pull in zip(components, penalty.pulls, strict=False)
+    ]
 
 
 def _imported(estimator, names):

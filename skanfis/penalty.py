@@ -104,8 +104,8 @@ class CommonLine:
         How far from its centre each rule stands for rows, along every input.
     antecedent : Antecedent
         The rules.
-    consequent_inputs : ndarray of shape (n_basis - 1,)
-        The inputs that the consequents are linear in.
+    slopes : list of (int or None)
+        The inputs that the consequents are linear in; None for those that are constant.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class CommonLine:
         local: LocalBasis,
         extent: np.ndarray,
         antecedent: Antecedent,
-        consequent_inputs: np.ndarray,
+        slopes: list[int | None],
     ):
         n_rules, n_basis = local.center.shape[0], local.n_basis
         n_columns = n_rules * n_basis
@@ -137,7 +137,7 @@ class CommonLine:
         scale[:, 1:] = extent / local.spread
         scale = scale.ravel()
         along = orthonormal * scale[:, None]
-        self.departures = Departures(scale, orthonormal, along, antecedent, consequent_inputs)
+        self.departures = Departures(scale, orthonormal, along, antecedent, slopes)
         # b = triangle^-1 along' u
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         self.slopes = to_slopes.T @ to_slopes

@@ -166,12 +166,12 @@ class ANFISRegressor(
         Why the solver stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
         The values used; ``slope_alpha_`` is that on the slopes of the rules' common line.
-    pulls_ : dict of tuple of str to float
-        For the inputs that a component of the departures concerns, its weight in ``alpha_``, which
-        is their geometric mean: ``("time",)`` is how the output bends with time alone, ``("time",
-        "temperature")`` how that changes with temperature, ``()`` the rest. The larger, the less
-        of it the data show. Of scattered rules, ``()`` are their values and ``("time",)`` their
-        slopes. Empty where alpha is given, or no rules departed.
+    pulls_ : list of dict
+        For the "inputs" that a component of the departures concerns, its weight, "pull", in
+        ``alpha_``, which is the geometric mean of all. ["time"] is how the output bends with time
+        alone, ["time", "temperature"] how that changes with temperature, [] the rest: the larger,
+        the less of it the data show. Of scattered rules, [] are their values and ["time"] their
+        slopes by time. Empty where alpha is given, or there are no departures.
     structures_ : list of dict
         The candidates that were compared where the structure was chosen by itself, best first:
         "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
@@ -381,7 +381,7 @@ class ANFISRegressor(
         self.status_ = fitted.result.message
         self._tell_noise()
         start = fitted.start
-        keep_weights(self, start.penalty, start.antecedent, request.consequent_inputs)
+        keep_weights(self, start.penalty, fitted.components)
         self.stiffness_ = start.penalty.stiffness
         self.structures_ = start.candidates
         self.redundant_rules_ = fitted.redundant_rules

@@ -23,6 +23,7 @@ KERNEL = [
     "data",
     "sampling",
     "passes",
+    "departures",
     "penalty",
     "objective",
     "evidence",

@@ -1,12 +1,14 @@
 """Parts of the departures: against means and differences, and functions whose parts are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.data import StandardisedData
-from skanfis.departures import components_of
+from skanfis.departures import Departures
 from skanfis.membership import Bell, Gaussian
 from skanfis.objective import SeparableProblem
 from skanfis.penalty import Penalty
@@ -32,13 +34,16 @@ class Problem:
         build, order, inputs = CASES[case]
         self.antecedent, self.inputs = build(g), np.array(inputs, dtype=int)
         self.rows = oracles.bumpy_rows(g, 80, 3, 2, True)
-        self.components = components_of(self.antecedent, self.inputs)
+        plain = Penalty(agreement=0.01, alpha=0.02, slope=0.1)
+        problem = SeparableProblem(
+            self.rows, self.antecedent, order, plain, consequent_inputs=self.inputs
+        )
+        self.departures = problem.common_line.departures
+        self.components = self.departures.components
         pulls = tuple(10.0 ** g.uniform(-2.0, 2.0, len(self.components)))
-        self.penalty = Penalty(agreement=0.01, alpha=0.02, slope=0.1, pulls=pulls)
-        arguments = (self.rows, self.antecedent, order, self.penalty)
-        self.problem = SeparableProblem(*arguments, consequent_inputs=self.inputs)
-        self.dense = oracles.DenseProblem(*arguments, consequent_inputs=self.inputs)
-        self.departures = self.problem.common_line.departures
+        penalty = replace(plain, pulls=pulls)
+        self.problem = problem.with_penalty(penalty)
+        self.dense = oracles.DenseProblem(self.rows, self.antecedent, order, penalty, self.inputs)
 
 
 @ON_ALL
@@ -151,12 +156,20 @@ class TestKnownFunctions:
         self.only(squares, (), atol=1e-4)
 
 
-def test_names_of_components():
+def components(antecedent, slopes):
+    n_basis = 1 + len(slopes)
+    zeros = np.zeros((antecedent.n_rules * n_basis, n_basis))
+    return Departures(zeros[:, 0], zeros, zeros, antecedent, slopes).components
+
+
+def test_inputs_of_components():
     g = np.random.default_rng(0)
     grid = oracles.random_grid(g, [Gaussian] * 2, [3, 2], [0, 2])
-    found = components_of(grid, np.arange(3))
-    assert found == [(0,), (2,), (0, 1), (0, 2), (1, 2), ()]
-    assert components_of(grid, np.arange(0)) == [(0,), (2,), (0, 2), ()]
+    assert components(grid, [0, 1, 2]) == [(0,), (2,), (0, 1), (0, 2), (1, 2), ()]
+    assert components(grid, []) == [(0,), (2,), (0, 2), ()]
     scattered = oracles.random_scattered(g, Gaussian, 4, [0, 1])
-    assert components_of(scattered, np.array([0, 2])) == [(0,), (2,), ()]
-    assert components_of(GridAntecedent((), counts=()), np.arange(3)) == [()]
+    assert components(scattered, [0, 2]) == [(0,), (2,), ()]
+    assert components(GridAntecedent((), counts=()), [0, 1, 2]) == [()]
+    # What is constant has no slope to depart, and no component.
+    assert components(grid, [0, None, 2]) == components(grid, [0, 2])
+    assert components(scattered, [0, None, 2]) == components(scattered, [0, 2])

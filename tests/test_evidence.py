@@ -11,7 +11,6 @@ from scipy import integrate, optimize, special, stats
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.data import StandardisedData
-from skanfis.departures import components_of
 from skanfis.evidence import (
     PRIOR_DISPLACEMENT,
     extrapolated,
@@ -63,9 +62,9 @@ def n_effective(found):
     return found.n_columns + found.curvature.size - found.held_after.sum()
 
 
-def with_pulls(penalty, antecedent, consequent_inputs, g):
+def with_pulls(penalty, problem, g):
     """The penalty with a pull for every component, whose geometric mean is one."""
-    logs = g.normal(size=len(components_of(antecedent, consequent_inputs)))
+    logs = g.normal(size=problem.common_line.n_components)
     return replace(penalty, pulls=tuple(np.exp(logs - logs.mean()).tolist()))
 
 
@@ -248,8 +247,9 @@ class TestAtGivenPremises:
         antecedent = oracles.random_grid(g, [Gaussian] * 2, [3, 2])
         if not is_grid:
             antecedent = oracles.random_scattered(g, Gaussian, 4, [0, 1])
+        problem = SeparableProblem(rows, antecedent, order, FIRST)
         for plain in PENALTIES:
-            penalty = with_pulls(plain, antecedent, np.arange(2 * order), g)
+            penalty = with_pulls(plain, problem, g)
             found = posterior(rows, antecedent, order, penalty)
             dense = Dense(rows, antecedent, order, penalty)
             expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
@@ -325,7 +325,7 @@ def at_fixed_premises(seed):
         )
 
     penalty = Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
-    return at, with_pulls(penalty, antecedent, problem.consequent_inputs, g)
+    return at, with_pulls(penalty, problem, g)
 
 
 def slope_of(function, penalty, key, step=1e-3):

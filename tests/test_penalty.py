@@ -236,7 +236,7 @@ class TestCommonLine:
         # ends. One slope changed by t of two rules departs by half of it each, and so do values.
         model = Model("scattered", 1)
         problem = model.problem(Penalty())
-        rules = model.antecedent, np.arange(2)
+        rules = model.antecedent, [0, 1]
         wide = CommonLine(problem.local, 10.0 * np.ones((4, 2)), *rules)
         narrow = CommonLine(problem.local, np.ones((4, 2)), *rules)
         model.beta[:] = 0.0

@@ -57,7 +57,7 @@ class HeldProblem:
         inputs, own = moments.inputs, moments.consequent_inputs
         center = inputs.offset[own] + inputs.scale[own] * self.local.center
         extent = np.maximum(farthest.distance(center) / inputs.scale[own], 1.0)
-        self.common_line = CommonLine(self.local, extent, antecedent, own)
+        self.common_line = CommonLine(self.local, extent, antecedent, inputs.varying(own))
 
     def with_penalty(self, penalty: Penalty):
         """Return the same problem with another penalty."""

@@ -45,6 +45,7 @@ class Solved:
     model: TSKModel
     penalty: Penalty
     mean_squared_error: float  # of the standardised target, summed over outputs
+    components: list[tuple[int, ...]]  # of the departures
     redundant_rules: list[dict] = field(default_factory=list)
 
 
@@ -173,6 +174,7 @@ class Stream:
             self._model(problem, evaluation),
             penalty,
             evaluation.mean_squared_error,
+            problem.common_line.departures.components,
             redundant_rules(statistics),
         )
 

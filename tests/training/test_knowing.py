@@ -100,7 +100,7 @@ def flat_rising_flat(x, width):
 @pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 @pytest.mark.parametrize(
-    ("seed", "width", "noise", "n_rules"), [(3, 0.3, 0.4, 3), (1, 0.15, 0.3, 6)]
+    ("seed", "width", "noise", "n_rules"), [(3, 0.3, 0.4, 3), (1, 0.15, 0.2, 6)]
 )
 def test_rules_that_a_rising_truth_needs_are_found_and_proven_to_rise(seed, width, noise, n_rules):
     """Too few free rules compensate one another by slopes that fall: what is known adds rules.
