@@ -172,6 +172,7 @@ class NormalFactor:
             return found, departures.products(solved, signs) / _PROBES
         inverse, _ = linalg.lapack.dpotri(self._lower, lower=1)
         # What is above the diagonal is zero.
-        inverse += np.tril(inverse, -1).T
+        inverse += inverse.T
+        inverse.flat[:: n + 1] *= 0.5
         found = [float(np.vdot(inverse, matrix)) for matrix in matrices]
         return found if departures is None else (found, departures.traces(inverse))

@@ -41,7 +41,7 @@ which for s without end is the ratio above, and else a value of Wright's omega.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from scipy.special import wrightomega
@@ -311,10 +311,15 @@ def _is_free(free, size):
     return found
 
 
+@cache
+def _limits(n_components):
+    return tuple(limits.weights(n_components) for limits in (_SMALLEST, _LARGEST))
+
+
 def _limited(penalty, weights, moves, others, least):
     """The penalty of weights within their limits where they move, and of others where not."""
     n_components = weights.size - len(WEIGHTS)
-    low, high = (limits.weights(n_components) for limits in (_SMALLEST, _LARGEST))
+    low, high = _limits(n_components)
     if least is not None:
         low = np.maximum(low, least.weights(n_components))
     found = np.where(moves, np.minimum(np.maximum(weights, low), high), others)

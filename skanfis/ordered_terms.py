@@ -182,34 +182,32 @@ class OrderedTerms:
 
     def near(self, gaps):
         """Log of every term's distance to the nearer neighbour."""
-        steep = self._inner(gaps)
-        return -np.log(steep[:-1] + steep[1:]) / _POWER
+        return self._reach(gaps)[0]
 
     def far(self, gaps):
         """The same for the farther one; an outermost term covers where it has moved from, too."""
-        high = self._covered(gaps) ** _POWER
-        return np.log(high[:-1] + high[1:]) / _POWER
+        return self._reach(gaps)[1]
 
-    @staticmethod
-    def _inner(gaps):
-        """The power of the gaps of the minimum, none beyond the outermost terms."""
+    def _reach(self, gaps):
+        """Both, and the powers of gaps that they are sums of; covered gaps last."""
+        # No gap beyond the outermost terms counts for the minimum.
         steep = gaps**-_POWER
         steep[0] = steep[-1] = 0.0
-        return steep
-
-    def _covered(self, gaps):
-        """The gaps, the outer ones as if there were a neighbour beyond where that term was."""
+        # The outer ones are as if there were a neighbour beyond where that term was.
         covered = gaps.copy()
         covered[0] = 2.0 * max(gaps[0] - self._outer[0], 0.0)
         covered[-1] = 2.0 * max(gaps[-1] - self._outer[1], 0.0)
-        return covered
-
-    def _slopes(self, gaps):
-        """Derivatives of near and far by the gaps."""
-        steep, covered = self._inner(gaps), self._covered(gaps)
         high = covered**_POWER
+        near = np.log(steep[:-1] + steep[1:]) / -_POWER
+        return near, np.log(high[:-1] + high[1:]) / _POWER, steep, high, covered
+
+    @staticmethod
+    def _slopes(gaps, reach):
+        """Derivatives of near and far by the gaps."""
+        _, _, steep, high, covered = reach
         by_near = _beside(steep / gaps, steep[:-1] + steep[1:])
-        by_far = _beside(covered ** (_POWER - 1.0), high[:-1] + high[1:])
+        # A gap that covers nothing has no slope.
+        by_far = _beside(high / np.where(covered > 0.0, covered, 1.0), high[:-1] + high[1:])
         by_far[0, 0] *= 2.0
         by_far[-1, -1] *= 2.0
         return by_near, by_far
@@ -221,26 +219,25 @@ class OrderedTerms:
     @cached_property
     def at_start(self):
         """What near and far are there."""
-        start = np.exp(self.log_gaps)
-        return self.near(start), self.far(start)
+        return self._reach(np.exp(self.log_gaps))[:2]
 
-    def _since_start(self, gaps):
+    def _since_start(self, reach):
         """What near and far have changed by, and where the ends of a term's widths meet."""
-        near, far = self.near(gaps) - self.at_start[0], self.far(gaps) - self.at_start[1]
+        near, far = reach[0] - self.at_start[0], reach[1] - self.at_start[1]
         # The ends never pass each other, nor quite meet.
         lowest = far - (1.0 - _LEAST_SLOPE) * self.span
         return np.maximum(near, lowest), far, near < lowest
 
     def widening(self, displacement, gaps):
         """What the logarithms of the widths change by, beside their displacements."""
-        near, far, _ = self._since_start(gaps)
+        near, far, _ = self._since_start(self._reach(gaps))
         t = self.terms
         between = self.part[t] + displacement[self.widths] / self.span[t]
         return (1.0 - between) * far[t] + between * near[t]
 
     def from_widths(self, change, gaps):
         """The displacements at which the logarithms of the widths have changed by so much."""
-        near, far, _ = self._since_start(gaps)
+        near, far, _ = self._since_start(self._reach(gaps))
         t = self.terms
         own = change - (1.0 - self.part[t]) * far[t] - self.part[t] * near[t]
         return own / self._slope(near, far)[t]
@@ -258,8 +255,9 @@ class OrderedTerms:
         by_gap = gaps[:, None] * (self.basis - (gaps @ self.basis) / gaps.sum())
         t = self.terms
         between = (self.part[t] + displacement[self.widths] / self.span[t])[:, None]
-        near, far, meets = self._since_start(gaps)
-        by_near, by_far = self._slopes(gaps)
+        reach = self._reach(gaps)
+        near, far, meets = self._since_start(reach)
+        by_near, by_far = self._slopes(gaps, reach)
         by_near = np.where(meets[:, None], by_far, by_near)
         by_width = (1.0 - between) * by_far[t] + between * by_near[t]
         own = self._slope(near, far)[t]

@@ -95,7 +95,7 @@ class Premise:
         jacobian = np.diag(self._unit)
         for row in self._ordered:
             by_location, by_gaps, own = row.jacobian(displacement)
-            jacobian[np.ix_(row.locations, row.locations)] = by_location
-            jacobian[np.ix_(row.widths, row.locations)] = by_gaps
+            jacobian[row.locations[:, None], row.locations] = by_location
+            jacobian[row.widths[:, None], row.locations] = by_gaps
             jacobian[row.widths, row.widths] = own
         return jacobian.T @ gradient, jacobian.T @ gauss_newton @ jacobian
