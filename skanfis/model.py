@@ -29,7 +29,7 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
-from .faces import sorted_by_face
+from .leaving import sorted_by_face
 from .naming import default_output_names, default_term_names
 from .policies import MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
 from .posterior import MOST_PARAMETERS, Posterior

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from .deviation import DerivativeRows, DeviationTables
-from .faces import STEP, Face, nodes, on_faces, products_off_faces, products_on_line
+from .faces import STEP, Face, nodes, products_off_faces, products_on_line
+from .leaving import on_faces
 from .shortest import N_COMPARED, SINGLE_DIGITS, points_of_range
 
 __all__ = ["Outside"]

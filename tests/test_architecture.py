@@ -34,6 +34,7 @@ KERNEL = [
     "deviation",
     "shortest",
     "faces",
+    "leaving",
     "outside",
     "posterior",
     "policies",
