@@ -55,7 +55,8 @@ class DeviationTables:
     -B_k F, and under them Q_k times the whole half, whose squares are taken off: (n_outputs,
     n_displacements + n_pinned, n_premises + n_columns). ``unit`` is a power of two near the noise
     of every output, (n_outputs, 1), in which squares stay finite; ``rulers`` measure ways out.
-    ``constant`` (n_outputs, 1) is the mean of what halves that are left out add.
+    ``constant`` (n_outputs, 1) is the mean of what halves that are left out add; ``is_narrow`` says
+    that derivatives by terms may be summed up in the tables' precision too.
     """
 
     form: QuadraticForm
@@ -65,6 +66,7 @@ class DeviationTables:
     n_added: int
     rulers: np.ndarray
     constant: np.ndarray
+    is_narrow: bool = False
 
     @property
     def n_premises(self):
@@ -203,7 +205,8 @@ class DeviationTables:
 class DerivativeRows:
     """Rows of the design and of the derivatives by the premises, about to be written.
 
-    ``basis`` is of inputs in standard deviations from the reference.
+    ``basis`` is of inputs in standard deviations from the reference; ``is_scaled`` says that
+    ``by_term`` is in units of the tables' already.
     """
 
     strengths: np.ndarray
@@ -212,10 +215,14 @@ class DerivativeRows:
     outputs: np.ndarray
     by_term: list[np.ndarray]  # of every output; none where the premises were not learnt
     gradients: list[np.ndarray]
+    is_scaled: bool = False
 
     @classmethod
-    def of(cls, model, Z, inputs, is_learnt):
-        """Rows at Z (n_inputs, n_rows); ``inputs`` are those that consequents are linear in."""
+    def of(cls, model, Z, inputs, is_learnt, tables=None):
+        """Rows at Z (n_inputs, n_rows); ``inputs`` are those that consequents are linear in.
+
+        In double precision; or, but for outputs and strengths, in that of narrow ``tables``.
+        """
         antecedent = model.antecedent
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
@@ -223,14 +230,23 @@ class DerivativeRows:
         basis_rows = np.ones((1 + inputs.size, Z.shape[1]))
         np.subtract(own, model.reference[inputs, None], out=basis_rows[1:])
         columns = np.concatenate([[0], 1 + inputs]) if model.order == 1 else [0]
+        is_narrow = tables is not None and tables.is_narrow
+        dtype = tables.dtype if is_narrow else np.float64
+        shares = shares.astype(dtype, copy=False)
         outputs, by_term = [], []
-        for one in model.coefficients[:, columns].transpose(2, 0, 1):
+        for k, one in enumerate(model.coefficients[:, columns].transpose(2, 0, 1)):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
             outputs.append(output)
             if is_learnt:
+                if is_narrow:
+                    by_rule *= 1.0 / tables.unit[k]
+                    output = (output / tables.unit[k]).astype(dtype)
+                by_rule = by_rule.astype(dtype, copy=False)
                 by_term.append(antecedent.term_sensitivity(by_rule, output, shares))
         basis_rows[1:] *= 1.0 / model.spread[inputs, None]
-        return cls(strengths, shares, basis_rows, np.stack(outputs), by_term, gradients)
+        basis_rows = basis_rows.astype(dtype, copy=False)
+        found = np.stack(outputs)
+        return cls(strengths, shares, basis_rows, found, by_term, gradients, is_narrow)
 
     @classmethod
     def of_parts(cls, model, inputs, is_learnt, outputs, parts):
@@ -289,7 +305,9 @@ class DerivativeRows:
 
         In units of ``unit``, in some precision.
         """
-        by_term, parts, term = (self.by_term[k] / unit[k]).astype(dtype, copy=False), [], 0
+        by_term, parts, term = self.by_term[k], [], 0
+        if not self.is_scaled:
+            by_term = (by_term / unit[k]).astype(dtype, copy=False)
         for gradient in self.gradients:
             own = by_term[term : term + gradient.shape[1]]
             part = np.multiply(gradient, own, dtype=dtype, casting="same_kind")

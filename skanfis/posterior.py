@@ -238,7 +238,7 @@ class Posterior:
         return self._within(model, Z, self._double(model) if exact else self._shortest(model))
 
     def _within(self, model, Z, tables):
-        row, unit = self._row(model, Z), tables.unit
+        row, unit = self._row(model, Z, tables), tables.unit
         shares, basis = (one.astype(tables.dtype, copy=False) for one in (row.shares, row.basis))
         square = tables.form.values(shares, basis)
         np.maximum(square, 0.0, out=square)
@@ -307,8 +307,8 @@ class Posterior:
             known[box][name] = find()
         return known[box][name]
 
-    def _row(self, model, Z):
-        return DerivativeRows.of(model, Z, self.inputs, self.premises.shape[0] > 0)
+    def _row(self, model, Z, tables=None):
+        return DerivativeRows.of(model, Z, self.inputs, self.premises.shape[0] > 0, tables)
 
 
 def _orthonormal(columns):

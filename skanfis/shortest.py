@@ -106,7 +106,11 @@ def shortest_tables(noise, model, double, row_of, deviations):
             ).without_weak_halves(row, weights, halves * DIGITS)
             for form, halves in _PARTS
         )
-        candidates = chain(turned, [short, double])
+        # Where an output is very much larger than its noise, sums want all digits.
+        either = (
+            replace(one, is_narrow=is_narrow) for one in turned for is_narrow in (True, False)
+        )
+        candidates = chain(either, [short, double])
         return _first_right(model, rng, deviations, double, candidates, DIGITS)
 
 

@@ -115,7 +115,7 @@ class GridAntecedent(Antecedent):
     def sum_over_rules(self, values):
         if not self.counts:
             return np.empty((0, values.shape[1]))
-        return _grid_indicator(self.counts) @ values
+        return _grid_indicator(self.counts).astype(values.dtype, copy=False) @ values
 
     def term_sensitivity(self, rule_outputs, output, shares):
         # A term's share is the sum of its rules' strengths: no need to form those products.
