@@ -9,7 +9,7 @@ fewer products do than in general.
 they are, and the basis changes by the way's own direction. The quadratic form of the range serves
 for all three products.
 
-*On a face.* Rows that leave it along up to three inputs with terms: at the edge the shares of these
+*On a face.* Rows that leave it along up to five inputs with terms: at the edge the shares of these
 and their basis functions are the same numbers for all of them. With chi the products of the other
 inputs' shares and basis functions, and a how many steps inside a row is along each input with terms
 that it leaves the range by, the design there is
@@ -29,7 +29,7 @@ inside along every one of the inputs with terms. What K differs from that is sec
 
 from dataclasses import dataclass, replace
 from functools import reduce
-from itertools import combinations_with_replacement, pairwise
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import blas
@@ -138,12 +138,9 @@ class Face:
         differences = nodes(len(away))[1]
         matrices = np.tensordot(differences, np.stack(at_points), axes=1)
         shares = [part for part, is_fixed in zip(parts, place, strict=True) if not is_fixed]
-        counts, forms = [part.stop - part.start for part in shares], []
-        halves = tables.factor @ matrices
-        for one, other in combinations_with_replacement(halves, 2):
-            across = one.T @ other
-            forms.append(QuadraticForm.of(0.5 * (across + across.T), counts, varying.size))
-        between = [QuadraticForm.between(h.T @ halves[0], counts, varying.size) for h in halves[1:]]
+        counts, halves = [part.stop - part.start for part in shares], tables.factor @ matrices
+        across = halves.swapaxes(1, 2)[:, None] @ halves
+        symmetric = 0.5 * (across + across.swapaxes(2, 3))[np.triu_indices(len(halves))]
         terms, start = [], 0
         for group in antecedent.groups:
             own = np.flatnonzero(~np.isin(group.inputs, away))
@@ -156,8 +153,8 @@ class Face:
             shares,
             varying,
             terms,
-            QuadraticForm.stack(forms),
-            QuadraticForm.stack(between),
+            QuadraticForm.of(symmetric, counts, varying.size),
+            QuadraticForm.between(across[1:, 0], counts, varying.size),
             by_term,
             joint,
             own,

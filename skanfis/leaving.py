@@ -15,7 +15,7 @@ _ENOUGH = 64
 # Columns of the design up to which there are any: they are kept, half a megabyte of each face.
 _MOST_COLUMNS = 512
 # Inputs with terms that rows of a face leave the range by: of more there are few rows on each.
-_MOST_AWAY = 3
+_MOST_AWAY = 5
 # Inputs with terms of a block up to which their sides make one number, exactly.
 _MOST_SIDES = 32
 # Those that rows are sorted by: their sides make a number of 16 bits.

@@ -14,14 +14,14 @@ import numpy as np
 from .deviation import DerivativeRows, DeviationTables
 from .faces import STEP, Face, nodes, products_off_faces, products_on_line
 from .leaving import on_faces
-from .shortest import N_COMPARED, SINGLE_DIGITS, points_of_range
+from .shortest import SINGLE_DIGITS, points_of_range
 
 __all__ = ["Outside"]
 
-# Standard deviations beyond an edge at which they are compared.
-_LENGTHS = (0.0, 0.3, 3.0, 100.0)
-# Faces whose tables are kept: of three inputs with terms there are 26.
-_MOST_FACES = 64
+# Points of a face, and standard deviations beyond it, at which precisions are compared.
+_N_COMPARED, _LENGTHS = 512, (0.0, 0.3, 3.0, 100.0)
+# Faces whose tables are kept: of five inputs with terms there are 242, of some 50 kB.
+_MOST_FACES = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,10 +115,10 @@ class Outside:
     def _quickest(self, face, inputs, at):
         """The same in single precision where deviations are right to ``SINGLE_DIGITS`` by it."""
         rng = np.random.default_rng(0)
-        Z = points_of_range(self.model, N_COMPARED, rng)
+        Z = points_of_range(self.model, _N_COMPARED, rng)
         Z[inputs] = at[inputs, None]
         row, single = self.row_of(Z), face.astype(np.float32)
-        directions = np.abs(rng.normal(size=(len(inputs), N_COMPARED)))
+        directions = np.abs(rng.normal(size=(len(inputs), _N_COMPARED)))
         ways = rng.normal(size=row.basis.shape)
         ways[0] = 0.0
         # Half of them leave the range along inputs without terms too.

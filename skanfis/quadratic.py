@@ -30,8 +30,6 @@ from math import prod
 import numpy as np
 from scipy import linalg
 
-from .gram import pair_index
-
 __all__ = ["QuadraticForm", "row_products", "summed_with"]
 
 # Pairs of a factor are compared at so many points for each of them at least, or all are kept.
@@ -57,7 +55,10 @@ class QuadraticForm:
 
     @classmethod
     def of(cls, matrix, counts, n_basis):
-        """Of a symmetric matrix (n_columns, n_columns), for shares and basis functions."""
+        """Of a symmetric matrix (n_columns, n_columns), for shares and basis functions.
+
+        Or of several, (n_forms, n_columns, n_columns), whose values are found together.
+        """
         lengths = (*counts, n_basis)
         pairs = [np.stack(np.triu_indices(length)) for length in lengths]
         return cls._of_table(lengths, pairs, _paired(matrix, lengths, lengths))
@@ -72,15 +73,10 @@ class QuadraticForm:
     @classmethod
     def _of_table(cls, counts, pairs, table, turns=None):
         """With rows and columns shared out so that fewest products are formed."""
-        sizes = table.shape
+        lead, sizes = table.shape[: -len(counts)], table.shape[-len(counts) :]
         split = min(range(len(sizes)), key=lambda k: prod(sizes[:k]) + prod(sizes[k:]))
-        table = np.ascontiguousarray(table).reshape(prod(sizes[:split]), -1)
+        table = np.ascontiguousarray(table).reshape(*lead, prod(sizes[:split]), -1)
         return cls(counts, tuple(pairs), table, split, tuple(turns or [None] * len(counts)))
-
-    @classmethod
-    def stack(cls, forms):
-        """Several, of the same shares and basis functions, whose values are found together."""
-        return replace(forms[0], table=np.stack([form.table for form in forms]))
 
     def astype(self, dtype):
         """The same in another precision."""
@@ -193,20 +189,24 @@ class QuadraticForm:
         return [_runs_of(*own) for own in self.pairs]
 
 
-def _paired(matrix, lengths, symmetric):
-    """A matrix (n_columns, n_columns) as a table over pairs of every factor's functions.
+def _paired(matrices, lengths, symmetric):
+    """Matrices (..., n_columns, n_columns) as tables over pairs of every factor's functions.
 
     Of the first factors, as many as are in ``symmetric``, pairs that differ in their order alone
     are one.
     """
-    n = len(lengths)
-    table = matrix.reshape(*lengths, *lengths)
-    table = table.transpose([axis for k in range(n) for axis in (k, n + k)])
-    table = table.reshape([length**2 for length in lengths])
-    for k, length in enumerate(symmetric):
-        summed = np.zeros((length * (length + 1) // 2, *np.delete(table.shape, k)))
-        np.add.at(summed, pair_index(length).ravel(), np.moveaxis(table, k, 0))
-        table = np.moveaxis(summed, 0, k)
+    *lead, _, _ = matrices.shape
+    n, before = len(lengths), len(lead)
+    table = matrices.reshape(*lead, *lengths, *lengths)
+    axes = [before + axis for k in range(n) for axis in (k, n + k)]
+    table = table.transpose([*range(before), *axes])
+    table = table.reshape([*lead, *(length**2 for length in lengths)])
+    for k, length in enumerate(symmetric, start=before):
+        i, j = np.triu_indices(length)
+        shape = [1] * table.ndim
+        shape[k] = len(i)
+        others = (i != j).astype(table.dtype).reshape(shape)
+        table = np.take(table, i * length + j, k) + others * np.take(table, j * length + i, k)
     return table
 
 

@@ -13,7 +13,6 @@ import numpy as np
 
 __all__ = [
     "DIGITS",
-    "N_COMPARED",
     "SINGLE_DIGITS",
     "points_of_range",
     "shortest_tables",
@@ -22,7 +21,7 @@ __all__ = [
 
 # What part of a deviation may be wrong: by tables for rows in the range, and by those for rows out
 # of it, where small parts grow; and at how many points they are compared.
-DIGITS, SINGLE_DIGITS, N_COMPARED = 5e-4, 1e-5, 1024
+DIGITS, SINGLE_DIGITS, _N_COMPARED = 5e-4, 1e-5, 1024
 # Points of the range at which products are found that others make up for.
 _N_EVEN = 512
 # What a form in fewer products may leave out, in squares of the noise.
@@ -120,7 +119,7 @@ def _shortened(double, row):
 
 def _first_right(model, rng, deviations, double, candidates, digits):
     """The first of some tables that are right in single precision, or ``double``."""
-    Z = points_of_range(model, N_COMPARED, rng)
+    Z = points_of_range(model, _N_COMPARED, rng)
     right = deviations(Z, double)
     for tables in candidates:
         single = tables.astype(np.float32)

@@ -48,7 +48,7 @@ def test_products_with_another_basis_and_of_several_forms(counts):
         for a, b in ((design, design), (design, other), (other, other))
     ]
     assert_allclose(forms[0].products(shares, basis, psi), expected, rtol=1e-9, atol=1e-9)
-    both = QuadraticForm.stack(forms).values(shares, basis)
+    both = QuadraticForm.of(halves.swapaxes(1, 2) @ halves, counts, 3).values(shares, basis)
     assert_allclose(both, [np.sum((half @ design) ** 2, axis=0) for half in halves], rtol=1e-11)
 
 
@@ -92,7 +92,7 @@ def test_weighted_sum_of_bilinear_forms_is_that_of_the_dense_designs(counts):
         strengths = (strengths[:, None] * share).reshape(-1, n)
     phi, psi = ((strengths[:, None] * one).reshape(-1, n) for one in (basis, others))
     matrices, weights = rng.normal(size=(2, len(phi), len(phi))), rng.normal(size=(2, n))
-    form = QuadraticForm.stack([QuadraticForm.between(one, counts, 3) for one in matrices])
+    form = QuadraticForm.between(matrices, counts, 3)
     found = form.summed_between(weights, np.vstack([np.empty((0, n)), *shares]), basis, others)
     expected = np.einsum("mn,in,mij,jn->n", weights, phi, matrices, psi)
     assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
