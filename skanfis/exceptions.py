@@ -158,8 +158,8 @@ class UnderdeterminedWarning(UserWarning):
     """The training rows do not tell so many rules.
 
     From ``fit``: there are more consequent parameters than distinct training rows, or at more than
-    a twentieth of places half-way between rows less is known than a single row there would tell, as
-    where they lie on a few curves; the latter is not sought where all weights of the penalty are
+    7.5 % of places half-way between rows less is known than a single row there would tell, as where
+    they lie on a few curves; the latter is not sought where all weights of the penalty are
     given. Take fewer rules, or ``order=0``, and judge the model on rows held out.
 
     Examples

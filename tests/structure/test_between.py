@@ -92,7 +92,7 @@ def test_leverage_is_that_of_the_dense_design(rng):
     problem = tuned.problem
     leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), places, 180)
     assert_allclose(leverage, expected, rtol=1e-4)
-    assert unknown_between(tuned, places) == np.mean(expected > 1.0) > 0.05
+    assert unknown_between(tuned, places) == np.mean(expected > 1.0) > 0.075
 
 
 @pytest.mark.parametrize(
@@ -126,8 +126,8 @@ def test_what_is_chosen_is_told_by_the_rows(rng):
     model = ANFISRegressor().fit(X, y)
     chosen = model.structures_[0]
     assert model.n_rules_ > 1
-    assert chosen["unknown_between"] <= 0.05
-    assert model.structures_[-1]["unknown_between"] > 0.05
+    assert chosen["unknown_between"] <= 0.075
+    assert model.structures_[-1]["unknown_between"] > 0.075
     # With groups, those that are left out decide.
     model.fit(X, y, groups=np.repeat([0, 1, 2], 60))
     assert not any("unknown_between" in c for c in model.structures_)
