@@ -31,7 +31,7 @@ _UNASKED = {"_MOST_UNKNOWN": 1.0}
 _OTHERWISE = {
     "3 others": {"_OTHERS": 3},
     "10 others": {"_OTHERS": 10},
-    "a tenth": {"_MOST_UNKNOWN": 0.1},
+    "5 %": {"_MOST_UNKNOWN": 0.05},
 }
 
 
