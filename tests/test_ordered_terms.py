@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
-from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, PiShaped, Triangular, TwoSidedGaussian
+from skanfis.ordered_terms import OrderedTerms, terms_of
 from skanfis.premise import Premise
 
 from .premises import (
@@ -200,3 +201,73 @@ def test_free_terms_may_be_four_times_as_wide_and_leave_the_data(antecedent):
     for j, places in moved.items():
         assert places[-1] > span(start[j], j, MARGIN)[1] or places[-1] > start[j][-1]
         assert places[-1] < span(start[j], j, FREE_MARGIN)[1]
+
+
+def bounds_of_widths(family, theta):
+    """Lowest and highest displacement of every width of terms of one input, (n_widths, n_terms)."""
+    premise = Premise.of(GridAntecedent.build([family], [0], [theta]), LOW[:1], HIGH[:1])
+    is_width = [parameter.kind == "log_width" for parameter in family.parameters]
+    lower, upper = (ends.reshape(theta.shape)[is_width] for ends in (premise.lower, premise.upper))
+    return lower, upper
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_narrower_flank_says_how_narrow_a_term_may_be(turned):
+    places = np.linspace(LOW[0], HIGH[0], 4)
+    narrow, wide = np.log(1.9), np.log(2.1)
+    theta = np.stack([places, np.full(4, narrow), np.full(4, wide)])
+    theta = theta[[0, 2, 1]] if turned else theta
+    lower, _ = bounds_of_widths(Triangular, theta)
+    # Half true half-way to the farther neighbour: as wide as that is far.
+    expected = np.log(distances(places, places)[1]) - narrow
+    assert_allclose(lower, [expected, expected], atol=0.015)
+
+
+def test_where_one_term_has_no_room_all_widths_go_with_the_nearer_neighbour():
+    places = np.linspace(LOW[0], HIGH[0], 3)
+    theta = Gaussian.start(places, np.full(3, places[1] - places[0]), 0.6)
+    as_gaussians = -0.5 * np.log(np.log(0.5) / np.log(0.6))
+    for family in (Bell, TwoSidedGaussian, PiShaped):
+        flat = family.start(places, np.full(3, places[1] - places[0]), 0.6)
+        lower, _ = bounds_of_widths(family, flat)
+        assert_allclose(lower, as_gaussians, rtol=1e-3)
+    # One flank of one term is three times as wide as the other: where both are at their widest it
+    # is too true next to its neighbour, and where they are at their narrowest not true enough.
+    theta = Triangular.start(places, np.full(3, places[1] - places[0]), 0.6)
+    room, _ = bounds_of_widths(Triangular, theta)
+    assert (np.abs(room - as_gaussians) > 0.01).all()
+    theta[1, 1] += np.log(3.0)
+    lower, _ = bounds_of_widths(Triangular, theta)
+    assert_allclose(lower, as_gaussians, rtol=1e-3)
+
+
+def test_ends_of_a_width_never_meet(rng):
+    places = np.linspace(LOW[0], HIGH[0], 3)
+    theta = Gaussian.start(places, np.full(3, places[1] - places[0]), 0.6)
+    antecedent = GridAntecedent.build([Gaussian], [0], [theta])
+    raw, span = antecedent.parameters, 0.3
+    row = OrderedTerms.of(terms_of(antecedent), raw, LOW[0], HIGH[0], is_free=False)
+    row = row.between(np.full(3, -0.1), np.full(3, span - 0.1))
+
+    def widening(x):
+        return row.widening(x, row.gaps(x))
+
+    least = []
+    for x in rng.uniform(-1.5, 1.5, (20, raw.size)):
+        _, by_location, own = row.jacobian(x)
+        least.append(own.min())
+        step = 1e-6
+        for j, location in enumerate(row.locations):
+            ahead = step * (np.arange(raw.size) == location)
+            slope = (widening(x + ahead) - widening(x - ahead)) / (2 * step)
+            assert_allclose(by_location[:, j], slope, atol=1e-7)
+        for k, width in enumerate(row.widths):
+            ahead = step * (np.arange(raw.size) == width)
+            slope = (
+                (x + ahead)[width]
+                - (x - ahead)[width]
+                + (widening(x + ahead) - widening(x - ahead))[k]
+            )
+            assert_allclose(own[k], slope / (2 * step), atol=1e-7)
+    # A tenth of what a width is free to do alone, and this is not idle.
+    assert_allclose(min(least), 0.1)

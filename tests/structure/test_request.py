@@ -1,5 +1,6 @@
 """Starts: imported rules, named partitions, mixed families, chosen features."""
 
+from dataclasses import replace
 from inspect import signature
 from itertools import pairwise
 
@@ -17,9 +18,13 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
-from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.data import StandardisedData
+from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
 from skanfis.membership import Gaussian
+from skanfis.penalty import Penalty
 from skanfis.solvers import VariableProjection
+from skanfis.structure import SampleSize, StructureRequest, request
+from skanfis.structure.start import Start
 
 from ..quick import quick
 
@@ -378,3 +383,42 @@ def test_parameters_of_a_clusterer_can_be_searched(data):
     model = quick(partition=KMeans(random_state=0))
     search = GridSearchCV(model, {"partition__n_clusters": [1, 4]}, cv=3).fit(*data)
     assert search.best_estimator_.n_rules_ == search.best_params_["partition__n_clusters"] == 4
+
+
+def request_for(counts, weights):
+    inputs = np.arange(len(counts))
+    names = [f"x{j}" for j in inputs]
+    return StructureRequest(
+        counts, "grid", [Gaussian] * len(counts), 1, inputs, inputs, weights, True, 0, names
+    )
+
+
+@pytest.mark.parametrize("is_held", [False, True])
+def test_weights_found_on_a_sample_are_for_all_rows(data, is_held, rng):
+    X, y = data[0].to_numpy(), data[1].to_numpy()[:, None]
+    weight = rng.uniform(0.5, 1.5, len(y))
+    rows = StandardisedData.of(X, y, weight)
+    sample = replace(rows, X=X[:60], y=y[:60], sample_weight=weight[:60])
+    found = Penalty(agreement=0.01, alpha=0.02, slope=0.03, stiffness=0.04)
+    start = Start(None, found, is_held=is_held)
+    asked = request_for([2, 1, 1], {"alpha": 0.02}).for_all(start, sample, rows).penalty
+    # Relative to a mean over rows they fall with their number; one that is given stays as it is.
+    ratio = weight[:60].sum() / weight.sum()
+    assert asked.alpha == 0.02
+    assert_allclose(asked.agreement, 0.01 * (1.0 if is_held else ratio), rtol=5e-3)
+    assert_allclose([asked.slope, asked.stiffness], np.multiply([0.03, 0.04], ratio), rtol=5e-3)
+
+
+@pytest.mark.parametrize("n_distinct", [11, 12, 30])
+def test_distinct_rows_are_counted_as_far_as_there_are_coefficients(n_distinct, monkeypatch, rng):
+    # Those of a long table up to some number only, unless there are more coefficients.
+    monkeypatch.setattr(request, "ENOUGH_ROWS", 10)
+    X = np.repeat(rng.standard_normal((n_distinct, 2)), 3, axis=0)
+    rows = StandardisedData.of(X, rng.standard_normal((len(X), 1)))
+    size, asked = SampleSize.of(rows, 10), request_for([2, 2], {})
+    assert size.n_distinct_inputs == 10
+    if n_distinct >= 12:
+        assert not asked._warn_if_underdetermined(4, rows, size)
+        return
+    with pytest.warns(UnderdeterminedWarning, match="4 rules with 3 .* are 12 .* for 11 distinct"):
+        assert asked._warn_if_underdetermined(4, rows, size)
