@@ -125,6 +125,7 @@ def test_deviations_beside_a_value_that_is_a_mistake(value, settings):
     model = ANFISRegressor(**settings).fit(X, y)
     prediction, deviation = model.predict(np.delete(X, 3, axis=0), return_std=True)
     left = np.sqrt(np.mean((prediction - np.delete(y, 3)) ** 2))
-    assert_allclose(model.noise_std_, left, rtol=0.2)
+    # By the rows less the effective parameters.
+    assert 0.95 * left < model.noise_std_ < 1.6 * left
     assert (model.noise_std_ < deviation).all()
-    assert deviation.max() < 1.5 * left
+    assert deviation.max() < 1.5 * model.noise_std_

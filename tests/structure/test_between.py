@@ -1,5 +1,7 @@
 """What is known between the rows, by the dense design and by curves with gaps between them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +11,7 @@ from skanfis import ANFISRegressor
 from skanfis.data import StandardisedData
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.membership import Gaussian
-from skanfis.structure.between import places_between, unknown_between
+from skanfis.structure.between import is_told, places_between, unknown_between
 from skanfis.structure.candidate import Candidate
 from skanfis.structure.search import StructureSearch
 
@@ -133,17 +135,30 @@ def test_what_is_chosen_is_told_by_the_rows(rng):
     assert not any("unknown_between" in c for c in model.structures_)
 
 
+def test_it_is_asked_at_how_many_places_and_not_by_how_much():
+    def tuned(leverage):
+        problem = SimpleNamespace(
+            antecedent=SimpleNamespace(n_rules=2),
+            solved_again=lambda evaluation: evaluation,
+            leverage_at=lambda evaluation, places, n_rows: leverage,
+        )
+        posterior = SimpleNamespace(n_rows=100.0)
+        return SimpleNamespace(problem=problem, evaluation=None, posterior=posterior)
+
+    # As beside three rows far off, and as of rows on three curves.
+    far = np.where(np.arange(60) < 3, 1e6, 0.1)
+    curves = np.where(np.arange(60) < 6, 1.2, 0.1)
+    assert far.mean() > 1.0 > curves.mean()
+    assert unknown_between(tuned(far), None) == 0.05
+    assert unknown_between(tuned(curves), None) == 0.1
+    assert is_told(0.05)
+    assert not is_told(0.1)
+
+
 def test_a_row_far_off_is_no_reason_to_refuse_rules(rng):
-    # Nor to warn: half-way to it next to nothing is known, and everywhere else all.
     X = rng.standard_normal((80, 2))
     X[0] = [30.0, 6.0]
     y = np.sin(1.5 * X[:, 0]) + 0.3 * np.cos(2.0 * X[:, 1]) + 0.02 * rng.standard_normal(80)
-    rows = rows_of(X, y)
-    found = StructureSearch(rows, [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6)
-    tuned = found._tuned(Candidate((4, 2)))
-    problem = tuned.problem
-    leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), found.places, 80)
-    assert leverage.mean() > 1.0
-    assert np.quantile(leverage, 0.95) < 0.5
-    assert np.isfinite(found._score(Candidate((4, 2))))
+    model = ANFISRegressor().fit(X, y)
+    assert all(one["unknown_between"] <= 0.075 for one in model.structures_)
     ANFISRegressor([4, 2]).fit(X, y)
