@@ -157,22 +157,20 @@ class NormalFactor:
         """log |G + P|."""
         return 2.0 * float(np.sum(np.log(np.diagonal(self._lower))))
 
-    def traces(self, matrices, departures=None):
+    def traces(self, matrices, line=None):
         """tr (G + P)^-1 A of every symmetric A; of large ones an estimate (Hutchinson 1990).
 
-        With ``departures`` also those of their components, (n_components,).
+        With a ``line`` also those of what it has ``traces`` of.
         """
         n = self._lower.shape[0]
         if n > _MOST_EXACT:
             signs = np.random.default_rng(n).choice([-1.0, 1.0], size=(n, _PROBES))
             solved = self.solve(signs)
             found = [float(np.vdot(solved, matrix @ signs)) / _PROBES for matrix in matrices]
-            if departures is None:
-                return found
-            return found, departures.products(solved, signs) / _PROBES
+            return found if line is None else (found, line.products(solved, signs) / _PROBES)
         inverse, _ = linalg.lapack.dpotri(self._lower, lower=1)
         # What is above the diagonal is zero.
         inverse += inverse.T
         inverse.flat[:: n + 1] *= 0.5
         found = [float(np.vdot(inverse, matrix)) for matrix in matrices]
-        return found if departures is None else (found, departures.traces(inverse))
+        return found if line is None else (found, line.traces(inverse))

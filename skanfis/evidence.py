@@ -30,10 +30,11 @@ to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premise
 takes no pass over the rows: for any weights, beta is one solve away.
 
 The pulls alpha_c on the components of the departures are weights like the others, but few
-departures may tell of one. What is expected beforehand is that they are alike: the logarithm of
-each is normally distributed about their mean, with the standard deviation s = log 5, which adds
-sum_c (log alpha_c / alpha)^2 / s^2 to -2 log p, alpha their geometric mean. The step of one is then
-that at which, what is paid growing with it and what is determined staying,
+departures may tell of one; and a single slope of each rho_j. What is expected beforehand is that
+those of a kind are alike: the logarithm of each is normally distributed about their mean, with the
+standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 / s^2 to -2 log p, alpha
+their geometric mean. The step of one is then that at which, what is paid growing with it and what
+is determined staying,
 
     paid exp(t) - determined + 2 (log alpha_c / alpha + t) / s^2 = 0 ,
 
@@ -41,14 +42,15 @@ which for s without end is the ratio above, and else a value of Wright's omega.
 """
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.special import wrightomega
 
 from .consequent import NormalFactor
 from .objective import NormalEquations
-from .penalty import WEIGHTS, CommonLine, Penalty
+from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 
 __all__ = [
     "FREE",
@@ -66,16 +68,21 @@ FREE = ("agreement", "alpha", "slope", "stiffness")
 # Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
 _SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
 _LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
-_AGREEMENT, _SLOPE, _STIFFNESS = range(len(WEIGHTS))
+_AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
+_OTHERS = slice(len(WEIGHTS), None)
 # The premises' weight has a prior of its own, as if so many displacements of such a size had been
 # seen before: a fifth of a spacing is what a term is expected to move.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
-# The pulls on components of the departures are expected to be within a factor of five of their
-# mean, as one standard deviation s: 1 / s^2.
-_LIKENESS = 1.0 / np.log(5.0) ** 2
+# The pulls on components of the departures, and those on slopes, are expected to be within a factor
+# of three of their mean, as one standard deviation s: 1 / s^2.
+_LIKENESS = 1.0 / np.log(3.0) ** 2
 # Least weights where there are fewer distinct rows than this per consequent.
 _UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
+# Slopes have a weight each from so many distinct rows per consequent on. With three rows per input,
+# planes of which a tenth of the slopes count leave half of the error, and planes of which all count
+# 5 % more; with fewer rows than inputs noise is fitted (tests/structure).
+_ROWS_EACH = 2.0
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -105,7 +112,7 @@ class Laplace:
         Those that vary.
     determinants : float
         log |M| - log |P|+ + log R.
-    paid : ndarray of shape (3 + n_components,)
+    paid : ndarray of shape (2 + n_slopes + n_components,)
         Of each part of the penalty, in the order of ``Penalty.weights``, beta' tau P beta (or
         kappa |x|^2).
     disagreement : ndarray of shape (n_columns, n_columns)
@@ -150,12 +157,10 @@ class Laplace:
         return self._held(self.factor, held)
 
     def _held(self, factor, by_stiffness):
-        found = self.penalty.weights(self.line.n_components)
-        traces, by_component = factor.traces(
-            [self.disagreement, self.line.slopes], self.line.departures
-        )
-        found[[_AGREEMENT, _SLOPE]] *= traces
-        found[3:] *= by_component
+        found = self.line.weights(self.penalty)
+        (apart,), others = factor.traces([self.disagreement], self.line)
+        found[_AGREEMENT] *= apart
+        found[_OTHERS] *= others
         found[_STIFFNESS] = by_stiffness
         return found
 
@@ -184,8 +189,9 @@ class Laplace:
     def minus_twice_log(self):
         """-2 log p, up to a constant of the data."""
         consequents = self.freedom * np.log(self.twice_cost) + self.n_outputs * self.determinants
-        if self.penalty.pulls:
-            consequents += _LIKENESS * float(np.sum(np.log(self.penalty.pulls) ** 2))
+        pulls = (*self.penalty.pulls.values(), *self.penalty.slope_pulls.values())
+        if pulls:
+            consequents += _LIKENESS * float(np.sum(np.log(pulls) ** 2))
         if self.curvature.size == 0 or self.penalty.stiffness == 0.0:
             return consequents
         expected = self.prior_precision
@@ -233,11 +239,10 @@ def laplace(
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
     has_premises = curvature is not None and curvature.size
-    paid = penalty.weights(line.n_components)
+    paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
-    paid[_SLOPE] *= np.vdot(solved, line.slopes @ solved)
     paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
-    paid[3:] *= line.departures.squares(solved)
+    paid[_OTHERS] *= line.squares(solved)
     return Laplace(
         penalty,
         n_rows,
@@ -274,9 +279,14 @@ def least_weights(posterior: Laplace, n_rules, n_distinct):
     return Penalty(agreement, max(least, noise / _FAR**2), least)
 
 
-def reestimated(posterior: Laplace, free, least=None):
-    """The penalty after one step of every free weight, none below ``least``."""
-    now = posterior.penalty.weights(posterior.line.n_components)
+def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
+    """The penalty after one step of every free weight, none below ``least``.
+
+    With too few distinct rows for so many consequents, one weight is found for all slopes: a weight
+    for each would make room for those that chance asks for, until noise is explained by them.
+    """
+    penalty, line = posterior.penalty, posterior.line
+    now = line.weights(penalty)
     before, outputs = posterior.held_before, np.full(now.size, posterior.n_outputs)
     outputs[_STIFFNESS] = 1
     determined = outputs * np.maximum(before - posterior.held_after, 0.0)
@@ -286,50 +296,64 @@ def reestimated(posterior: Laplace, free, least=None):
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = np.log((determined + 1e-12) / (cost + 1e-12))
-    if now.size > len(WEIGHTS) + 1:
-        pulls = np.array(posterior.penalty.pulls or 1.0)
-        step[3:] = _step_to_likeness(cost[3:], determined[3:], pulls)
-    moves = _is_free(free, now.size) & (before > 0.0)
-    moves[3:] = moves[3:].any()
+    slopes, components = _blocks(line)
+    if n_distinct < _ROWS_EACH * posterior.n_columns:
+        step[slopes] = np.log((determined[slopes].sum() + 1e-12) / (cost[slopes].sum() + 1e-12))
+    else:
+        step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
+    step[components] = _step_to_likeness(cost[components], determined[components], now[components])
+    moves = _is_free(free, line, now.size) & (before > 0.0)
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
-    return _limited(posterior.penalty, now * ratio, moves, now, least)
+    return _limited(penalty, line, now * ratio, moves, now, least)
 
 
-def _step_to_likeness(cost, determined, pulls):
-    """The root t of cost e^t - determined + 2 (log pulls + t) / s^2, for every component.
+def _blocks(line):
+    """Where the weights on slopes are in a row, and where those on components."""
+    first = len(WEIGHTS)
+    after = first + len(line.slopes)
+    return slice(first, after), slice(after, None)
 
-    With z = determined s^2 / 2 - log pulls, t = z - omega(z + log(cost s^2 / 2)).
+
+def _step_to_likeness(cost, determined, weights):
+    """The root t of cost e^t - determined + 2 (log pulls + t) / s^2, for every weight.
+
+    Pulls are weights over their geometric mean. With z = determined s^2 / 2 - log pulls,
+    t = z - omega(z + log(cost s^2 / 2)).
     """
-    z = determined / (2.0 * _LIKENESS) - np.log(pulls)
+    if weights.size <= 1 or weights[0] == 0.0:
+        return np.log((determined + 1e-12) / (cost + 1e-12))
+    logs = np.log(weights)
+    z = determined / (2.0 * _LIKENESS) - (logs - logs.mean())
     return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
 
 
-def _is_free(free, size):
+def _is_free(free, line, size):
     """Of a row of weights, which of them may be found."""
     found = np.full(size, "alpha" in free)
-    found[:3] = [key in free for key in WEIGHTS]
+    found[_AGREEMENT], found[_STIFFNESS] = "agreement" in free, "stiffness" in free
+    found[_blocks(line)[0]] = "slope" in free
     return found
 
 
-@cache
-def _limits(n_components):
-    return tuple(limits.weights(n_components) for limits in (_SMALLEST, _LARGEST))
-
-
-def _limited(penalty, weights, moves, others, least):
+def _limited(penalty, line, weights, moves, others, least):
     """The penalty of weights within their limits where they move, and of others where not."""
-    n_components = weights.size - len(WEIGHTS)
-    low, high = _limits(n_components)
+    slopes, components = _blocks(line)
+    # All of a block, or none.
+    moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
+    low, high = line.weights(_SMALLEST), line.weights(_LARGEST)
     if least is not None:
-        low = np.maximum(low, least.weights(n_components))
+        low = np.maximum(low, line.weights(least))
     found = np.where(moves, np.minimum(np.maximum(weights, low), high), others)
-    if moves[3:].any():
-        return Penalty.of_weights(found)
-    single = dict(zip(WEIGHTS, found.tolist(), strict=False))
-    return replace(penalty, **single)
+    after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
+    if moves[slopes].any():
+        after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
+    if moves[components].any():
+        names = line.departures.components
+        after["alpha"], after["pulls"] = mean_and_parts(found[components], names)
+    return replace(penalty, **after)
 
 
-def extrapolated(before, now, after, free, least):
+def extrapolated(line, before, now, after, free, least):
     """Where steps that follow one another lead: ``after``, and beyond it where they are alike.
 
     Where data hardly decide on a weight, as with more columns than rows, every step is a small part
@@ -339,25 +363,20 @@ def extrapolated(before, now, after, free, least):
     """
     if before is None:
         return after
-    weights = _rows_of(before, now, after)
+    weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = _is_free(free, step.size)
+    moves = _is_free(free, line, step.size)
     moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after
     ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
     jump = np.clip(step / (1.0 - ratio), -_LONGEST_STEP, _LONGEST_STEP)
-    return _limited(after, np.exp(second + jump), moves, weights[2], least)
+    far = np.where(moves, np.exp(second + jump), weights[2])
+    return _limited(after, line, far, moves, weights[2], least)
 
 
-def is_settled(penalty, after):
+def is_settled(line, penalty, after):
     """Whether no weight changes in its second digit."""
-    now, then = _rows_of(penalty, after)
+    now, then = line.weights(penalty), line.weights(after)
     return bool((np.abs(then - now) <= _SETTLED * now).all())
-
-
-def _rows_of(*penalties):
-    """Weights of some penalties of the same rules, a row each."""
-    n_components = max(len(penalty.pulls) for penalty in penalties) or 1
-    return np.array([penalty.weights(n_components) for penalty in penalties])

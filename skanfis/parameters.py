@@ -162,18 +162,31 @@ def found_weights(estimator):
         "alpha": estimator.alpha_,
         "slope": estimator.slope_alpha_,
         "stiffness": estimator.stiffness_,
-        "pulls": tuple(component["pull"] for component in estimator.pulls_),
+        **_by_place(estimator),
     }
 
 
-def keep_weights(estimator, penalty, components):
+def keep_weights(estimator, penalty):
     """Set the attributes that say which weights on the consequents were used."""
     estimator.agreement_, estimator.alpha_ = penalty.agreement, penalty.alpha
     estimator.slope_alpha_, names = penalty.rho, estimator.model_.input_names
+    estimator.slope_pulls_ = {names[j]: pull for j, pull in penalty.slope_pulls.items()}
     estimator.pulls_ = [
         {"inputs": [names[j] for j in component], "pull": pull}
-        for component, pull in zip(components, penalty.pulls, strict=False)
+        for component, pull in penalty.pulls.items()
     ]
+
+
+def _by_place(estimator):
+    """The pulls that training has used, of inputs by their places."""
+    place = {name: j for j, name in enumerate(estimator.model_.input_names)}
+    return {
+        "slope_pulls": {place[name]: pull for name, pull in estimator.slope_pulls_.items()},
+        "pulls": {
+            tuple(place[name] for name in component["inputs"]): component["pull"]
+            for component in estimator.pulls_
+        },
+    }
 
 
 def _imported(estimator, names):

@@ -2,7 +2,7 @@ r"""What the consequents pay beside their errors: for disagreement, for standing
 
 With f_r the value of rule r and y_hat = sum_r w_r f_r, the cost of a model is
 
-    F = 1/2 [ MSE + lambda V + sum_c alpha_c |delta_c|^2 + rho |slopes of b|^2 ] ,
+    F = 1/2 [ MSE + lambda V + sum_c alpha_c |delta_c|^2 + sum_j rho_j b_j^2 ] ,
 
     V = mean over rows of  sum_r w_r (f_r - y_hat)^2 ,
 
@@ -27,11 +27,12 @@ through all rules, that for which sum_r |delta_r|^2 is smallest. What a departur
 input alone, or how one input's part depends on another, are components with a pull each (see
 ``departures``): alpha times one of ``pulls``, whose geometric mean is one.
 
-*The slopes of that line*, rho, are a plain ridge; of a single rule it is all there is. Nothing
-pulls on the line's height: constants are free.
+*The slopes b_j of that line* have a plain ridge, rho_j, with a weight for the slope by each input:
+rho times one of ``slope_pulls``. Of a single rule it is all there is. Nothing pulls on the line's
+height: constants are free.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import linalg
@@ -40,13 +41,20 @@ from .antecedent import Antecedent
 from .consequent import LocalBasis
 from .departures import Departures
 
-__all__ = ["GREATEST_ALONE", "WEIGHTS", "CommonLine", "Penalty", "disagreement_matrix"]
+__all__ = [
+    "GREATEST_ALONE",
+    "WEIGHTS",
+    "CommonLine",
+    "Penalty",
+    "disagreement_matrix",
+    "mean_and_parts",
+]
 
 # In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
 # explains three quarters of the variance; beyond, the rule says too little of the model.
 GREATEST_ALONE = 0.5
-# What comes first in a row of weights; after these, the pulls on all components.
-WEIGHTS = ("agreement", "slope", "stiffness")
+# What comes first in a row of weights; after these, those on all slopes and on all components.
+WEIGHTS = ("agreement", "stiffness")
 
 
 @dataclass(frozen=True)
@@ -55,31 +63,36 @@ class Penalty:
 
     agreement: float = 0.0  # lambda
     alpha: float = 0.0  # pull of each rule to the common line, the mean of all components
-    slope: float | None = None  # rho, on the slopes of the common line; None is alpha
+    slope: float | None = None  # rho, on the slopes of the common line, their mean; None is alpha
     stiffness: float = 0.0  # kappa, on the displacements of the premises
-    pulls: tuple[float, ...] = ()  # of each component, in alphas; () is one for all
+    # Of each component of the departures in alphas, and of the slope by each input in rhos; one
+    # where there is none. Those of some rows hold for others, where other inputs are constant.
+    pulls: dict[tuple[int, ...], float] = field(default_factory=dict)
+    slope_pulls: dict[int, float] = field(default_factory=dict)
 
     @property
     def rho(self):
         """The weight of the common line's slopes."""
         return self.alpha if self.slope is None else self.slope
 
-    def weights(self, n_components):
-        """All weights in a row, (3 + n_components,): those of ``WEIGHTS``, and the pulls."""
-        found = np.empty(len(WEIGHTS) + n_components)
-        found[:3] = self.agreement, self.rho, self.stiffness
-        found[3:] = self.pulls or 1.0
-        found[3:] *= self.alpha
+    def weights(self, slopes, components):
+        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
+        found = np.empty(len(WEIGHTS) + len(slopes) + len(components))
+        found[:2] = self.agreement, self.stiffness
+        first = 2 + len(slopes)
+        found[2:first] = [self.slope_pulls.get(j, 1.0) for j in slopes]
+        found[first:] = [self.pulls.get(component, 1.0) for component in components]
+        found[2:first] *= self.rho
+        found[first:] *= self.alpha
         return found
 
-    @classmethod
-    def of_weights(cls, weights):
-        """The penalty of such a row; the pulls of several components are positive."""
-        agreement, slope, stiffness, *alphas = weights.tolist()
-        if len(alphas) == 1:
-            return cls(agreement, alphas[0], slope, stiffness)
-        alpha = float(np.exp(np.mean(np.log(weights[3:]))))
-        return cls(agreement, alpha, slope, stiffness, tuple(one / alpha for one in alphas))
+
+def mean_and_parts(weights, names):
+    """The geometric mean of some weights, and these in units of it by name, where there are two."""
+    if weights.size == 1:
+        return float(weights[0]), {}
+    mean = float(np.exp(np.mean(np.log(weights))))
+    return mean, dict(zip(names, (weights / mean).tolist(), strict=True))
 
 
 def disagreement_matrix(gram, n_rules):
@@ -111,8 +124,10 @@ class CommonLine:
     ----------
     departures : Departures
         From the line, of the local coefficients u.
-    slopes : ndarray of shape (n_columns, n_columns)
-        E of |slopes of b|^2 = u' E u.
+    slopes : list of int
+        The inputs, those that vary, by which b has slopes.
+    to_slopes : ndarray of shape (n_slopes, n_columns)
+        These slopes out of u.
     height : ndarray of shape (n_columns,)
         The unit vector along which all rules rise alike: the null space of the whole penalty.
     """
@@ -139,21 +154,41 @@ class CommonLine:
         along = orthonormal * scale[:, None]
         self.departures = Departures(scale, orthonormal, along, antecedent, slopes)
         # b = triangle^-1 along' u
+        is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
-        self.slopes = to_slopes.T @ to_slopes
+        self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
+        self._to_none = to_slopes[~is_varying]
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
     def pull(self, penalty: Penalty):
-        """The matrix of what departures and slopes pay, sum_c alpha_c |delta_c|^2 + rho |b|^2."""
+        """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
+        slopes, components = np.split(self.weights(penalty)[2:], [len(self.slopes)])
         if penalty.pulls:
-            matrix = self.departures.pulled(penalty.weights(self.n_components)[3:])
+            matrix = self.departures.pulled(components)
         else:
             matrix = penalty.alpha * self.departures.together
-        matrix += penalty.rho * self.slopes
+        rooted = np.sqrt(slopes)[:, None] * self.to_slopes
+        matrix += rooted.T @ rooted
+        # What is constant has no slope to learn, but one that is held.
+        matrix += penalty.rho * self._to_none.T @ self._to_none
         return matrix
 
-    @property
-    def n_components(self):
-        """Of the departures."""
-        return len(self.departures.components)
+    def weights(self, penalty: Penalty):
+        """All weights of a penalty, in a row."""
+        return penalty.weights(self.slopes, self.departures.components)
+
+    def squares(self, coefficients):
+        """Of every slope, and of every component of the departures; local, summed over outputs."""
+        slopes = np.sum((self.to_slopes @ coefficients) ** 2, axis=1)
+        return np.concatenate([slopes, self.departures.squares(coefficients)])
+
+    def traces(self, inverse):
+        """The same of the columns of a root of a symmetric matrix."""
+        slopes = np.sum((self.to_slopes @ inverse) * self.to_slopes, axis=1)
+        return np.concatenate([slopes, self.departures.traces(inverse)])
+
+    def products(self, one, other):
+        """Sums of products of the same of one and of the other."""
+        slopes = np.sum((self.to_slopes @ one) * (self.to_slopes @ other), axis=1)
+        return np.concatenate([slopes, self.departures.products(one, other)])

@@ -119,9 +119,9 @@ class ANFISRegressor(
         Ridge penalty on the consequents, zero or positive, in standard deviations of inputs and
         target: alpha / 2 times the squares of each rule's departure from the rules' common line, in
         its value at its own centre and in its slopes, and of the slopes of that line. Of a single
-        rule it is scikit-learn's ``Ridge``. "auto": the common line has a weight, and so has each
-        component of the departures, what concerns one input alone and what two together; the
-        evidence finds them. At zero, a ridge at the level of rounding errors remains.
+        rule it is scikit-learn's ``Ridge``. "auto": each slope of the common line has a weight, and
+        so has each component of the departures, what concerns one input alone and what two
+        together; the evidence finds them. At zero, a ridge at the level of rounding errors remains.
     max_iter : int, default=500
         Most iterations (epochs). With 0, premises stay as they start.
     early_stopping : bool or EarlyStopping, default=False
@@ -172,6 +172,9 @@ class ANFISRegressor(
         alone, ["time", "temperature"] how that changes with temperature, [] the rest: the larger,
         the less of it the data show. Of scattered rules, [] are their values and ["time"] their
         slopes by time. Empty where alpha is given, or there are no departures.
+    slope_pulls_ : dict of str to float
+        The weight on the common line's slope by each input, in ``slope_alpha_``, which is their
+        geometric mean. Empty where alpha is given, or there is one slope or none.
     structures_ : list of dict
         The candidates that were compared where the structure was chosen by itself, best first:
         "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
@@ -381,7 +384,7 @@ class ANFISRegressor(
         self.status_ = fitted.result.message
         self._tell_noise()
         start = fitted.start
-        keep_weights(self, start.penalty, fitted.components)
+        keep_weights(self, start.penalty)
         self.stiffness_ = start.penalty.stiffness
         self.structures_ = start.candidates
         self.redundant_rules_ = fitted.redundant_rules

@@ -247,21 +247,25 @@ class DenseProblem:
             phi,
             np.sqrt(self.penalty.agreement) * apart.reshape(-1, n_columns),
             self._pulled(values - self.line @ to_line),
-            np.sqrt(self.penalty.rho) * to_line[1:],
+            self._slope_roots()[:, None] * to_line[1:],
         ]
         return np.vstack(parts)
+
+    def _slope_inputs(self):
+        inputs = np.arange(len(self.Z)) if self.inputs is None else self.inputs
+        return inputs.tolist() if self.order else []
+
+    def _slope_roots(self):
+        pulls = self.penalty.slope_pulls
+        own = [pulls.get(j, 1.0) for j in self._slope_inputs()]
+        return np.sqrt(self.penalty.rho * np.array(own))
 
     def _pulled(self, departures):
         """Departures of all rules, each part times the root of its pull."""
         alpha, pulls = self.penalty.alpha, self.penalty.pulls
-        if not pulls:
-            return np.sqrt(alpha) * departures
-        inputs = np.arange(len(self.Z)) if self.inputs is None else self.inputs
-        projectors = departure_projectors(self.antecedent, inputs.tolist() if self.order else [])
-        # One input, two, the rest.
-        keys = sorted(projectors, key=lambda key: (len(key) or 99, key))
-        parts = zip(pulls, keys, strict=True)
-        return sum(np.sqrt(alpha * pull) * projectors[key] @ departures for pull, key in parts)
+        parts = departure_projectors(self.antecedent, self._slope_inputs())
+        roots = {key: np.sqrt(alpha * pulls.get(key, 1.0)) for key in parts}
+        return sum(roots[key] * part @ departures for key, part in parts.items())
 
     def right_side(self, n_residuals):
         """b, (n_residuals, n_outputs)."""

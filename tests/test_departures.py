@@ -40,8 +40,9 @@ class Problem:
         )
         self.departures = problem.common_line.departures
         self.components = self.departures.components
-        pulls = tuple(10.0 ** g.uniform(-2.0, 2.0, len(self.components)))
-        penalty = replace(plain, pulls=pulls)
+        pulls = {one: 10.0 ** g.uniform(-2.0, 2.0) for one in self.components}
+        slope_pulls = {j: 10.0 ** g.uniform(-2.0, 2.0) for j in inputs}
+        penalty = replace(plain, pulls=pulls, slope_pulls=slope_pulls)
         self.problem = problem.with_penalty(penalty)
         self.dense = oracles.DenseProblem(self.rows, self.antecedent, order, penalty, self.inputs)
 

@@ -21,7 +21,7 @@ from skanfis.evidence import (
 )
 from skanfis.membership import Gaussian
 from skanfis.objective import SeparableProblem
-from skanfis.penalty import WEIGHTS, Penalty
+from skanfis.penalty import Penalty
 from skanfis.premise import Premise
 
 from . import oracles
@@ -36,7 +36,7 @@ PENALTIES = [
     Penalty(agreement=1.0, alpha=1e-5),
 ]
 # Pulls of components are expected to be within this factor of one another, as one deviation.
-LIKENESS = np.log(5.0)
+LIKENESS = np.log(3.0)
 
 
 def rules(rng, n_rules):
@@ -62,15 +62,22 @@ def n_effective(found):
     return found.n_columns + found.curvature.size - found.held_after.sum()
 
 
-def with_pulls(penalty, problem, g):
-    """The penalty with a pull for every component, whose geometric mean is one."""
-    logs = g.normal(size=problem.common_line.n_components)
-    return replace(penalty, pulls=tuple(np.exp(logs - logs.mean()).tolist()))
+def with_pulls(penalty, line, g):
+    """The penalty with a pull for every slope and component, whose geometric means are one."""
+
+    def around_one(names):
+        logs = g.normal(size=len(names))
+        pulls = np.exp(logs - logs.mean()) if len(names) > 1 else []
+        return dict(zip(names, pulls, strict=False))
+
+    components, slopes = around_one(line.departures.components), around_one(line.slopes)
+    return replace(penalty, slope=penalty.rho, pulls=components, slope_pulls=slopes)
 
 
 def prior_of_pulls(penalty):
     """Minus twice the logarithm of the prior of the pulls, but for a constant."""
-    return np.sum(np.log(penalty.pulls) ** 2) / LIKENESS**2 if penalty.pulls else 0.0
+    pulls = [*penalty.pulls.values(), *penalty.slope_pulls.values()]
+    return np.sum(np.log(pulls) ** 2) / LIKENESS**2 if pulls else 0.0
 
 
 def in_full(found):
@@ -249,7 +256,7 @@ class TestAtGivenPremises:
             antecedent = oracles.random_scattered(g, Gaussian, 4, [0, 1])
         problem = SeparableProblem(rows, antecedent, order, FIRST)
         for plain in PENALTIES:
-            penalty = with_pulls(plain, problem, g)
+            penalty = with_pulls(plain, problem.common_line, g)
             found = posterior(rows, antecedent, order, penalty)
             dense = Dense(rows, antecedent, order, penalty)
             expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
@@ -325,7 +332,7 @@ def at_fixed_premises(seed):
         )
 
     penalty = Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
-    return at, with_pulls(penalty, problem, g)
+    return at, with_pulls(penalty, problem.common_line, g)
 
 
 def slope_of(function, penalty, key, step=1e-3):
@@ -338,18 +345,30 @@ def slope_of(function, penalty, key, step=1e-3):
     return (ends[0] - ends[1]) / (2.0 * step)
 
 
-def slopes_of_pulls(function, penalty, step=1e-3):
-    """Derivatives by the logarithms of what every component is pulled by."""
-    slopes, alphas = [], penalty.alpha * np.array(penalty.pulls)
-    for k in range(alphas.size):
-        ends = []
-        for side in (1.0, -1.0):
-            moved = alphas.copy()
-            moved[k] *= np.exp(side * step)
-            alpha = np.exp(np.log(moved).mean())
-            ends.append(function(replace(penalty, alpha=alpha, pulls=tuple(moved / alpha))))
-        slopes.append((ends[0] - ends[1]) / (2.0 * step))
-    return np.array(slopes)
+BLOCKS = {"slope": "slope_pulls", "alpha": "pulls"}
+
+
+def logs_of(penalty, block):
+    """Logarithms of the weights on every slope, or on every component."""
+    mean = getattr(penalty, block)
+    return np.log([mean * pull for pull in getattr(penalty, BLOCKS[block]).values()])
+
+
+def with_logs(penalty, block, logs):
+    """The penalty with such weights."""
+    names, mean = getattr(penalty, BLOCKS[block]), float(np.exp(np.mean(logs)))
+    pulls = dict(zip(names, np.exp(logs - np.mean(logs)).tolist(), strict=True))
+    return replace(penalty, **{block: mean, BLOCKS[block]: pulls})
+
+
+def slopes_of_pulls(function, penalty, block, step=1e-3):
+    """Derivatives by the logarithms of all weights of a block."""
+    logs = logs_of(penalty, block)
+    ends = [
+        [function(with_logs(penalty, block, logs + side * step * unit)) for side in (1.0, -1.0)]
+        for unit in np.eye(logs.size)
+    ]
+    return np.array([(high - low) / (2.0 * step) for high, low in ends])
 
 
 class TestReestimated:
@@ -367,100 +386,115 @@ class TestReestimated:
             slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
             # At an edge the evidence may rise still, but not by anything.
             assert abs(slope) < 1e-3
-        if penalty.pulls:
-            assert np.abs(slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty)).max() < 1e-3
+        for block, pulls in BLOCKS.items():
+            if getattr(penalty, pulls):
+                slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
+                assert np.abs(slopes).max() < 2e-3
 
+    @pytest.mark.parametrize("block", BLOCKS)
     @pytest.mark.parametrize("seed", [1, 2, 4, 8])
-    def test_step_of_the_pulls_is_where_what_is_paid_for_them_is_made_good(self, seed):
+    def test_step_of_the_pulls_is_where_what_is_paid_for_them_is_made_good(self, seed, block):
         at, penalty = at_fixed_premises(seed)
-        now, stepped = at(penalty), reestimated(at(penalty), ["alpha"])
-        cost = now.n_rows / now.noise_variance * now.paid[3:]
-        determined = now.n_outputs * (now.held_before - now.held_after)[3:]
-        pulls = np.log(penalty.pulls)
-        slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty)
+        now, stepped = at(penalty), reestimated(at(penalty), [block])
+        own = slice(2, 2 + len(now.line.slopes))
+        if block == "alpha":
+            own = slice(own.stop, None)
+        cost = now.n_rows / now.noise_variance * now.paid[own]
+        determined = now.n_outputs * (now.held_before - now.held_after)[own]
+        before, after = logs_of(penalty, block), logs_of(stepped, block)
+        pulls = before - before.mean()
+        slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
         # The prior has a part in it, 2 log(pull) / s^2, whose mean is zero.
-        assert_allclose(cost - determined + 2.0 * pulls / LIKENESS**2, slopes, rtol=1e-4, atol=1e-5)
-        before = penalty.alpha * np.array(penalty.pulls)
-        after = stepped.alpha * np.array(stepped.pulls)
-        assert_allclose(np.exp(np.log(stepped.pulls).sum()), 1.0, rtol=1e-12)
-        step = np.log(after / before)
+        expected = cost - determined + 2.0 * pulls / LIKENESS**2
+        assert_allclose(slopes, expected, rtol=1e-4, atol=1e-5)
+        assert_allclose(after.mean(), np.log(getattr(stepped, block)), rtol=1e-10)
+        step = after - before
         left = cost * np.exp(step) - determined + 2.0 * (pulls + step) / LIKENESS**2
         moved = np.abs(step) < np.log(100.0) - 1e-9
         assert_allclose(left[moved], 0.0, atol=1e-8 * max(cost.max(), 1.0))
-        assert moved.sum() > moved.size // 2
+        assert moved.any()
+        others = {block: getattr(penalty, block), BLOCKS[block]: getattr(penalty, BLOCKS[block])}
+        assert replace(stepped, **others) == penalty
 
-    @pytest.mark.parametrize("key", ["agreement", "slope"])
     @pytest.mark.parametrize("seed", [1, 2, 8])
-    def test_step_is_up_the_evidence_and_by_its_derivative(self, seed, key):
+    def test_step_is_up_the_evidence_and_by_its_derivative(self, seed):
         # d(-2 log p) / d log tau is what is paid less what is determined: their ratio is the step.
         at, penalty = at_fixed_premises(seed)
-        penalty = replace(penalty, slope=penalty.rho)
         now = at(penalty)
-        stepped = reestimated(now, [key])
-        ratio = getattr(stepped, key) / getattr(penalty, key)
-        place = WEIGHTS.index(key)
-        cost = now.n_rows / now.noise_variance * now.paid[place]
-        determined = now.n_outputs * (now.held_before - now.held_after)[place]
-        slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
+        stepped = reestimated(now, ["agreement"])
+        cost = now.n_rows / now.noise_variance * now.paid[0]
+        determined = now.n_outputs * (now.held_before - now.held_after)[0]
+        slope = slope_of(lambda p: at(p).minus_twice_log, penalty, "agreement")
         assert_allclose(cost - determined, slope, rtol=1e-4, atol=1e-5)
-        assert_allclose(ratio, np.clip(determined / cost, 0.01, 100.0), rtol=1e-6)
-        assert replace(stepped, **{key: getattr(penalty, key)}) == penalty
+        ratio = np.clip(determined / cost, 0.01, 100.0)
+        assert_allclose(stepped.agreement / penalty.agreement, ratio, rtol=1e-6)
+        assert replace(stepped, agreement=penalty.agreement) == penalty
 
     def test_no_weight_falls_below_its_own_least_or_moves_by_more_than_a_step(self):
         at, penalty = at_fixed_premises(1)
         found = at(penalty)
         free = reestimated(found, CONSEQUENTS)
         none = Penalty(slope=0.0)
-        for key in ("agreement", "slope"):
-            least = {key: 1.5 * getattr(free, key)}
-            held = reestimated(found, CONSEQUENTS, replace(none, **least))
-            assert held == replace(free, **least)
+        least = replace(none, agreement=1.2 * free.agreement)
+        assert reestimated(found, CONSEQUENTS, least) == replace(free, agreement=least.agreement)
         # Of the pulls every one is held.
-        alphas = free.weights(len(free.pulls))[3:]
-        held = reestimated(found, CONSEQUENTS, replace(none, alpha=np.median(alphas)))
-        expected = np.maximum(alphas, np.median(alphas))
-        assert_allclose(held.weights(alphas.size)[3:], expected, rtol=1e-12)
+        for block in BLOCKS:
+            logs = logs_of(free, block)
+            least = replace(none, **{block: float(np.exp(np.median(logs)))})
+            held = reestimated(found, CONSEQUENTS, least)
+            assert_allclose(logs_of(held, block), np.maximum(logs, np.median(logs)), rtol=1e-10)
         # Where nothing is paid at all, the weight rises as far as a step goes.
-        paid = found.paid.copy()
-        paid[WEIGHTS.index("slope")] = 0.0
-        risen = reestimated(replace(found, paid=paid), ["slope"])
-        assert_allclose(risen.slope, 100.0 * penalty.rho, rtol=1e-12)
+        risen = reestimated(replace(found, paid=np.zeros_like(found.paid)), ["agreement"])
+        assert_allclose(risen.agreement, min(100.0 * penalty.agreement, 1.0), rtol=1e-12)
 
     def test_it_is_where_the_evidence_is_largest(self):
         at, penalty = at_fixed_premises(12)
         for _ in range(300):
             penalty = reestimated(at(penalty), CONSEQUENTS)
         found = at(penalty).minus_twice_log
+        n_slopes = len(penalty.slope_pulls)
 
         def function(logs):
-            agreement, slope, *alphas = np.exp(np.clip(logs, -27.0, 9.0))
-            alpha = np.exp(np.log(alphas).mean())
-            pulls = tuple(np.array(alphas) / alpha)
-            return at(Penalty(agreement, alpha, slope, pulls=pulls)).minus_twice_log
+            logs = np.clip(logs, -27.0, 9.0)
+            moved = replace(penalty, agreement=float(np.exp(logs[0])))
+            moved = with_logs(moved, "slope", logs[1 : 1 + n_slopes])
+            return at(with_logs(moved, "alpha", logs[1 + n_slopes :])).minus_twice_log
 
-        weights = np.delete(penalty.weights(len(penalty.pulls)), WEIGHTS.index("stiffness"))
-        start = np.log(weights)
+        blocks = [logs_of(penalty, block) for block in BLOCKS]
+        start = np.concatenate([[np.log(penalty.agreement)], *blocks])
         around = optimize.minimize(
             function, start + 0.5, method="Nelder-Mead", options={"maxiter": 2000}
         )
         assert found <= around.fun + 1e-3
 
-    def test_known_noise_and_slope_are_found(self):
-        # One rule with many inputs: the noise's variance, and the variance that slopes have.
+    def of_slopes(self, slopes):
+        """Noise of one is added to a plane over 2,000 rows: the noise and the weights found."""
         g = np.random.default_rng(0)
-        X, slopes = g.normal(size=(2000, 100)), 0.1 * g.normal(size=100)
+        X = g.normal(size=(2000, slopes.size))
         y = X @ slopes + g.normal(size=2000)
         rows, penalty = StandardisedData.of(X, y[:, None]), FIRST
         problem = SeparableProblem(rows, ONE_RULE, 1, penalty)
         evaluation = problem.evaluate(np.empty(0))
-        for _ in range(30):
+        for _ in range(100):
             error = evaluation.mean_squared_error
             found = laplace(evaluation.normal, problem.common_line, error, penalty, 2000.0, 1)
             penalty = reestimated(found, ["slope"])
-        noise = found.noise_variance * y.var()
+        return found.noise_variance * y.var(), penalty
+
+    def test_known_noise_and_slope_are_found(self):
+        noise, penalty = self.of_slopes(np.tile([0.1, -0.1], 50))
         assert_allclose(noise, 1.0, rtol=0.05)
         # n rho / sigma^2 is the precision of the slopes, where inputs have a deviation of one.
-        assert_allclose(noise / (2000 * penalty.rho), slopes.var(), rtol=0.15)
+        assert_allclose(noise / (2000 * penalty.rho), 0.01, rtol=0.15)
+        assert max(map(abs, np.log(list(penalty.slope_pulls.values())))) < 1.0
+
+    def test_inputs_that_matter_are_pulled_less_than_those_that_do_not(self):
+        slopes = np.zeros(40)
+        slopes[::8] = 0.5
+        noise, penalty = self.of_slopes(slopes)
+        assert_allclose(noise, 1.0, rtol=0.05)
+        pulls = np.array(list(penalty.slope_pulls.values()))
+        assert pulls[slopes != 0.0].max() < 0.1 * pulls[slopes == 0.0].min()
 
 
 # Distinct rows for every consequent, and what that asks of all weights.
@@ -484,6 +518,10 @@ STEPS = np.array([-0.01, 0.0, 0.01])
 class TestExtrapolated:
     """Logarithms of a weight that come nearer to their limit by the same factor every step."""
 
+    line = SeparableProblem(
+        oracles.bumpy_rows(np.random.default_rng(0), 20, 1), ONE_RULE, 1, FIRST
+    ).common_line
+
     @staticmethod
     def steps(ratio, first=1e-3, limit=2.0):
         """Three penalties on the way to a limit, of the agreement."""
@@ -492,27 +530,33 @@ class TestExtrapolated:
 
     @pytest.mark.parametrize("ratio", [0.55, 0.7])
     def test_a_geometric_sequence_is_taken_to_its_limit(self, ratio):
-        found = extrapolated(*self.steps(ratio, limit=0.05), ("agreement", "alpha"), None)
+        found = extrapolated(
+            self.line, *self.steps(ratio, limit=0.05), ("agreement", "alpha"), None
+        )
         assert_allclose(found.agreement, 0.05, rtol=1e-12)
         assert found.alpha == 1.0
 
     @pytest.mark.parametrize("ratio", [0.45, -0.9])
     def test_steps_that_are_not_alike_are_left(self, ratio):
         before, now, after = self.steps(ratio)
-        assert extrapolated(before, now, after, ("agreement",), None) == after
-        assert extrapolated(None, now, after, ("agreement",), None) == after
+        assert extrapolated(self.line, before, now, after, ("agreement",), None) == after
+        assert extrapolated(self.line, None, now, after, ("agreement",), None) == after
 
     def test_a_long_way_is_a_hundredfold_and_within_limits(self):
         before, now, after = (Penalty(agreement=a, alpha=1.0) for a in (1e-4, 2e-4, 4e-4))
-        assert_allclose(extrapolated(before, now, after, ("agreement",), None).agreement, 2e-2)
-        downward = extrapolated(after, now, before, ("agreement",), Penalty(1e-5, slope=0.0))
+        assert_allclose(
+            extrapolated(self.line, before, now, after, ("agreement",), None).agreement, 2e-2
+        )
+        downward = extrapolated(
+            self.line, after, now, before, ("agreement",), Penalty(1e-5, slope=0.0)
+        )
         assert downward.agreement == 1e-5
-        assert extrapolated(before, now, after, (), None) == after
+        assert extrapolated(self.line, before, now, after, (), None) == after
 
     def test_settled_is_what_changes_by_less_than_half_a_hundredth(self):
         penalty = Penalty(agreement=1.0, alpha=2.0, slope=3.0, stiffness=4.0)
-        assert is_settled(penalty, replace(penalty, stiffness=4.0 * 1.004))
-        assert not is_settled(penalty, replace(penalty, slope=3.0 * 0.994))
+        assert is_settled(self.line, penalty, replace(penalty, stiffness=4.0 * 1.004))
+        assert not is_settled(self.line, penalty, replace(penalty, slope=3.0 * 0.994))
 
 
 class OneWidth:

@@ -45,7 +45,7 @@ class LossCurveDisplay:
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import LossCurveDisplay
     >>> X, y = make_jang_sinc()
-    >>> model = ANFISRegressor(n_mfs=3).fit(X, y)
+    >>> model = ANFISRegressor(n_mfs=3, solver="hybrid", max_iter=50).fit(X, y)
     >>> display = LossCurveDisplay.from_estimator(model)
     >>> bool(display.loss[-1] < display.loss[0])
     True

@@ -200,7 +200,7 @@ class LearnsFromChunksMixin:
         self.n_iter_ = 1
         self.loss_curve_ = np.full(2, solved.mean_squared_error)
         self.status_ = MESSAGES["no_premise"]
-        keep_weights(self, solved.penalty, solved.components)
+        keep_weights(self, solved.penalty)
         self.redundant_rules_ = solved.redundant_rules
         self._tell_noise()
 

@@ -31,7 +31,7 @@ __all__ = ["Solved", "Stream"]
 # The weights of the penalty that premises which stay have.
 _FREE = ("agreement", "alpha", "slope")
 # All that a penalty on consequents is made of.
-_OF_CONSEQUENTS = (*_FREE, "pulls")
+_OF_CONSEQUENTS = (*_FREE, "pulls", "slope_pulls")
 # Distinct rows per consequent that are counted: beyond, nothing asks for their number.
 _ROWS_EACH = 2
 # Weights of a fit that this part of the least falls short of were found without a least.
@@ -45,7 +45,6 @@ class Solved:
     model: TSKModel
     penalty: Penalty
     mean_squared_error: float  # of the standardised target, summed over outputs
-    components: list[tuple[int, ...]]  # of the departures
     redundant_rules: list[dict] = field(default_factory=list)
 
 
@@ -174,7 +173,6 @@ class Stream:
             self._model(problem, evaluation),
             penalty,
             evaluation.mean_squared_error,
-            problem.common_line.departures.components,
             redundant_rules(statistics),
         )
 
@@ -188,8 +186,9 @@ class Stream:
     def _solve(self, weights):
         free = [key for key in _FREE if key not in weights]
         given = {key: value for key, value in weights.items() if key in _OF_CONSEQUENTS}
-        if "alpha" in given:
-            given.setdefault("pulls", ())
+        for key, pulls in (("alpha", "pulls"), ("slope", "slope_pulls")):
+            if key in given:
+                given.setdefault(pulls, {})
         penalty = replace(self._first_penalty(), **given, stiffness=0.0)
         antecedent, n_distinct = self.base.antecedent, int(self.distinct.counts[0])
         problem = HeldProblem(self.moments, self.farthest, antecedent, penalty, n_distinct)

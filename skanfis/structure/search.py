@@ -207,7 +207,8 @@ class StructureSearch:
             if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best
             best = grown_best
-            self.first = replace(self.first, slope=self._tuned(best).penalty.slope)
+            found = self._tuned(best).penalty
+            self.first = replace(self.first, slope=found.slope, slope_pulls=found.slope_pulls)
 
     def _screened(self, linear):
         """Inputs that are worth a try: all, or those whose terms the linear model asks for most."""

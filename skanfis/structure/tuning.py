@@ -186,13 +186,14 @@ class _Weights:
         is always a plain one.
         """
         posterior, before = self._posterior(evaluation, x, penalty, curvature), None
+        line = self.problem.common_line
         for left in reversed(range(steps)):
             least = None
             if self.has_least:
                 least = least_weights(posterior, self.n_rules, self.n_distinct)
-            plain = reestimated(posterior, free, least)
-            far = extrapolated(before, posterior.penalty, plain, free, least)
-            if before is not None and is_settled(posterior.penalty, far):
+            plain = reestimated(posterior, free, least, self.n_distinct)
+            far = extrapolated(line, before, posterior.penalty, plain, free, least)
+            if before is not None and is_settled(line, posterior.penalty, far):
                 break
             now, before = posterior, None
             if left and far != plain:
@@ -396,6 +397,12 @@ def scaled(penalty: Penalty, free, ratio, is_held=False):
         "slope": penalty.rho,
         "stiffness": penalty.stiffness,
     }
-    pulls = tuple(float(f"{pull:.3g}") for pull in penalty.pulls)
-    weights = {key: float(f"{own[key] * ratio:.3g}") for key in free}
-    return replace(penalty, **weights, pulls=pulls)
+    weights: dict[str, Any] = {key: _in_digits(own[key] * ratio) for key in free}
+    for key in ("pulls", "slope_pulls"):
+        pulls = getattr(penalty, key)
+        weights[key] = {name: _in_digits(pull) for name, pull in pulls.items()}
+    return replace(penalty, **weights)
+
+
+def _in_digits(weight):
+    return float(f"{weight:.3g}")

@@ -391,7 +391,6 @@ class _Fit:
             redundant_rules(rule_statistics(self.rows, firing)),
             weights,
             run.validation_losses,
-            components=run.problem.common_line.departures.components,
             n_units=self.n_units,
         )
 
