@@ -157,7 +157,7 @@ class Laplace:
         return self._held(self.factor, held)
 
     def _held(self, factor, by_stiffness):
-        found = self.line.weights(self.penalty)
+        found = self.line.weights(self.penalty).copy()
         (apart,), others = factor.traces([self.disagreement], self.line)
         found[_AGREEMENT] *= apart
         found[_OTHERS] *= others
@@ -239,7 +239,7 @@ def laplace(
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
     has_premises = curvature is not None and curvature.size
-    paid = line.weights(penalty)
+    paid = line.weights(penalty).copy()
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
     paid[_OTHERS] *= line.squares(solved)

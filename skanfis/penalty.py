@@ -55,6 +55,8 @@ __all__ = [
 GREATEST_ALONE = 0.5
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
+# Penalties whose weights are kept.
+_MOST_KNOWN = 8
 
 
 @dataclass(frozen=True)
@@ -158,6 +160,7 @@ class CommonLine:
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
         self._to_none = to_slopes[~is_varying]
+        self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
@@ -175,8 +178,15 @@ class CommonLine:
         return matrix
 
     def weights(self, penalty: Penalty):
-        """All weights of a penalty, in a row."""
-        return penalty.weights(self.slopes, self.departures.components)
+        """All weights of a penalty, in a row; not to be changed."""
+        # The same few penalties are asked about again and again; kept, none is mistaken for them.
+        known = self._known.get(id(penalty))
+        if known is None:
+            while len(self._known) >= _MOST_KNOWN:
+                del self._known[next(iter(self._known))]
+            known = penalty, penalty.weights(self.slopes, self.departures.components)
+            self._known[id(penalty)] = known
+        return known[1]
 
     def squares(self, coefficients):
         """Of every slope, and of every component of the departures; local, summed over outputs."""
