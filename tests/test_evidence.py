@@ -488,6 +488,31 @@ class TestReestimated:
         assert_allclose(noise / (2000 * penalty.rho), 0.01, rtol=0.15)
         assert max(map(abs, np.log(list(penalty.slope_pulls.values())))) < 1.0
 
+    @pytest.mark.parametrize(("n_matter", "least", "most"), [(6, 0.0, 0.6), (60, 0.9, 1.15)])
+    def test_what_a_weight_for_every_slope_is_worth(self, n_matter, least, most):
+        # Planes of 60 slopes and three rows each, over one weight for all slopes.
+        errors = []
+        for seed in range(4):
+            g = np.random.default_rng(seed)
+            slopes = np.zeros(60)
+            slopes[:n_matter] = g.normal(size=n_matter) / np.sqrt(n_matter)
+            X = g.normal(size=(180, 60))
+            y = X @ slopes + 0.7 * g.normal(size=180)
+            rows = StandardisedData.of(X, y[:, None])
+            problem = SeparableProblem(rows, ONE_RULE, 1, FIRST)
+            evaluation = problem.evaluate(np.empty(0))
+            for n_distinct in (180, 0):
+                penalty, error = FIRST, evaluation.mean_squared_error
+                for _ in range(60):
+                    line = problem.common_line
+                    found = laplace(evaluation.normal, line, error, penalty, 180.0, 1)
+                    penalty = reestimated(found, ["slope"], n_distinct=n_distinct)
+                solved = problem.with_penalty(penalty).solved_again(evaluation)
+                own = solved.coefficients[1:, 0] * rows.targets.scale / rows.inputs.scale
+                errors.append(np.sum((own - slopes) ** 2))
+        each, one = np.reshape(errors, (4, 2)).sum(axis=0)
+        assert least < each / one < most
+
     def test_inputs_that_matter_are_pulled_less_than_those_that_do_not(self):
         slopes = np.zeros(40)
         slopes[::8] = 0.5
