@@ -84,7 +84,7 @@ class Departures:
 
     def squares(self, coefficients):
         """|delta_c|^2 of every component, summed over outputs; local (n_columns, n_outputs)."""
-        return self._sums(np.sum((self.matrix @ coefficients) ** 2, axis=1))
+        return self.products(coefficients, coefficients)
 
     def traces(self, inverse):
         """Traces of D_c M^-1 D_c' of every component, M^-1 a symmetric matrix."""

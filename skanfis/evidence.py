@@ -55,6 +55,7 @@ from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 __all__ = [
     "FREE",
     "PRIOR_DISPLACEMENT",
+    "ROWS_EACH",
     "Laplace",
     "extrapolated",
     "is_settled",
@@ -79,10 +80,11 @@ _PRIOR_NUMBER = 100.0
 _LIKENESS = 1.0 / np.log(3.0) ** 2
 # Least weights where there are fewer distinct rows than this per consequent.
 _UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
-# Slopes have a weight each from so many distinct rows per consequent on. With three rows per input,
-# planes of which a tenth of the slopes count leave half of the error, and planes of which all count
-# 5 % more; with fewer rows than inputs noise is fitted (tests/structure).
-_ROWS_EACH = 2.0
+# Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
+# and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
+# count leave half of the error, and planes of which all count 5 % more (tests/test_evidence.py);
+# with fewer rows than inputs noise is fitted (tests/structure/test_tuning.py).
+ROWS_EACH = 2.0
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -297,7 +299,7 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = np.log((determined + 1e-12) / (cost + 1e-12))
     slopes, components = _blocks(line)
-    if n_distinct < _ROWS_EACH * posterior.n_columns:
+    if n_distinct < ROWS_EACH * posterior.n_columns:
         step[slopes] = np.log((determined[slopes].sum() + 1e-12) / (cost[slopes].sum() + 1e-12))
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])

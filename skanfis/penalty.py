@@ -190,8 +190,7 @@ class CommonLine:
 
     def squares(self, coefficients):
         """Of every slope, and of every component of the departures; local, summed over outputs."""
-        slopes = np.sum((self.to_slopes @ coefficients) ** 2, axis=1)
-        return np.concatenate([slopes, self.departures.squares(coefficients)])
+        return self.products(coefficients, coefficients)
 
     def traces(self, inverse):
         """The same of the columns of a root of a symmetric matrix."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from ..antecedent import Antecedent
 from ..data import StandardisedData
-from ..evidence import FREE
+from ..evidence import FREE, ROWS_EACH
 from ..objective import SeparableProblem
 from ..premise import Premise
 from .between import places_between, unknown_between
@@ -23,7 +23,6 @@ from .tuning import (
     LESS_NOISE,
     MOST_COLUMNS,
     MOST_TURNS,
-    ROWS_EACH,
     Tuned,
     held,
     held_for_nothing,

@@ -34,7 +34,7 @@ import numpy as np
 from sklearn.model_selection import GroupKFold
 
 from ..data import StandardisedData
-from ..evidence import FREE
+from ..evidence import FREE, ROWS_EACH
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
@@ -50,7 +50,6 @@ from .tuning import (
     FIRST_PENALTY,
     FIRST_STEPS,
     HOLDING,
-    ROWS_EACH,
     Tuned,
     held_for_nothing,
     scaled,

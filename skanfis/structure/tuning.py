@@ -42,7 +42,6 @@ __all__ = [
     "LESS_NOISE",
     "MOST_COLUMNS",
     "MOST_TURNS",
-    "ROWS_EACH",
     "WORTHWHILE",
     "Tuned",
     "held",
@@ -72,8 +71,6 @@ ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 MOST_COLUMNS = 512
 _FEW_STEPS, _FEW_TURNS = 3, 2
-# Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone.
-ROWS_EACH = 2.0
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
 # A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
