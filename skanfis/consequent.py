@@ -23,6 +23,7 @@ sum_r' G[(r, i), (r', j)] = sum over rows of s w_r b_i b_j, where b_j is 1 or z_
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
@@ -39,6 +40,7 @@ _MOST_SHIFTS = 20
 # many random signs give it to about 1 %.
 _MOST_EXACT = 512
 _PROBES = 32
+_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 
 
 def basis(Z):
@@ -98,6 +100,13 @@ class LocalBasis:
         half = self.transform_rows(gram.copy())
         return self.transform_rows(np.ascontiguousarray(half.T))
 
+    def transform_blocks(self, blocks):
+        """T_r' B_r T_r of every rule's own block, (n_rules, n_basis, n_basis); in place."""
+        for half in (blocks, blocks.transpose(0, 2, 1)):
+            half[:, 1:] -= self.center[:, :, None] * half[:, :1]
+            half[:, 1:] /= self.spread[:, :, None]
+        return blocks
+
     def to_local(self, coefficients):
         """Coefficients on the local basis from those on [1, z], the inverse of to_global."""
         blocks = coefficients.reshape(-1, self.n_basis, coefficients.shape[1]).copy()
@@ -123,9 +132,8 @@ class NormalFactor:
     """
 
     def __init__(self, matrix):
-        diagonal = np.diagonal(matrix)
-        floor = matrix.shape[0] * np.finfo(float).eps * diagonal.max(initial=0.0)
-        self.shift = max(floor, np.finfo(float).tiny)
+        floor = matrix.shape[0] * _EPS * np.diagonal(matrix).max(initial=0.0)
+        self.shift = max(floor, _TINY)
         shifted = matrix.copy()
         shifted.flat[:: matrix.shape[0] + 1] += self.shift
         self._lower = self._factorise(shifted)
@@ -157,20 +165,29 @@ class NormalFactor:
         """log |G + P|."""
         return 2.0 * float(np.sum(np.log(np.diagonal(self._lower))))
 
-    def traces(self, matrices, line=None):
-        """tr (G + P)^-1 A of every symmetric A; of large ones an estimate (Hutchinson 1990).
+    @cached_property
+    def root(self):
+        """L^-1, whose product with many columns is quicker than solving for them."""
+        return np.ascontiguousarray(linalg.lapack.dtrtri(self._lower, lower=1)[0])
 
-        With a ``line`` also those of what it has ``traces`` of.
-        """
+    def trace(self, matrix):
+        """Tr (G + P)^-1 A of a symmetric A; of a large one an estimate (Hutchinson 1990)."""
+        if matrix.shape[0] > _MOST_EXACT:
+            signs, solved = self._probes
+            return float(np.vdot(solved, matrix @ signs)) / _PROBES
+        return float(np.vdot(self.root @ matrix, self.root))
+
+    def squares(self, rows):
+        """The diagonal of R (G + P)^-1 R' for the rows of R; estimated as in ``trace``."""
+        if rows.shape[1] > _MOST_EXACT:
+            signs, solved = self._probes
+            return np.sum((rows @ solved) * (rows @ signs), axis=1) / _PROBES
+        half = rows @ self.root.T
+        return np.einsum("ij,ij->i", half, half)
+
+    @cached_property
+    def _probes(self):
+        """Random signs, and what solves them."""
         n = self._lower.shape[0]
-        if n > _MOST_EXACT:
-            signs = np.random.default_rng(n).choice([-1.0, 1.0], size=(n, _PROBES))
-            solved = self.solve(signs)
-            found = [float(np.vdot(solved, matrix @ signs)) / _PROBES for matrix in matrices]
-            return found if line is None else (found, line.products(solved, signs) / _PROBES)
-        inverse, _ = linalg.lapack.dpotri(self._lower, lower=1)
-        # What is above the diagonal is zero.
-        inverse += inverse.T
-        inverse.flat[:: n + 1] *= 0.5
-        found = [float(np.vdot(inverse, matrix)) for matrix in matrices]
-        return found if line is None else (found, line.traces(inverse))
+        signs = np.random.default_rng(n).choice([-1.0, 1.0], size=(n, _PROBES))
+        return signs, self.solve(signs)

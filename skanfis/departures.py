@@ -18,7 +18,7 @@ Each component c has a pull of its own, alpha_c: sum_c alpha_c |delta_c|^2 = u' 
 with D = H N, H the contrasts.
 """
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -50,15 +50,15 @@ class Departures:
     ----------
     components : list of tuple of int
         The inputs that each component concerns; () for the rest.
+    component : ndarray of shape (n_columns,)
+        The component, by its place in this list, that each row of D belongs to.
     """
 
     def __init__(self, scale, orthonormal, along, antecedent: Antecedent, slopes):
         self._scale, self._orthonormal, self._along = scale, orthonormal, along
         self._counts = antecedent.grid_counts
-        inputs = _inputs_of_departures(antecedent, slopes)
-        self.components = sorted(set(inputs), key=lambda own: (own == (), len(own), own))
-        place = {own: k for k, own in enumerate(self.components)}
-        self._component = np.array([place[own] for own in inputs])
+        grid = (antecedent.grid_counts, antecedent.share_inputs)
+        self.components, self.component = _components(*grid, antecedent.n_rules, tuple(slopes))
 
     @cached_property
     def together(self):
@@ -77,35 +77,20 @@ class Departures:
         by_rule = found.reshape(contrasts.shape[0], -1)
         return np.ascontiguousarray((contrasts @ by_rule).reshape(found.shape))
 
-    def pulled(self, weights):
-        """D' diag(weights) D for a weight of every component, (n_columns, n_columns)."""
-        rooted = np.sqrt(weights)[self._component, None] * self.matrix
-        return rooted.T @ rooted
 
-    def squares(self, coefficients):
-        """|delta_c|^2 of every component, summed over outputs; local (n_columns, n_outputs)."""
-        return self.products(coefficients, coefficients)
-
-    def traces(self, inverse):
-        """Traces of D_c M^-1 D_c' of every component, M^-1 a symmetric matrix."""
-        return self._sums(np.sum((self.matrix @ inverse) * self.matrix, axis=1))
-
-    def products(self, one, other):
-        """Sums of delta_c of one times delta_c of the other, of every component; as ``squares``."""
-        return self._sums(np.sum((self.matrix @ one) * (self.matrix @ other), axis=1))
-
-    def _sums(self, values):
-        return np.bincount(self._component, values, len(self.components))
-
-
-def _inputs_of_departures(antecedent, slopes):
-    """The inputs that each row of D concerns."""
-    if antecedent.grid_counts is None:
-        return [(), *(() if j is None else (j,) for j in slopes)] * antecedent.n_rules
+@lru_cache(maxsize=64)
+def _components(counts, axes, n_rules, slopes):
+    """All components, and which of them each row of D belongs to; not to be changed."""
     functions = [(), *((j,) for j in slopes)]
-    axes = [int(j) for j in antecedent.share_inputs]
-    contrasts = product(*map(range, antecedent.grid_counts))
-    return [_concerned(axes, one, by) for one in contrasts for by in functions]
+    if counts is None:
+        # Of scattered rules; by an input that is constant there is nothing to learn.
+        inputs = [() if None in by else by for by in functions] * n_rules
+    else:
+        contrasts = product(*map(range, counts))
+        inputs = [_concerned(axes, one, by) for one in contrasts for by in functions]
+    found = sorted(set(inputs), key=lambda own: (own == (), len(own), own))
+    place = {own: k for k, own in enumerate(found)}
+    return found, np.array([place[own] for own in inputs])
 
 
 def _concerned(axes, contrast, by):

@@ -160,9 +160,8 @@ class Laplace:
 
     def _held(self, factor, by_stiffness):
         found = self.line.weights(self.penalty).copy()
-        (apart,), others = factor.traces([self.disagreement], self.line)
-        found[_AGREEMENT] *= apart
-        found[_OTHERS] *= others
+        found[_AGREEMENT] *= factor.trace(self.disagreement)
+        found[_OTHERS] *= self.line.traces(factor)
         found[_STIFFNESS] = by_stiffness
         return found
 
@@ -305,7 +304,7 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
     moves = _is_free(free, line, now.size) & (before > 0.0)
-    ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
+    ratio = np.exp(np.minimum(np.maximum(step, -_LONGEST_STEP), _LONGEST_STEP))
     return _limited(penalty, line, now * ratio, moves, now, least)
 
 
@@ -373,7 +372,7 @@ def extrapolated(line, before, now, after, free, least):
     if not moves.any():
         return after
     ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
-    jump = np.clip(step / (1.0 - ratio), -_LONGEST_STEP, _LONGEST_STEP)
+    jump = np.minimum(np.maximum(step / (1.0 - ratio), -_LONGEST_STEP), _LONGEST_STEP)
     far = np.where(moves, np.exp(second + jump), weights[2])
     return _limited(after, line, far, moves, weights[2], least)
 

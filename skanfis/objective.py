@@ -47,7 +47,7 @@ from .blocks import BLOCK_ROWS
 from .consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
 from .data import StandardisedData
 from .gram import DesignMoments
-from .passes import Design, FirstPass, JointPass, SecondPass
+from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
 __all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "SeparableProblem"]
@@ -103,10 +103,10 @@ class NormalEquations:
         # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 and u_0 those of here.
         slope = self.penalty @ self.coefficients
         change = factor.solve(slope - penalty @ self.coefficients)
-        error = error - 2.0 * np.sum(change * slope) + np.sum(change * (self.gram @ change))
+        error += float(np.vdot(change, self.gram @ change - 2.0 * slope))
         solved = self.coefficients + change
         normal = replace(self, penalty=penalty, factor=factor, coefficients=solved)
-        return normal, change, max(float(error), 0.0)
+        return normal, change, max(error, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +171,7 @@ class SeparableProblem:
             self.n_basis,
             self.n_outputs,
             DesignMoments(antecedent.share_counts, self.n_basis),
+            own_parameters(antecedent),
         )
         self._block_rows = self._rows_of_block(antecedent)
         self._weight = rows.total_weight
@@ -231,6 +232,7 @@ class SeparableProblem:
         values_per_row = (
             sum(self._design.moments.shape)
             + antecedent.parameters.size * (1 + self.n_basis)
+            + 2 * self._design.own_parameters.size
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
@@ -258,25 +260,23 @@ class SeparableProblem:
                 known = self._first_pass(antecedent, reference)
             gram, slope, square = known
             slope = slope.copy()  # it is changed below
-        disagreement = self.local.transform_gram(disagreement_matrix(gram, antecedent.n_rules))
-        penalty = self.penalty_matrix(disagreement)
         masses = rule_masses(gram, antecedent.n_rules)
-        gram = self.local.transform_gram(gram)
+        disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
+        penalty = self.penalty_matrix(disagreement)
         factor = NormalFactor(gram + penalty)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
         pull = penalty @ reference_local
         slope = self.local.transform_rows(slope) - pull
         change = factor.solve(slope)
-        at_reference = square.sum() + np.sum(reference_local * pull)
-        cost = 0.5 * (at_reference - np.sum(slope * change))
+        cost = 0.5 * float(square.sum() + np.vdot(reference_local, pull) - np.vdot(slope, change))
         solved = reference_local + change
         return Evaluation(
             antecedent,
             cost,
             reference + self.local.to_global(change),
             masses,
-            max(2.0 * cost - np.sum(solved * (penalty @ solved)), 0.0),
+            max(2.0 * cost - float(np.vdot(solved, penalty @ solved)), 0.0),
             NormalEquations(gram, disagreement, penalty, factor, solved),
         )
 
@@ -286,7 +286,7 @@ class SeparableProblem:
         normal, change, error = before.with_penalty(
             self.penalty_matrix(before.disagreement), evaluation.mean_squared_error
         )
-        paid = float(np.sum(normal.coefficients * (normal.penalty @ normal.coefficients)))
+        paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
         return replace(
             evaluation,
             cost=0.5 * (error + paid),
@@ -352,13 +352,19 @@ class SeparableProblem:
 
     def residual(self, evaluation, part):
         """Residual (n_outputs, n_rows) of the standardised target, and weights, of some rows."""
-        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
         Z, target, weight = self.rows.read(part)
-        strengths = evaluation.antecedent.strengths(Z)
-        basis_rows = self._design.basis(Z)
+        strengths, basis_rows = self._firing(evaluation, Z)
+        return self._residual_at(evaluation, strengths, basis_rows, target), weight
+
+    def _firing(self, evaluation, Z):
+        """Strengths of the rules and functions of the basis at some places."""
+        return evaluation.antecedent.strengths(Z), self._design.basis(Z)
+
+    def _residual_at(self, evaluation, strengths, basis_rows, target):
+        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
         for k in range(self.n_outputs):
             target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
-        return target, weight
+        return target
 
     def strongest_alone(self, evaluation):
         """RMS of the strongest rule's distance from the model, of the output where it is largest.
@@ -407,40 +413,36 @@ class SeparableProblem:
         each constraint met with equality. Exact as long as these stay so: what moves without a row
         is orthogonal to them, and h_i that of this smaller problem.
         """
-        solved = self.solved_again(evaluation) if held is None else evaluation
         total, unit = 0.0, self._weight / n_rows
-        for part, residual, weight in self.residuals(solved):
-            leverage = self.leverage(solved, part, held)
-            kept = np.maximum(1.0 - unit * leverage, _SMALLEST_FREEDOM)
-            squares = np.sum((residual / kept) ** 2, axis=0)
-            total += squares.sum() if weight is None else weight @ squares
+        for chunk in self.rows.chunks(self._block_rows):
+            for part in chunk:
+                Z, target, weight = self.rows.read(part)
+                strengths, basis_rows = self._firing(evaluation, Z)
+                residual = self._residual_at(evaluation, strengths, basis_rows, target)
+                half = self._half_at(evaluation, strengths, basis_rows)
+                leverage = _leverage(half, held) / self._weight
+                residual /= np.maximum(1.0 - unit * leverage, _SMALLEST_FREEDOM)
+                squares = np.sum(residual**2, axis=0)
+                total += squares.sum() if weight is None else weight @ squares
         return float(total / self._weight)
 
-    def leverage(self, evaluation, part, held=None):
-        """h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i of some rows, shape (n_rows,).
-
-        Where something is ``held``, of every output, (n_outputs, n_rows).
-        """
-        half = self.half(evaluation, part)
-        found = np.sum(half**2, axis=0)
-        if held is not None:
-            found = np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])
-        return found
-
     def half(self, evaluation, part):
-        """W^-1/2 L^-1 phi of some rows, (n_columns, n_rows), of which squares are leverages."""
+        """W^-1/2 L^-1 phi of some rows, (n_columns, n_rows), of which squares are leverages.
+
+        Those are h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i.
+        """
         Z, _, _ = self.rows.read(part)
-        return self._half_at(evaluation, Z) / np.sqrt(self._weight)
+        return self._half_at(evaluation, *self._firing(evaluation, Z)) / np.sqrt(self._weight)
 
     def leverage_at(self, evaluation, Z, n_rows):
         """Leverages of any places (n_inputs, n_places), where the weights are those of n rows."""
-        return np.sum(self._half_at(evaluation, Z) ** 2, axis=0) / n_rows
+        return _leverage(self._half_at(evaluation, *self._firing(evaluation, Z))) / n_rows
 
-    def _half_at(self, evaluation, Z):
+    def _half_at(self, evaluation, strengths, basis_rows):
         """L^-1 phi of some places."""
-        strengths = evaluation.antecedent.strengths(Z)
-        design = (strengths[:, None, :] * self._design.basis(Z)).reshape(self.n_columns, -1)
-        return evaluation.normal.factor.half_solve(self.local.transform_rows(design))
+        design = (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
+        # L^-1 T': what is changed is a matrix of few rows, and not the design.
+        return self.local.to_global(evaluation.normal.factor.root.T).T @ design
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""
@@ -448,3 +450,11 @@ class SeparableProblem:
         blocks[:, 1:] *= self.local.spread[:, :, None]
         blocks[:, 1:] += self.local.center[:, :, None] * blocks[:, :1]
         return blocks.reshape(local.shape)
+
+
+def _leverage(half, held=None):
+    """Squares of some columns; where something is ``held``, of every output, (n_outputs, ...)."""
+    found = np.einsum("ij,ij->j", half, half)
+    if held is None:
+        return found
+    return np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])

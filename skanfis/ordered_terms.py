@@ -203,13 +203,15 @@ class OrderedTerms:
 
     @staticmethod
     def _slopes(gaps, reach):
-        """Derivatives of near and far by the gaps."""
+        """Derivatives of near and far by the gaps on the left and on the right of every term."""
         _, _, steep, high, covered = reach
-        by_near = _beside(steep / gaps, steep[:-1] + steep[1:])
+        of_near, total = steep / gaps, steep[:-1] + steep[1:]
+        by_near = np.array([of_near[:-1], of_near[1:]]) / total
         # A gap that covers nothing has no slope.
-        by_far = _beside(high / np.where(covered > 0.0, covered, 1.0), high[:-1] + high[1:])
+        of_far = high / np.where(covered > 0.0, covered, 1.0)
+        by_far = np.array([of_far[:-1], of_far[1:]]) / (high[:-1] + high[1:])
         by_far[0, 0] *= 2.0
-        by_far[-1, -1] *= 2.0
+        by_far[1, -1] *= 2.0
         return by_near, by_far
 
     @cached_property
@@ -254,23 +256,15 @@ class OrderedTerms:
         gaps = self.gaps(displacement)
         by_gap = gaps[:, None] * (self.basis - (gaps @ self.basis) / gaps.sum())
         t = self.terms
-        between = (self.part[t] + displacement[self.widths] / self.span[t])[:, None]
+        between = self.part[t] + displacement[self.widths] / self.span[t]
         reach = self._reach(gaps)
         near, far, meets = self._since_start(reach)
         by_near, by_far = self._slopes(gaps, reach)
-        by_near = np.where(meets[:, None], by_far, by_near)
-        by_width = (1.0 - between) * by_far[t] + between * by_near[t]
+        by_near = np.where(meets, by_far, by_near)
+        left, right = (1.0 - between) * by_far[:, t] + between * by_near[:, t]
+        by_width = left[:, None] * by_gap[t] + right[:, None] * by_gap[t + 1]
         own = self._slope(near, far)[t]
-        return np.cumsum(by_gap, axis=0)[:-1], by_width @ by_gap, own
-
-
-def _beside(of_gap, total):
-    """A row per term: the parts of its two gaps, over its total."""
-    found = np.zeros((total.size, of_gap.size))
-    k = np.arange(total.size)
-    found[k, k] = of_gap[:-1] / total
-    found[k, k + 1] = of_gap[1:] / total
-    return found
+        return by_gap.cumsum(axis=0)[:-1], by_width, own
 
 
 def _narrowest(term, raw, reach):

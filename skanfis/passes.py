@@ -14,7 +14,9 @@ from .antecedent import Antecedent
 from .consequent import basis, rule_outputs
 from .gram import DesignMoments
 
-__all__ = ["Design", "FirstPass", "JointPass", "SecondPass"]
+__all__ = ["Design", "FirstPass", "JointPass", "SecondPass", "own_parameters"]
+
+_TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +29,15 @@ class Design:
         The inputs that the consequents are linear in; None is all.
     n_basis, n_outputs : int
     moments : DesignMoments
+    own_parameters : ndarray of int
+        Of the premises, see the function of this name.
     """
 
     consequent_inputs: np.ndarray | None
     n_basis: int
     n_outputs: int
     moments: DesignMoments
+    own_parameters: np.ndarray
 
     def basis(self, Z):
         """Basis functions of the consequents at a block of rows."""
@@ -116,10 +121,11 @@ class SecondPass:
         """Add the part of V: its dV, K and L."""
         antecedent, agreement, n_raw = self.antecedent, self.agreement, slope.size
         # w_r e_r^2, where w_r may be next to nothing.
-        squares = excess**2 / np.maximum(strengths, np.finfo(float).tiny)
+        squares = excess**2
+        squares /= np.maximum(strengths, _TINY)
         weight, n_rows = weighted_basis[0], excess.shape[1]
         total = squares.sum(axis=0)
-        every = np.concatenate([g.reshape(-1, n_rows) for g in gradients])
+        every = np.concatenate([g.reshape(-1, n_rows) for g in gradients] or [excess[:0]])
         mean, change = np.empty((2, n_raw, n_rows))
         _chain(gradients, antecedent.sum_over_rules(strengths), mean)  # N
         _chain(gradients, antecedent.sum_over_rules(squares), change)
@@ -129,15 +135,19 @@ class SecondPass:
         half = (0.25 * agreement * weight) * (change + 0.5 * total * mean)
         product = half @ mean.T
         square -= product + product.T
-        weighted_mean = (-0.5 * agreement) * mean[:, None, :] * weighted_basis
-        cross += weighted_mean.reshape(-1, n_rows) @ excess.T
-        cross = cross.reshape(n_raw, self.design.n_basis, antecedent.n_rules)
+        cross -= _outer_rows(mean, (0.5 * agreement) * weighted_basis) @ excess.T
+        # Of every rule, its own parameters; those that it lacks are a row of nothing at the end.
+        own, size = self.design.own_parameters, n_raw + 1
+        of_rule = np.concatenate([every, np.zeros((1, n_rows))])[own]
         squares *= 0.25 * agreement * weight
-        excess *= 0.5 * agreement
-        for r, rows in enumerate(_own_parameters(antecedent)):
-            gradient = every[rows]
-            square[rows[:, None], rows] += (gradient * squares[r]) @ gradient.T
-            cross[rows, :, r] += (gradient * excess[r]) @ weighted_basis.T
+        blocks = (of_rule * squares[:, None]) @ of_rule.transpose(0, 2, 1)
+        places = (size * own[:, :, None] + own[:, None, :]).ravel()
+        whole = np.bincount(places, blocks.ravel(), size**2).reshape(size, size)
+        square += whole[:n_raw, :n_raw]
+        of_rule *= (0.5 * agreement) * excess[:, None]
+        apart = np.zeros((n_raw + 1, self.design.n_basis, antecedent.n_rules))
+        apart[own, :, np.arange(antecedent.n_rules)[:, None]] = of_rule @ weighted_basis.T
+        cross += apart[:n_raw].reshape(cross.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +184,7 @@ class JointPass:
             by_term *= weighted
             if agreement:
                 excess = by_rule_k - strengths * output
-                squares = excess**2 / np.maximum(strengths, np.finfo(float).tiny)
+                squares = excess**2 / np.maximum(strengths, _TINY)
                 total = squares.sum(axis=0)
                 own = np.ones_like(total) if weight is None else weight
                 apart[k] += own @ total
@@ -206,15 +216,25 @@ def _chain(gradients, by_term, out):
         row, term = row + n_parameters * n_terms, term + n_terms
 
 
-def _own_parameters(antecedent):
-    """Of every rule, the positions of its terms' parameters in the vector of all."""
-    of_term: list[np.ndarray] = []
-    start = 0
+def _outer_rows(rows, others):
+    """Products of every row with every one of others, (rows.shape[0] * others.shape[0], n)."""
+    return (rows[:, None, :] * others).reshape(-1, rows.shape[1])
+
+
+def own_parameters(antecedent):
+    """Of every rule, the positions of its terms' parameters in the vector of all.
+
+    Shape (n_rules, the most that a rule has); of rules that have fewer, the rest is one position
+    beyond the vector.
+    """
+    n_raw = antecedent.parameters.size
+    most = max([group.theta.shape[0] for group in antecedent.groups], default=0)
+    of_term = np.full((antecedent.n_terms + 1, most), n_raw)
+    start = term = 0
     for group in antecedent.groups:
+        n_parameters, n_terms = group.theta.shape
         rows = start + np.arange(group.theta.size).reshape(group.theta.shape)
-        of_term.extend(rows.T)
-        start += group.theta.size
-    return [
-        np.concatenate([of_term[t] for t in terms if t >= 0] or [np.empty(0, dtype=int)])
-        for terms in antecedent.rule_terms
-    ]
+        of_term[term : term + n_terms, :n_parameters] = rows.T
+        start, term = start + group.theta.size, term + n_terms
+    # No term is the last.
+    return of_term[antecedent.rule_terms].reshape(antecedent.n_rules, -1)

@@ -33,12 +33,13 @@ height: constants are free.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 
 from .antecedent import Antecedent
-from .consequent import LocalBasis
+from .consequent import LocalBasis, NormalFactor
 from .departures import Departures
 
 __all__ = [
@@ -93,20 +94,24 @@ def mean_and_parts(weights, names):
     """The geometric mean of some weights, and these in units of it by name, where there are two."""
     if weights.size == 1:
         return float(weights[0]), {}
-    mean = float(np.exp(np.mean(np.log(weights))))
+    mean = float(np.exp(np.log(weights).sum() / weights.size))
     return mean, dict(zip(names, (weights / mean).tolist(), strict=True))
 
 
-def disagreement_matrix(gram, n_rules):
-    """Q = B - G of the disagreement V = beta' Q beta, from the Gram matrix on [1, z]."""
+def disagreement_matrix(gram, n_rules, local: LocalBasis):
+    """Q = B - G of the disagreement V = beta' Q beta, and G itself, in the local basis.
+
+    ``gram`` is that of the design on [1, z].
+    """
     n_columns = gram.shape[0]
     n_basis = n_columns // n_rules
     sums = gram.reshape(n_rules, n_basis, n_rules, n_basis).sum(axis=2)
+    gram = local.transform_gram(gram)
     matrix = -gram
     blocks = matrix.reshape(n_rules, n_basis, n_rules, n_basis)
     rules = np.arange(n_rules)
-    blocks[rules, :, rules, :] += sums
-    return matrix
+    blocks[rules, :, rules, :] += local.transform_blocks(sums)
+    return matrix, gram
 
 
 class CommonLine:
@@ -160,21 +165,30 @@ class CommonLine:
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
         self._to_none = to_slopes[~is_varying]
+        self._part = np.concatenate(
+            [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
+        )
         self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
+    @cached_property
+    def _rows(self):
+        """Slopes and departures out of u, (n_slopes + n_columns, n_columns)."""
+        return np.concatenate([self.to_slopes, self.departures.matrix])
+
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
-        slopes, components = np.split(self.weights(penalty)[2:], [len(self.slopes)])
+        weights = self.weights(penalty)[len(WEIGHTS) :]
         if penalty.pulls:
-            matrix = self.departures.pulled(components)
+            rooted = np.sqrt(weights)[self._part, None] * self._rows
+            matrix = rooted.T @ rooted
         else:
-            matrix = penalty.alpha * self.departures.together
-        rooted = np.sqrt(slopes)[:, None] * self.to_slopes
-        matrix += rooted.T @ rooted
-        # What is constant has no slope to learn, but one that is held.
-        matrix += penalty.rho * self._to_none.T @ self._to_none
+            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
+            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        if self._to_none.size:
+            # What is constant has no slope to learn, but one that is held.
+            matrix += penalty.rho * self._to_none.T @ self._to_none
         return matrix
 
     def weights(self, penalty: Penalty):
@@ -190,14 +204,12 @@ class CommonLine:
 
     def squares(self, coefficients):
         """Of every slope, and of every component of the departures; local, summed over outputs."""
-        return self.products(coefficients, coefficients)
+        own = self._rows @ coefficients
+        return self._by_part(np.einsum("ij,ij->i", own, own))
 
-    def traces(self, inverse):
-        """The same of the columns of a root of a symmetric matrix."""
-        slopes = np.sum((self.to_slopes @ inverse) * self.to_slopes, axis=1)
-        return np.concatenate([slopes, self.departures.traces(inverse)])
+    def traces(self, factor: NormalFactor):
+        """The same of the columns of a root of the inverse of what is factorised."""
+        return self._by_part(factor.squares(self._rows))
 
-    def products(self, one, other):
-        """Sums of products of the same of one and of the other."""
-        slopes = np.sum((self.to_slopes @ one) * (self.to_slopes @ other), axis=1)
-        return np.concatenate([slopes, self.departures.products(one, other)])
+    def _by_part(self, values):
+        return np.bincount(self._part, values, len(self.slopes) + len(self.departures.components))

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent
+from skanfis.consequent import NormalFactor
 from skanfis.data import StandardisedData
 from skanfis.departures import Departures
 from skanfis.membership import Bell, Gaussian
@@ -38,7 +39,8 @@ class Problem:
         problem = SeparableProblem(
             self.rows, self.antecedent, order, plain, consequent_inputs=self.inputs
         )
-        self.departures = problem.common_line.departures
+        self.line = problem.common_line
+        self.departures = self.line.departures
         self.components = self.departures.components
         pulls = {one: 10.0 ** g.uniform(-2.0, 2.0) for one in self.components}
         slope_pulls = {j: 10.0 ** g.uniform(-2.0, 2.0) for j in inputs}
@@ -63,7 +65,11 @@ class TestComponents:
         beta = g.normal(size=(one.problem.n_columns, 2))
         local = one.problem.local.to_local(beta)
         expected = [np.sum((parts[key] @ departures @ beta) ** 2) for key in one.components]
-        assert_allclose(one.departures.squares(local), expected, rtol=1e-9, atol=1e-12)
+        n_slopes = len(one.line.slopes)
+        squares = one.line.squares(local)
+        assert_allclose(squares[n_slopes:], expected, rtol=1e-9, atol=1e-12)
+        slopes = np.sum((one.line.to_slopes @ local) ** 2, axis=1)
+        assert_allclose(squares[:n_slopes], slopes, rtol=1e-12)
         # All of them together are all that there is.
         assert_allclose(sum(expected), np.sum((departures @ beta) ** 2), rtol=1e-10, atol=1e-14)
         together = np.sum(local * (one.departures.together @ local))
@@ -84,21 +90,21 @@ class TestComponents:
         assert_allclose(joint.evaluation.cost, expected, rtol=1e-10)
         assert_allclose(joint.coefficients, residuals.T @ (residuals @ beta - right), rtol=1e-8)
 
-    def test_traces_are_sums_over_unit_vectors(self, case):
+    def test_traces_are_sums_over_the_columns_of_a_root(self, case):
         one = Problem(case)
         n, g = one.problem.n_columns, np.random.default_rng(2)
-        root = g.normal(size=(n, n))
+        root = np.tril(g.normal(size=(n, n)) / n) + np.eye(n)
         # Columns of a root of M^-1 are directions whose squares add up.
-        expected = one.departures.squares(root)
-        assert_allclose(one.departures.traces(root @ root.T), expected, rtol=1e-9, atol=1e-12)
-        assert_allclose(one.departures.products(root, root), expected, rtol=1e-12)
-        # Of signs and what solves them, as for large matrices: all signs give it exactly.
-        assert_allclose(one.departures.products(root @ root.T, np.eye(n)), expected, rtol=1e-9)
+        expected = one.line.squares(np.linalg.inv(root).T)
+        factor = NormalFactor(root @ root.T)
+        assert_allclose(one.line.traces(factor), expected, rtol=1e-9, atol=1e-12)
 
     def test_weights_of_one_are_no_weights(self, case):
         one = Problem(case)
-        equal = one.departures.pulled(np.full(len(one.components), 0.3))
-        assert_allclose(equal, 0.3 * one.departures.together, atol=1e-12)
+        plain = Penalty(alpha=0.3, slope=0.2)
+        pulls = dict.fromkeys(one.components, 1.0)
+        equal = one.line.pull(replace(plain, pulls=pulls))
+        assert_allclose(equal, one.line.pull(plain), atol=1e-12)
 
 
 def of_a_function(value, slopes):
@@ -113,9 +119,9 @@ def of_a_function(value, slopes):
     center = problem.local.center
     local = np.column_stack([value(*center.T), *slopes(*center.T)])
     local[:, 1:] *= problem.local.spread
-    departures = problem.common_line.departures
-    squares = departures.squares(local.reshape(-1, 1))
-    return dict(zip(departures.components, squares, strict=True))
+    line = problem.common_line
+    squares = line.squares(local.reshape(-1, 1))[len(line.slopes) :]
+    return dict(zip(line.departures.components, squares, strict=True))
 
 
 class TestKnownFunctions:

@@ -76,11 +76,14 @@ class TestDisagreement:
         design = (model.w[:, None] * model.basis).reshape(-1, 200)
         gram = (design * model.share) @ design.T
         before = gram.copy()
-        matrix = disagreement_matrix(gram, model.antecedent.n_rules)
+        basis = model.problem(Penalty()).local
+        matrix, local_gram = disagreement_matrix(gram, model.antecedent.n_rules, basis)
         assert_allclose(gram, before, rtol=0, atol=0)
-        assert_allclose(np.sum(model.flat * (matrix @ model.flat)), model.disagreement, rtol=1e-11)
-        assert_allclose(matrix, matrix.T, atol=1e-15)
-        assert np.linalg.eigvalsh(matrix).min() > -1e-15
+        assert_allclose(local_gram, basis.transform_gram(gram), rtol=1e-12, atol=1e-14)
+        local = basis.to_local(model.flat)
+        assert_allclose(np.sum(local * (matrix @ local)), model.disagreement, rtol=1e-11)
+        assert_allclose(matrix, matrix.T, atol=1e-14)
+        assert np.linalg.eigvalsh(matrix).min() > -1e-14
 
     def test_cost_has_it_times_its_weight(self, kind, order, n_outputs):
         model = Model(kind, order, n_outputs)

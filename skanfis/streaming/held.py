@@ -68,8 +68,7 @@ class HeldProblem:
     def evaluate(self, _=None):
         """Cost and coefficients, as ``SeparableProblem.evaluate`` without a reference."""
         n_rules = self.antecedent.n_rules
-        gram = self.local.transform_gram(self._gram)
-        apart = self.local.transform_gram(disagreement_matrix(self._gram, n_rules))
+        apart, gram = disagreement_matrix(self._gram, n_rules, self.local)
         penalty = self.penalty.agreement * apart
         penalty += self.common_line.pull(self.penalty)
         factor = NormalFactor(gram + penalty)

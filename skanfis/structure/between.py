@@ -49,11 +49,10 @@ def places_between(rows: StandardisedData) -> np.ndarray:
 
 def unknown_between(tuned: Tuned, places: np.ndarray) -> float:
     """The part of some places that is not known, the premises being held; none of a single rule."""
-    problem = tuned.problem
-    if problem.antecedent.n_rules == 1:
+    if tuned.problem.antecedent.n_rules == 1:
         return 0.0
-    solved = problem.solved_again(tuned.evaluation)
-    return float(np.mean(problem.leverage_at(solved, places, tuned.posterior.n_rows) > 1.0))
+    leverage = tuned.problem.leverage_at(tuned.solved, places, tuned.posterior.n_rows)
+    return float(np.mean(leverage > 1.0))
 
 
 def is_told(unknown: float) -> bool:

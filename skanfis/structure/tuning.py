@@ -130,6 +130,11 @@ class Tuned:
         return self.posterior.curvature.size > 0
 
     @cached_property
+    def solved(self):
+        """The evaluation at the weights found, where those it was made at are others."""
+        return self.problem.solved_again(self.evaluation)
+
+    @cached_property
     def expected_error(self):
         """Mean squared error to be expected on new rows, of the standardised target.
 
@@ -141,7 +146,7 @@ class Tuned:
         share = self.posterior.n_effective_premises / n_rows
         if share > _MOST_EFFECTIVE:  # and nothing need be left out
             return np.inf
-        left_out = self.problem.leave_one_out_error(self.evaluation, n_rows)
+        left_out = self.problem.leave_one_out_error(self.solved, n_rows)
         return with_premises(left_out, share)
 
     @property

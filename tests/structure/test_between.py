@@ -139,11 +139,10 @@ def test_it_is_asked_at_how_many_places_and_not_by_how_much():
     def tuned(leverage):
         problem = SimpleNamespace(
             antecedent=SimpleNamespace(n_rules=2),
-            solved_again=lambda evaluation: evaluation,
             leverage_at=lambda evaluation, places, n_rows: leverage,
         )
         posterior = SimpleNamespace(n_rows=100.0)
-        return SimpleNamespace(problem=problem, evaluation=None, posterior=posterior)
+        return SimpleNamespace(problem=problem, solved=None, posterior=posterior)
 
     # As beside three rows far off, and as of rows on three curves.
     far = np.where(np.arange(60) < 3, 1e6, 0.1)
