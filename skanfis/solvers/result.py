@@ -35,6 +35,9 @@ class SolverResult:
         Iterations run.
     status : str
         Why it stopped, a key of ``skanfis.solvers.result.MESSAGES``.
+    gauss_newton : ndarray of shape (n_displacements, n_displacements) or None
+        Curvature of the cost by the premises' displacements, their pull left out, where the solver
+        last asked for it: at most one iteration before the end. None of solvers that never do.
 
     Examples
     --------
@@ -48,6 +51,7 @@ class SolverResult:
     loss_curve: np.ndarray
     n_iter: int
     status: str
+    gauss_newton: np.ndarray | None = None
 
     @property
     def converged(self) -> bool:

@@ -93,8 +93,8 @@ class _ReducedCost:
 
     def linearise(self, x, evaluation):
         raw = self.problem.linearise(evaluation)
-        gradient, hessian = self.premise.pull_back(x, raw.gradient, raw.gauss_newton)
-        return gradient + self.stiffness * x, hessian + self.stiffness * np.eye(x.size)
+        gradient, curvature = self.premise.pull_back(x, raw.gradient, raw.gauss_newton)
+        return gradient + self.stiffness * x, curvature
 
 
 def _free(x, gradient, premise):
@@ -159,8 +159,10 @@ def varpro(
     loss_curve = [current.mean_squared_error]
     status = "max_iter" if premise.size else "no_premise"
     radius, settled, n_iter = _FIRST_RADIUS, 0, 0
+    curvature = None
     while premise.size and n_iter < max_iter:
-        gradient, hessian = cost_of.linearise(x, current)
+        gradient, curvature = cost_of.linearise(x, current)
+        hessian = curvature + stiffness * np.eye(x.size)
         free = _free(x, gradient, premise)
         steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
         if steepest <= _GRADIENT_FACTOR * tol * cost:
@@ -192,7 +194,7 @@ def varpro(
         if settled == patience:
             status = "cost"
             break
-    return SolverResult(current, np.array(loss_curve), n_iter, status)
+    return SolverResult(current, np.array(loss_curve), n_iter, status, curvature)
 
 
 class VariableProjection(Solver):

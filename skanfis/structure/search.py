@@ -77,6 +77,8 @@ _MOST_TERMS = 6
 _MOST_GROWING = 8
 # Of those that are tried in a round, so many are trained: the most promising at their start.
 _MOST_TRAINED = 3
+# Steps of the weights that tell what a candidate promises; training goes on from there.
+_STEPS_TO_PROMISE = 2
 # More inputs than this are screened before terms are tried on them.
 _MOST_UNSCREENED = 16
 # Turns of weights and premises of a candidate; after the first of them, those whose expected error
@@ -220,7 +222,7 @@ class StructureSearch:
     def _promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
         self.untrained = {
-            candidate: self._train(candidate, self.sample, turns=0, first_steps=2)
+            candidate: self._train(candidate, self.sample, turns=0, first_steps=_STEPS_TO_PROMISE)
             for candidate in candidates
             if not self._is_too_many(candidate, self.sample.n_rows)
         }
@@ -407,7 +409,7 @@ class StructureSearch:
         elif begun.is_trained:
             problem, turns = begun.problem, turns - _FIRST_TURNS
         else:
-            problem = begun.problem.with_penalty(self.first)
+            problem, first_steps = begun.problem, first_steps - _STEPS_TO_PROMISE
         antecedent = problem.antecedent
         premise = Premise.of(antecedent, rows.inputs.minimum, rows.inputs.maximum)
         return tune(

@@ -4,7 +4,7 @@ At fixed weights the premises take a few steps down the cost; at fixed premises 
 few steps up the evidence, which needs no pass over the data. The premises' step does not see the
 evidence, only its cost: it may trade the one for the other, sharpening the terms until no two rules
 fire on the same row and the disagreement is nought. So what is kept is the turn of the largest
-evidence, and the turns end when it has not risen twice.
+evidence, and the turns end when it rises no further.
 
 The weights come first, at the premises of the start: from weights that are far too small, the first
 steps of the premises would go where no evidence leads back from. Data without noise are the other
@@ -85,8 +85,7 @@ WORTHWHILE = 2.0
 # Of displacements, which are in spacings: no data tell a hundred-thousandth of a spacing, and
 # rounding errors stay below it.
 _DIGITS = 5
-# Turns without a rise of the evidence, and what counts as one, in -2 log p.
-_PATIENCE = 2
+# What counts as a rise of the evidence, in -2 log p: with the first turn without one they end.
 _RISE = 0.5
 # Where the strongest rule does not hold alone, agreement rises by a power of how far it is off, and
 # within these factors; beyond the last weight, all rules are one line.
@@ -286,7 +285,6 @@ def tune(
             penalty = replace(penalty, stiffness=stiffness)
     else:
         x, penalty, evaluation = best.displacement, best.penalty, best.evaluation
-    without_rise = 0
     for turn in range(turns):
         is_first = is_loose and turn == 0 and best is None
         iterations = _LOOSE_ITERATIONS if is_first else _ITERATIONS
@@ -294,10 +292,9 @@ def tune(
         found = _turned(weights, premise, penalty, x, evaluation, free, iterations, steps)
         x, penalty, evaluation = found.displacement, found.penalty, found.evaluation
         rises = best is None or found.score < best.score - _RISE
-        without_rise = 0 if rises else without_rise + 1
         if best is None or found.score < best.score:
             best = found
-        if without_rise == _PATIENCE:
+        if not rises:
             break
     assert best is not None
     if "agreement" in free and is_last:
@@ -319,9 +316,8 @@ def _turned(weights: _Weights, premise: Premise, penalty, x, evaluation, free, i
     )
     evaluation = result.evaluation
     x = premise.displacement(evaluation.antecedent.parameters)
-    raw = weighted.linearise(evaluation)
-    _, hessian = premise.pull_back(x, raw.gradient, raw.gauss_newton)
-    curvature = np.maximum(np.linalg.eigvalsh(hessian), 0.0)
+    # One step before the end as a rule, and as good there: another pass is not worth it.
+    curvature = np.maximum(np.linalg.eigvalsh(result.gauss_newton), 0.0)
     posterior = weights.improved(evaluation, x, penalty, steps, free, curvature)
     problem = weights.problem.with_penalty(posterior.penalty)
     return Tuned(problem, evaluation, x, posterior)
