@@ -264,6 +264,13 @@ class TestOnKnownProblems:
         expected = np.linalg.solve(A.T @ A + stiffness * np.eye(2), A.T @ b)
         assert_allclose(result.evaluation.x, expected, rtol=1e-5, atol=1e-7)
         assert result.n_iter < 12  # its curvature is known too
+        assert_allclose(result.gauss_newton, A.T @ A, rtol=1e-12)
+
+    def test_curvature_is_that_of_the_last_linearisation(self):
+        problem = rosenbrock()
+        result = varpro(problem, Box([-3, -3], [3, 3]), max_iter=4, tol=0.0)
+        J = problem.jacobian(problem.linearised[-1])
+        assert_allclose(result.gauss_newton, J.T @ J, rtol=1e-12)
 
 
 def spread_rows(kind, rng, n_rows=300):
