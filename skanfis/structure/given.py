@@ -20,7 +20,6 @@ from .tuning import (
     ARRIVING,
     FIRST_PENALTY,
     FIRST_STEPS,
-    LESS_NOISE,
     MOST_COLUMNS,
     MOST_TURNS,
     Tuned,
@@ -36,8 +35,7 @@ __all__ = ["tuned_start"]
 # The weights of rules that are given are found on at most so many representative rows.
 _MOST_ROWS = 1000
 # Of the noise, what is left where terms are freed beyond all reading: only for data that are next
-# to exact. And of
-# the error, where they are freed, and can be read nevertheless.
+# to exact. And of the error, where they are freed and can be read nevertheless.
 _LEAST_NOISE = 0.01
 _LESS_ERROR = 0.1
 
@@ -76,7 +74,7 @@ def tuned_start(
     best = tune(problem, premise, free, n_sample, turns, first_steps)
     if premises_move and _may_be_free(problem) and not is_noisy:
         loose = _freely(problem, premise, free, n_sample)
-        if loose.posterior.noise_variance < LESS_NOISE * best.posterior.noise_variance:
+        if best.takes_for_noise(loose):
             loose = held(loose, premise, free, n_sample)
             best = loose if loose.priced_error < best.priced_error else best
         anywhere = _premise(problem, is_free=True)

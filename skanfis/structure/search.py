@@ -191,8 +191,13 @@ class StructureSearch:
         return best
 
     def _is_beaten_loosely(self, best, loose):
-        is_beaten = self._tuned(best).is_beaten_loosely(self._tuned(loose))
-        return is_beaten and np.isfinite(self._score(loose))
+        tuned = self._tuned(best)
+        begun = self._train(loose, self.sample, _FIRST_TURNS)
+        # The first turn goes far; those that follow leave no less.
+        if not tuned.takes_for_noise(begun):
+            return False
+        self.begun[loose] = begun
+        return tuned.is_beaten_loosely(self._tuned(loose)) and np.isfinite(self._score(loose))
 
     def _grow_grid(self, best):
         self._score(best)

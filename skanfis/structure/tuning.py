@@ -153,10 +153,13 @@ class Tuned:
         """The error to be expected, and what rules are worth that hold where these do not."""
         return (HOLDING if self.is_apart else 1.0) * self.expected_error
 
-    def is_beaten_loosely(self, loose, part=LESS_NOISE):
+    def takes_for_noise(self, loose, part=LESS_NOISE):
         """Whether a loose training has found what this one took for noise, down to a part of it."""
-        noise, other = self.posterior.noise_variance, loose.posterior.noise_variance
-        return other < part * noise and loose.score < self.score - WORTHWHILE
+        return loose.posterior.noise_variance < part * self.posterior.noise_variance
+
+    def is_beaten_loosely(self, loose, part=LESS_NOISE):
+        """Whether it has, and the evidence is for it."""
+        return self.takes_for_noise(loose, part) and loose.score < self.score - WORTHWHILE
 
 
 def held(tuned, premise, free, n_rows) -> Tuned:
