@@ -36,7 +36,7 @@ __all__ = ["tuned_start"]
 _MOST_ROWS = 1000
 # Of the noise, what is left where terms are freed beyond all reading: only for data that are next
 # to exact. And of the error, where they are freed and can be read nevertheless.
-_LEAST_NOISE = 0.01
+_LEAST_NOISE = 0.05
 _LESS_ERROR = 0.1
 
 

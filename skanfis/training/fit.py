@@ -20,6 +20,7 @@ from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
+from ..antecedent import Antecedent
 from ..constraints.exchange import constrained
 from ..data import StandardisedData
 from ..model import TSKModel
@@ -204,14 +205,16 @@ class _Fit:
 
         Rows that the search has not seen may draw a term into a gap between them, out of which no
         gradient leads. The premises are then held ten times as much, from the start again, unless
-        it was asked for how much they are held. Likewise agreement rises, unless it was asked for,
-        until the strongest rule holds alone, if that is cheap.
+        it was asked for how much they are held, or terms were freed beyond all reading because that
+        is worth it (``structure.given``). Likewise agreement rises, unless it was asked for, until
+        the strongest rule holds alone, if that is cheap.
         """
         run = self.run(rows, start, is_watched)
         if self.was_stopped(run):
             return run
         given = self.request.weights
-        if "stiffness" not in given and not has_idle_term(rows, start.antecedent):
+        first = _freed(rows, start) if start.is_free else start.antecedent
+        if "stiffness" not in given and not has_idle_term(rows, first):
             run = self.without_idle_terms(rows, run)
         if "agreement" not in given and not start.is_apart:
             run = self.with_rules_that_hold(rows, run)
@@ -454,6 +457,13 @@ def _premise(rows: StandardisedData, start: Start) -> Premise:
     """What moves at a start, within the box of the data."""
     low, high = rows.inputs.box
     return Premise.of(start.antecedent, low, high, start.is_free)
+
+
+def _freed(rows: StandardisedData, start: Start) -> Antecedent:
+    """The rule base with its premises where tuning has found them."""
+    premise = _premise(rows, start)
+    x = np.zeros(premise.size) if start.displacement is None else start.displacement
+    return start.antecedent.with_parameters(premise.parameters(x))
 
 
 def _is_of_one_size(one: Start, other: Start) -> bool:
