@@ -52,9 +52,9 @@ GROUPS = {
         "structure/test_search.py::test_family_is_that_of_the_truth_where_it_is_asked_for"
     ),
     "structure/candidate structure/held_out structure/readable_terms structure/search "
-    "structure/terms "
-    "structure/tuning": (
-        "structure/test_search.py structure/test_terms.py structure/test_held_out.py "
+    "structure/terms structure/trials structure/tuning": (
+        "structure/test_search.py structure/test_trials.py structure/test_terms.py "
+        "structure/test_held_out.py "
         "structure/test_tuning.py structure/test_candidate.py structure/test_readable_terms.py "
         "structure/test_request.py::test_radius_of_clusters_is_reported_and_is_that_of_the_clusterer"
     ),

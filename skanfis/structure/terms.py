@@ -92,7 +92,7 @@ def search_terms(
         )
         best = search.choose("grid")
     tried: dict = {}
-    for candidate in search.scores:
-        error = float(rows.targets.scale[0] * search.error(candidate))
+    for candidate in search.trials.scores:
+        error = float(rows.targets.scale[0] * search.trials.error(candidate))
         tried[candidate.counts] = min(error, tried.get(candidate.counts, np.inf))
     return TermsFound(best.counts, tuple(tried.items()))

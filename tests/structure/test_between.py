@@ -75,8 +75,8 @@ def test_leverage_is_that_of_the_dense_design(rng):
     X, y = three_runs(rng, THREE)
     found = StructureSearch(
         rows_of(X, y), [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6
-    )
-    tuned, places = found._tuned(Candidate((3, 3))), found.places
+    ).trials
+    tuned, places = found.tuned(Candidate((3, 3))), found.places
 
     def design(Z):
         strengths = tuned.evaluation.antecedent.strengths(Z)
@@ -104,9 +104,9 @@ def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatur
     X, y = three_runs(rng, temperatures)
     found = StructureSearch(
         rows_of(X, y), [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6
-    )
-    assert np.isfinite(found._score(Candidate((1, 1))))
-    assert bool(np.isfinite(found._score(Candidate((4, 3))))) is is_known
+    ).trials
+    assert np.isfinite(found.score(Candidate((1, 1))))
+    assert bool(np.isfinite(found.score(Candidate((4, 3))))) is is_known
 
 
 def test_rules_that_are_given_come_with_a_warning(rng):

@@ -112,9 +112,8 @@ def test_of_terms_that_were_tried_twice_the_smaller_error_is_told(monkeypatch):
         Candidate((2, 1), is_loose=True): 0.2,
         Candidate((1, 1), is_loose=True): 0.25,
     }
-    search = SimpleNamespace(
-        scores=errors, error=errors.get, choose=lambda partition: Candidate((2, 1))
-    )
+    trials = SimpleNamespace(scores=errors, error=errors.get)
+    search = SimpleNamespace(trials=trials, choose=lambda partition: Candidate((2, 1)))
     monkeypatch.setattr(terms, "StructureSearch", lambda *args, **settings: search)
     X, y, *_ = campaign(0.0)
     found = terms.search_terms(X, y, [])
