@@ -92,7 +92,8 @@ def check_log(
     """
     units = CANONICAL | declared_units(units)
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
-        raise LogError(f"{len(log)} rows are too few; at least {_FEWEST_ROWS} are needed.")
+        rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
+        raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
     for part in QUANTITIES:
         if part in log:
             check_finite(log[part], part)

@@ -1,5 +1,6 @@
 """Pictures: what they store is right, and what they draw says so, with units."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -119,6 +120,15 @@ def test_tables_hold_what_is_drawn(display_class, unit, rates):
     else:
         expected = np.concatenate([np.column_stack([table[position], v]) for v in values])
     np.testing.assert_allclose(drawn_lines(display), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("display_class", DISPLAYS)
+def test_tables_need_no_drawing(display_class, rates):
+    display = display_class.from_predictions(*three(rates), **OPTIONS[display_class](rates))
+    drawn, undrawn = display.tables(), replace(display).tables()
+    assert drawn.keys() == undrawn.keys()
+    for name, table in drawn.items():
+        pd.testing.assert_frame_equal(undrawn[name], table)
 
 
 def test_tables_of_bands_cells_and_scale_factors_hold_what_is_drawn(rates):

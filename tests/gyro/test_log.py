@@ -281,8 +281,10 @@ def test_a_log_at_rest_is_told_from_one_that_moves(log):
 
 def test_a_log_that_is_not_learnt_from_may_be_short_and_narrow(log):
     check_log(log.iloc[:3], inputs=())
-    with pytest.raises(LogError, match="too few"):
+    with pytest.raises(LogError, match="3 rows are too few"):
         check_log(log.iloc[:3])
+    with pytest.raises(LogError, match="1 row is too few"):
+        check_log(log.iloc[:1])
 
 
 def test_the_span_may_be_declared_enough(log):

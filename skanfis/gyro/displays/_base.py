@@ -112,13 +112,18 @@ class DisplayInUnit(CompensationDisplay):
         return self
 
     @property
+    def _unit(self):
+        """That in which it was drawn, or would be."""
+        return getattr(self, "unit_", self._UNIT)
+
+    @property
     def _factor(self):
         """What errors stored are multiplied by."""
-        return RATE_UNITS[self.unit_] / RATE_UNITS[self._UNIT]
+        return RATE_UNITS[self._unit] / RATE_UNITS[self._UNIT]
 
     @property
     def _symbol(self):
-        return SYMBOL[self.unit_]
+        return SYMBOL[self._unit]
 
     def _draw(self, ax):
         raise NotImplementedError

@@ -150,8 +150,8 @@ class AllanDisplay(DisplayInUnit):
             columns = {
                 "curve": name,
                 "averaging time [s]": curve["averaging_time"],
-                f"Allan deviation [{self.unit_}]": factor * curve["deviation"],
-                f"error [{self.unit_}]": factor * curve["error"],
+                f"Allan deviation [{self._unit}]": factor * curve["deviation"],
+                f"error [{self._unit}]": factor * curve["error"],
             }
             curves.append(pd.DataFrame(columns))
         return {"allan": pd.concat(curves, ignore_index=True)}

@@ -173,15 +173,15 @@ class ErrorDisplay(DisplayInUnit):
         points = pd.DataFrame(
             {
                 self.position_label: self.position,
-                f"error before [{self.unit_}]": factor * self.before,
-                f"error after [{self.unit_}]": factor * self.after,
+                f"error before [{self._unit}]": factor * self.before,
+                f"error after [{self._unit}]": factor * self.after,
             }
         )
         bands = {"from": self.edges[:-1], "to": self.edges[1:]}
         bands = {f"{self.position_label}, {end}": edge for end, edge in bands.items()}
         for name, ranges in (("before", self.range_before), ("after", self.range_after)):
             for which, column in zip(("smallest", "largest"), ranges.T, strict=True):
-                bands[f"{which} error {name} [{self.unit_}]"] = factor * column
+                bands[f"{which} error {name} [{self._unit}]"] = factor * column
         return {"points": points, "bands": pd.DataFrame(bands)}
 
 

@@ -144,8 +144,8 @@ class GroupResidualDisplay(DisplayInUnit):
         factor = self._factor
         columns = {
             "group": self.groups,
-            f"RMS error before [{self.unit_}]": factor * self.before,
-            f"RMS error after [{self.unit_}]": factor * self.after,
+            f"RMS error before [{self._unit}]": factor * self.before,
+            f"RMS error after [{self._unit}]": factor * self.after,
         }
         return {"groups": pd.DataFrame(columns)}
 

@@ -176,7 +176,7 @@ class HysteresisDisplay(DisplayInUnit):
         columns = {"temperature [degC]": self.temperature}
         for name, branches in (("before", self.before), ("after", self.after)):
             for branch, values in zip(("warming", "cooling"), branches, strict=True):
-                columns[f"bias {name}, {branch} [{self.unit_}]"] = factor * values
+                columns[f"bias {name}, {branch} [{self._unit}]"] = factor * values
         return {"bias": pd.DataFrame(columns)}
 
 

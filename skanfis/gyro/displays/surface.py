@@ -151,7 +151,7 @@ class ResidualSurfaceDisplay(DisplayInUnit):
         edges = {"temperature [degC]": self.temperature_edges, "true rate [deg/s]": self.rate_edges}
         values = {
             "rows": self.counts,
-            f"mean error after [{self.unit_}]": self._factor * self.residual,
+            f"mean error after [{self._unit}]": self._factor * self.residual,
         }
         return {"cells": cells_table(edges, values)}
 
