@@ -1,6 +1,6 @@
 """Intervals that were promised to cover 90 %: how often they do, and how wide they are.
 
-Real sets (a third left out, at most 500 rows to train on), every twentieth function of the battery,
+Real sets (a third left out, at most 500 rows to train on), every fourth function of the battery,
 and cold starts of a dozen simulated gyros at rest, thirty to train on and thirty new ones of each:
 by so few runs the mean coverage of one gyro is uncertain by 4 %. Beside the deviation alone, taken
 for normal, and the intervals of ``ConformalRegressor``, a Gaussian process (of at most 400 rows)
@@ -34,7 +34,7 @@ __all__ = ["cases", "run"]
 
 COVERAGE = 0.9
 _NORMAL = 1.6448536269514722
-_EVERY = 20
+_EVERY = 4
 _MOST_ROWS, _GP_ROWS = 500, 400
 _SEEDS = tuple(range(20, 32))
 _N_RUNS, _EVERY_ROW = 60, 12
