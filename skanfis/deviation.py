@@ -15,11 +15,21 @@ import numpy as np
 from .consequent import rule_outputs
 from .quadratic import QuadraticForm, row_products, summed_with
 
-__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "rulers"]
+__all__ = ["DerivativeRows", "DeviationTables", "inner_products", "narrowed", "rulers"]
 
 # Widths of a term that ways out of the range are measured by at the most, and the logarithm of the
 # part of the largest membership that a term has at an edge where it still counts.
 _WIDEST, _TRACE = 4.0, -40.0
+# The least share or strength in single precision. Of less, products of four are no normal numbers,
+# with which many processors calculate a hundred times as long; beside one it is no digit.
+_LEAST_SHARE = 1e-9
+
+
+def narrowed(shares, dtype):
+    """Shares or strengths in some precision, none of them too small for it."""
+    if dtype == np.float64:
+        return shares
+    return np.maximum(shares, _LEAST_SHARE, dtype=dtype, casting="same_kind")
 
 
 def rulers(model):
@@ -232,7 +242,7 @@ class DerivativeRows:
         columns = np.concatenate([[0], 1 + inputs]) if model.order == 1 else [0]
         is_narrow = tables is not None and tables.is_narrow
         dtype = tables.dtype if is_narrow else np.float64
-        shares = shares.astype(dtype, copy=False)
+        shares = narrowed(shares, dtype)
         outputs, by_term = [], []
         for k, one in enumerate(model.coefficients[:, columns].transpose(2, 0, 1)):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
@@ -283,8 +293,8 @@ class DerivativeRows:
             return self
         return replace(
             self,
-            strengths=self.strengths.astype(dtype),
-            shares=self.shares.astype(dtype),
+            strengths=narrowed(self.strengths, dtype),
+            shares=narrowed(self.shares, dtype),
             basis=self.basis.astype(dtype),
         )
 

@@ -34,7 +34,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import blas
 
-from .deviation import inner_products
+from .deviation import inner_products, narrowed
 from .gram import pair_index
 from .quadratic import QuadraticForm, row_products
 
@@ -178,7 +178,7 @@ class Face:
         """
         dtype, n_rows = self.joint.dtype, row.basis.shape[1]
         kept = [row.shares[part] for part in self.shares]
-        shares = np.concatenate(kept or [np.empty((0, n_rows))]).astype(dtype, copy=False)
+        shares = narrowed(np.concatenate(kept or [np.empty((0, n_rows))]), dtype)
         shifts = None if ways is None else STEP * ways[self.basis]
         basis = row.basis[self.basis] if shifts is None else row.basis[self.basis] - shifts
         basis = basis.astype(dtype)
@@ -217,7 +217,7 @@ class Face:
     def _add_own(self, k, row, chi, turned, weights, both):
         """What derivatives by the terms that vary add, at one step inside and to the change."""
         of_terms = np.concatenate([own for _, own in self.terms])
-        shares = row.shares[of_terms].astype(chi.dtype)
+        shares = narrowed(row.shares[of_terms], chi.dtype)
         sums = _sides(self.by_term[k], chi, turned, weights)
         for own_sums, part in zip(sums, both, strict=True):
             by_term = own_sums[:-1] - shares * own_sums[-1]

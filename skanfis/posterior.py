@@ -39,7 +39,7 @@ from scipy.special import ndtr
 
 from .antecedent import Antecedent
 from .consequent import NormalFactor
-from .deviation import DerivativeRows, DeviationTables
+from .deviation import DerivativeRows, DeviationTables, narrowed
 from .objective import Evaluation, SeparableProblem
 from .outside import Outside
 from .premise import Premise
@@ -239,7 +239,7 @@ class Posterior:
 
     def _within(self, model, Z, tables):
         row, unit = self._row(model, Z, tables), tables.unit
-        shares, basis = (one.astype(tables.dtype, copy=False) for one in (row.shares, row.basis))
+        shares, basis = narrowed(row.shares, tables.dtype), row.basis.astype(tables.dtype)
         square = tables.form.values(shares, basis)
         np.maximum(square, 0.0, out=square)
         square += 1.0

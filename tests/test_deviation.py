@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skanfis.deviation import DerivativeRows, DeviationTables
+from skanfis.deviation import DerivativeRows, DeviationTables, narrowed
 from skanfis.quadratic import QuadraticForm
 
 
@@ -54,3 +54,14 @@ def test_squares_without_weak_halves_are_off_by_no_more_than_was_asked(n_added, 
         assert (np.abs(wrong) * weights[k]).max() <= tol
         assert_allclose(np.average(wrong, weights=weights[k]), 0.0, atol=1e-12)
     assert_allclose(half, joint[1] @ design)
+
+
+def test_narrow_shares_are_normal_numbers_and_so_are_products_of_four(rng):
+    shares = 10.0 ** rng.uniform(-300.0, 0.0, (6, 200))
+    shares[0] = 1.0
+    assert narrowed(shares, np.float64) is shares
+    narrow = narrowed(shares, np.float32)
+    assert narrow.dtype == np.float32
+    assert (narrow**4 >= np.finfo(np.float32).tiny).all()
+    # Beside a sum of one, what was added is no digit.
+    np.testing.assert_allclose(narrow, shares, rtol=1e-7, atol=np.finfo(np.float32).eps / 50)
