@@ -27,7 +27,7 @@ _LEAST_SHARE = 1e-9
 
 def narrowed(shares, dtype):
     """Shares or strengths in some precision, none of them too small for it."""
-    if dtype == np.float64:
+    if shares.dtype == dtype:
         return shares
     return np.maximum(shares, _LEAST_SHARE, dtype=dtype, casting="same_kind")
 

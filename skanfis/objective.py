@@ -55,6 +55,9 @@ __all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "S
 _TINY = float(np.finfo(float).tiny)
 # A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
 _SMALLEST_FREEDOM = 1e-6
+# Columns up to which a product with an inverse is quicker than solving for every row; to invert
+# more takes as long, and memory.
+_MOST_INVERTED = 512
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
 # a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
 _BLOCK_BYTES = 2**22
@@ -441,8 +444,11 @@ class SeparableProblem:
     def _half_at(self, evaluation, strengths, basis_rows):
         """L^-1 phi of some places."""
         design = (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
+        factor = evaluation.normal.factor
+        if self.n_columns > _MOST_INVERTED:
+            return factor.half_solve(self.local.transform_rows(design))
         # L^-1 T': what is changed is a matrix of few rows, and not the design.
-        return self.local.to_global(evaluation.normal.factor.root.T).T @ design
+        return self.local.to_global(factor.root.T).T @ design
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""

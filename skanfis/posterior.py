@@ -239,7 +239,8 @@ class Posterior:
 
     def _within(self, model, Z, tables):
         row, unit = self._row(model, Z, tables), tables.unit
-        shares, basis = narrowed(row.shares, tables.dtype), row.basis.astype(tables.dtype)
+        shares = narrowed(row.shares, tables.dtype)
+        basis = row.basis.astype(tables.dtype, copy=False)
         square = tables.form.values(shares, basis)
         np.maximum(square, 0.0, out=square)
         square += 1.0

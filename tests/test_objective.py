@@ -397,7 +397,9 @@ def test_residuals_are_those_of_the_dense_design(case):
 
 
 @pytest.mark.parametrize("name", ["grid of both", "scattered bells", "grid, order 0, outputs"])
-def test_leverage_and_mean_squares_are_those_of_the_dense_design(name):
+@pytest.mark.parametrize("most_inverted", [0, 512])
+def test_leverage_and_mean_squares_are_those_of_the_dense_design(monkeypatch, name, most_inverted):
+    monkeypatch.setattr("skanfis.objective._MOST_INVERTED", most_inverted)
     case = Case.named(name, FULL)
     evaluation = case.problem.evaluate(case.point)
     matrix, phi = case.dense.residual_matrix(case.point), case.dense.design(case.point)
