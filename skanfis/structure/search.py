@@ -59,27 +59,20 @@ class StructureSearch:
 
     Parameters
     ----------
-    rows : StandardisedData
-        The rows that the final model will be trained on.
-    families : sequence of type of Membership
-        One per input.
-    order : {0, 1}
-    premise_inputs, consequent_inputs : ndarray of int
-        The inputs that may have terms, and those that the consequents are linear in.
-    seed : int or RandomState
-        Of the clustering.
-    fixed : dict
-        The weights of the penalty that are given, by their names in ``evidence.FREE``.
-    overlap : float
-        Membership at which neighbouring terms of a grid cross.
+    rows, families, order, consequent_inputs, seed, fixed, overlap, split
+        As ``trials.Trials`` takes them.
+    premise_inputs : ndarray of int
+        The inputs that may have terms, where they vary.
     other_families : sequence of type of Membership
         For all inputs in place of ``families``, tried on the structure that is found.
     max_rules : int, optional
         Most rules of a candidate. Where it is not given, the number of consequent parameters is
         bounded too.
-    split : callable
-        From the groups of some rows to training and held-out positions of every fold; none where
-        the groups say nothing.
+
+    Attributes
+    ----------
+    trials : Trials
+        What is known of the candidates.
     """
 
     def __init__(
