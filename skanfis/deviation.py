@@ -21,7 +21,8 @@ __all__ = ["DerivativeRows", "DeviationTables", "inner_products", "narrowed", "r
 # part of the largest membership that a term has at an edge where it still counts.
 _WIDEST, _TRACE = 4.0, -40.0
 # The least share or strength in single precision. Of less, products of four are no normal numbers,
-# with which many processors calculate a hundred times as long; beside one it is no digit.
+# with which some processors take so long that a whole prediction with its deviation takes up to
+# three times as long (benchmarks/deviation.py, 6 x 6 terms); beside one it is no digit.
 _LEAST_SHARE = 1e-9
 
 

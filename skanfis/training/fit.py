@@ -213,7 +213,7 @@ class _Fit:
         if self.was_stopped(run):
             return run
         given = self.request.weights
-        first = _freed(rows, start) if start.is_free else start.antecedent
+        first = _as_tuned(rows, start) if start.is_free else start.antecedent
         if "stiffness" not in given and not has_idle_term(rows, first):
             run = self.without_idle_terms(rows, run)
         if "agreement" not in given and not start.is_apart:
@@ -459,7 +459,7 @@ def _premise(rows: StandardisedData, start: Start) -> Premise:
     return Premise.of(start.antecedent, low, high, start.is_free)
 
 
-def _freed(rows: StandardisedData, start: Start) -> Antecedent:
+def _as_tuned(rows: StandardisedData, start: Start) -> Antecedent:
     """The rule base with its premises where tuning has found them."""
     premise = _premise(rows, start)
     x = np.zeros(premise.size) if start.displacement is None else start.displacement

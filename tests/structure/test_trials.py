@@ -143,3 +143,39 @@ def test_score_counts_rows_by_weight_and_all_outputs(rng):
         expected = times.sum() * 2 * np.log(worth * found.error(candidate) ** 2)
         assert_allclose(score, expected, rtol=1e-12)
     assert {tuned.is_apart for tuned in found._found.values()} == {True, False}
+
+
+def test_training_goes_on_from_what_told_the_promise(rng, monkeypatch):
+    X = inputs(rng, 120, 1)
+    found, candidate = search_of(X, np.sin(3.0 * X[:, 0])), Candidate((3,))
+    steps, tune = [], trials.tune
+
+    def noting(problem, premise, free, n_rows, turns, first_steps, *args, **more):
+        steps.append((turns, first_steps, problem.penalty))
+        return tune(problem, premise, free, n_rows, turns, first_steps, *args, **more)
+
+    monkeypatch.setattr(trials, "tune", noting)
+    assert found.promising([candidate]) == [candidate]
+    found.leading([candidate], candidate)
+    (_, before, start), (turns, after, at), *_ = steps
+    assert (before, turns, before + after) == (2, 1, tuning.FIRST_STEPS)
+    assert start == tuning.FIRST_PENALTY != at
+
+
+def test_a_loose_training_that_leaves_the_noise_ends_with_its_first_turn(rng, monkeypatch):
+    X = inputs(rng, 200, 1)
+    found = search_of(X, X[:, 0] ** 2 + 0.3 * rng.standard_normal(200))
+    best = Candidate((2,))
+    found.tuned(best)
+    train, turns = found.train, []
+    monkeypatch.setattr(
+        found, "train", lambda *args, **more: turns.append(args[2:]) or train(*args, **more)
+    )
+    assert found.loosely(best) is None
+    assert turns == [(1,)]
+    # What one does find, where data are exact, is trained out and scored.
+    x = 0.25 * rng.normal(size=(93, 1)) + rng.choice([-1.0, 0.0, 1.2], (93, 1))
+    exact = search_of(x, np.exp(-2.0 * (x[:, 0] - 0.3) ** 2))
+    loose = exact.loosely(Candidate((5,)))
+    assert loose == Candidate((5,), is_loose=True)
+    assert exact.scores[loose] < exact.score(Candidate((5,)))
