@@ -1,7 +1,12 @@
-"""Three problems of Jang 1993; defaults but for ``n_mfs`` and ``mf``."""
+"""Three problems of Jang 1993; defaults but for ``n_mfs`` and ``mf``.
+
+Mackey-Glass once more with the cost that Jang has, squared error alone: it fits the training rows
+closer, and the rows that check it no better.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -38,9 +43,11 @@ class Problem:
     unit: str
     bars: tuple
     aims: tuple
+    penalty: tuple[tuple[str, Any], ...] = ()  # weights that are not found by the evidence
 
     def fit(self, mf=None):
-        return ANFISRegressor(n_mfs=self.n_mfs, mf=mf or self.mf).fit(*self.train)
+        weights = dict(self.penalty)
+        return ANFISRegressor(n_mfs=self.n_mfs, mf=mf or self.mf, **weights).fit(*self.train)
 
     def errors(self, model):
         return self.error(model, *self.train), self.error(model, *self.check)
@@ -100,14 +107,19 @@ PROBLEMS = [
         aims=(0.0010, 0.0022),
     ),
 ]
+SQUARED_ERROR_ALONE = replace(
+    PROBLEMS[-1],
+    name="Mackey-Glass, 16 rules, squared error alone",
+    penalty=(("agreement", 0.0), ("alpha", 0.0)),
+)
 
 
 def run(options):
-    lines = []
-    for problem in PROBLEMS:
+    lines, problems = [], [*PROBLEMS, SQUARED_ERROR_ALONE]
+    for problem in problems:
         for mf in ("gaussian", "bell"):
             seconds, model = best_of(lambda problem=problem, mf=mf: problem.fit(mf))
             lines.append([problem.name, mf, *problem.errors(model), model.n_iter_, seconds])
     head = ["problem", "mf", "error, train", "error, check", "iterations", "CPU [s]"]
     table = Table("Jang's problems with either membership", head, lines)
-    return Results([problem.row() for problem in PROBLEMS], [table])
+    return Results([problem.row() for problem in problems], [table])

@@ -36,12 +36,10 @@ _RULES_OF_MANY = 3
 _MOST_OF_MANY = 1000
 # More names for one input nobody reads.
 _MOST_TERMS = 6
-# After each round, so many inputs stay in the running for a further term.
-_MOST_GROWING = 8
 # Of those that are tried in a round, so many are trained: the most promising at their start.
 _MOST_TRAINED = 3
-# More inputs than this are screened before terms are tried on them.
-_MOST_UNSCREENED = 16
+# More inputs than this are screened before terms are tried on them, and so many are left.
+_MOST_UNSCREENED, _SCREENED = 16, 8
 # Of k-means and fuzzy c-means: each about half as many again.
 _RULE_NUMBERS = (2, 3, 5, 8, 12)
 # Of subtractive clustering in one input and target, from few clusters to many.
@@ -130,7 +128,8 @@ class StructureSearch:
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
-            inputs = [grown[candidate] for candidate in small[:_MOST_GROWING]]
+            # In the order of promise; one that promises little now may do so beside others' terms.
+            inputs = [grown[candidate] for candidate in small]
             grown_best = trials.leading(small[: self._n_trained(small[0])], best)
             if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best
@@ -144,7 +143,7 @@ class StructureSearch:
             return list(self.inputs)
         centers = np.array([self.trials.spacing.centers(j, 2) for j in self.inputs])
         asked = residual_asks_for(self.trials.tuned(linear), self.inputs, centers, self.overlap)
-        return [int(j) for j in self.inputs[np.argsort(-asked, kind="stable")[:_MOST_GROWING]]]
+        return [int(j) for j in self.inputs[np.argsort(-asked, kind="stable")[:_SCREENED]]]
 
     @staticmethod
     def _with_one_more(candidate, j):

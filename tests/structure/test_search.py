@@ -17,6 +17,7 @@ from skanfis.membership import TRIED_FAMILIES, Gaussian
 from skanfis.solvers import VariableProjection
 from skanfis.structure import search, tuning
 from skanfis.structure.candidate import Candidate
+from skanfis.structure.trials import Trials
 
 pytestmark = pytest.mark.theory
 
@@ -228,12 +229,23 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
 def test_of_many_inputs_those_that_matter_are_found(rng, monkeypatch):
     X = inputs(rng, 300, 12)
     y = np.sin(3.0 * X[:, 7]) + np.abs(X[:, 2]) + 0.05 * rng.standard_normal(300)
-    monkeypatch.setattr(search, "_MOST_GROWING", 3)
+    rounds, promising = [], Trials.promising
+
+    def noting(self, candidates):
+        rounds.append(promising(self, candidates))
+        return rounds[-1]
+
+    monkeypatch.setattr(Trials, "promising", noting)
     model = ANFISRegressor(partition="grid").fit(X, y)
     counts = terms_per_input(model, 12)
     assert [j for j, count in enumerate(counts) if count > 1] == [2, 7]
     # The linear model; in every round no more are trained than look promising.
     assert all((count - 1) <= search._MOST_TERMS for count in counts)
+    # None is given up for what it promises in a round: beside others' terms it may do better.
+    for tried in rounds[:3]:
+        counts = np.array([candidate.counts for candidate in tried])
+        grown = np.argmax(counts - counts.min(axis=0), axis=1)
+        assert_array_equal(np.sort(grown), np.arange(12))
 
 
 def test_screened_inputs_hold_those_that_matter(monkeypatch):
@@ -248,7 +260,7 @@ def test_screened_inputs_hold_those_that_matter(monkeypatch):
 
     monkeypatch.setattr(search.StructureSearch, "_screened", noting)
     model = ANFISRegressor(partition="grid").fit(X, y)
-    assert len(kept) == search._MOST_GROWING < 40
+    assert len(kept) == search._SCREENED < 40
     assert {0, 1, 2} <= set(kept)
     with_terms = {int(term["input"].removeprefix("x")) for term in model.memberships_}
     assert 2 in with_terms
@@ -276,7 +288,7 @@ def test_screening_is_by_correlations_of_weighted_rows(rng):
         w -= np.average(w, weights=s)
         parts = [(s * w * b) @ r / np.sqrt(s @ (w * b) ** 2) for b in basis.T]
         statistic.append(np.sum(np.square(parts)))
-    best = np.argsort(statistic)[::-1][: search._MOST_GROWING]
+    best = np.argsort(statistic)[::-1][: search._SCREENED]
     assert found._screened(linear) == list(best)
 
 
