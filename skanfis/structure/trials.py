@@ -49,7 +49,7 @@ _STEPS_TO_PROMISE = 2
 # Turns of weights and premises of a candidate; after the first of them, those whose expected error
 # is beyond the best one's by this factor are left as they are.
 _TURNS, _FIRST_TURNS = 4, 1
-_BEHIND = 1.25
+_BEHIND = 1.15
 # But where less than this is left of the target's variance, premises have a long way to go, and the
 # first turn says little of the last.
 _NEARLY_EXACT = 0.01
