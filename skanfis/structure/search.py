@@ -128,7 +128,7 @@ class StructureSearch:
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
-            # In the order of promise; one that promises little now may do so beside others' terms.
+            # One that promises little now may promise more beside others' terms.
             inputs = [grown[candidate] for candidate in small]
             grown_best = trials.leading(small[: self._n_trained(small[0])], best)
             if not self._is_better(grown_best, best, of=self.inputs.size):
