@@ -8,7 +8,6 @@ import argparse
 import sys
 
 import numpy as np
-from sklearn.model_selection import KFold
 
 from skanfis import ANFISRegressor
 
@@ -30,7 +29,7 @@ def data_sets():
 def ratio(X, y, seed):
     """Error of five folds over that of the best rival."""
     squares = {name: [] for name in (*BEST_OF, "own")}
-    for train, test in KFold(5, shuffle=True, random_state=seed).split(X):
+    for train, test in real_sets.folds(X, seed):
         models = {name: fitted_rival(name, X[train], y[train])[0] for name in BEST_OF}
         models["own"] = ANFISRegressor().fit(X[train], y[train])
         for name, model in models.items():

@@ -113,8 +113,8 @@ def data_sets():
         yield real_set.name, *load(real_set)
 
 
-def folds(X):
-    return KFold(5, shuffle=True, random_state=0).split(X)
+def folds(X, seed=0):
+    return KFold(5, shuffle=True, random_state=seed).split(X)
 
 
 def rival_figures(name, X, y):

@@ -123,13 +123,12 @@ class StructureSearch:
         trials, inputs = self.trials, self._screened(best)
         trials.score(best)
         while True:
-            grown = {self._with_one_more(best, j): j for j in inputs}
+            # One that promises little now may promise more beside others' terms: none is dropped.
+            grown = [self._with_one_more(best, j) for j in inputs]
             trials.parent = trials.tuned(best)
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
-            # One that promises little now may promise more beside others' terms.
-            inputs = [grown[candidate] for candidate in small]
             grown_best = trials.leading(small[: self._n_trained(small[0])], best)
             if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best

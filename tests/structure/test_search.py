@@ -239,8 +239,6 @@ def test_of_many_inputs_those_that_matter_are_found(rng, monkeypatch):
     model = ANFISRegressor(partition="grid").fit(X, y)
     counts = terms_per_input(model, 12)
     assert [j for j, count in enumerate(counts) if count > 1] == [2, 7]
-    # The linear model; in every round no more are trained than look promising.
-    assert all((count - 1) <= search._MOST_TERMS for count in counts)
     # None is given up for what it promises in a round: beside others' terms it may do better.
     for tried in rounds[:3]:
         counts = np.array([candidate.counts for candidate in tried])
