@@ -31,7 +31,7 @@ from .antecedent import Antecedent
 from .consequent import rule_outputs
 from .leaving import sorted_by_face
 from .naming import default_output_names, default_term_names
-from .policies import MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
+from .policies import FARTHEST, MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 from .target import TargetRange
@@ -312,12 +312,31 @@ class TSKModel:
         return text
 
     def with_out_of_bounds(self, policy, max_extrapolation=None) -> Self:
-        """Return the same model with another policy; the limit stays where None is given."""
+        """Return the same model with another policy; the limit stays where None is given.
+
+        "auto" is how far the data speak for the tangent.
+        """
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
+        check_policy(policy, limit)
+        if limit == "auto":
+            limit = self._supported_extrapolation
         if policy == self.out_of_bounds and limit == self.max_extrapolation:
             return self
-        check_policy(policy, limit)
         return replace(self, out_of_bounds=policy, max_extrapolation=float(limit))
+
+    @cached_property
+    def _supported_extrapolation(self):
+        """How far the data speak for the tangent; the limit as it is where they are not known.
+
+        A line that leaves an n-th of the target bends, for all that is known, by no more of it.
+        """
+        if self.posterior is None or self.target is None:
+            return self.max_extrapolation
+        if self.n_rules > 1:
+            return MAX_EXTRAPOLATION
+        spread = self.target.spread
+        of_noise = spread / np.maximum(self.posterior.noise, spread / FARTHEST)
+        return max(float(f"{of_noise.min():.3g}"), MAX_EXTRAPOLATION)
 
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).

@@ -7,12 +7,11 @@ the word ``"huber"``, which has no settings.
 
 import math
 from numbers import Integral, Real
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from sklearn.base import BaseEstimator
 
-from ._sklearn import Interval
-from .policies import MAX_EXTRAPOLATION
+from ._sklearn import Interval, StrOptions
 
 __all__ = ["EarlyStopping", "Huber", "LinearExtrapolation", "policy_of"]
 
@@ -109,12 +108,17 @@ class LinearExtrapolation(BaseEstimator):
 
     Parameters
     ----------
-    max_extrapolation : float, default=0.5
+    max_extrapolation : float or "auto", default="auto"
         How far the tangent is followed beyond the range of an input, in standard deviations of that
         input in the training data: zero or positive. The value reached there is held. 0 holds the
         value at the edge, as "clip" does; ``math.inf`` is the tangent without end. Outputs are
         held as many standard deviations of the target, or half a one where that is more, beyond
         its range.
+
+        "auto" is half a one where there are several rules: what bends among the data may bend
+        beyond them. A single rule is a line, and is followed the further the less it leaves of
+        the target: for as many standard deviations as those of the target are of the noise
+        (``noise_std_``), from half a one to a hundred, of several outputs the least of all.
 
     See Also
     --------
@@ -134,14 +138,14 @@ class LinearExtrapolation(BaseEstimator):
     """
 
     _parameter_constraints: ClassVar[dict] = {
-        "max_extrapolation": [Interval(Real, 0, math.inf, closed="both")],
+        "max_extrapolation": [Interval(Real, 0, math.inf, closed="both"), StrOptions({"auto"})],
     }
 
-    def __init__(self, max_extrapolation: float = MAX_EXTRAPOLATION) -> None:
+    def __init__(self, max_extrapolation: float | Literal["auto"] = "auto") -> None:
         self.max_extrapolation = max_extrapolation
 
 
-def policy_of(out_of_bounds: "str | LinearExtrapolation") -> tuple[str, float]:
+def policy_of(out_of_bounds: "str | LinearExtrapolation") -> tuple[str, float | str]:
     """Give ``out_of_bounds`` and ``max_extrapolation`` of a model for the parameter of that name.
 
     Parameters
@@ -151,15 +155,15 @@ def policy_of(out_of_bounds: "str | LinearExtrapolation") -> tuple[str, float]:
 
     Returns
     -------
-    policy : tuple of str and float
+    policy : tuple of str and float or "auto"
         What ``with_out_of_bounds`` of a TSKModel takes.
 
     Examples
     --------
     >>> from skanfis.options import LinearExtrapolation, policy_of
     >>> policy_of(LinearExtrapolation(1.5)), policy_of("clip")
-    (('linear', 1.5), ('clip', 0.5))
+    (('linear', 1.5), ('clip', 'auto'))
     """
     if isinstance(out_of_bounds, LinearExtrapolation):
         return "linear", out_of_bounds.max_extrapolation
-    return out_of_bounds, MAX_EXTRAPOLATION
+    return out_of_bounds, "auto"

@@ -4,6 +4,7 @@ import math
 from numbers import Real
 
 __all__ = [
+    "FARTHEST",
     "MAX_EXTRAPOLATION",
     "OUT_OF_BOUNDS",
     "SILENT",
@@ -15,8 +16,10 @@ __all__ = [
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # Those that answer nothing.
 SILENT = ("nan", "raise")
-# How far the tangent is followed by default, in standard deviations of each input.
-MAX_EXTRAPOLATION = 0.5
+# How far the tangent is followed by default, in standard deviations of each input; and at most, by
+# a line that leaves nothing of the target: no more than a row in 10,000 is that far from its mean
+# (Chebyshev).
+MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 
 
 def policy_in_words(policy: str, max_extrapolation: float) -> str:
@@ -35,13 +38,14 @@ def policy_in_words(policy: str, max_extrapolation: float) -> str:
 
 
 def check_policy(policy, max_extrapolation):
-    """Raise ValueError where there is no such policy, or its limit is no number from zero on."""
+    """Raise ValueError where there is no such policy, or no such limit."""
     if policy not in OUT_OF_BOUNDS:
         raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
-    if not (isinstance(max_extrapolation, Real) and float(max_extrapolation) >= 0.0):
+    is_distance = isinstance(max_extrapolation, Real) and float(max_extrapolation) >= 0.0
+    if not is_distance and max_extrapolation != "auto":
         raise ValueError(
             f"max_extrapolation={max_extrapolation!r} must be a number, zero or positive, or "
-            "infinite."
+            "infinite, or 'auto'."
         )
 
 

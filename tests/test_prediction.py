@@ -10,9 +10,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
 
+from skanfis import ANFISRegressor
 from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.export import export_json
+from skanfis.export.json_reader import parse_json
 from skanfis.options import LinearExtrapolation
-from skanfis.policies import MAX_EXTRAPOLATION
+from skanfis.policies import FARTHEST, MAX_EXTRAPOLATION
 
 from . import oracles
 from .quick import quick
@@ -134,6 +137,69 @@ def test_array_in_place_of_the_frame_is_warned_of(trained):
     with pytest.warns(UserWarning, match="valid feature names"):
         found = trained.predict(X)
     assert_array_equal(found, trained.predict(FRAME))
+
+
+def accounts(rng, noise, n_rows=200):
+    """Four long-tailed items, and a total of them."""
+    X = rng.lognormal(sigma=1.0, size=(n_rows, 4))
+    return X, X @ [1.0, 2.0, 0.5, 1.5] + noise * rng.normal(size=n_rows)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_line_is_followed_far_where_it_leaves_little(rng):
+    """Accounts that add up do so beyond the largest that was seen as well."""
+    X, y = accounts(rng, noise=0.0)
+    model = ANFISRegressor().fit(X, y)
+    assert model.n_rules_ == 1
+    assert model.model_.max_extrapolation == FARTHEST
+    far = X.max(axis=0) + 90.0 * X.std(axis=0) * np.eye(4)
+    assert_allclose(model.predict(far), far @ [1.0, 2.0, 0.5, 1.5], rtol=1e-6)
+    farther = X.max(axis=0) + 1e9
+    assert model.predict(farther[None]) <= y.max() + FARTHEST * y.std()
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.parametrize("noise", [0.2, 3.0])
+def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(rng, noise):
+    X, y = accounts(rng, noise)
+    model = ANFISRegressor(n_mfs=1).fit(X, y)
+    limit = model.model_.max_extrapolation
+    assert limit == pytest.approx(y.std() / model.noise_std_, rel=5e-3)
+    # The noise that was planted, to what 200 rows tell of it.
+    assert limit == pytest.approx(y.std() / noise, rel=0.15)
+    edge = X.max(axis=0)
+    for way in (0.9 * limit, 5.0 * limit):
+        expected = oracles.held_tangent(model.model_, edge[None] + way * X.std(axis=0), limit)
+        held = min(expected[0, 0], y.max() + limit * y.std())
+        found = model.predict(edge[None] + way * X.std(axis=0))
+        assert_allclose(found, held, rtol=1e-6)
+
+
+def test_distance_of_a_line_is_the_least_of_its_outputs_and_kept_in_files(rng):
+    X, y = accounts(rng, noise=0.5)
+    Y = np.column_stack([y, y + 5.0 * rng.normal(size=y.size)])
+    model = ANFISRegressor(n_mfs=1).fit(X, Y)
+    assert model.model_.max_extrapolation == pytest.approx(
+        np.min(Y.std(axis=0) / model.noise_std_), rel=5e-3
+    )
+    frozen = parse_json(export_json(model.model_))
+    again = ANFISRegressor(partition=frozen, max_iter=0).fit(X, Y)
+    assert again.model_.max_extrapolation == frozen.max_extrapolation
+    assert frozen.max_extrapolation == model.model_.max_extrapolation
+
+
+def test_several_rules_are_followed_half_a_deviation(trained):
+    assert trained.n_rules_ > 1
+    assert trained.model_.max_extrapolation == MAX_EXTRAPOLATION
+
+
+def test_line_learnt_in_chunks_is_followed_as_one_learnt_at_once(rng):
+    X, y = accounts(rng, noise=0.5)
+    whole = ANFISRegressor(n_mfs=1).fit(X, y).model_.max_extrapolation
+    model = ANFISRegressor(n_mfs=1)
+    for rows in (slice(0, 120), slice(120, None)):
+        model.partial_fit(X[rows], y[rows])
+    assert model.model_.max_extrapolation == pytest.approx(whole, rel=1e-2)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -38,7 +39,7 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    max_extrapolation: float = LinearExtrapolation().max_extrapolation
+    max_extrapolation: float | Literal["auto"] = LinearExtrapolation().max_extrapolation
     time_constant: float = 30.0
     min_coverage: float = 0.1
     max_rules: int = 36

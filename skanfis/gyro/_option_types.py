@@ -75,7 +75,10 @@ def positive(text):
 
 
 def extent(text):
-    return _number(text, float, lambda value: value >= 0, "a number, zero or positive, or inf")
+    if text == "auto":
+        return text
+    what = "a number, zero or positive, or inf, or auto"
+    return _number(text, float, lambda value: value >= 0, what)
 
 
 def seconds(text):

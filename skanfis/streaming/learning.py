@@ -1,7 +1,6 @@
 """What an estimator gains by keeping sums over its rows: partial_fit and merge."""
 
 from copy import copy
-from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -195,8 +194,7 @@ class LearnsFromChunksMixin:
     def _learn_from(self, stream):
         """The model of a stream."""
         solved = stream.solved(given_weights(self))
-        policy, limit = policy_of(self.out_of_bounds)
-        self.model_ = replace(solved.model, out_of_bounds=policy, max_extrapolation=limit)
+        self.model_ = solved.model.with_out_of_bounds(*policy_of(self.out_of_bounds))
         self.n_iter_ = 1
         self.loss_curve_ = np.full(2, solved.mean_squared_error)
         self.status_ = MESSAGES["no_premise"]

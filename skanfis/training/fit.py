@@ -25,7 +25,7 @@ from ..constraints.exchange import constrained
 from ..data import StandardisedData
 from ..model import TSKModel
 from ..objective import SeparableProblem
-from ..options import EarlyStopping, Huber
+from ..options import EarlyStopping, Huber, policy_of
 from ..posterior import Posterior, effective_premises
 from ..premise import Premise
 from ..sampling import is_many, with_sample
@@ -400,6 +400,7 @@ class _Fit:
     def sure(self, fitted, run, robust) -> Fitted:
         """The same with a posterior, and with what is known kept, and proven to be."""
         model = replace(fitted.model, posterior=self.posterior(run, robust))
+        model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
         fitted = replace(fitted, model=model)
         return fitted if self.data.wishes is None else self.constrained(fitted, run)
 

@@ -47,8 +47,7 @@ class ModelBuilder:
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
         support = RuleSupport.of(rows, trained, self.n_coefficients, firing)
-        policy, limit = policy_of(self.out_of_bounds)
-        return TSKModel(
+        model = TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),
             coefficients=self.in_user_units(evaluation.coefficients),
@@ -59,13 +58,12 @@ class ModelBuilder:
             rule_weights=evaluation.masses,
             rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
             input_names=self.data.input_names,
-            out_of_bounds=policy,
-            max_extrapolation=limit,
             support=support.change_units(offset, scale),
             term_names=start.term_names,
             output_names=self.data.output_names,
             target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
         )
+        return model.with_out_of_bounds(*policy_of(self.out_of_bounds))
 
     def in_user_units(self, coefficients):
         """Consequents about the inputs' means, from those on [1, z] of standardised data."""
@@ -89,14 +87,11 @@ def as_given(estimator, data, model) -> Fitted:
             f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}: with "
             "max_iter=0 the model is taken as it is."
         )
-    policy, limit = policy_of(estimator.out_of_bounds)
     model = replace(
-        model,
+        model.with_out_of_bounds(*policy_of(estimator.out_of_bounds)),
         initial_antecedent=model.antecedent,
         input_names=data.input_names,
         output_names=data.output_names,
-        out_of_bounds=policy,
-        max_extrapolation=limit,
     )
     rows = StandardisedData.of(data.X, data.y, data.sample_weight)
     # Rows beyond the model's range count as they are predicted, or where that is not at all, held.

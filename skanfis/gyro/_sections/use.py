@@ -14,7 +14,8 @@ def limits_of_use(page, results):
     page.section("Where it may be used")
     policy = "no rate is given"
     if recipe.outside != "nan":
-        policy = policy_in_words(recipe.outside, recipe.max_extrapolation)
+        found = calibration.rules[-1].model_.max_extrapolation
+        policy = policy_in_words(recipe.outside, found)
     page.paragraph(
         f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
         "Inside them, rows near which there are hardly any data "
