@@ -36,7 +36,7 @@ _RULES_OF_MANY = 3
 _MOST_OF_MANY = 1000
 # More names for one input nobody reads.
 _MOST_TERMS = 6
-# Of those that are tried in a round, so many are trained: the most promising at their start.
+# Of those that are tried in a round, so many are trained.
 _MOST_TRAINED = 3
 # More inputs than this are screened before terms are tried on them, and so many are left.
 _MOST_UNSCREENED, _SCREENED = 16, 8
@@ -129,7 +129,7 @@ class StructureSearch:
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
-            grown_best = trials.leading(small[: self._n_trained(small[0])], best)
+            grown_best = trials.leading(self._worth_training(small, best), best)
             if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best
             best = grown_best
@@ -149,6 +149,23 @@ class StructureSearch:
         counts = list(candidate.counts)
         counts[j] += 1
         return replace(candidate, counts=tuple(counts))
+
+    def _worth_training(self, promising, best):
+        """The most promising, one of them with one more term where the best has several.
+
+        Such a one promises less than it keeps: the terms of that input begin anew, where those of
+        one that gives another input terms are where the best has trained them.
+        """
+        chosen = promising[: self._n_trained(promising[0])]
+        anew = [c for c in promising if self._begins_anew(c, best)]
+        if len(chosen) > 1 and anew and anew[0] not in chosen:
+            chosen[-1] = anew[0]
+        return chosen
+
+    @staticmethod
+    def _begins_anew(candidate, best):
+        pairs = zip(candidate.counts, best.counts, strict=True)
+        return any(count > before > 1 for count, before in pairs)
 
     def _n_trained(self, candidate):
         """How many of the promising candidates are trained."""

@@ -69,6 +69,19 @@ def test_only_the_input_that_bends_the_surface_gets_terms(which, rng):
     assert all(count == 1 for j, count in enumerate(counts) if j != which)
 
 
+@pytest.mark.parametrize("n_inputs", [8, 20])
+def test_exact_function_of_one_input_of_many_gets_the_terms_that_it_needs(n_inputs, rng):
+    """Two trained terms leave next to nothing, which a third, at its start, does not promise."""
+    X = np.clip(rng.standard_normal((300, n_inputs)), -2.5, 2.5)
+    X_new = np.clip(rng.standard_normal((500, n_inputs)), X.min(axis=0), X.max(axis=0))
+    model = ANFISRegressor().fit(X, np.tanh(3.0 * X[:, 0]))
+    assert terms_per_input(model, n_inputs)[0] > 2
+    assert max(terms_per_input(model, n_inputs)[1:]) == 1
+    error = model.predict(X_new) - np.tanh(3.0 * X_new[:, 0])
+    # With two terms, or some on other inputs besides, 0.001 to 0.04.
+    assert np.sqrt(np.mean(error**2)) < 5e-4
+
+
 def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
     X = inputs(rng, n_inputs=1)
     y = X[:, 0] + 0.05 * rng.standard_normal(400)
