@@ -326,14 +326,14 @@ class TSKModel:
 
     @cached_property
     def _supported_extrapolation(self):
-        """How far the data speak for the tangent; the limit as it is where they are not known.
+        """How far the data speak for the tangent; of a line, as it is where they are not known.
 
         A line that leaves an n-th of the target bends, for all that is known, by no more of it.
         """
-        if self.posterior is None or self.target is None:
-            return self.max_extrapolation
         if self.n_rules > 1:
             return MAX_EXTRAPOLATION
+        if self.posterior is None or self.target is None:
+            return self.max_extrapolation
         spread = self.target.spread
         of_noise = spread / np.maximum(self.posterior.noise, spread / FARTHEST)
         return max(float(f"{of_noise.min():.3g}"), MAX_EXTRAPOLATION)

@@ -118,7 +118,8 @@ class LinearExtrapolation(BaseEstimator):
         "auto" is half a one where there are several rules: what bends among the data may bend
         beyond them. A single rule is a line, and is followed the further the less it leaves of
         the target: for as many standard deviations as those of the target are of the noise
-        (``noise_std_``), from half a one to a hundred, of several outputs the least of all.
+        (``noise_std_``), from half a one to a hundred, of several outputs the least of all; one
+        that was read from a file, as far as the file says.
 
     See Also
     --------

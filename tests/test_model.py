@@ -356,6 +356,12 @@ def test_limit_is_checked(limit):
         frozen.with_out_of_bounds("linear", limit)
 
 
+def test_several_rules_are_followed_half_a_deviation_whatever_was_set_before():
+    far = build(grid()).with_out_of_bounds("linear", 2.0)
+    assert far.n_rules > 1
+    assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 0.5
+
+
 def test_policy_as_it_is_set():
     frozen = build(grid())
     assert frozen.policy == "out_of_bounds='clip'"
