@@ -23,6 +23,7 @@ from sklearn.model_selection import KFold
 from skanfis import ANFISRegressor
 
 from .cases import geometric_mean
+from .real_sets import in_deviations
 from .report import Results, Table, markdown
 from .rivals import BEST_OF, fitted_rival
 
@@ -103,7 +104,7 @@ def judged(X, y, has_rivals):
 
 
 def root_mean(parts, y):
-    return max(float(np.sqrt(np.mean(np.concatenate(parts)))) / y.std(), _EXACT)
+    return max(in_deviations(parts, y), _EXACT)
 
 
 def spread_of(ratios):
