@@ -74,6 +74,9 @@ class TSKModel:
         Where the training data of every rule lie; None where the model knows of none.
     posterior : Posterior or None
         What the standard deviation of a prediction needs; None where the model knows of none.
+    told_extrapolation : float or None
+        L for which the outermost training rows speak, see ``training.outermost``; None where the
+        model knows of no rows.
     term_names : tuple of str
         One per term, unique on its input; where not given, see ``naming``.
     target : TargetRange or None
@@ -99,6 +102,7 @@ class TSKModel:
     output_names: tuple[str, ...] = ()
     target: TargetRange | None = None
     posterior: Posterior | None = None
+    told_extrapolation: float | None = None
 
     def __post_init__(self):
         if not self.term_names:
@@ -326,17 +330,17 @@ class TSKModel:
 
     @cached_property
     def _supported_extrapolation(self):
-        """How far the data speak for the tangent; of a line, as it is where they are not known.
+        """How far the data speak for the tangent; as it is set where the model knows of none.
 
-        A line that leaves an n-th of the target bends, for all that is known, by no more of it.
+        So far as the outermost rows do. A line, of which these say that it goes on, bends beyond
+        them by no more than it leaves of the target, for all that is known.
         """
-        if self.n_rules > 1:
-            return MAX_EXTRAPOLATION
-        if self.posterior is None or self.target is None:
-            return self.max_extrapolation
-        spread = self.target.spread
-        of_noise = spread / np.maximum(self.posterior.noise, spread / FARTHEST)
-        return max(float(f"{of_noise.min():.3g}"), MAX_EXTRAPOLATION)
+        told, target, posterior = self.told_extrapolation, self.target, self.posterior
+        goes_on = self.n_rules == 1 and told != MAX_EXTRAPOLATION
+        if goes_on and target is not None and posterior is not None:
+            of_noise = target.spread / np.maximum(posterior.noise, target.spread / FARTHEST)
+            return max(float(f"{of_noise.min():.3g}"), told or MAX_EXTRAPOLATION)
+        return self.max_extrapolation if told is None else told
 
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).

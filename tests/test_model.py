@@ -356,10 +356,12 @@ def test_limit_is_checked(limit):
         frozen.with_out_of_bounds("linear", limit)
 
 
-def test_several_rules_are_followed_half_a_deviation_whatever_was_set_before():
+def test_auto_is_what_the_rows_told_and_what_is_set_where_there_were_none():
     far = build(grid()).with_out_of_bounds("linear", 2.0)
-    assert far.n_rules > 1
-    assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 0.5
+    assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 2.0
+    told = replace(far, told_extrapolation=3.0)
+    assert told.n_rules > 1
+    assert told.with_out_of_bounds("linear", "auto").max_extrapolation == 3.0
 
 
 def test_policy_as_it_is_set():

@@ -159,7 +159,7 @@ def test_line_is_followed_far_where_it_leaves_little(rng):
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-@pytest.mark.parametrize("noise", [0.2, 3.0])
+@pytest.mark.parametrize("noise", [0.1, 0.3])
 def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(rng, noise):
     X, y = accounts(rng, noise)
     model = ANFISRegressor(n_mfs=1).fit(X, y)
@@ -176,9 +176,10 @@ def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(
 
 
 def test_distance_of_a_line_is_the_least_of_its_outputs_and_kept_in_files(rng):
-    X, y = accounts(rng, noise=0.5)
-    Y = np.column_stack([y, y + 5.0 * rng.normal(size=y.size)])
+    X, y = accounts(rng, noise=0.1)
+    Y = np.column_stack([y, y + 0.3 * rng.normal(size=y.size)])
     model = ANFISRegressor(n_mfs=1).fit(X, Y)
+    assert model.model_.max_extrapolation > model.model_.told_extrapolation
     assert model.model_.max_extrapolation == pytest.approx(
         np.min(Y.std(axis=0) / model.noise_std_), rel=5e-3
     )
@@ -188,9 +189,16 @@ def test_distance_of_a_line_is_the_least_of_its_outputs_and_kept_in_files(rng):
     assert frozen.max_extrapolation == model.model_.max_extrapolation
 
 
-def test_several_rules_are_followed_half_a_deviation(trained):
-    assert trained.n_rules_ > 1
-    assert trained.model_.max_extrapolation == MAX_EXTRAPOLATION
+def test_line_goes_as_far_as_the_outermost_rows_tell_where_that_is_farther(rng):
+    X, y = accounts(rng, noise=0.8)
+    model = ANFISRegressor(n_mfs=1).fit(X, y)
+    assert y.std() / model.noise_std_ < model.model_.told_extrapolation
+    assert model.model_.max_extrapolation == model.model_.told_extrapolation
+
+
+def test_line_that_leaves_much_is_followed_half_a_deviation(rng):
+    X, y = accounts(rng, noise=10.0)
+    assert ANFISRegressor(n_mfs=1).fit(X, y).model_.max_extrapolation == MAX_EXTRAPOLATION
 
 
 def test_line_learnt_in_chunks_is_followed_as_one_learnt_at_once(rng):

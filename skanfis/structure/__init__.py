@@ -5,7 +5,7 @@ from .grid import Spacing, grid_antecedent
 from .imported import check_inputs, imported_antecedent
 from .readable_terms import has_idle_term
 from .request import StructureRequest, report_constant
-from .sample import SampleSize, effective_weight, representative_rows
+from .sample import SampleSize, effective_weight, representative_rows, weighted_quantile
 from .size import GridSize, term_counts
 from .start import Start
 from .terms import TermsFound, search_terms
@@ -30,5 +30,6 @@ __all__ = [
     "representative_rows",
     "search_terms",
     "term_counts",
+    "weighted_quantile",
     "with_premises",
 ]

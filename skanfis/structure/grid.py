@@ -15,7 +15,7 @@ import numpy as np
 
 from ..antecedent import GridAntecedent
 from ..data import StandardisedData
-from .sample import representative_rows
+from .sample import representative_rows, weighted_quantile
 
 __all__ = ["Spacing", "grid_antecedent"]
 
@@ -68,21 +68,13 @@ class Spacing:
 
 def _levels(column, weight):
     """Values between the outer quantiles, and G there, from 0 to 1."""
-    order = np.argsort(column, kind="stable")
-    low, high = (_quantile(column, weight, side) for side in (order, order[::-1]))
-    if low == high:
-        low, high = column[order[0]], column[order[-1]]
+    low, high = (weighted_quantile(column, weight, _EDGE, side) for side in (1, -1))
     values = np.unique(column)
+    if low == high:
+        low, high = values[[0, -1]]
     values = values[(values >= low) & (values <= high)]
     levels = np.concatenate([[0.0], np.cumsum(np.diff(values) ** _QUANTISER)])
     return values, levels / max(levels[-1], np.finfo(float).tiny)
-
-
-def _quantile(column, weight, order):
-    """The first value in this order that has ``_EDGE`` of the weight up to it."""
-    upto = np.cumsum(weight[order])
-    # From either side alike, whatever the last bit of a sum.
-    return column[order[np.searchsorted(upto, (1.0 - 1e-9) * _EDGE * upto[-1])]]
 
 
 def grid_antecedent(families, counts, spacing: Spacing, overlap):

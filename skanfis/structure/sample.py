@@ -14,7 +14,14 @@ import numpy as np
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..data import Scale, StandardisedData, fingerprint
 
-__all__ = ["ENOUGH_ROWS", "SampleSize", "representative_rows", "search_sample", "unit_scale"]
+__all__ = [
+    "ENOUGH_ROWS",
+    "SampleSize",
+    "representative_rows",
+    "search_sample",
+    "unit_scale",
+    "weighted_quantile",
+]
 
 # More rows than this tell a clustering nothing new.
 _MOST_ROWS = 20_000
@@ -91,6 +98,14 @@ def representative_rows(rows: StandardisedData, most=_MOST_ROWS):
     table = rows.table(distinct)
     order = np.lexsort(table.T[::-1])
     return table[order], weight[order], distinct[order]
+
+
+def weighted_quantile(column, weight, part, side):
+    """The first value, from below (side 1) or above (-1), with a part of the weight up to it."""
+    order = np.argsort(column, kind="stable")[::side]
+    upto = np.cumsum(weight[order])
+    # From either side alike, whatever the last bit of a sum.
+    return column[order[np.searchsorted(upto, (1.0 - 1e-9) * part * upto[-1])]]
 
 
 def unit_scale(values):

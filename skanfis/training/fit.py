@@ -45,6 +45,7 @@ from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
 from .knowing import grown
 from .left_out import leave_group_out_error
+from .outermost import told_by_outermost
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
 from .result import Fitted, SolverRun
@@ -400,6 +401,7 @@ class _Fit:
     def sure(self, fitted, run, robust) -> Fitted:
         """The same with a posterior, and with what is known kept, and proven to be."""
         model = replace(fitted.model, posterior=self.posterior(run, robust))
+        model = replace(model, told_extrapolation=told_by_outermost(model, self.rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
         fitted = replace(fitted, model=model)
         return fitted if self.data.wishes is None else self.constrained(fitted, run)

@@ -1,0 +1,104 @@
+"""How far the tangent is followed: against the definition row by row, and on planted functions."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from skanfis import ANFISRegressor
+from skanfis.policies import FARTHEST, MAX_EXTRAPOLATION
+
+from ..quick import quick
+
+DISTANCES = [MAX_EXTRAPOLATION, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, FARTHEST]
+
+
+def quartiles(column):
+    """The ends of the inner half of a column, each row of which counts once."""
+    ordered = np.sort(column)
+    quarter = int(np.ceil(0.25 * ordered.size)) - 1
+    return ordered[quarter], ordered[-1 - quarter]
+
+
+def by_definition(model, X, Y):
+    """The distance that leaves the least of rows beyond the quartiles, row by row."""
+    frozen, ends = model.model_, [quartiles(column) for column in X.T]
+    left = np.zeros(len(DISTANCES))
+    n_beyond = 0
+    for x, y in zip(X, Y, strict=True):
+        nearest = np.array([min(max(v, a), b) for v, (a, b) in zip(x, ends, strict=True)])
+        if (nearest == x).all():
+            continue
+        n_beyond += 1
+        value, slope = frozen.predict(nearest[None])[0], frozen.gradient(nearest[None])[0]
+        for k, distance in enumerate(DISTANCES):
+            way = [
+                min(max(v, -distance * h), distance * h)
+                for v, h in zip(x - nearest, frozen.spread, strict=True)
+            ]
+            error = (value + way @ slope - y) / frozen.target.spread
+            left[k] += error @ error
+    left /= n_beyond
+    left += np.sum((frozen.posterior.noise / frozen.target.spread) ** 2)
+    best = int(np.argmin(left))
+    return DISTANCES[best] if left[best] < 0.25 * left[0] else MAX_EXTRAPOLATION
+
+
+@pytest.mark.parametrize("case", range(12))
+def test_distance_is_that_of_the_definition(case):
+    g = np.random.default_rng(case)
+    X = [g.normal, g.lognormal, g.uniform][case % 3](size=(120, 3))
+    Y = np.column_stack([X @ [1.0, -2.0, 0.5], np.tanh(X[:, 0]) + X[:, 1]])[:, : 1 + case % 2]
+    Y = Y + [0.0, 0.05][case // 6] * g.normal(size=Y.shape)
+    model = quick(2).fit(X, Y)
+    assert model.model_.told_extrapolation == by_definition(model, X, Y)
+
+
+def far_rows(g, n_rows=300):
+    """Long tails: some rows are many deviations from the rest."""
+    return g.lognormal(sigma=1.0, size=(n_rows, 2))
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_what_bends_at_first_and_then_goes_on_is_followed(rng):
+    def truth(X):
+        return np.tanh(2.0 * X[:, 0]) + X[:, 1]
+
+    X = far_rows(rng)
+    model = ANFISRegressor().fit(X, truth(X))
+    assert model.n_rules_ > 1
+    assert model.model_.max_extrapolation >= 5.0
+    far = X[:20] + np.array([0.0, X[:, 1].max() + 4.0 * X[:, 1].std()])
+    error = model.predict(far) - truth(far)
+    assert np.sqrt(np.mean(error**2)) < 0.05 * truth(X).std()
+
+
+def test_what_goes_level_is_not_followed(rng):
+    X = far_rows(rng)
+    model = ANFISRegressor().fit(X, np.tanh(X[:, 0]) * np.tanh(X[:, 1]))
+    assert model.n_rules_ > 1
+    assert model.model_.max_extrapolation == MAX_EXTRAPOLATION
+
+
+def test_noise_tells_nothing_of_it(rng):
+    X = far_rows(rng)
+    y = X[:, 0] + X[:, 1]
+    model = ANFISRegressor(n_mfs=1).fit(X, y + 2.0 * y.std() * rng.normal(size=y.size))
+    assert model.model_.max_extrapolation == MAX_EXTRAPOLATION
+
+
+def test_weights_are_copies_and_order_is_of_no_account(rng):
+    X = rng.lognormal(size=(60, 2))
+    y = X[:, 0] * X[:, 1]
+    times = rng.integers(1, 4, size=60)
+    told = [
+        quick(2).fit(X, y, sample_weight=times).model_.told_extrapolation,
+        quick(2).fit(np.repeat(X, times, axis=0), np.repeat(y, times)).model_.told_extrapolation,
+        quick(2).fit(X[::-1], y[::-1], sample_weight=times[::-1]).model_.told_extrapolation,
+    ]
+    assert_array_equal(told, told[0])
+
+
+def test_rows_that_are_all_within_the_quartiles_tell_nothing():
+    X = np.repeat([[0.0], [1.0]], 20, axis=0)
+    model = ANFISRegressor(n_mfs=1).fit(X, X[:, 0])
+    assert model.model_.told_extrapolation == MAX_EXTRAPOLATION
