@@ -18,7 +18,8 @@ Strengths are those of the nearest point; they sum to one everywhere, so that no
 silent zero.
 
 Outputs are held too, inside the box and out of it: within L standard deviations of the training
-target, or half a one where L is less, of its range. Whatever the inputs, no answer is further off.
+target, or half a one where L is less, of its range, and of several rules within a quarter of that.
+Whatever the inputs, no answer is further off.
 """
 
 from dataclasses import dataclass, replace
@@ -147,7 +148,7 @@ class TSKModel:
         """Lowest and highest output that the model gives, (2, n_outputs); infinite if not held."""
         if self.target is None:
             return np.full((2, self.n_outputs), [[-np.inf], [np.inf]])
-        return self.target.limits(self.max_extrapolation)
+        return self.target.limits(self.max_extrapolation, is_line=self.n_rules == 1)
 
     def memberships(self, trained=True) -> list[dict]:
         """Memberships in the user's units, after training or before it.

@@ -113,13 +113,15 @@ class LinearExtrapolation(BaseEstimator):
         input in the training data: zero or positive. The value reached there is held. 0 holds the
         value at the edge, as "clip" does; ``math.inf`` is the tangent without end. Outputs are
         held as many standard deviations of the target, or half a one where that is more, beyond
-        its range.
+        its range, those of several rules a quarter of that range at most.
 
-        "auto" is half a one where there are several rules: what bends among the data may bend
-        beyond them. A single rule is a line, and is followed the further the less it leaves of
-        the target: for as many standard deviations as those of the target are of the noise
-        (``noise_std_``), from half a one to a hundred, of several outputs the least of all; one
-        that was read from a file, as far as the file says.
+        "auto" asks the outermost training rows. Had the data ended at the quartiles of every
+        input, most rows would have been beyond them; where following the tangent would have
+        halved the error of these, the new rows' noise included, it is followed for the distance
+        that does best, and for half a one otherwise. A line, a single rule that is followed so, is
+        followed for as many standard deviations as those of the target are of the noise
+        (``noise_std_``) where that is more, a hundred at most, of several outputs the least of
+        all. A model that was read from a file goes as far as the file says.
 
     See Also
     --------

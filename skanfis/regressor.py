@@ -131,9 +131,9 @@ class ANFISRegressor(
     out_of_bounds : {"linear", "clip", "nan", "raise"} or LinearExtrapolation, default="linear"
         What ``predict`` does with rows outside the range of the training data, input by input:
         "linear" warns, goes on along the tangent at the edge for half a standard deviation of the
-        input, or where there is a single rule, a line, the further the less this leaves of the
-        target (:class:`~skanfis.options.LinearExtrapolation`, which takes another distance too),
-        and holds the value reached; "clip" holds the value at the edge; "nan" returns NaN; "raise"
+        input, or further where the outermost rows speak for it
+        (:class:`~skanfis.options.LinearExtrapolation`, which takes another distance too), and
+        holds the value reached; "clip" holds the value at the edge; "nan" returns NaN; "raise"
         raises ValueError. It may be changed by ``set_params`` after training.
     verbose : bool, default=False
         Whether to write a line per iteration. scikit-learn's callbacks (``set_callbacks``) work

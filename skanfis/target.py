@@ -10,6 +10,9 @@ __all__ = ["TargetRange"]
 # take beyond the range that was seen. The range has two deviations at least, so that this is a
 # quarter of it at most.
 _LEAST_MARGIN = 0.5
+# Of the range of the target: what rules that bend may say beyond it, however far their tangent is
+# followed. A line has no peaks between rows.
+_MOST_OF_RANGE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,13 @@ class TargetRange:
         low, high = (offset + scale * end for end in (self.minimum, self.maximum))
         return TargetRange(low, high, scale * self.spread)
 
-    def limits(self, max_extrapolation):
-        """Lowest and highest output, (2, n_outputs)."""
-        margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
+    def limits(self, max_extrapolation, is_line):
+        """Lowest and highest output, of a line or of what bends, (2, n_outputs).
+
+        They are infinite where the tangent is followed without end.
+        """
+        margin = max_extrapolation * self.spread
+        if not is_line and np.isfinite(max_extrapolation):
+            margin = np.minimum(margin, _MOST_OF_RANGE * (self.maximum - self.minimum))
+        margin = np.maximum(margin, _LEAST_MARGIN * self.spread)
         return np.stack([self.minimum - margin, self.maximum + margin])

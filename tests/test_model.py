@@ -462,7 +462,7 @@ TARGET = TargetRange(np.array([-1.0]), np.array([0.5]), np.array([0.6]))
 
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
-@pytest.mark.parametrize(("limit", "margin"), [(0.0, 0.3), (0.5, 0.3), (1.0, 0.6)])
+@pytest.mark.parametrize(("limit", "margin"), [(0.0, 0.3), (0.5, 0.3), (0.6, 0.36), (1.0, 0.375)])
 def test_outputs_are_held_beside_the_range_of_the_target(policy, limit, margin):
     free = build(scattered(), out_of_bounds=policy, max_extrapolation=limit)
     X = np.random.default_rng(4).uniform(-4.0, 4.0, (500, 3))

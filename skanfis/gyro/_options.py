@@ -259,8 +259,8 @@ def _add_range(group):
         default=Recipe.max_extrapolation,
         metavar="SD",
         help="how far the rules follow the tangent beyond the range of an input, in its standard "
-        "deviations; inf for without end; auto for half a one, or of a single rule, a line, for as "
-        f"many as those of the rate are of the noise ({Recipe.max_extrapolation})",
+        "deviations; inf for without end; auto for as many as the outermost rows speak for, "
+        f"half a one at least ({Recipe.max_extrapolation})",
     )
     group.add_argument(
         "--min-coverage",
