@@ -77,7 +77,7 @@ class TSKModel:
         What the standard deviation of a prediction needs; None where the model knows of none.
     told_extrapolation : float or None
         L for which the outermost training rows speak, see ``training.outermost``; None where the
-        model knows of no rows.
+        model knows of no rows, as one that was read from a file.
     term_names : tuple of str
         One per term, unique on its input; where not given, see ``naming``.
     target : TargetRange or None
@@ -337,11 +337,12 @@ class TSKModel:
         them by no more than it leaves of the target, for all that is known.
         """
         told, target, posterior = self.told_extrapolation, self.target, self.posterior
-        goes_on = self.n_rules == 1 and told != MAX_EXTRAPOLATION
-        if goes_on and target is not None and posterior is not None:
-            of_noise = target.spread / np.maximum(posterior.noise, target.spread / FARTHEST)
-            return max(float(f"{of_noise.min():.3g}"), told or MAX_EXTRAPOLATION)
-        return self.max_extrapolation if told is None else told
+        if told is None:
+            return self.max_extrapolation
+        if self.n_rules > 1 or told == MAX_EXTRAPOLATION or target is None or posterior is None:
+            return told
+        of_noise = target.spread / np.maximum(posterior.noise, target.spread / FARTHEST)
+        return max(float(f"{of_noise.min():.3g}"), told)
 
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).

@@ -54,10 +54,10 @@ def told_by_outermost(model: TSKModel, rows: StandardisedData) -> float:
     free = replace(model, target=None)  # outputs are not held
     values, slopes = free.predict(nearest), free.gradient(nearest) * model.spread[:, None]
     if model.posterior is None:
-        variance = np.average((free.predict(X) - y) ** 2, axis=0, weights=weight)
+        deviations = (free.predict(X) - y) / rows.targets.scale
+        noise = float(np.average(deviations**2, axis=0, weights=weight).sum())
     else:
-        variance = model.posterior.noise**2
-    noise = float(np.sum(variance / rows.targets.scale**2))
+        noise = float(np.sum((model.posterior.noise / rows.targets.scale) ** 2))
 
     def left_by(distance):
         told = values + np.einsum("nj,njo->no", np.clip(way, -distance, distance), slopes)
