@@ -102,3 +102,15 @@ def test_rows_that_are_all_within_the_quartiles_tell_nothing():
     X = np.repeat([[0.0], [1.0]], 20, axis=0)
     model = ANFISRegressor(n_mfs=1).fit(X, X[:, 0])
     assert model.model_.told_extrapolation == MAX_EXTRAPOLATION
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_however_far_it_is_followed_answers_stay_within_a_quarter_of_the_range(rng):
+    X = far_rows(rng)
+    y = np.tanh(2.0 * X[:, 0]) + X[:, 1]
+    model = ANFISRegressor().fit(X, y)
+    assert model.model_.max_extrapolation * y.std() > 0.25 * np.ptp(y)
+    answers = model.predict(50.0 * rng.standard_normal((500, 2)))
+    quarter = 0.25 * np.ptp(y)
+    assert answers.max() == pytest.approx(y.max() + quarter)
+    assert answers.min() >= y.min() - quarter * (1.0 + 1e-12)
