@@ -8,9 +8,17 @@ that their penalty lets them say. No criterion on the rows themselves sees it.
 The leverage of a place z, h = phi(z)' (Phi' S Phi + n P)^-1 phi(z), is the variance of the
 prediction there, in units of the noise's. On a row it is one at most, which is what is left when
 that row alone decides. A place half-way between two rows where it is more is not known: a single
-row there would tell more than all the others. What is asked is at how many places that is so, not
-by how much: beside one row far off it may be a thousand at a single place, and the model is as good
-as ever at all others.
+row there would tell more than all the others.
+
+Unless no less is known there than by the smaller model that would be taken instead. With inputs
+that depend on one another, as a product of two others does, or columns of zeros and ones, what lies
+half-way may be nothing that ever comes, and where hardly any noise is left, that must not matter: a
+model whose errors fall to a tenth may have a leverage of ninety-nine before the smaller one errs as
+little. So a place is not known where the larger model's error, (1 + h) sigma^2, is expected to be
+more than that of what it is to beat.
+
+What is asked is at how many places that is so, not by how much: beside one row far off it may be a
+thousand at a single place, and the model is as good as ever at all others.
 """
 
 import numpy as np
@@ -47,12 +55,17 @@ def places_between(rows: StandardisedData) -> np.ndarray:
     return np.ascontiguousarray(0.5 * (X[own] + X[nearest]).T)
 
 
-def unknown_between(tuned: Tuned, places: np.ndarray) -> float:
-    """The part of some places that is not known, the premises being held; none of a single rule."""
+def unknown_between(tuned: Tuned, places: np.ndarray, to_beat: float = 0.0) -> float:
+    """The part of some places that is not known, the premises being held; none of a single rule.
+
+    ``to_beat`` is the squared error, a mean over rows and outputs, that is expected of the model to
+    be taken instead; none where there is no such one.
+    """
     if tuned.problem.antecedent.n_rules == 1:
         return 0.0
     leverage = tuned.problem.leverage_at(tuned.solved, places, tuned.posterior.n_rows)
-    return float(np.mean(leverage > 1.0))
+    is_worse = (1.0 + leverage) * tuned.posterior.noise_variance > to_beat
+    return float(np.mean((leverage > 1.0) & is_worse))
 
 
 def is_told(unknown: float) -> bool:

@@ -104,18 +104,19 @@ class StructureSearch:
     def choose(self, partition):
         """The best candidate; all that were tried are in ``trials.scores``."""
         best = Candidate((1,) * self.n_inputs)
+        self.trials.incumbent = self.trials.tuned(best)
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
             loose = self.trials.loosely(best) if max(best.counts) > 1 else None
             if loose is not None:
                 best = self._grow_grid(loose)
-        self.trials.parent = None
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
             clusters = self._best_clusters(clustering, best)
             best = best if clusters is None else self._better(best, clusters)
         if best.counts is None or max(best.counts) > 1:
             for family in self.other_families:
+                self.trials.incumbent = self.trials.tuned(best)
                 best = self._better(best, replace(best, family=family))
         return best
 
@@ -125,7 +126,7 @@ class StructureSearch:
         while True:
             # One that promises little now may promise more beside others' terms: none is dropped.
             grown = [self._with_one_more(best, j) for j in inputs]
-            trials.parent = trials.tuned(best)
+            trials.incumbent = trials.tuned(best)
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best

@@ -87,8 +87,9 @@ class Trials:
         The rows that candidates see.
     first : Penalty
         The weights that candidates begin with, which may be set to the best so far.
-    parent : Tuned or None
-        The grid whose terms its successors begin with.
+    incumbent : Tuned or None
+        The best so far: what candidates are to beat, and the grid whose terms its successors begin
+        with.
     """
 
     def __init__(
@@ -113,7 +114,7 @@ class Trials:
         self.places = places_between(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.n_all = effective_weight(rows)
-        self.parent: Tuned | None = None
+        self.incumbent: Tuned | None = None
         self.scores: dict[Candidate, float] = {}
         self.folds = (split or _folds)(self.sample.groups)
         self._found: dict[Candidate, Tuned] = {}
@@ -132,7 +133,7 @@ class Trials:
 
     def _promise(self, tuned):
         """What goes first: rules that the rows tell, and among these the least expected error."""
-        are_told = bool(self.folds) or is_told(unknown_between(tuned, self.places))
+        are_told = bool(self.folds) or is_told(self._unknown_between(tuned))
         return not are_told, self.expected(tuned)
 
     def leading(self, candidates, before):
@@ -180,7 +181,7 @@ class Trials:
         if self.folds:
             return self._held_out_score(candidate)
         tuned = self.tuned(candidate)
-        self._unknown[candidate] = unknown_between(tuned, self.places)
+        self._unknown[candidate] = self._unknown_between(tuned)
         if not is_told(self._unknown[candidate]):
             return np.inf
         if has_idle_term(self.sample, tuned.evaluation.antecedent):
@@ -191,8 +192,15 @@ class Trials:
         with np.errstate(divide="ignore"):
             return self.n_sample * tuned.posterior.n_outputs * np.log(error)
 
+    def _unknown_between(self, tuned):
+        n_outputs = tuned.posterior.n_outputs
+        to_beat = 0.0 if self.incumbent is None else self.expected(self.incumbent) / n_outputs
+        return unknown_between(tuned, self.places, to_beat)
+
     def expected(self, tuned):
-        """Mean squared error expected on new rows, of a training on all rows and not the sample.
+        """Squared error expected on new rows, of a training on all rows and not the sample.
+
+        The mean over rows, summed over outputs.
 
         What the parameters cost, k / n of the noise's variance, falls as the rows rise.
         """
@@ -273,10 +281,10 @@ class Trials:
         )
 
     def _inherited(self, antecedent, premise):
-        """Displacements at which a grid has its parent's terms, where it has as many of them."""
-        if self.parent is None or antecedent.grid_counts is None:
+        """Displacements at which a grid has the incumbent's terms, where it has as many of them."""
+        if self.incumbent is None or antecedent.grid_counts is None:
             return None
-        before = self.parent.evaluation.antecedent
+        before = self.incumbent.evaluation.antecedent
         theta = [group.theta.copy() for group in antecedent.groups]
         for group, own in zip(antecedent.groups, theta, strict=True):
             for j in np.unique(group.inputs):

@@ -95,6 +95,14 @@ def test_leverage_is_that_of_the_dense_design(rng):
     leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), places, 180)
     assert_allclose(leverage, expected, rtol=1e-4)
     assert unknown_between(tuned, places) == np.mean(expected > 1.0) > 0.075
+    # A place at which the smaller model is expected to err by more is known well enough.
+    noise = tuned.posterior.noise_variance
+    to_beat = (1.0 + np.median(expected[expected > 1.0])) * noise
+    part = np.mean((1.0 + expected) * noise > to_beat)
+    assert 0.0 < part < np.mean(expected > 1.0)
+    assert unknown_between(tuned, places, to_beat) == part
+    # None is known for the sake of one that errs by less than the noise.
+    assert unknown_between(tuned, places, 0.5 * noise) == np.mean(expected > 1.0)
 
 
 @pytest.mark.parametrize(
@@ -107,6 +115,46 @@ def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatur
     ).trials
     assert np.isfinite(found.score(Candidate((1, 1))))
     assert bool(np.isfinite(found.score(Candidate((4, 3))))) is is_known
+
+
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_what_is_to_be_beaten_is_the_error_of_the_best_so_far(rng, n_outputs):
+    X, y = three_runs(rng, THREE)
+    rows = StandardisedData.of(X, np.column_stack([y] * n_outputs))
+    found = StructureSearch(
+        rows, [Gaussian] * 2, 1, np.arange(2), np.arange(2), 0, {}, overlap=0.6
+    ).trials
+    tuned = found.tuned(Candidate((3, 3)))
+    found.incumbent = found.tuned(Candidate((1, 3)))
+    error = found.expected(found.incumbent) / n_outputs
+    noise = tuned.posterior.noise_variance
+    assert error > 2.0 * noise  # or it would say nothing
+    leverage = tuned.problem.leverage_at(tuned.solved, found.places, tuned.posterior.n_rows)
+    found.score(Candidate((3, 3)))
+    unknown = {line["structure"]: line.get("unknown_between") for line in found.report()}
+    assert unknown["grid [3, 3]"] == np.mean((leverage > 1.0) & ((1.0 + leverage) * noise > error))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules(seed):
+    # Half-way between two rows the product is not that of the factors: no new row lies there.
+    rng = np.random.default_rng(seed)
+    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 800, 3))
+    noise = 1e-3
+
+    def truth(X):
+        time, temperature, rate = X.T[:3]
+        bias = 0.05 * np.exp(-time / 600.0) + 2e-6 * (temperature - 20.0) ** 2
+        scale_factor = -4.1e-4 * (temperature - 20.0) - (0.2536 * np.deg2rad(rate)) ** 2 / 6.0
+        return bias + 1e-3 * np.sin(temperature / 15.0) + rate * scale_factor
+
+    X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
+    low, high = X.min(axis=0), X.max(axis=0)
+    fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
+    model = ANFISRegressor().fit(X, truth(X) + noise * rng.standard_normal(800))
+    errors = model.predict(fresh) - truth(fresh)
+    # 4.1 to 4.3 times the noise where the smaller model is not asked what it errs by.
+    assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
 
 def test_rules_that_are_given_come_with_a_warning(rng):
@@ -141,7 +189,7 @@ def test_it_is_asked_at_how_many_places_and_not_by_how_much():
             antecedent=SimpleNamespace(n_rules=2),
             leverage_at=lambda evaluation, places, n_rows: leverage,
         )
-        posterior = SimpleNamespace(n_rows=100.0)
+        posterior = SimpleNamespace(n_rows=100.0, noise_variance=1.0)
         return SimpleNamespace(problem=problem, solved=None, posterior=posterior)
 
     # As beside three rows far off, and as of rows on three curves.
