@@ -10,12 +10,12 @@ prediction there, in units of the noise's. On a row it is one at most, which is 
 that row alone decides. A place half-way between two rows where it is more is not known: a single
 row there would tell more than all the others.
 
-Unless no less is known there than by the smaller model that would be taken instead. With inputs
-that depend on one another, as a product of two others does, or columns of zeros and ones, what lies
-half-way may be nothing that ever comes, and where hardly any noise is left, that must not matter: a
-model whose errors fall to a tenth may have a leverage of ninety-nine before the smaller one errs as
-little. So a place is not known where the larger model's error, (1 + h) sigma^2, is expected to be
-more than that of what it is to beat.
+Unless no less is known there by it than by the smaller model that would be taken instead. With
+inputs that depend on one another, as a product of two others does, or columns of zeros and ones,
+what lies half-way may be nothing that ever comes, and where hardly any noise is left, that must not
+matter: a model whose noise falls to a tenth may have a leverage of ninety-nine before it errs by as
+much. So a place is not known where the error to be expected, (1 + h) sigma^2, is more than the
+smaller model's.
 
 What is asked is at how many places that is so, not by how much: beside one row far off it may be a
 thousand at a single place, and the model is as good as ever at all others.
@@ -26,7 +26,7 @@ import numpy as np
 from ..data import StandardisedData
 from .tuning import Tuned
 
-__all__ = ["is_told", "places_between", "unknown_between"]
+__all__ = ["expected_between", "is_told", "places_between", "unknown_between"]
 
 _MOST_PLACES = 200
 _SEED = 0
@@ -55,17 +55,26 @@ def places_between(rows: StandardisedData) -> np.ndarray:
     return np.ascontiguousarray(0.5 * (X[own] + X[nearest]).T)
 
 
-def unknown_between(tuned: Tuned, places: np.ndarray, to_beat: float = 0.0) -> float:
+def expected_between(tuned: Tuned, places: np.ndarray) -> np.ndarray:
+    """Squared error to be expected at some places, the premises being held; a mean over outputs."""
+    return (1.0 + _leverage(tuned, places)) * tuned.posterior.noise_variance
+
+
+def unknown_between(tuned: Tuned, places: np.ndarray, to_beat: np.ndarray | float = 0.0) -> float:
     """The part of some places that is not known, the premises being held; none of a single rule.
 
-    ``to_beat`` is the squared error, a mean over rows and outputs, that is expected of the model to
-    be taken instead; none where there is no such one.
+    ``to_beat`` is what is to be expected there of the model that would be taken instead, as
+    ``expected_between`` has it; nothing where there is no such one.
     """
     if tuned.problem.antecedent.n_rules == 1:
         return 0.0
-    leverage = tuned.problem.leverage_at(tuned.solved, places, tuned.posterior.n_rows)
+    leverage = _leverage(tuned, places)
     is_worse = (1.0 + leverage) * tuned.posterior.noise_variance > to_beat
     return float(np.mean((leverage > 1.0) & is_worse))
+
+
+def _leverage(tuned, places):
+    return tuned.problem.leverage_at(tuned.solved, places, tuned.posterior.n_rows)
 
 
 def is_told(unknown: float) -> bool:

@@ -36,8 +36,9 @@ _RULES_OF_MANY = 3
 _MOST_OF_MANY = 1000
 # More names for one input nobody reads.
 _MOST_TERMS = 6
-# Of those that are tried in a round, so many are trained.
-_MOST_TRAINED = 3
+# Of those that are tried in a round, so many are trained; more where hardly any noise is left:
+# there, where premises stand decides, and what is promised before they move says little.
+_MOST_TRAINED, _MOST_TRAINED_NEARLY_EXACT = 3, 6
 # More inputs than this are screened before terms are tried on them, and so many are left.
 _MOST_UNSCREENED, _SCREENED = 16, 8
 # Of k-means and fuzzy c-means: each about half as many again.
@@ -104,7 +105,7 @@ class StructureSearch:
     def choose(self, partition):
         """The best candidate; all that were tried are in ``trials.scores``."""
         best = Candidate((1,) * self.n_inputs)
-        self.trials.incumbent = self.trials.tuned(best)
+        self.trials.beat(best)
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
             loose = self.trials.loosely(best) if max(best.counts) > 1 else None
@@ -116,7 +117,7 @@ class StructureSearch:
             best = best if clusters is None else self._better(best, clusters)
         if best.counts is None or max(best.counts) > 1:
             for family in self.other_families:
-                self.trials.incumbent = self.trials.tuned(best)
+                self.trials.beat(best)
                 best = self._better(best, replace(best, family=family))
         return best
 
@@ -126,7 +127,7 @@ class StructureSearch:
         while True:
             # One that promises little now may promise more beside others' terms: none is dropped.
             grown = [self._with_one_more(best, j) for j in inputs]
-            trials.incumbent = trials.tuned(best)
+            trials.beat(best)
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
@@ -157,7 +158,7 @@ class StructureSearch:
         Such a one promises less than it keeps: the terms of that input begin anew, where those of
         one that gives another input terms are where the best has trained them.
         """
-        chosen = promising[: self._n_trained(promising[0])]
+        chosen = promising[: self._n_trained(promising[0], best)]
         anew = [c for c in promising if self._begins_anew(c, best)]
         if len(chosen) > 1 and anew and anew[0] not in chosen:
             chosen[-1] = anew[0]
@@ -168,9 +169,13 @@ class StructureSearch:
         pairs = zip(candidate.counts, best.counts, strict=True)
         return any(count > before > 1 for count, before in pairs)
 
-    def _n_trained(self, candidate):
+    def _n_trained(self, candidate, best):
         """How many of the promising candidates are trained."""
-        return 1 if prod(candidate.counts) * self.n_basis > _MOST_COLUMNS else _MOST_TRAINED
+        if prod(candidate.counts) * self.n_basis > _MOST_COLUMNS:
+            return 1
+        if self.trials.folds or self.trials.leaves_noise(best):
+            return _MOST_TRAINED
+        return _MOST_TRAINED_NEARLY_EXACT
 
     @property
     def _most_columns(self):

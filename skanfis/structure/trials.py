@@ -30,7 +30,7 @@ from ..evidence import FREE
 from ..membership import Membership
 from ..objective import SeparableProblem
 from ..premise import Premise
-from .between import is_told, places_between, unknown_between
+from .between import expected_between, is_told, places_between, unknown_between
 from .candidate import Candidate, RuleBases
 from .grid import Spacing
 from .held_out import held_out_loss
@@ -87,9 +87,6 @@ class Trials:
         The rows that candidates see.
     first : Penalty
         The weights that candidates begin with, which may be set to the best so far.
-    incumbent : Tuned or None
-        The best so far: what candidates are to beat, and the grid whose terms its successors begin
-        with.
     """
 
     def __init__(
@@ -114,13 +111,21 @@ class Trials:
         self.places = places_between(self.sample)
         self.n_sample = effective_weight(self.sample)
         self.n_all = effective_weight(rows)
-        self.incumbent: Tuned | None = None
+        self._incumbent: Tuned | None = None
+        self._to_beat: np.ndarray | float = 0.0
         self.scores: dict[Candidate, float] = {}
         self.folds = (split or _folds)(self.sample.groups)
         self._found: dict[Candidate, Tuned] = {}
         self._untrained: dict[Candidate, Tuned] = {}  # of this round
         self._begun: dict[Candidate, Tuned] = {}
         self._unknown: dict[Candidate, float] = {}
+
+    def beat(self, best: Candidate):
+        """Have candidates compared with the best so far, and grids begin with its terms."""
+        incumbent = self.tuned(best)
+        if incumbent is not self._incumbent:
+            self._incumbent = incumbent
+            self._to_beat = expected_between(incumbent, self.places)
 
     def promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
@@ -133,7 +138,7 @@ class Trials:
 
     def _promise(self, tuned):
         """What goes first: rules that the rows tell, and among these the least expected error."""
-        are_told = bool(self.folds) or is_told(self._unknown_between(tuned))
+        are_told = bool(self.folds) or is_told(unknown_between(tuned, self.places, self._to_beat))
         return not are_told, self.expected(tuned)
 
     def leading(self, candidates, before):
@@ -154,6 +159,10 @@ class Trials:
                 if is_behind and candidate in self._begun:
                     self._found[candidate] = self._begun.pop(candidate)
         return min(candidates, key=self.score)
+
+    def leaves_noise(self, best: Candidate):
+        """Whether the best so far leaves more than data next to exact do."""
+        return self.expected(self.tuned(best)) > _NEARLY_EXACT
 
     def loosely(self, best: Candidate):
         """The loose training of a candidate where it beats the one before; else None.
@@ -181,7 +190,7 @@ class Trials:
         if self.folds:
             return self._held_out_score(candidate)
         tuned = self.tuned(candidate)
-        self._unknown[candidate] = self._unknown_between(tuned)
+        self._unknown[candidate] = unknown_between(tuned, self.places, self._to_beat)
         if not is_told(self._unknown[candidate]):
             return np.inf
         if has_idle_term(self.sample, tuned.evaluation.antecedent):
@@ -191,11 +200,6 @@ class Trials:
         # As the evidence, in units of twice the logarithm of a probability.
         with np.errstate(divide="ignore"):
             return self.n_sample * tuned.posterior.n_outputs * np.log(error)
-
-    def _unknown_between(self, tuned):
-        n_outputs = tuned.posterior.n_outputs
-        to_beat = 0.0 if self.incumbent is None else self.expected(self.incumbent) / n_outputs
-        return unknown_between(tuned, self.places, to_beat)
 
     def expected(self, tuned):
         """Squared error expected on new rows, of a training on all rows and not the sample.
@@ -282,9 +286,9 @@ class Trials:
 
     def _inherited(self, antecedent, premise):
         """Displacements at which a grid has the incumbent's terms, where it has as many of them."""
-        if self.incumbent is None or antecedent.grid_counts is None:
+        if self._incumbent is None or antecedent.grid_counts is None:
             return None
-        before = self.incumbent.evaluation.antecedent
+        before = self._incumbent.evaluation.antecedent
         theta = [group.theta.copy() for group in antecedent.groups]
         for group, own in zip(antecedent.groups, theta, strict=True):
             for j in np.unique(group.inputs):

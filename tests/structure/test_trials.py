@@ -43,11 +43,15 @@ def test_a_grid_starts_from_where_the_terms_of_the_best_so_far_are(rng):
     y = np.sin(3.0 * X[:, [0]]) + np.cos(4.0 * X[:, [1]]) + 0.05 * rng.standard_normal((200, 1))
     rows = StandardisedData.of(X, y)
     found = search.StructureSearch(rows, [Gaussian] * 2, 1, used, used, 0, {}, overlap=0.6).trials
-    found.incumbent = found.train(Candidate((3, 2)), found.sample)
+    found.beat(Candidate((3, 2)))
     child = found.rule_bases.of(Candidate((3, 3)), found.sample)
     premise = Premise.of(child, found.sample.inputs.minimum, found.sample.inputs.maximum)
     started = child.with_parameters(premise.parameters(found._inherited(child, premise)))
-    before, (own,), (start,) = found.incumbent.evaluation.antecedent, started.groups, child.groups
+    before, (own,), (start,) = (
+        found.tuned(Candidate((3, 2))).evaluation.antecedent,
+        started.groups,
+        child.groups,
+    )
     assert np.abs(before.groups[0].theta[:, :3] - start.theta[:, :3]).max() > 0.05
     assert_allclose(own.theta[:, :3], before.groups[0].theta[:, :3], atol=1e-9)
     # Of the input that has one more term nothing is inherited.
