@@ -157,10 +157,11 @@ class SplitLeakWarning(UserWarning):
 class UnderdeterminedWarning(UserWarning):
     """The training rows do not tell so many rules.
 
-    From ``fit``: there are more consequent parameters than distinct training rows, or at more than
-    7.5 % of places half-way between rows less is known than a single row there would tell, as where
-    they lie on a few curves; the latter is not sought where all weights of the penalty are
-    given. Take fewer rules, or ``order=0``, and judge the model on rows held out.
+    From ``fit``, of a structure that is given: there are more consequent parameters than distinct
+    training rows, or at more than 7.5 % of places half-way between rows less is known than a single
+    row there would tell, as where they lie on a few curves; the latter is not sought where all
+    weights of the penalty are given. Take fewer rules, or ``order=0``, and judge the model on rows
+    held out.
 
     Examples
     --------

@@ -55,8 +55,18 @@ def describe_out_of_bounds(X, minimum, maximum, names) -> str:
     for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
         outside = (column < low) | (column > high)
         if outside.any():
+            ends = _told_apart(low, high, column.min(), column.max())
             parts.append(
                 f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
-                f"[{low:.6g}, {high:.6g}], found [{column.min():.6g}, {column.max():.6g}])"
+                f"[{ends[0]}, {ends[1]}], found [{ends[2]}, {ends[3]}])"
             )
     return "X lies outside the training data: " + "; ".join(parts) + "."
+
+
+def _told_apart(*values):
+    """Numbers in six digits, or as many as tell them apart, as those of time stamps."""
+    for n_digits in range(6, 18):
+        texts = [f"{value:.{n_digits}g}" for value in values]
+        if len(set(texts)) == len(set(values)):
+            break
+    return texts

@@ -181,8 +181,8 @@ class ANFISRegressor(
         "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
         on new rows like these, "log_evidence", "agreement", "alpha", "stiffness"; without groups
         "unknown_between", the part of places half-way between rows at which a single row would tell
-        more than all do, and at which more error is to be expected than of what the candidate is to
-        beat (above 0.075 it is out of the running); with groups "held_out_error", which then
+        more than all do, and at which the smaller model that the candidate is to beat is expected to
+        err by less (above 0.075 it is out of the running); with groups "held_out_error", which then
         decides. Both errors are in standard deviations of the target.
         Empty where the structure was given.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
@@ -222,7 +222,9 @@ class ANFISRegressor(
     ConstantInputWarning
         If an input is constant in the training data; it gets no terms and no slope.
     UnderdeterminedWarning
-        If there are more consequent parameters than distinct training rows.
+        If rules that are given are more than the rows tell: more consequent parameters than
+        distinct rows, or places between the rows at which less is known than a row there would
+        tell. A structure found by itself has none such, and the evidence bounds what few rows tell.
     OutOfBoundsWarning
         From ``predict`` and ``score``, of rows that are extrapolated to: with
         ``out_of_bounds="linear"``. "clip" and "nan" are answers that were asked for, as in

@@ -52,14 +52,14 @@ class ChecksRowsMixin:
                     {**numeric, "ensure_2d": False},
                 ),
             )
-        check_consistent_length(X, y, groups)
+        check_consistent_length(X, y)
         self._single_output = y.ndim == 1
         targets = y.reshape(-1, 1) if y.ndim == 1 else y
         if output_names is None or len(output_names) != targets.shape[1]:
             output_names = default_output_names(targets.shape[1])
         check_finite(X, "X", self._input_names())
         check_finite(targets, "y", output_names)
-        groups = None if groups is None else group_numbers(groups)
+        groups = None if groups is None else _checked_groups(groups, X.shape[0])
         keep = None
         if sample_weight is not None:
             sample_weight = _checked_weights(sample_weight, X, is_chunk)
@@ -97,6 +97,16 @@ class ChecksRowsMixin:
     def _input_names(self):
         names = getattr(self, "feature_names_in_", None)
         return [f"x{j}" for j in range(self.n_features_in_)] if names is None else list(names)
+
+
+def _checked_groups(groups, n_rows):
+    """Numbers of the groups, one per row."""
+    groups = group_numbers(groups)
+    if len(groups) != n_rows:
+        raise ValueError(
+            f"groups has {len(groups)} entries for {n_rows} rows of X: give every row its label."
+        )
+    return groups
 
 
 def _checked_weights(sample_weight, X, is_chunk):

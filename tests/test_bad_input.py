@@ -226,6 +226,11 @@ def test_groups_of_two_kinds(groups):
         ANFISRegressor(**QUICK).fit(X, Y, groups=groups)
 
 
+def test_groups_of_other_rows():
+    with refused(ValueError, "groups has 2 entries for 60 rows", "every row"):
+        ANFISRegressor(**QUICK).fit(X, Y, groups=[1, 2])
+
+
 def test_groups_of_pairs():
     with refused(ValueError, "groups must have one entry per row", "(60, 2)", "one label"):
         ANFISRegressor(**QUICK).fit(X, Y, groups=[(1, 2)] * N_ROWS)

@@ -79,6 +79,8 @@ def test_constant_column_is_named_as_the_pipeline_was_given_it():
     pipe = make_pipeline(front, LINE)
     with pytest.warns(ConstantInputWarning, match=r"'hours' \(always 0 after the steps in front"):
         pipe.fit(FRAME.assign(hours=3.0), Y)
+    with pytest.warns(ConstantInputWarning, match=r"'hours' \(always 0\)"):
+        LINE.fit(FRAME.assign(hours=-0.0), Y)
     runs = [0] * 30 + [1] * 30
     held = FRAME.assign(hours=runs)
     # Within each fold of two runs the column is constant; of all rows it is not.

@@ -17,6 +17,12 @@ def test_columns_that_leave_their_range_are_told_with_rows_and_ranges():
     )
 
 
+def test_values_are_told_in_as_many_digits_as_tell_them_apart():
+    X = np.array([[1_000_001.5], [1_000_000.25]])
+    told = describe_out_of_bounds(X, [999_999.5], [1_000_001.0], ["time"])
+    assert "(trained on [999999.5, 1000001], found [1000000, 1000002])" in told
+
+
 @pytest.mark.parametrize(
     ("policy", "limit", "part"),
     [

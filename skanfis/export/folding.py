@@ -253,6 +253,7 @@ def _with_raw_terms(antecedent, offset, scale, order):
 
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
+    label = f"{label}: transformer of the target" if label else "transformer of the target"
     columns = columns_after(label, transformer, [Column(k) for k in range(model.n_outputs)])
     if [column.source for column in columns] != list(range(model.n_outputs)):
         refuse_step(label, transformer, "it drops or moves columns of the target")

@@ -66,7 +66,7 @@ class Scorer:
             raise ValueError(
                 f"method='loo' needs a fitted ANFISRegressor, alone or at the end of a Pipeline; "
                 f"{type(final).__name__} tells nothing of its noise (noise_std_). Use "
-                "method='cross' or 'split'."
+                "another method; with scaled=False where predict has no return_std."
             )
         centers, deviations = _with_deviation(estimator, data.X)
         targets = data.targets.reshape(len(data.targets), -1)

@@ -263,7 +263,7 @@ def report_constant(rows, names):
     given = names_in_pipeline(names)
     names, where = (names, "") if given is None else (given, " after the steps in front")
     flat = [
-        f"{name!r} (always {value:.6g}{where})"
+        f"{name!r} (always {value + 0.0:.6g}{where})"  # 0, not -0
         for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
         if is_flat
     ]

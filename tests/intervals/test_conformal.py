@@ -353,7 +353,8 @@ def test_bad_input_is_refused_by_name():
     refused(
         "leaves out rows, not groups", rules, method="loo", fit=lambda X: {"groups": np.arange(24)}
     )
-    refused("tells nothing of its noise", BayesianRidge(), method="loo")
+    for other in (BayesianRidge(), LinearRegression()):
+        refused(r"tells nothing of its noise.* another method; with scaled", other, method="loo")
     refused("LinearRegression does not have: use scaled=False", LinearRegression())
     refused("every row must be held out once", rules, cv=ShuffleSplit(2, random_state=0))
     refused("leaves no row to train on", rules, method="split", calibration_fraction=1.0)
