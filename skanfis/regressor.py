@@ -181,9 +181,9 @@ class ANFISRegressor(
         "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
         on new rows like these, "log_evidence", "agreement", "alpha", "stiffness"; without groups
         "unknown_between", the part of places half-way between rows at which a single row would tell
-        more than all do, and the smaller model that the candidate is to beat no less (above 0.075
-        it is out of the running); with groups "held_out_error", which then decides. Both errors are
-        in standard deviations of the target. Empty where the structure was given.
+        more than all do, while the smaller model that is to be beaten errs by less (above 0.075 the
+        candidate is out of the running); with groups "held_out_error", which then decides. Both
+        errors are in standard deviations of the target. Empty where the structure was given.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y: what remains of
         the residual after the effective number of parameters. None where

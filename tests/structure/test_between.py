@@ -159,7 +159,8 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules(seed):
     fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
     model = ANFISRegressor().fit(X, truth(X) + noise * rng.standard_normal(800))
     errors = model.predict(fresh) - truth(fresh)
-    # 4.1 to 4.3 times the noise where the smaller model is not asked what it errs by.
+    # 4.0 to 4.3 times the noise where the smaller model is not asked what it knows; and on seed 1
+    # where three candidates of a round are trained.
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
 
