@@ -183,9 +183,14 @@ def saturating(seed, options):
 # The gyro-like surface --------------------------------------------------------------------------
 
 
-def surface(seed, options):
-    """In the box and on all rows, in deviations of the noise; 1 is perfect."""
+def surface(seed, options, with_product=False):
+    """In the box and on all rows, in deviations of the noise; 1 is perfect.
+
+    ``with_product``: temperature times rate is a column too.
+    """
     X, y, fresh, truth = gyro.make_surface(seed)
+    if with_product:
+        X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
     model, seconds = fitted(X, y, options)
     inside, everywhere = gyro.score(model.predict(fresh), X, fresh, truth)
     return {
@@ -344,6 +349,9 @@ KINDS = {
     ),
     "gyro-like surface, 2,000 x 3": Kind(
         surface, range(10), "in the box [σ]", 1.05, None, "median", (("all rows", None),)
+    ),
+    "gyro-like surface, a product beside": Kind(
+        partial(surface, with_product=True), range(10), "in the box [σ]"
     ),
     "saturating, rows outside": Kind(
         saturating, range(5), "RMS outside [sd]", None, None, "median", _POLICIES

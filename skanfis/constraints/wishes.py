@@ -121,8 +121,9 @@ class Wishes:
     def _check(self):
         for k, (low, high) in enumerate(zip(self.lower, self.upper, strict=True)):
             if not low < high:
+                which = "the output" if len(self.lower) == 1 else f"output {k}"
                 raise ValueError(
-                    f"constraints limits output {k} to [{low:g}, {high:g}], between which nothing "
+                    f"constraints limits {which} to [{low:g}, {high:g}], between which nothing "
                     "lies: lower must be below upper."
                 )
         for point, value in zip(self.points, self.values, strict=True):

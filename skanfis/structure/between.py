@@ -10,12 +10,11 @@ prediction there, in units of the noise's. On a row it is one at most, which is 
 that row alone decides. A place half-way between two rows where it is more is not known: a single
 row there would tell more than all the others.
 
-Unless the smaller model that would be taken instead knows no more there. With
-inputs that depend on one another, as a product of two others does, or columns of zeros and ones,
-what lies half-way may be nothing that ever comes, and where hardly any noise is left, that must not
-matter: a model whose noise falls to a tenth may have a leverage of ninety-nine before it errs by as
-much. So a place is known too where the error to be expected, (1 + h) sigma^2, is no more than
-the smaller model's.
+Unless the smaller model that would be taken instead knows no more there. With inputs that depend on
+one another, as a product of two others does, or columns of zeros and ones, what lies half-way may
+be nothing that ever comes, and where hardly any noise is left, that must not matter: a model whose
+noise falls to a tenth may have a leverage of ninety-nine before it errs by as much. So a place is
+known too where the error to be expected, (1 + h) sigma^2, is no more than the smaller model's.
 
 What is asked is at how many places that is so, not by how much: beside one row far off it may be a
 thousand at a single place, and the model is as good as ever at all others.

@@ -267,7 +267,7 @@ def test_what_is_not_proven_is_said(rng):
         ({"monotonic_cst": [2, 0]}, r"must hold -1 \(falling\), 0 \(free\) and 1"),
         ({"monotonic_cst": {"rate": 1}}, "monotonic_cst names 'rate', which is no column of X"),
         ({"constraints": [3.0]}, "constraints holds 3.0: it must be OutputLimits and FixedPoints"),
-        ({"constraints": [OutputLimits(1.0, 0.0)]}, r"limits output 0 to \[1, 0\]"),
+        ({"constraints": [OutputLimits(1.0, 0.0)]}, r"limits the output to \[1, 0\]"),
         ({"constraints": [OutputLimits([0.0, 1.0])]}, "must be a number, or one for each of the 1"),
         ({"constraints": [FixedPoint([0.0], 1.0)]}, "a number for each of the 2 columns of X"),
         ({"constraints": [FixedPoint({"x0": 0.0}, 1.0)]}, "it must name every column of X"),
