@@ -30,8 +30,8 @@ __all__ = ["expected_between", "is_told", "places_between", "unknown_between"]
 _MOST_PLACES = 200
 _SEED = 0
 # Of so many others the nearest: between rows far apart, as those of two clusters, lies what hardly
-# any new row comes to. With three, functions of clustered inputs have 34 % more error than where
-# nothing is asked, with ten 3 %, with twenty none (benchmarks/between.py).
+# any new row comes to. With three, functions of clustered inputs have 10 and 21 % more error than
+# where nothing is asked, with ten 1 %, with twenty none (benchmarks/between.py).
 _OTHERS = 20
 # Three rows far off among sixty come to a twentieth, structures told by three runs alone to a tenth
 # and more; docs/mathematics.rst has what other parts and means give.
