@@ -70,7 +70,7 @@ class TSKModel:
     max_extrapolation : float
         L of "linear": how far the tangent is followed, in standard deviations (``spread``) of each
         input beyond its range; zero or positive, or infinite. Where it is infinite, outputs are not
-        held either.
+        held either, but by limits that were asked for.
     support : RuleSupport or None
         Where the training data of every rule lie; None where the model knows of none.
     posterior : Posterior or None

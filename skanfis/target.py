@@ -1,4 +1,4 @@
-"""What the target was in training, and the limits within which outputs are held by it."""
+"""What is known of the target, and the limits within which outputs are held by it."""
 
 from dataclasses import dataclass
 
@@ -17,31 +17,47 @@ _MOST_OF_RANGE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class TargetRange:
-    """What the target was in training.
+    """What the target was in training, and what else is known of it.
 
     Attributes
     ----------
     minimum, maximum : ndarray of shape (n_outputs,)
     spread : ndarray of shape (n_outputs,)
         Weighted standard deviation, positive.
+    lower, upper : ndarray of shape (n_outputs,), or float
+        Limits that were asked for; infinite where none was.
     """
 
     minimum: np.ndarray
     maximum: np.ndarray
     spread: np.ndarray
+    lower: np.ndarray | float = -np.inf
+    upper: np.ndarray | float = np.inf
+
+    def within(self, lower, upper, values):
+        """The same where limits are known too, and some values (n_values, n_outputs).
+
+        A value that is known is as good as one that was seen; a limit that all that was seen
+        lies beyond shows how far the target goes.
+        """
+        low = np.vstack([self.minimum, upper, values]).min(axis=0)
+        high = np.vstack([self.maximum, lower, values]).max(axis=0)
+        return TargetRange(low, high, self.spread, lower, upper)
 
     def change_units(self, offset, scale):
         """The same in units y = offset + scale * y_now, with positive scales."""
-        low, high = (offset + scale * end for end in (self.minimum, self.maximum))
-        return TargetRange(low, high, scale * self.spread)
+        ends = (self.minimum, self.maximum, self.lower, self.upper)
+        low, high, lower, upper = (offset + scale * end for end in ends)
+        return TargetRange(low, high, scale * self.spread, lower, upper)
 
     def limits(self, max_extrapolation, is_line):
         """Lowest and highest output, of a line or of what bends, (2, n_outputs).
 
-        They are infinite where the tangent is followed without end.
+        They are those that were asked for, or infinite, where the tangent is followed without end.
         """
         margin = max_extrapolation * self.spread
         if not is_line and np.isfinite(max_extrapolation):
             margin = np.minimum(margin, _MOST_OF_RANGE * (self.maximum - self.minimum))
         margin = np.maximum(margin, _LEAST_MARGIN * self.spread)
-        return np.stack([self.minimum - margin, self.maximum + margin])
+        low, high = self.minimum - margin, self.maximum + margin
+        return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])

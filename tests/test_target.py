@@ -23,6 +23,30 @@ def test_limits_are_the_range_and_a_margin_in_deviations(max_extrapolation, is_l
     assert_allclose(found, [moved.min(axis=0) - margin, moved.max(axis=0) + margin], rtol=1e-9)
 
 
+@pytest.mark.parametrize("max_extrapolation", [0.5, np.inf])
+def test_limits_that_were_asked_for_come_first(max_extrapolation):
+    own = TargetRange(np.array([0.0, 0.0]), np.array([4.0, 4.0]), np.array([1.0, 1.0]))
+    asked = own.within(np.array([-0.2, -9.0]), np.array([np.inf, 4.1]), np.empty((0, 2)))
+    end = np.inf if max_extrapolation == np.inf else 4.5
+    low = -9.0 if max_extrapolation == np.inf else -0.5
+    found = asked.limits(max_extrapolation, is_line=False)
+    assert_allclose(found, [[-0.2, low], [end, 4.1]], rtol=1e-12)
+    moved = asked.change_units(np.array([1.0, 0.0]), np.array([2.0, 0.1]))
+    expected = np.array([1.0, 0.0]) + np.array([2.0, 0.1]) * found
+    assert_allclose(moved.limits(max_extrapolation, is_line=False), expected, rtol=1e-12)
+
+
+def test_what_is_known_beyond_what_was_seen_counts_as_seen():
+    own = TargetRange(np.array([0.0]), np.array([4.0]), np.array([1.0]))
+    nothing = np.array([-np.inf]), np.array([np.inf])
+    found = own.within(*nothing, np.array([[6.0], [-2.0]])).limits(0.5, is_line=False)
+    assert_allclose(found, [[-2.5], [6.5]], rtol=1e-12)
+    found = own.within(np.array([5.0]), np.array([np.inf]), np.empty((0, 1)))
+    assert_allclose(found.limits(0.5, is_line=False), [[5.0], [5.5]], rtol=1e-12)
+    found = own.within(np.array([-np.inf]), np.array([-3.0]), np.empty((0, 1)))
+    assert_allclose(found.limits(0.5, is_line=False), [[-3.5], [-3.0]], rtol=1e-12)
+
+
 def test_target_that_is_constant_is_left_half_of_its_unit():
     own = TargetRange(np.array([3.0]), np.array([3.0]), np.array([1.0]))
     assert_allclose(own.limits(2.0, is_line=False), [[2.5], [3.5]], rtol=1e-12)

@@ -11,9 +11,10 @@ __all__ = ["FixedPoint", "OutputLimits", "Wishes"]
 
 @dataclass(frozen=True)
 class OutputLimits:
-    """Limits that no prediction passes in the range of the training data.
+    """Limits that no prediction passes.
 
-    Nor any beyond it with ``out_of_bounds="clip"``; along the tangents of "linear" some may.
+    In the range of the training data the rules themselves keep them, provably; beyond it, where a
+    tangent may lead across them, the prediction is held at them.
 
     Parameters
     ----------
@@ -108,15 +109,6 @@ class Wishes:
         found._check()
         asks = signs.any() or np.isfinite([lower, upper]).any() or points
         return found if asks else None
-
-    def are_kept_within(self, limits):
-        """Whether a model that keeps them still does where its outputs are held within limits.
-
-        ``limits`` are the lowest and the highest output, (2, n_outputs).
-        """
-        low, high = limits
-        is_apart = (self.upper < low) | (self.lower > high)
-        return not is_apart.any() and bool(((low <= self.values) & (self.values <= high)).all())
 
     def _check(self):
         for k, (low, high) in enumerate(zip(self.lower, self.upper, strict=True)):

@@ -177,7 +177,7 @@ def _reach(model, dtype):
 
 def _output_limits(model, dtype):
     """What outputs are held within, in a type, its ends standing for what is beyond; or None."""
-    if not np.isfinite(model.output_limits).all():
+    if not np.isfinite(model.output_limits).any():
         return None, None
     end = float(np.finfo(dtype).max)
     return np.clip(model.output_limits, -end, end).astype(dtype)

@@ -21,7 +21,7 @@ from ..target import TargetRange
 from ._posterior_json import read_posterior
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, shown
 
-__all__ = ["FORMAT", "KINDS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
+__all__ = ["FORMAT", "KINDS", "LIMITS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
 
 FORMAT = "skanfis-model"
 VERSION = 1
@@ -43,7 +43,9 @@ _FILE = [
     "support",
 ]
 _INPUT = ["name", "minimum", "maximum", "reference", "spread"]
-OUTPUT = ["name", "minimum", "maximum", "spread"]
+# Of an output; null where there is none.
+LIMITS = ["lower", "upper"]
+OUTPUT = ["name", "minimum", "maximum", "spread", *LIMITS]
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 # Of weights, each of which is a part of the whole.
 _ROUNDING = 1e-6
@@ -150,10 +152,23 @@ def _outputs(outputs):
         names.append(_text(name, where))
         if all(value is None for value in numbers):
             continue
-        known.append(_range(numbers, OUTPUT[1:], where))
+        *seen, lower, upper = numbers
+        seen = _range(seen, OUTPUT[1:-2], where)
+        known.append([*seen, *_limits(lower, upper, seen, where)])
     if known and len(known) < len(names):
         raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
     return tuple(names), TargetRange(*np.array(known).T.copy()) if known else None
+
+
+def _limits(lower, upper, seen, where):
+    """What an output is held within, infinite where nothing is; what was seen reaches there."""
+    low = -np.inf if lower is None else number(lower, f"{where}.lower")
+    high = np.inf if upper is None else number(upper, f"{where}.upper")
+    if not low < high:
+        raise ValueError(f"{where}: lower is not below upper.")
+    if low > seen[1] or high < seen[0]:
+        raise ValueError(f"{where}: nothing from minimum to maximum is within lower and upper.")
+    return low, high
 
 
 def _range(values, keys, where):

@@ -28,8 +28,9 @@ Numbers are written so that the same double comes back; widths stay the logarith
 holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
 terms are positions in "terms", -1 for an input that it does not look at. "max_extrapolation" is
 null where the tangent has no end. An output's minimum, maximum and spread are those of the target
-in training. "support" has an entry per rule, its factor row by row up to the diagonal. Either is
-null where the model knows of no data.
+in training, lower and upper the limits that were asked for, null where none was. "support" has an
+entry per rule, its factor row by row up to the diagonal. Either is null where the model knows of no
+data.
 On request there is a further object, "posterior"; see ``_posterior_json``.
 """
 
@@ -45,7 +46,7 @@ from ..membership import MEMBERSHIPS
 from ..model import TSKModel
 from ._posterior_json import posterior_item
 from .folding import fold
-from .json_reader import FORMAT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
+from .json_reader import FORMAT, KINDS, LIMITS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
 
 __all__ = ["export_json", "read_json", "write_json"]
@@ -258,9 +259,13 @@ def _output_items(model):
     target = model.target
     if target is None:
         return [dict.fromkeys(OUTPUT) | {"name": name} for name in model.output_names]
-    numbers = (values.tolist() for values in (target.minimum, target.maximum, target.spread))
+    ends = (target.minimum, target.maximum, target.spread, target.lower, target.upper)
+    numbers = (np.broadcast_to(values, target.spread.shape).tolist() for values in ends)
     return [
-        dict(zip(OUTPUT, item, strict=True))
+        {
+            key: None if key in LIMITS and isinf(value) else value
+            for key, value in zip(OUTPUT, item, strict=True)
+        }
         for item in zip(model.output_names, *numbers, strict=True)
     ]
 

@@ -238,6 +238,11 @@ def _legend(model, precision):
         if np.isfinite([low, high]).all():
             ends = " to ".join(place(end, precision, high - low) for end in (low, high))
             lines.append(f"Held within the limits of its training: {name}, {ends}.")
+        elif np.isfinite([low, high]).any():
+            side, end = ("above", low) if np.isfinite(low) else ("below", high)
+            lines.append(
+                f"Held {side} the limit of its training: {name}, {number(end, precision)}."
+            )
     if model.posterior is not None:
         noise = zip(model.output_names, model.posterior.noise, strict=True)
         told = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)

@@ -417,9 +417,8 @@ class _Fit:
             model, evaluation, run.problem, wishes, in_user_units, is_trial
         )
         model = replace(model, coefficients=in_user_units(evaluation.coefficients))
-        if not wishes.are_kept_within(model.output_limits):
-            # What is asked for lies beyond what was seen: it goes before.
-            model = replace(model, target=None)
+        target = model.target.within(wishes.lower, wishes.upper, wishes.values)
+        model = replace(model, target=target)
         if model.posterior is not None:
             model = replace(model, posterior=model.posterior.given(model, solved.known))
         return replace(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import lsq_linear
 from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
@@ -185,6 +185,29 @@ def test_limits_hold(rng):
     assert found.highest[1] <= 1.7
     assert found.highest[1] > 1.6
     assert monotonicity(held, 0)[1] == -1
+
+
+@pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
+def test_limits_hold_beyond_the_range(rng, policy):
+    """A tangent is followed up to them; so it is in a file, and the box of it is proven."""
+    X, _, y = planted(rng)
+    params = QUICK | {"out_of_bounds": policy}
+    known = OutputLimits(lower=-0.9, upper=y.max())
+    held = ANFISRegressor(**params, constraints=[known]).fit(X, y)
+    free = replace(held.model_, target=None)
+    beyond = rng.uniform(-9.0, 9.0, (2000, 2))
+    told = held.predict(beyond)
+    if policy == "linear":
+        limits = held.model_.output_limits[:, 0]
+        # The upper one is nearer than what the target holds by.
+        assert_allclose(limits, [-0.9, y.max()], rtol=1e-12)
+    assert_allclose(told, np.clip(free.predict(beyond)[:, 0], -0.9, y.max()), rtol=1e-12)
+    crosses = free.predict(beyond)[:, 0] > y.max()
+    assert crosses.any() == (policy != "clip")
+    assert_array_equal(parse_json(export_json(held)).predict(beyond)[:, 0], told)
+    if policy == "linear":
+        found = bounds(held, [(-9.0, 9.0)] * 2)
+        assert -0.9 <= found.lower[0] <= found.upper[0] <= y.max()
 
 
 def test_points_are_met_and_rows_weigh(rng):
