@@ -242,8 +242,9 @@ class ANFISRegressor(
     Constraints (``monotonic_cst``, ``constraints``) are kept by the consequents, the solution of a
     convex quadratic programme at the premises that were learnt without them. Bounds on the model
     (:mod:`skanfis.bounds`) prove that they hold at every point in the range of the training data,
-    not only at rows; with ``out_of_bounds="clip"`` then everywhere. A structure that the data
-    decide on grows on under them, term by term, where they cost it something.
+    not only at rows; with ``out_of_bounds="clip"`` then everywhere. Limits of the output hold
+    everywhere. A structure that the data decide on grows on under them, term by term, where they
+    cost it something.
 
     Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
     compared by their error on rows that are left out one by one, which for the consequents takes no
