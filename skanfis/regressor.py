@@ -92,8 +92,8 @@ class ANFISRegressor(
         a row for each, (n_outputs, n_features). Kept by the predictions all over the range of the
         training data, and proven; see Notes.
     constraints : list of OutputLimits and FixedPoint, default=None
-        More that is known: limits of the output, which hold for every row, and values at points; see
-        :mod:`skanfis.constraints`. In the units of X as it comes here, behind any scaler.
+        More that is known: limits of the output, which hold for every row, and values at points;
+        see :mod:`skanfis.constraints`. In the units of X as it comes here, behind any scaler.
     loss : {"squared_error", "huber"} or Huber, default="squared_error"
         What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: rows
         far from the model count by the size of their residual and not its square, so that outliers
