@@ -16,7 +16,7 @@ from ..antecedent import RuleTableAntecedent
 from ..membership import Membership
 from ._constants import CONSTANTS_OF
 
-__all__ = ["Numbers", "TermTable", "as_held"]
+__all__ = ["Numbers", "TermTable", "as_held", "rounded_within"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +180,16 @@ def _output_limits(model, dtype):
     if not np.isfinite(model.output_limits).any():
         return None, None
     end = float(np.finfo(dtype).max)
-    return np.clip(model.output_limits, -end, end).astype(dtype)
+    return rounded_within(np.clip(model.output_limits, -end, end), dtype)
+
+
+def rounded_within(limits, dtype):
+    """Limits, low and high (2, n_outputs), in a type; none is beyond what is given."""
+    low, high = limits.astype(dtype)
+    inf = dtype.type(np.inf)
+    low = np.where(low < limits[0], np.nextafter(low, inf), low)
+    high = np.where(high > limits[1], np.nextafter(high, -inf), high)
+    return np.stack([low, high])
 
 
 def _support(model, reference):

@@ -19,11 +19,13 @@ from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 from skanfis.bounds import bounds
 from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c, fold
+from skanfis.export._numbers import Numbers
 from skanfis.export.c.status import STATUS
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
 from skanfis.solvers import VariableProjection
+from skanfis.target import TargetRange
 
 from ..oracles import random_grid
 from ..quick import quick
@@ -212,6 +214,16 @@ def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     assert codes[1].cost.table_bytes == codes[0].cost.table_bytes + limits.size * Z.itemsize
     # Proven limits change nothing in the box, but for their own rounding.
     np.testing.assert_allclose(sound, free, rtol=2.0 * np.finfo(Z.dtype).eps)
+
+
+@pytest.mark.parametrize("end", [0.1, 0.3, 0.7])
+def test_limits_that_were_asked_for_hold_in_single_precision(end):
+    X, y = surface()
+    model = quick(n_mfs=1).fit(X, y).model_
+    told = TargetRange(*np.array([[-2.0], [2.0], [1.0]]), *np.array([[-end], [end]]))
+    numbers = Numbers.of(replace(model, target=told), np.float32)
+    for side, found in ((-1.0, numbers.output_low), (1.0, numbers.output_high)):
+        assert 0.0 <= end - side * float(found[0]) <= np.spacing(np.float32(end))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .._numbers import rounded_within
+
 __all__ = ["read_limits"]
 
 
@@ -21,9 +23,4 @@ def read_limits(saturate, numbers):
         )
     if not (np.isfinite(given).all() and (given[:, 0] < given[:, 1]).all()):
         raise ValueError(f"saturate={given.tolist()} must be finite, each low below its high.")
-    limits = given.astype(numbers.dtype)
-    inf = numbers.dtype.type(np.inf)
-    low, high = limits.T
-    low = np.where(low < given[:, 0], np.nextafter(low, inf), low)
-    high = np.where(high > given[:, 1], np.nextafter(high, -inf), high)
-    return np.stack([low, high], axis=1)
+    return rounded_within(given.T, numbers.dtype).T
