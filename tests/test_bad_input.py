@@ -356,6 +356,25 @@ def test_constant_column_gets_no_terms_and_no_slope(settings):
     )
 
 
+@pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {}])
+def test_constant_columns_cost_nothing_however_many_they_are(settings):
+    """They are no slopes that a row has to pay for, in no count of parameters."""
+    rng = np.random.default_rng(0)
+    inputs = rng.uniform(-1.0, 1.0, (80, 2))
+    target = np.sin(4.0 * inputs[:, 0]) + 0.5 * inputs[:, 1] ** 2 + 0.05 * rng.normal(size=80)
+    without = ANFISRegressor(**settings).fit(inputs, target)
+    if settings:
+        settings = {"n_mfs": [3, 2] + [1] * 40}
+    with pytest.warns(ConstantInputWarning):
+        model = ANFISRegressor(**settings).fit(np.hstack([inputs, np.ones((80, 40))]), target)
+    assert model.n_rules_ == without.n_rules_
+    rows = np.hstack([inputs, np.ones((80, 40))])
+    told, deviation = model.predict(rows, return_std=True)
+    expected, expected_deviation = without.predict(inputs, return_std=True)
+    assert_allclose(told, expected, rtol=0, atol=1e-9)
+    assert_allclose(deviation, expected_deviation, rtol=1e-7)
+
+
 def test_every_constant_column_is_named():
     both = with_entry(flat(1), (slice(None), 2), -7.0)
     with pytest.warns(ConstantInputWarning, match=r"'x1' \(always 4\.25\), 'x2' \(always -7\)"):

@@ -19,7 +19,7 @@ __all__ = ["Choice", "choose", "choose_in_folds", "some_rows"]
 
 # For comparing structures; what neighbours in time say twice is left out.
 _SEARCH_ROWS = 6_000
-# Of the other folds, so many are held out within one.
+# Of the other folds, so many are held out within one at least.
 _N_INNER_FOLDS = 2
 
 
@@ -62,21 +62,28 @@ def choose_in_folds(X, target, folds, recipe, tell):
     for number, (train, _) in enumerate(folds):
         tell(f"choosing the terms within fold {number + 1} of {len(folds)}")
         rows = some_rows(train, _SEARCH_ROWS, X, np.random.default_rng(0))
-        others = _within(rows, _nearest(folds, number), len(X))[:_N_INNER_FOLDS]
-        choices.append(_choose(X.iloc[rows], target[rows], others, recipe))
+        others = _within(rows, _nearest(folds, number), len(X))
+        part = X.iloc[rows]
+        choices.append(_choose(part, target[rows], _enough(part, others), recipe))
     return choices
 
 
 def _choose(X, target, folds, recipe):
-    """The degree by the error of linear rules, then the terms."""
+    """The degree by the error of linear rules, then the terms.
+
+    Where no fold holds out a row in range, nothing can be compared: the law is of the least degree,
+    and the terms are left to the estimator, which compares them on the rows that it is given.
+    """
     linear, degree = (1,) * len(recipe.inputs), 1
     with warnings.catch_warnings():
         # What a candidate warns of, it is judged by.
         warnings.simplefilter("ignore")
         if recipe.physics:
             degree = min((1, 2), key=lambda d: _held_out_rms(recipe, (d, linear), X, target, folds))
-        if recipe.terms != "search":
-            return Choice(degree, None if recipe.terms == "auto" else recipe.terms, ())
+        if recipe.terms not in ("search", "auto"):
+            return Choice(degree, recipe.terms, ())
+        if recipe.terms == "auto" or not any(_in_range(X, *fold).any() for fold in folds):
+            return Choice(degree, None, ())
         left = target
         if recipe.physics:
             law = make_estimator(recipe, (degree, linear)).fit(X, target).base_
@@ -91,11 +98,34 @@ def _held_out_rms(recipe, structure, X, target, folds):
     for train, test in folds:
         estimator = make_estimator(recipe, structure).fit(X.iloc[train], target[train])
         errors = estimator.predict(X.iloc[test]) - target[test]
-        low, high, tested = X.iloc[train].min(), X.iloc[train].max(), X.iloc[test]
-        inside = ((tested >= low) & (tested <= high)).all(axis=1).to_numpy() & np.isfinite(errors)
+        inside = _in_range(X, train, test) & np.isfinite(errors)
         squares += float(np.sum(errors[inside] ** 2))
         count += int(inside.sum())
     return math.sqrt(squares / count) if count else math.inf
+
+
+def _in_range(X, train, test):
+    """Which of the rows held out are in the range of those trained on."""
+    low, high, tested = X.iloc[train].min(), X.iloc[train].max(), X.iloc[test]
+    return ((tested >= low) & (tested <= high)).all(axis=1).to_numpy()
+
+
+def _enough(X, folds):
+    """The first folds, until as many rows are held out in range as a fold has; two at least.
+
+    A fold of the coldest run may hold out none in range, and judges nothing.
+    """
+    wanted = np.mean([test.size for _, test in folds]) if folds else 0.0
+    taken: list[tuple] = []
+    n_judged = 0
+    for fold in folds:
+        if len(taken) >= _N_INNER_FOLDS and n_judged >= wanted:
+            break
+        n_in_range = int(_in_range(X, *fold).sum())
+        if n_in_range:
+            taken.append(fold)
+            n_judged += n_in_range
+    return taken
 
 
 def _nearest(folds, number):

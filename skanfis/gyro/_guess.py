@@ -245,7 +245,7 @@ def _by_behaviour(names, columns, guess):
             for place in free
             if not _is_smooth(columns.numbers(place)) and _score("output", names[place]) == 0.0
         ]
-        _followers(columns, guess, stepping, lacking)
+        _followers(names, columns, guess, stepping, lacking)
         free = [place for place in free if place not in guess.places.values()]
     angular = [k for k in free if names[k].quantity in _QUANTITIES["output"]]
     if (
@@ -279,7 +279,7 @@ def _is_smooth(values):
     )
 
 
-def _followers(columns, guess, free, lacking):
+def _followers(names, columns, guess, free, lacking):
     """The pair, of the columns that are free or settled, that follow one another."""
     firsts = [guess.places[part] for part in ("output", "rate") if part in guess.places] or free
     pairs = {
@@ -294,6 +294,11 @@ def _followers(columns, guess, free, lacking):
     places = list(pairs.pop())
     if len(lacking) == 1:
         place = next(place for place in places if place in free)
+        if lacking[0] == "rate" and names[place].quantity == "signal":
+            # A raw signal is nobody's rate: what it follows is.
+            _take(guess, "rate", guess.places["output"], why)
+            _take(guess, "output", place, why)
+            return
         _take(guess, lacking[0], place, why)
         return
     # The table stops at levels; the gyro has noise.

@@ -72,11 +72,11 @@ class Scorer:
         targets = data.targets.reshape(len(data.targets), -1)
         noise = np.maximum(np.atleast_1d(noise), self.floor)
         leverage = (deviations.reshape(targets.shape) / noise) ** 2 - 1.0
-        if weight is not None:
-            leverage *= (weight / np.mean(weight[weight > 0.0]))[:, None]
-        freedom = np.clip(1.0 - leverage, _SMALLEST_FREEDOM, 1.0)
-        residual = np.abs(targets - centers.reshape(targets.shape))
-        return residual / (np.sqrt(freedom) * noise) if self.scaled else residual / freedom
+        own = 1.0 if weight is None else _row_weights(weight)[:, None]
+        freedom = np.clip(1.0 - own * leverage, _SMALLEST_FREEDOM, 1.0)
+        residual = np.abs(targets - centers.reshape(targets.shape)) / freedom
+        # The leverage of the row in the model without it is h / (1 - w h).
+        return residual / (np.sqrt(1.0 + leverage / freedom) * noise) if self.scaled else residual
 
 
 def final_step(estimator):
@@ -86,6 +86,12 @@ def final_step(estimator):
     if hasattr(estimator, "best_estimator_"):
         return final_step(estimator.best_estimator_)
     return final_step(estimator.steps[-1][1]) if isinstance(estimator, Pipeline) else estimator
+
+
+def _row_weights(weight):
+    """Rows that each row counts as in a fit; see ``structure.sample.effective_weight``."""
+    total = weight.sum()
+    return weight * max(1.0, total / np.sum(weight**2))
 
 
 def _with_deviation(estimator, X):

@@ -133,7 +133,7 @@ class _Fit:
     """What every step of one fit needs: the rows, what was asked for, and who watches."""
 
     def __init__(self, estimator, data, request, callbacks):
-        self.estimator, self.data, self.request = estimator, data, request
+        self.estimator, self.data = estimator, data
         self.callbacks = callbacks
         self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
         self.solver: Solver = _object_for(estimator.solver, SOLVERS)
@@ -153,6 +153,9 @@ class _Fit:
         elif is_many(self.rows) and self.huber is None:
             self.rows = with_sample(self.rows)
         self.size = SampleSize.of(self.rows.sample or self.rows)
+        # A slope by a column that never changes is nothing that data could tell of.
+        slopes, is_constant = request.consequent_inputs, self.rows.inputs.is_constant
+        self.request = replace(request, consequent_inputs=slopes[~is_constant[slopes]])
 
     @property
     def builder(self) -> ModelBuilder:

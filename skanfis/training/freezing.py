@@ -32,8 +32,8 @@ class ModelBuilder:
 
     @property
     def n_coefficients(self):
-        """Of a rule: one, and a slope for every input that its consequent takes and that varies."""
-        return 1 + int(np.sum(~self.rows.inputs.is_constant[self.request.consequent_inputs]))
+        """Of a rule: one, and a slope for every input that its consequent takes."""
+        return 1 + self.request.consequent_inputs.size
 
     def firing(self, evaluation: Evaluation) -> RuleFiring:
         """How the rules fire on the rows, in a pass over them."""

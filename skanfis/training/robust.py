@@ -134,5 +134,6 @@ def reweighted(rows, weights):
 def without_outliers(rows, weights):
     """The rows that have at least half of their weight; all of them where these are few."""
     kept = weights >= _OUTLIER
+    given = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     # What is said of most rows is said of none.
-    return rows.part(kept) if 2 * np.count_nonzero(kept) >= rows.n_rows else rows
+    return rows.part(kept) if 2.0 * given[kept].sum() >= given.sum() else rows

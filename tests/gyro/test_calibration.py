@@ -157,6 +157,27 @@ def test_what_a_fold_holds_out_has_no_say_in_its_structure():
     assert choose_in_folds(X, y, folds, Recipe(("temperature",), terms=(2,)), print) is None
 
 
+def test_folds_without_a_row_in_range_do_not_choose_a_structure():
+    """Beside the run in the middle lie the coldest and the hottest: they hold out none in range."""
+    rng = np.random.default_rng(0)
+    middle = [20.0, 0.0, 25.0, 50.0, 30.0]
+    temperature = np.concatenate([center + rng.uniform(-12.0, 12.0, 120) for center in middle])
+    run = np.repeat(np.arange(5), 120)
+    X = pd.DataFrame({"temperature": temperature})
+    y = 0.3 * np.abs(temperature - 25.0) + 0.01 * rng.normal(size=run.size)
+    folds = [(np.flatnonzero(run != k), np.flatnonzero(run == k)) for k in (0, 1, 2, 4, 3)]
+    recipe = Recipe(("temperature",), max_rules=4)
+    found = choose_in_folds(X, y, folds, recipe, lambda text: None)
+    assert all(choice.terms > (1,) for choice in found)
+    assert all(np.isfinite(rms) for choice in found for _, rms in choice.tried)
+    # Of two runs apart, each is outside of the other: there is nothing to compare.
+    three = run < 3
+    apart = pd.DataFrame({"temperature": (temperature + 1e3 * run)[three]})
+    folds = folds_of(pd.DataFrame({"run": run[three]}), 3)
+    found = choose_in_folds(apart, y[three], folds, recipe, lambda text: None)
+    assert [choice.structure for choice in found] == [(1, None)] * 3
+
+
 @pytest.mark.floors
 def test_terms_are_for_what_the_law_leaves():
     log, told = log_of(law), []

@@ -156,6 +156,20 @@ def test_columns_without_names_are_told_by_what_they_do(tmp_path, truth):
     assert "'d' is taken for 'D '" in told.notes
 
 
+@pytest.mark.parametrize("scale", [1.0, -8.0])
+@pytest.mark.parametrize("name", ["U_mV", "gyro_mV", "U [mV]"])
+def test_a_raw_signal_is_no_rate(tmp_path, truth, name, scale):
+    """The lone rate of a log is the gyro's own, but not where a voltage follows it."""
+    table = truth[["time", "temperature"]].assign(
+        **{name: scale * truth["output"], "rate_dps": truth["rate"]}
+    )
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv", require=("temperature", "output", "rate", "time"))
+    layout = reading.files[0].layout
+    assert (layout.name("output"), layout.name("rate")) == (name, "rate_dps")
+    assert reading.units["output"] == "mV"
+
+
 def test_an_output_alone_is_told_by_its_unit(tmp_path, truth):
     table = truth[["time", "temperature"]].assign(**{"G7 [mV]": truth["output"], "note": "a"})
     table.to_csv(tmp_path / "log.csv", index=False)

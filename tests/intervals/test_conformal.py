@@ -24,6 +24,7 @@ from skanfis.intervals._quantiles import (
     row_masses,
     score_quantile,
 )
+from skanfis.intervals._scores import final_step
 from skanfis.solvers import VariableProjection
 
 QUICK = {
@@ -159,26 +160,37 @@ def test_rows_and_groups_are_covered_as_often_as_theory_says(within):
     assert np.mean(whole) > 0.89
 
 
-def test_leave_one_out_is_that_of_refits():
-    """One rule and no ridge are a line: its residual and deviation without each row, by refits."""
+@pytest.mark.parametrize("weighting", ["none", "whole", "parts"])
+def test_leave_one_out_is_that_of_refits(weighting):
+    """One rule and no ridge are a line: its residual and deviation without each row, by refits.
+
+    A row is left out with all of its weight.
+    """
     rng = np.random.default_rng(4)
     X, y = rng.normal(size=(25, 2)), rng.normal(size=25)
-    regressor = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=1, alpha=0.0))
-    model = ConformalRegressor(regressor, method="loo").fit(X, y)
+    given = {"whole": rng.integers(1, 6, 25).astype(float), "parts": rng.uniform(0.1, 1.0, 25)}
+    weight = given.get(weighting)
+    rules = ANFISRegressor(n_mfs=1, alpha=0.0)
+    regressor = make_pipeline(StandardScaler(), rules) if weight is None else rules
+    model = ConformalRegressor(regressor, method="loo").fit(X, y, sample_weight=weight)
+    # As many rows as the weights say, or as their spread leaves, whichever are more.
+    w = np.ones(25) if weight is None else weight * max(1.0, weight.sum() / np.sum(weight**2))
     A = np.column_stack([np.ones(25), X])
-    noise = np.sqrt(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=None)[0]) ** 2) / 22)
-    assert_allclose(model.estimator_[-1].noise_std_, noise, rtol=1e-8)
-    expected = []
+    root = np.sqrt(w)
+    beta = np.linalg.lstsq(root[:, None] * A, root * y, rcond=None)[0]
+    noise = np.sqrt(np.sum(w * (y - A @ beta) ** 2) / (w.sum() - 3.0))
+    assert_allclose(final_step(model.estimator_).noise_std_, noise, rtol=1e-8)
+    expected, residuals = [], []
     for i in range(25):
-        rest = np.delete(A, i, axis=0)
-        beta = np.linalg.lstsq(rest, np.delete(y, i), rcond=None)[0]
-        leverage = A[i] @ np.linalg.solve(rest.T @ rest, A[i])
-        expected.append(abs(y[i] - A[i] @ beta) / (noise * np.sqrt(1 + leverage)))
-    assert_allclose(model.scores_, np.sort(expected), rtol=1e-7)
-    plain = clone(model).set_params(scaled=False).fit(X, y)
-    one = np.delete(np.arange(25), 3)
-    without = LinearRegression().fit(X[one], y[one]).predict(X[[3]])
-    assert np.isclose(plain.scores_, np.abs(y[3] - without), rtol=1e-7).any()
+        rest, own = np.delete(A, i, axis=0), np.delete(w, i)
+        matrix = rest.T @ (own[:, None] * rest)
+        beta = np.linalg.solve(matrix, rest.T @ (own * np.delete(y, i)))
+        leverage = A[i] @ np.linalg.solve(matrix, A[i])
+        residuals.append(abs(y[i] - A[i] @ beta))
+        expected.append(residuals[-1] / (noise * np.sqrt(1 + leverage)))
+    assert_allclose(model.scores_, np.sort(expected), rtol=1e-6)
+    plain = clone(model).set_params(scaled=False).fit(X, y, sample_weight=weight)
+    assert_allclose(plain.scores_, np.sort(residuals), rtol=1e-6)
 
 
 @pytest.mark.theory

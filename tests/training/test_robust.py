@@ -120,6 +120,21 @@ def test_outliers_do_not_decide_on_the_start(settings, size):
     assert np.sqrt(np.mean(errors[~is_outlier] ** 2)) < 0.02
 
 
+def test_rows_of_weight_are_rows_repeated_where_outliers_are_many():
+    """Which rows are most is said by their weight: here those that are fewer."""
+    rng = np.random.default_rng(1)
+    X = rng.uniform(-1.0, 1.0, (125, 1))
+    y = np.concatenate(
+        [np.sin(3.0 * X[:60, 0]) + 0.05 * rng.normal(size=60), rng.uniform(-8.0, 8.0, 65)]
+    )
+    weight = np.repeat([6, 1], [60, 65])
+    weighted = ANFISRegressor(loss="huber").fit(X, y, sample_weight=weight)
+    repeated = ANFISRegressor(loss="huber").fit(np.repeat(X, weight, 0), np.repeat(y, weight))
+    assert weighted.n_rules_ == repeated.n_rules_
+    grid = np.linspace(-0.9, 0.9, 50)[:, None]
+    assert_allclose(weighted.predict(grid), repeated.predict(grid), rtol=0, atol=1e-5)
+
+
 @pytest.mark.parametrize("n_rows", [199, 200])
 def test_unit_weights_are_none(n_rows):
     X, y, *_ = with_outliers(n_rows)
