@@ -157,7 +157,7 @@ def _signs(given, input_names, n_outputs):
                 )
             signs[list(input_names).index(name)] = sign
     else:
-        signs = np.asarray(given, dtype=float)
+        signs = _as_numbers(given, "monotonic_cst")
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(
             f"monotonic_cst has shape {signs.shape}, but X has {n_inputs} columns and y "
@@ -184,10 +184,18 @@ def _listed(constraints):
     return list(constraints)
 
 
+def _as_numbers(given, what):
+    """An array of numbers; ValueError, with its name, where it holds something else."""
+    try:
+        return np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what}={given!r} must hold numbers alone.") from None
+
+
 def _per_output(given, nothing, what, n_outputs):
     if given is None:
         given = nothing
-    values = np.asarray(given, dtype=float)
+    values = _as_numbers(given, f"{what} in constraints")
     if values.ndim > 1 or values.size not in (1, n_outputs) or np.isnan(values).any():
         raise ValueError(
             f"{what}={given!r} in constraints must be a number, or one for each of the "
@@ -205,7 +213,7 @@ def _point(fixed, input_names):
                 f"X, {', '.join(map(repr, input_names))}, and no other."
             )
         given = [given[name] for name in input_names]
-    point = np.asarray(given, dtype=float)
+    point = _as_numbers(given, "FixedPoint.x")
     if point.shape != (len(input_names),):
         raise ValueError(
             f"FixedPoint.x={fixed.x!r} must have a number for each of the {len(input_names)} "
