@@ -139,7 +139,7 @@ class StructureRequest:
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""
         free = [key for key in FREE if key not in self.weights]
-        ratio = effective_weight(sample) / rows.total_weight
+        ratio = effective_weight(sample) / effective_weight(rows)
         return replace(start, penalty=scaled(start.penalty, free, ratio, start.is_held))
 
     def _check_combination(self):

@@ -54,7 +54,9 @@ class SampleSize:
 
 
 def effective_weight(rows: StandardisedData):
-    """Rows by weight."""
+    """Rows by weight: their sum, or as many as their spread leaves, whichever are more."""
+    if not isinstance(rows, StandardisedData):
+        return rows.total_weight  # on a cluster, where no squares are summed
     if rows.sample_weight is None:
         return float(rows.n_rows)
     # By the largest: squares of tiny weights would vanish.

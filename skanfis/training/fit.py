@@ -378,15 +378,14 @@ class _Fit:
     def posterior(self, run, robust):
         """What standard deviations need; ``robust`` are the weights of rows and Huber's epsilon."""
         learnt = run.premise if self.solver.moves_premises else None
-        rows = run.problem.rows
-        n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
+        n_rows = effective_weight(run.problem.rows)
         return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
 
     @property
     def n_units(self):
-        """How many rows there are, or, where they are given, groups."""
+        """How many rows there are by weight, or, where they are given, groups."""
         groups = (self.rows.sample or self.rows).groups
-        return self.rows.n_rows if groups is None else np.unique(groups).size
+        return effective_weight(self.rows) if groups is None else np.unique(groups).size
 
     def frozen(self, run, weights) -> Fitted:
         """What the run leaves, of which no deviations are known yet."""
@@ -438,7 +437,7 @@ class _Fit:
         That of rows left out one by one, or of groups, with what holds the consequents back held.
         """
         rows, problem = run.problem.rows, run.problem.on_sample or run.problem
-        n_rows = effective_weight(rows) if rows.sample is None else rows.total_weight
+        n_rows = effective_weight(rows)
         held = solved.held(evaluation.normal.factor)
         if problem.rows.groups is None or self.n_units == 1:
             left_out = problem.leave_one_out_error(evaluation, n_rows, held)

@@ -127,6 +127,20 @@ def test_rules_that_a_rising_truth_needs_are_found_and_proven_to_rise(seed, widt
     assert errors[0] < 0.75 * errors[1]
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+@pytest.mark.parametrize("settings", [{}, {"n_mfs": [4]}])
+def test_a_weight_is_so_many_rows(settings):
+    """In what growing costs, and in the rows at which a constraint is asked about."""
+    rng = np.random.default_rng(3)
+    X = np.sort(rng.uniform(-1.0, 1.0, (25, 1)), axis=0)
+    y = np.floor(2.2 * X[:, 0]) + 0.1 * rng.standard_normal(25)
+    known = settings | {"monotonic_cst": [1]}
+    weighted = ANFISRegressor(**known).fit(X, y, sample_weight=np.full(25, 8.0))
+    repeated = ANFISRegressor(**known).fit(np.repeat(X, 8, axis=0), np.repeat(y, 8))
+    assert weighted.n_rules_ == repeated.n_rules_
+    np.testing.assert_allclose(weighted.predict(X), repeated.predict(X), rtol=0, atol=1e-7)
+
+
 def test_what_fails_for_another_reason_is_not_passed_over():
     """Nor are the filters of warnings, which all threads share, touched meanwhile."""
 

@@ -48,6 +48,19 @@ def test_threshold_is_where_the_docs_say():
     assert (sampling.MANY_ROWS, sampling.SAMPLE_ROWS) == (100_000, 20_000)
 
 
+@pytest.mark.parametrize("settings", [{"n_mfs": 3}, {}])
+def test_weights_that_are_all_alike_are_of_no_account_below_one(few_are_many, settings):
+    """However small: as many rows as there are, and not what the weights add up to."""
+    X, y = noisy_surface()
+    plain = ANFISRegressor(**settings).fit(X, y)
+    light = ANFISRegressor(**settings).fit(X, y, sample_weight=np.full(N_ROWS, 1e-4))
+    assert light.n_rules_ == plain.n_rules_
+    told, deviation = light.predict(X[:200], return_std=True)
+    expected, expected_deviation = plain.predict(X[:200], return_std=True)
+    assert_allclose(told, expected, rtol=0, atol=1e-6)
+    assert_allclose(deviation, expected_deviation, rtol=1e-5)
+
+
 @pytest.mark.theory
 def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeypatch):
     X, y = noisy_surface()
