@@ -20,7 +20,6 @@ WORKERS ?= auto
 DEMO := .venv
 DEV := .venv-dev
 FLOORS := .venv-floors
-MUTANTS := .venv-mutants
 WHEEL := .venv-wheel
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -50,13 +49,12 @@ test fuzz test-floors docs first-hour: export OPENBLAS_NUM_THREADS := 1
 # No more processes than four where their number is left open: each pays for its imports.
 pytest = $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist worksteal
 
-.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour mutants release clean
+.PHONY: help demo test fuzz lint format test-floors wheel check-dist test-wheel docs benchmarks first-hour release clean
 
 help:
 	@echo "make demo         run the gyro example and save its pictures in figures/"
 	@echo "make test         all tests and docstring examples, newest dependencies"
 	@echo "make fuzz         the properties alone, on fifty times as much that is drawn anew"
-	@echo "make mutants      would the tests of the kernel and of structure notice small changes?"
 	@echo "make lint         style, format, types"
 	@echo "make format       put style and format right where a tool can"
 	@echo "make test-floors  the tests at the oldest dependencies that pyproject.toml allows"
@@ -85,11 +83,6 @@ $(FLOORS)/.installed: pyproject.toml .ci/floors.py
 	$(call pip-install,$(FLOORS)) --editable ".[plot,allan,onnx,dask]" --group test --constraint $(FLOORS)/floors.txt
 	@touch $@
 
-$(MUTANTS)/.installed: pyproject.toml
-	$(call make-venv,$(MUTANTS),$(PYTHON),>=)
-	$(call pip-install,$(MUTANTS)) --editable ".[dask]" --group mutants
-	@touch $@
-
 demo: $(DEMO)/.installed
 	$(DEMO)/bin/python examples/plot_gyro_compensation.py figures
 
@@ -98,9 +91,6 @@ test: $(DEV)/.installed
 
 fuzz: $(DEV)/.installed
 	$(call pytest,$(DEV)) tests/properties --hypothesis-profile fuzz --hypothesis-show-statistics
-
-mutants: $(MUTANTS)/.installed
-	$(MUTANTS)/bin/python .ci/mutants.py $(MODULES)
 
 lint: $(DEV)/.installed
 	$(DEV)/bin/ruff check
@@ -165,7 +155,7 @@ benchmarks: $(DEV)/.installed
 	$(DEV)/bin/python -m benchmarks
 
 clean:
-	rm -rf $(DEMO) $(DEV) $(FLOORS) $(WHEEL) $(MUTANTS) build dist figures
+	rm -rf $(DEMO) $(DEV) $(FLOORS) $(WHEEL) build dist figures
 	rm -rf .mypy_cache .pytest_cache .ruff_cache
 	rm -rf docs/_build docs/auto_examples docs/generated docs/sg_execution_times.rst
 	find skanfis tests examples benchmarks docs -type d -name __pycache__ -exec rm -rf {} +

@@ -15,7 +15,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from skanfis.structure import between, trials
+from skanfis.search import between, trials
 
 from .cases import evaluate, fitted, geometric_mean
 from .random_functions import Case, Data, make_data

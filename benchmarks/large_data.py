@@ -17,8 +17,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from skanfis import ANFISRegressor, sampling
-from skanfis.data import StandardisedData
+from skanfis import ANFISRegressor
+from skanfis.learning import sampling
+from skanfis.learning.data import StandardisedData
 
 from .fresh import alone
 from .memory import status

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-from skanfis.objective import Evaluation
-from skanfis.solvers import LeastSquares, Solver, SolverResult
+from skanfis.learning import LeastSquares, Solver, SolverResult
+from skanfis.learning.objective import Evaluation
 
 __all__ = ["LBFGS"]
 

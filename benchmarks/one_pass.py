@@ -1,7 +1,7 @@
 """One pass over many rows, cost, gradient and Gauss-Newton, against the bare symmetric product.
 
 The product of the design with itself is what a pass would take if it formed the design (it need
-not, see ``skanfis.gram``); its time is the unit.
+not, see ``skanfis.learning.gram``); its time is the unit.
 
 No large array is freed before the passes: the C library then keeps memory at hand, and spares them
 what allocation costs them in a fresh process.
@@ -12,12 +12,12 @@ from unittest.mock import patch
 import numpy as np
 from scipy.linalg import blas
 
-from skanfis import objective
-from skanfis.data import StandardisedData
+from skanfis.learning import objective
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
 from skanfis.membership import Gaussian
-from skanfis.objective import SeparableProblem
-from skanfis.penalty import Penalty
-from skanfis.structure import Spacing, grid_antecedent
+from skanfis.search import Spacing, grid_antecedent
 
 from .fresh import alone
 from .report import Measure, Results, Row, Table

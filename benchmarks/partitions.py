@@ -12,7 +12,7 @@ from sklearn.datasets import make_friedman1
 from sklearn.mixture import GaussianMixture
 
 from skanfis import ANFISRegressor
-from skanfis.solvers import VariableProjection
+from skanfis.learning import VariableProjection
 
 from .gyro import SIGMA, make_surface
 from .report import Measure, Results, Row, Table

@@ -16,14 +16,8 @@ import numpy as np
 
 from skanfis import ANFISRegressor
 from skanfis.consequent import basis, rule_outputs
-from skanfis.objective import SeparableProblem
-from skanfis.solvers import (
-    GradientDescent,
-    Hybrid,
-    LeastSquares,
-    Solver,
-    VariableProjection,
-)
+from skanfis.learning import GradientDescent, Hybrid, LeastSquares, Solver, VariableProjection
+from skanfis.learning.objective import SeparableProblem
 
 from .gyro import SIGMA, make_surface, score
 from .jang import PROBLEMS

@@ -3,7 +3,7 @@
 from unittest.mock import patch
 
 from skanfis import ANFISRegressor
-from skanfis.structure import request as start
+from skanfis.search import request as start
 
 from .gyro import measure, summary
 from .jang import PROBLEMS

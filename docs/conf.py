@@ -32,7 +32,7 @@ nitpick_ignore_regex = [
     ("py:.*", r"(sklearn|numpy|scipy|pandas)\..*"),
     # Properties, which stand in the tables of attributes; and what signatures name but no page has.
     ("py:obj", r"\w+"),
-    ("py:class", r"skanfis\.(model\.TSKModel|readable\.measures\.Measures)"),
+    ("py:class", r"skanfis\.(model\.TSKModel|inspection\.measures\.Measures)"),
 ]
 
 autosummary_generate = True

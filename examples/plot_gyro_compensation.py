@@ -26,8 +26,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.export import export_text
-from skanfis.inspection import MembershipDisplay
+from skanfis.inspection import MembershipDisplay, export_text
 
 # %%
 # A calibration campaign

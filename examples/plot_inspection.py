@@ -13,7 +13,6 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.export import explain, export_text, rules_table
 from skanfis.inspection import (
     LossCurveDisplay,
     MembershipDisplay,
@@ -21,9 +20,12 @@ from skanfis.inspection import (
     ResponseSurfaceDisplay,
     RuleActivationDisplay,
     RuleContributionDisplay,
+    explain,
+    export_text,
     readability,
+    rules_table,
 )
-from skanfis.solvers import VariableProjection
+from skanfis.learning import VariableProjection
 
 # %%
 # The model

@@ -20,8 +20,13 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.export import explain, export_text
-from skanfis.inspection import MembershipDisplay, ReadabilityDisplay, ResponseSurfaceDisplay
+from skanfis.inspection import (
+    MembershipDisplay,
+    ReadabilityDisplay,
+    ResponseSurfaceDisplay,
+    explain,
+    export_text,
+)
 
 # %%
 # The table

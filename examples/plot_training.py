@@ -14,8 +14,8 @@ from sklearn.base import clone
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.inspection import LossCurveDisplay
+from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping
-from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 # %%
 # Solvers

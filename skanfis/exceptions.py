@@ -84,7 +84,7 @@ class InfeasibleConstraintsError(ValueError):
     --------
     >>> import numpy as np
     >>> from skanfis import ANFISRegressor
-    >>> from skanfis.constraints import FixedPoint
+    >>> from skanfis.bounds import FixedPoint
     >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
     >>> points = [FixedPoint([x], y) for x, y in ((0.1, 0.0), (0.5, 1.0), (0.9, 0.0))]
     >>> ANFISRegressor(n_mfs=1, constraints=points).fit(X, X[:, 0])
@@ -123,7 +123,7 @@ class ReadabilityWarning(UserWarning):
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.exceptions import ReadabilityWarning
-    >>> from skanfis.export import export_text
+    >>> from skanfis.inspection import export_text
     >>> warnings.simplefilter("error", ReadabilityWarning)
     >>> X, y = make_jang_sinc()
     >>> export_text(ANFISRegressor(n_mfs=4, solver="lse", agreement=0.0, alpha=0.0).fit(X, y))

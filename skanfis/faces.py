@@ -35,7 +35,7 @@ import numpy as np
 from scipy.linalg import blas
 
 from .deviation import inner_products, narrowed
-from .gram import pair_index
+from .learning.gram import pair_index
 from .quadratic import QuadraticForm, row_products
 
 __all__ = ["STEP", "Face", "nodes", "products_off_faces", "products_on_line"]

@@ -13,13 +13,13 @@ from sklearn.utils import check_random_state
 
 from ._sklearn import HasMethods, Hidden, Interval, StrOptions
 from ._validation import feature_indices
-from .constraints import FixedPoint, OutputLimits
+from .bounds import FixedPoint, OutputLimits
+from .learning import SOLVERS, Solver, VariableProjection
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, TRIED_FAMILIES, membership_families
 from .model import TSKModel
 from .options import EarlyStopping, Huber, LinearExtrapolation
 from .policies import OUT_OF_BOUNDS
-from .solvers import SOLVERS, Solver, VariableProjection
-from .structure import StructureRequest, check_inputs
+from .search import StructureRequest, check_inputs
 
 __all__ = [
     "SettingsMixin",

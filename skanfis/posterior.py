@@ -40,9 +40,9 @@ from scipy.special import ndtr
 from .antecedent import Antecedent
 from .consequent import NormalFactor
 from .deviation import DerivativeRows, DeviationTables, narrowed
-from .objective import Evaluation, SeparableProblem
+from .learning.objective import Evaluation, SeparableProblem
+from .learning.premise import Premise
 from .outside import Outside
-from .premise import Premise
 from .shortest import shortest_tables, single_tables
 
 __all__ = ["MOST_PARAMETERS", "Posterior", "effective_premises"]

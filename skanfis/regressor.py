@@ -12,15 +12,15 @@ from ._notebook import RulesReprMixin
 from ._sklearn import CallbackSupportMixin, check_parameters, fit_context
 from ._threads import one_blas_thread
 from .fitted_rules import TellsOfRulesMixin
+from .inspection.readability import readability_of_rows
+from .learning import Solver
 from .membership import Membership
 from .options import EarlyStopping, Huber, LinearExtrapolation
 from .parameters import SettingsMixin, keep_weights, structure_request
 from .prediction import PredictsMixin
-from .readable import readability_of_rows
 from .row_checks import ChecksRowsMixin
-from .solvers import Solver
-from .streaming.learning import LearnsFromChunksMixin
 from .training import Callbacks, fit_rules
+from .training.partial_fit import LearnsFromChunksMixin
 
 __all__ = ["ANFISRegressor"]
 
@@ -93,19 +93,19 @@ class ANFISRegressor(
         training data, and proven; see Notes.
     constraints : list of OutputLimits and FixedPoint, default=None
         More that is known: limits of the output, which hold for every row, and values at points;
-        see :mod:`skanfis.constraints`. In the units of X as it comes here, behind any scaler.
+        see :mod:`skanfis.bounds`. In the units of X as it comes here, behind any scaler.
     loss : {"squared_error", "huber"} or Huber, default="squared_error"
         What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: rows
         far from the model count by the size of their residual and not its square, so that outliers
         in the target do little.
     solver : {"varpro", "hybrid", "gradient", "lse"} or Solver, default="varpro"
-        How the premises are learnt; an object of :mod:`skanfis.solvers` has settings of its own.
-        "varpro", :class:`~skanfis.solvers.VariableProjection`: trust-region Gauss-Newton steps;
+        How the premises are learnt; an object of :mod:`skanfis.learning` has settings of its own.
+        "varpro", :class:`~skanfis.learning.VariableProjection`: trust-region Gauss-Newton steps;
         its ``tol`` says when to stop, its ``stiffness`` holds the premises near their start.
-        "hybrid", :class:`~skanfis.solvers.Hybrid`: Jang's rule, least squares forward and a
+        "hybrid", :class:`~skanfis.learning.Hybrid`: Jang's rule, least squares forward and a
         gradient step of his own step size backward [1]_. "gradient",
-        :class:`~skanfis.solvers.GradientDescent`: on premises and consequents together, as in
-        back-propagation. "lse", :class:`~skanfis.solvers.LeastSquares`: premises stay as they
+        :class:`~skanfis.learning.GradientDescent`: on premises and consequents together, as in
+        back-propagation. "lse", :class:`~skanfis.learning.LeastSquares`: premises stay as they
         start.
     agreement : "auto" or float, default="auto"
         Weight of the penalty on rules that disagree where they fire together, zero or positive:
@@ -206,7 +206,7 @@ class ANFISRegressor(
         NaN for rows that had no part in the training.
     n_samples_seen_ : int
         After ``partial_fit``: rows with weight, of all calls.
-    information_ : skanfis.streaming.Information or None
+    information_ : skanfis.training.Information or None
         After ``partial_fit``: how well the consequents are determined; None after ``fit``.
     n_features_in_ : int
         Number of inputs.

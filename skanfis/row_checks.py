@@ -19,7 +19,7 @@ from ._validation import (
     positive_weights,
     refuse_lazy,
 )
-from .constraints.wishes import Wishes
+from .bounds.wishes import Wishes
 from .model import TSKModel
 from .naming import default_output_names
 from .training import ValidatedData

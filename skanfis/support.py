@@ -22,8 +22,8 @@ import numpy as np
 from .antecedent import Antecedent
 from .blocks import fitting_rows, row_blocks
 from .consequent import basis
-from .data import StandardisedData, fingerprint
-from .gram import pairs
+from .learning.data import StandardisedData, fingerprint
+from .learning.gram import pairs
 
 __all__ = ["FIRES", "RuleFiring", "RuleSupport", "inverse_factor"]
 
@@ -154,7 +154,7 @@ class RuleFiring:
 
 
 def _symmetric(products):
-    """Sums of :func:`~skanfis.gram.pairs` of n functions as matrices, (n_rules, n, n)."""
+    """Sums of :func:`~skanfis.learning.gram.pairs` of n functions as matrices, (n_rules, n, n)."""
     n = int(np.sqrt(2 * products.shape[1]))
     upper = np.triu_indices(n)
     found = np.zeros((products.shape[0], n, n))

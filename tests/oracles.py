@@ -9,13 +9,8 @@ from itertools import product
 
 import numpy as np
 
-from skanfis.antecedent import (
-    GridAntecedent,
-    RuleTableAntecedent,
-    ScatteredAntecedent,
-    TermGroup,
-)
-from skanfis.data import StandardisedData
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.learning.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.support import RuleSupport
 
@@ -181,7 +176,7 @@ class DenseProblem:
     """min_beta 1/2 [MSE + lambda V + sum alpha_c |delta_c|^2 + rho |slopes|^2], in one piece.
 
     Everything is a sum of squares of :meth:`residuals`, which are written down from the definitions
-    in ``skanfis.penalty``: no row sums of Gram matrices, no projections.
+    in ``skanfis.learning.penalty``: no row sums of Gram matrices, no projections.
     """
 
     def __init__(self, rows, antecedent, order, penalty, consequent_inputs=None):

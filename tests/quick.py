@@ -3,8 +3,8 @@
 from sklearn.base import clone
 
 from skanfis import ANFISRegressor
-from skanfis.solvers import SOLVERS
-from skanfis.structure import search
+from skanfis.learning import SOLVERS
+from skanfis.search import search
 
 STIFFNESS = 1e-3
 

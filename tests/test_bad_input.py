@@ -16,8 +16,8 @@ from sklearn.exceptions import NotFittedError
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning, UnderdeterminedWarning
+from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
-from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
 
 from .quick import quick
 
@@ -640,7 +640,7 @@ def test_unknown_parameter():
 @pytest.mark.parametrize(
     ("given", "setting", "advice"),
     [
-        ({}, "solver__stiffness", "give solver=VariableProjection(), of skanfis.solvers"),
+        ({}, "solver__stiffness", "give solver=VariableProjection(), of skanfis.learning"),
         ({"solver": "hybrid"}, "solver__step_size", "solver='hybrid'.*give solver=Hybrid()"),
         ({"loss": "huber"}, "loss__epsilon", "give loss=Huber(), of skanfis.options"),
         ({}, "early_stopping__tol", "early_stopping=False.*give early_stopping=EarlyStopping()"),

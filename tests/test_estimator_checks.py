@@ -5,8 +5,8 @@ from sklearn.cluster import KMeans
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
+from skanfis.learning import VariableProjection
 from skanfis.options import EarlyStopping
-from skanfis.solvers import VariableProjection
 
 from .quick import with_few_candidates
 

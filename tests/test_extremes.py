@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.data import column_statistics
-from skanfis.solvers import VariableProjection
+from skanfis.learning import VariableProjection
+from skanfis.learning.data import column_statistics
 
 LOW, HIGH = -1000, 1000
 

@@ -53,7 +53,7 @@ def test_the_command_is_there(capsys):
 
 
 def test_every_text_that_a_model_is_written_to(model, tmp_path):
-    assert "IF x0 is" in export.export_text(model)
+    assert "IF x0 is" in inspection.export_text(model)
     export.write_json(model, tmp_path / "m.json")
     export.write_fis(model, tmp_path / "m.fis")
     read = export.read_json(tmp_path / "m.json")

@@ -21,9 +21,9 @@ from threadpoolctl import threadpool_limits
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_mackey_glass
 from skanfis.exceptions import UnderdeterminedWarning
+from skanfis.learning import SOLVERS, VariableProjection
 from skanfis.membership import MEMBERSHIPS
-from skanfis.solvers import SOLVERS, VariableProjection
-from skanfis.structure import representative_rows
+from skanfis.search import representative_rows
 
 from .quick import of_given_stiffness
 

@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
+from skanfis.learning import VariableProjection
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
-from skanfis.solvers import VariableProjection
 from skanfis.support import RuleSupport
 from skanfis.target import TargetRange
 

@@ -15,16 +15,16 @@ from sklearn.preprocessing import RobustScaler, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
-from skanfis.constraints import FixedPoint
+from skanfis.bounds import FixedPoint
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
+from skanfis.learning import GradientDescent, Hybrid, LeastSquares, VariableProjection
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
 from skanfis.membership import Bell, Gaussian
-from skanfis.objective import SeparableProblem
 from skanfis.options import LinearExtrapolation
-from skanfis.penalty import Penalty
 from skanfis.posterior import Posterior, _mean_squares
-from skanfis.premise import Premise
-from skanfis.solvers import GradientDescent, Hybrid, LeastSquares, VariableProjection
 
 from . import oracles
 
@@ -300,8 +300,8 @@ def test_noise_of_hubers_loss_is_that_of_the_sound_rows():
 
 @pytest.mark.parametrize("block_bytes", [1, 2**22])
 def test_noise_of_hubers_loss_is_his_second_proposal(monkeypatch, block_bytes):
-    monkeypatch.setattr("skanfis.objective._BLOCK_BYTES", block_bytes)
-    monkeypatch.setattr("skanfis.objective._FEWEST_ROWS", 64)
+    monkeypatch.setattr("skanfis.learning.objective._BLOCK_BYTES", block_bytes)
+    monkeypatch.setattr("skanfis.learning.objective._FEWEST_ROWS", 64)
     g, c = np.random.default_rng(12), 1.3
     given = oracles.bumpy_rows(g, 250, 2, 2, weighted=True)
     # As a fit leaves them: Huber's weights are in those of the rows.

@@ -13,7 +13,6 @@ PUBLIC_MODULES = [
     "skanfis",
     "skanfis.bounds",
     "skanfis.cluster",
-    "skanfis.constraints",
     "skanfis.dask",
     "skanfis.datasets",
     "skanfis.export",
@@ -21,7 +20,7 @@ PUBLIC_MODULES = [
     "skanfis.inspection",
     "skanfis.intervals",
     "skanfis.options",
-    "skanfis.solvers",
+    "skanfis.learning",
 ]
 API_PAGE = Path(__file__).parents[1] / "docs" / "api.rst"
 

@@ -22,12 +22,12 @@ from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut, cross_val_sc
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor, objective
-from skanfis import data as rows
-from skanfis.data import StandardisedData
+from skanfis import ANFISRegressor
 from skanfis.exceptions import UnderdeterminedWarning
+from skanfis.learning import Hybrid, VariableProjection, objective
+from skanfis.learning import data as rows
+from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS
-from skanfis.solvers import Hybrid, VariableProjection
 
 from . import oracles
 

@@ -8,7 +8,7 @@ import pytest
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
-from skanfis.solvers import GradientDescent, Hybrid, VariableProjection
+from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 
 SETTINGS = {
     # Grids, and clusters by k-means.

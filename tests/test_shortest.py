@@ -5,9 +5,9 @@ import pytest
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
-from skanfis.constraints import FixedPoint
+from skanfis.bounds import FixedPoint
+from skanfis.learning import VariableProjection
 from skanfis.shortest import points_of_range
-from skanfis.solvers import VariableProjection
 
 SETTINGS = {
     "grid": {},

@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, blocks, support
-from skanfis.data import StandardisedData
 from skanfis.exceptions import ConstantInputWarning
+from skanfis.learning.data import StandardisedData
 from skanfis.support import RuleSupport
 
 from . import oracles

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from skanfis import ANFISRegressor
 from skanfis._threads import map_in_threads
-from skanfis.solvers import LeastSquares
+from skanfis.learning import LeastSquares
 
 
 @pytest.mark.parametrize("n_jobs", [None, 1, 2, 3])

@@ -57,7 +57,7 @@ def test_what_is_public_says_what_it_takes():
     untyped = [
         f"{function.__qualname__}: {name}"
         for named in public()
-        if not named.__module__.startswith("skanfis.solvers")
+        if not named.__module__.startswith("skanfis.learning")
         for function in map(inspect.unwrap, functions_of(named))
         for name, parameter in inspect.signature(function).parameters.items()
         if parameter.annotation is parameter.empty and name not in ("self", "cls")

@@ -12,21 +12,17 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.bounds import Bounds, bounds, gradient_bounds, monotonicity
-from skanfis.constraints import FixedPoint, OutputLimits
+from skanfis.bounds import Bounds, FixedPoint, OutputLimits, bounds, gradient_bounds, monotonicity
 from skanfis.dask import DaskANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_ofog
 from skanfis.export import (
     CCode,
-    explain,
     export_c,
-    export_text,
     fold,
     fold_with_rows,
     found_by_search,
     last_step,
     read_json,
-    rules_table,
     write_json,
 )
 from skanfis.gyro import (
@@ -56,11 +52,14 @@ from skanfis.inspection import (
     ReadabilityDisplay,
     ResponseSurfaceDisplay,
     RuleActivationDisplay,
+    explain,
+    export_text,
     readability,
+    rules_table,
 )
 from skanfis.intervals import ConformalRegressor
+from skanfis.learning import Hybrid
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
-from skanfis.solvers import Hybrid
 
 X, y = make_jang_sinc()
 model = ANFISRegressor(n_mfs=3).fit(X, y)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .._validation import check_finite, positive_weights
-from ..data import Scale, StandardisedData, column_statistics
+from ..learning.data import Scale, StandardisedData, column_statistics
 from ..naming import default_output_names
 from .fusing import Unread, fused
 

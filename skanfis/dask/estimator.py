@@ -9,11 +9,12 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from .._memory import keeps_freed_memory
-from ..constraints.wishes import Wishes
+from ..bounds.wishes import Wishes
+from ..inspection.measures import TargetScale, rule_sums
+from ..inspection.readability import Readability
+from ..learning.sampling import is_many
 from ..options import policy_of
-from ..readable import Readability, TargetScale, rule_sums
 from ..regressor import ANFISRegressor
-from ..sampling import is_many
 from .blocks import Blocks, is_collection
 from .rows import ClusterData, add_each, reduce_blocks
 

@@ -8,8 +8,8 @@ from operator import methodcaller
 import numpy as np
 
 from .._memory import keeps_freed_memory
-from ..constraints.wishes import Wishes
-from ..data import Scale, StandardisedData, check_scales
+from ..bounds.wishes import Wishes
+from ..learning.data import Scale, StandardisedData, check_scales
 from .blocks import Blocks, Described, describe, joined
 from .keeping import kept_blocks
 

@@ -1,12 +1,10 @@
-"""Carrying a trained model away: rules as text and as tables, other formats, other languages."""
+"""Carrying a trained model away: other formats, other languages."""
 
 from .c import CCode, CCost, export_c
 from .fis import export_fis, read_fis, write_fis
 from .folding import fold, fold_with_reader, fold_with_rows
 from .model_json import export_json, read_json, write_json
 from .onnx import register_onnx_converter
-from .table import explain, memberships_table, rules_table
-from .text import export_text
 from .trusted import TRUSTED_TYPES
 from .unwrapping import found_by_search, last_step
 
@@ -14,21 +12,17 @@ __all__ = [
     "TRUSTED_TYPES",
     "CCode",
     "CCost",
-    "explain",
     "export_c",
     "export_fis",
     "export_json",
-    "export_text",
     "fold",
     "fold_with_reader",
     "fold_with_rows",
     "found_by_search",
     "last_step",
-    "memberships_table",
     "read_fis",
     "read_json",
     "register_onnx_converter",
-    "rules_table",
     "write_fis",
     "write_json",
 ]

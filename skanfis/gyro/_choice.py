@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..structure import search_terms
+from ..search import search_terms
 from ._models import make_estimator
 
 __all__ = ["Choice", "choose", "choose_in_folds", "some_rows"]

@@ -1,4 +1,4 @@
-"""Pictures of a trained model, after scikit-learn's convention; whether its rules can be read."""
+"""A trained model as text, tables and pictures; whether its rules can be read."""
 
 from .activation import RuleActivationDisplay
 from .contribution import RuleContributionDisplay
@@ -7,6 +7,8 @@ from .loss import LossCurveDisplay
 from .memberships import MembershipDisplay
 from .reading import Readability, ReadabilityDisplay, readability
 from .surface import ResponseSurfaceDisplay
+from .table import explain, memberships_table, rules_table
+from .text import export_text
 
 __all__ = [
     "LossCurveDisplay",
@@ -16,6 +18,10 @@ __all__ = [
     "ResponseSurfaceDisplay",
     "RuleActivationDisplay",
     "RuleContributionDisplay",
+    "explain",
+    "export_text",
+    "memberships_table",
     "readability",
     "rules_html",
+    "rules_table",
 ]

@@ -6,7 +6,7 @@ from numbers import Real
 import numpy as np
 
 from .._validation import position_of
-from ..export.rules import knows_data
+from .rules import knows_data
 
 __all__ = [
     "COVERED",

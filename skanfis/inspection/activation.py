@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..export import fold, fold_with_rows
-from ..export.rules import knows_data, premises
-from ..export.text import rows_text
 from ._common import one_axes
 from .labels import as_label
+from .rules import knows_data, premises
+from .text import rows_text
 
 __all__ = ["RuleActivationDisplay"]
 

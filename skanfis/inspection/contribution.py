@@ -9,18 +9,10 @@ import numpy as np
 
 from .._validation import check_count
 from ..export import fold
-from ..export.rules import premises
-from ..export.table import rule_values
-from ._common import (
-    COVERED,
-    colors,
-    coverage_if_known,
-    held_row,
-    one_axes,
-    position,
-    terms_text,
-)
+from ._common import COVERED, colors, coverage_if_known, held_row, one_axes, position, terms_text
 from .labels import as_label
+from .rules import premises
+from .table import rule_values
 
 __all__ = ["RuleContributionDisplay"]
 
@@ -64,7 +56,7 @@ class RuleContributionDisplay:
 
     See Also
     --------
-    skanfis.export.explain : The same as a table, for given rows.
+    skanfis.inspection.explain : The same as a table, for given rows.
 
     Examples
     --------
@@ -119,7 +111,7 @@ class RuleContributionDisplay:
             Which output, by position or name.
         baseline : "mean" or float, default="mean"
             What the rules' values are compared with. "mean" is the mean of the prediction along the
-            line drawn; 0 gives the contributions of :func:`skanfis.export.explain`.
+            line drawn; 0 gives the contributions of :func:`skanfis.inspection.explain`.
         n_deviations : float, default=0
             Half the width of a band around the prediction, in its standard deviations
             (``predict(X, return_std=True)``), zero or positive; 0 draws none.

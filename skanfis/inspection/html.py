@@ -7,7 +7,8 @@ import numpy as np
 
 from .._validation import check_count
 from ..export import fold
-from ..export.rules import (
+from .findings import findings_without_rows
+from .rules import (
     choose_rules,
     consequents_about,
     knows_data,
@@ -15,8 +16,7 @@ from ..export.rules import (
     readability_in_training,
     round_reference,
 )
-from ..export.text import consequent_text, count_text, range_text, term_text
-from ..readable import findings_without_rows
+from .text import consequent_text, count_text, range_text, term_text
 
 __all__ = ["rules_html"]
 

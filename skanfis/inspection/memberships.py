@@ -52,7 +52,7 @@ class MembershipDisplay:
 
     See Also
     --------
-    skanfis.export.memberships_table : The parameters in figures.
+    skanfis.inspection.memberships_table : The parameters in figures.
 
     Examples
     --------

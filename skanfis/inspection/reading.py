@@ -9,18 +9,13 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_count, check_finite, positive_weights
 from ..export import fold_with_reader
-from ..export.table import rule_values
-from ..export.text import range_text
-from ..readable import (
-    GREATEST_ALONE,
-    GREATEST_CROSSING,
-    LEAST_TRUTH,
-    Readability,
-    Source,
-    measure,
-    own_terms,
-)
 from ._common import panels, position
+from .findings import GREATEST_ALONE, GREATEST_CROSSING, LEAST_TRUTH
+from .measures import Source, measure
+from .readability import Readability
+from .readable_terms import own_terms
+from .table import rule_values
+from .text import range_text
 
 __all__ = ["Readability", "ReadabilityDisplay", "readability"]
 
@@ -83,7 +78,7 @@ def readability(
     See Also
     --------
     ReadabilityDisplay : The same as a picture.
-    skanfis.export.explain : What each rule contributes to given rows.
+    skanfis.inspection.explain : What each rule contributes to given rows.
 
     Examples
     --------

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..constraints.wishes import Wishes
-from ..data import StandardisedData, check_scales
+from ..bounds.wishes import Wishes
+from ..learning.data import StandardisedData, check_scales
 
 __all__ = ["ValidatedData"]
 

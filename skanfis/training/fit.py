@@ -21,16 +21,16 @@ from sklearn.exceptions import ConvergenceWarning
 from .._threads import map_in_threads
 from .._validation import warn_user
 from ..antecedent import Antecedent
-from ..constraints.exchange import constrained
-from ..data import StandardisedData
+from ..bounds.exchange import constrained
+from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
+from ..learning.data import StandardisedData
+from ..learning.objective import SeparableProblem
+from ..learning.premise import Premise
+from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
-from ..objective import SeparableProblem
 from ..options import EarlyStopping, Huber, policy_of
 from ..posterior import Posterior, effective_premises
-from ..premise import Premise
-from ..sampling import is_many, with_sample
-from ..solvers import SOLVERS, LeastSquares, Solver, VariableProjection
-from ..structure import (
+from ..search import (
     SampleSize,
     Start,
     StructureRequest,
@@ -49,14 +49,7 @@ from .outermost import told_by_outermost
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
 from .result import Fitted, SolverRun
-from .robust import (
-    MANY_ROWS,
-    huber_weights,
-    resistant,
-    reweighted,
-    some_rows,
-    without_outliers,
-)
+from .robust import MANY_ROWS, huber_weights, resistant, reweighted, some_rows, without_outliers
 from .stopping import ValidationLoss, hold_out
 
 __all__ = ["fit_rules"]

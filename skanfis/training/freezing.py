@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from ..data import StandardisedData
+from ..learning import SolverResult
+from ..learning.data import StandardisedData
+from ..learning.objective import Evaluation
+from ..learning.penalty import Penalty
 from ..model import TSKModel
-from ..objective import Evaluation
 from ..options import policy_of
-from ..penalty import Penalty
-from ..solvers import SolverResult
-from ..structure import Start, StructureRequest, imported_antecedent
+from ..search import Start, StructureRequest, imported_antecedent
 from ..support import RuleFiring, RuleSupport
 from ..target import TargetRange
 from .data import ValidatedData

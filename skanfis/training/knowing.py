@@ -22,7 +22,7 @@ from math import prod
 import numpy as np
 
 from .._validation import collected_warnings, warn_user
-from ..constraints.wishes import Wishes
+from ..bounds.wishes import Wishes
 from ..exceptions import InfeasibleConstraintsError
 from .result import Fitted
 

@@ -16,10 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import StandardisedData
+from ..learning.data import StandardisedData
 from ..model import TSKModel
 from ..policies import FARTHEST, MAX_EXTRAPOLATION
-from ..structure import representative_rows, weighted_quantile
+from ..search import representative_rows, weighted_quantile
 
 __all__ = ["told_by_outermost"]
 

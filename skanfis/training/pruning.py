@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..data import StandardisedData
+from ..learning.data import StandardisedData
 from ..model import TSKModel
 from ..support import RuleFiring, RuleSupport
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..learning import SolverResult
+from ..learning.objective import Evaluation, SeparableProblem
+from ..learning.premise import Premise
 from ..model import TSKModel
-from ..objective import Evaluation, SeparableProblem
-from ..premise import Premise
-from ..solvers import SolverResult
-from ..structure import Start
+from ..search import Start
 
 __all__ = ["Fitted", "SolverRun"]
 

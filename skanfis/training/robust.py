@@ -27,7 +27,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
 from ..blocks import BLOCK_ROWS
-from ..data import column_statistics
+from ..learning.data import column_statistics
 
 __all__ = ["MANY_ROWS", "huber_weights", "resistant", "reweighted", "some_rows", "without_outliers"]
 

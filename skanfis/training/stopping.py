@@ -6,8 +6,8 @@ import numpy as np
 from sklearn.model_selection import GroupShuffleSplit
 
 from ..blocks import BLOCK_ROWS
-from ..data import StandardisedData, fingerprint
-from ..structure.held_out import held_out_loss
+from ..learning.data import StandardisedData, fingerprint
+from ..search.held_out import held_out_loss
 
 __all__ = ["ValidationLoss", "hold_out"]
 

@@ -13,9 +13,9 @@ from sklearn.preprocessing import MinMaxScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TermGroup
 from skanfis.bounds import bounds, gradient_bounds, monotonicity
+from skanfis.learning import VariableProjection
 from skanfis.membership import Gaussian
 from skanfis.options import LinearExtrapolation
-from skanfis.solvers import VariableProjection
 
 from ..export.every_model import CASES
 from ..export.rule_bases import MODELS, OFFSET, SCALE

@@ -15,8 +15,9 @@ import dask.array as da
 from distributed import Client, LocalCluster
 from distributed.scheduler import KilledWorker
 
-from skanfis import ANFISRegressor, sampling
+from skanfis import ANFISRegressor
 from skanfis.dask import DaskANFISRegressor, rows
+from skanfis.learning import sampling
 
 N_ROWS = 4000
 

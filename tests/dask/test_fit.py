@@ -14,11 +14,12 @@ import dask
 import dask.array as da
 import dask.dataframe as dd
 
-from skanfis import ANFISRegressor, sampling
+from skanfis import ANFISRegressor
 from skanfis.dask import DaskANFISRegressor, blocks, rows
 from skanfis.dask.blocks import joined_scales
-from skanfis.data import column_statistics
 from skanfis.export import export_json
+from skanfis.learning import sampling
+from skanfis.learning.data import column_statistics
 
 N_ROWS = 6000
 NAMES = ["temperature", "rate"]

@@ -21,24 +21,16 @@ from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c, fold
 from skanfis.export._numbers import Numbers
 from skanfis.export.c.status import STATUS
+from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
-from skanfis.solvers import VariableProjection
 from skanfis.target import TargetRange
 
 from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
-from .every_model import (
-    CASES,
-    FEWEST,
-    full_scale,
-    print_differences,
-    rows,
-    size_of_sum,
-    surface,
-)
+from .every_model import CASES, FEWEST, full_scale, print_differences, rows, size_of_sum, surface
 
 MIN_COVERAGE = 0.3
 

@@ -10,11 +10,11 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.constraints import FixedPoint
+from skanfis.bounds import FixedPoint
 from skanfis.export import export_c, fold
 from skanfis.intervals import ConformalRegressor
+from skanfis.learning import VariableProjection
 from skanfis.options import LinearExtrapolation
-from skanfis.solvers import VariableProjection
 
 from .c_compiler import SANITIZE, UNTOUCHED, needs_compiler, run_on_rows
 

@@ -16,8 +16,8 @@ from numpy.testing import assert_allclose
 
 from skanfis.datasets import make_jang_sinc
 from skanfis.export import read_fis, write_fis
+from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS
-from skanfis.solvers import VariableProjection
 
 from ..quick import quick
 from .rule_bases import EVERY_PAIR, MODELS, rows_of

@@ -11,7 +11,7 @@ from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from skanfis.export import read_fis, write_fis
 from skanfis.export.fis.reader import parse_fis
-from skanfis.solvers import VariableProjection
+from skanfis.learning import VariableProjection
 
 from .fis_files import BY_HAND, with_line
 from .mutations import mutated, seeds

@@ -10,8 +10,9 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.export import export_json, export_text, read_json, write_json
+from skanfis.export import export_json, read_json, write_json
 from skanfis.export.json_reader import parse_json
+from skanfis.inspection import export_text
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS

@@ -15,8 +15,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
+from skanfis.bounds import FixedPoint, OutputLimits
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
-from skanfis.constraints import FixedPoint, OutputLimits
 from skanfis.export import TRUSTED_TYPES
 from skanfis.export.fis.reader import parse_fis
 from skanfis.gyro import (
@@ -27,9 +27,9 @@ from skanfis.gyro import (
     TimeSincePowerOn,
 )
 from skanfis.intervals import ConformalRegressor
+from skanfis.learning import SOLVERS, Hybrid
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
-from skanfis.solvers import SOLVERS, Hybrid
 
 from ..quick import quick, with_few_candidates
 from .fis_files import BY_HAND

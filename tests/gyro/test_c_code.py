@@ -17,15 +17,7 @@ from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
 from skanfis.gyro._ask import ask
 
-from ..export.c_compiler import (
-    SANITIZE,
-    STRICT,
-    UNTOUCHED,
-    evaluate_all,
-    gcc,
-    needs_compiler,
-    run,
-)
+from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from ..quick import quick
 
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.export import fold, rules_table
-from skanfis.inspection import RuleActivationDisplay
+from skanfis.export import fold
+from skanfis.inspection import RuleActivationDisplay, rules_table
 
 from ..export.rule_bases import MODELS
 from .drawing import A_GRID, ALL, NAMES, drawn

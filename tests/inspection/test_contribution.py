@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
-from skanfis.export import explain
-from skanfis.inspection import RuleContributionDisplay
+from skanfis.inspection import RuleContributionDisplay, explain
 
 from .drawing import A_GRID, ALL, NAMES, drawn
 

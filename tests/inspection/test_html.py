@@ -12,7 +12,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.inspection import rules_html
-from skanfis.readable import readability_of_rows
+from skanfis.inspection.readability import readability_of_rows
 
 from .drawing import A_GRID, ALL
 

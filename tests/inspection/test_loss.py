@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.inspection import LossCurveDisplay
-from skanfis.solvers import VariableProjection
+from skanfis.learning import VariableProjection
 
 from .drawing import A_GRID, drawn, plt
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.export import memberships_table
-from skanfis.inspection import MembershipDisplay
+from skanfis.inspection import MembershipDisplay, memberships_table
 
 from ..export.rule_bases import EVERY_PAIR, MODELS
 from .drawing import drawn, plt

@@ -12,9 +12,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.inspection import ReadabilityDisplay, readability
+from skanfis.inspection import ReadabilityDisplay, measures, readability
 from skanfis.inspection.reading import _bands
-from skanfis.readable import measures
 
 from ..export.rule_bases import MODELS, rows_of
 from .drawing import A_GRID, EACH, drawn, plt

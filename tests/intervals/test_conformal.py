@@ -25,7 +25,7 @@ from skanfis.intervals._quantiles import (
     score_quantile,
 )
 from skanfis.intervals._scores import final_step
-from skanfis.solvers import VariableProjection
+from skanfis.learning import VariableProjection
 
 QUICK = {
     "n_mfs": 2,

@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
-from skanfis.data import StandardisedData
 from skanfis.datasets import make_jang_sinc
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
 from skanfis.membership import MEMBERSHIPS, Gaussian
-from skanfis.objective import SeparableProblem
-from skanfis.penalty import Penalty
-from skanfis.premise import Premise
 
 from .. import oracles
 from ..quick import quick

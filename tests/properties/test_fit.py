@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skanfis import ANFISRegressor
-from skanfis.data import column_statistics
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning, UnderdeterminedWarning
-from skanfis.export import export_json, export_text
+from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
+from skanfis.inspection import export_text
+from skanfis.learning.data import column_statistics
 
 from .strategies import settings_of_fit, tables
 

@@ -10,8 +10,8 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import UnderdeterminedWarning
-from skanfis.solvers import VariableProjection
-from skanfis.structure.request import _labeller
+from skanfis.learning import VariableProjection
+from skanfis.search.request import _labeller
 from skanfis.training import fit
 
 from ..quick import quick

@@ -11,10 +11,10 @@ from skanfis import ANFISRegressor
 from skanfis._validation import warn_user
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.bounds import gradient_bounds, monotonicity
-from skanfis.constraints.wishes import Wishes
+from skanfis.bounds.wishes import Wishes
 from skanfis.exceptions import InfeasibleConstraintsError
 from skanfis.membership import Gaussian
-from skanfis.structure import Start
+from skanfis.search import Start
 from skanfis.training.knowing import grown
 from skanfis.training.result import Fitted
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skanfis import ANFISRegressor, sampling
-from skanfis.data import StandardisedData
+from skanfis import ANFISRegressor
+from skanfis.learning import VariableProjection, sampling
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.sampling import with_sample
 from skanfis.membership import Gaussian
-from skanfis.objective import SeparableProblem
-from skanfis.penalty import Penalty
-from skanfis.sampling import with_sample
-from skanfis.solvers import VariableProjection
 
 from .. import oracles
 

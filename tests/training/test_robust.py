@@ -8,8 +8,8 @@ from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import FuzzyCMeans
+from skanfis.learning import VariableProjection
 from skanfis.options import EarlyStopping, Huber
-from skanfis.solvers import VariableProjection
 from skanfis.training import fit, robust
 
 from ..quick import quick

@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.data import StandardisedData
+from skanfis.learning import SOLVERS, VariableProjection
+from skanfis.learning.data import StandardisedData
 from skanfis.options import EarlyStopping
-from skanfis.solvers import SOLVERS, VariableProjection
 from skanfis.training.stopping import hold_out
 
 SETTINGS = {"early_stopping": True}

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ...export import export_text, fold
+from ...export import fold
+from ...inspection import export_text
 from .._pictures import draw_memberships
 from .._reading import readability_of
 from ..displays._style import figures

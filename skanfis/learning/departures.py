@@ -1,0 +1,104 @@
+r"""How rules depart from their common line, in parts that each concern some inputs alone.
+
+The departures delta = N u of all rules, in the value at their own centre and in their slopes, are a
+table over the rules of a grid, (m_1, ..., m_d), and the functions of the basis. It is split as in
+the analysis of variance, but in functions and not in cells: along the axis of every input with
+terms by orthonormal contrasts, the first of which is the mean. What varies along the axes of the
+inputs S, in the slope by input j, is a function of S and j together. So each contrast belongs to
+one *component*,
+
+    (j,)      how a rule's part of the output changes with input j alone,
+    (i, j)    how that change depends on input i,
+    ()        the rest: what concerns three inputs and more,
+
+and |delta|^2 is the sum of the components' own. Scattered rules have no axes: there a component is
+the values at the centres, (), or the slopes by an input, (j,).
+
+Each component c has a pull of its own, alpha_c: sum_c alpha_c |delta_c|^2 = u' D' diag(alpha) D u
+with D = H N, H the contrasts.
+"""
+
+from functools import cached_property, lru_cache
+from itertools import product
+
+import numpy as np
+from scipy import linalg
+
+from ..antecedent import Antecedent
+
+__all__ = ["Departures"]
+
+# Beyond pairs nobody tells one interaction from another.
+_MOST_INPUTS = 2
+
+
+class Departures:
+    """The departures N u of consequents in local coordinates u, N = S - Q A'.
+
+    Parameters
+    ----------
+    scale : ndarray of shape (n_columns,)
+        The diagonal of S.
+    orthonormal, along : ndarray of shape (n_columns, n_basis)
+        Q and A.
+    antecedent : Antecedent
+    slopes : list of (int or None)
+        The input that each function of the basis but the first is a slope by; None where it is
+        constant, and there is nothing to learn.
+
+    Attributes
+    ----------
+    components : list of tuple of int
+        The inputs that each component concerns; () for the rest.
+    component : ndarray of shape (n_columns,)
+        The component, by its place in this list, that each row of D belongs to.
+    """
+
+    def __init__(self, scale, orthonormal, along, antecedent: Antecedent, slopes):
+        self._scale, self._orthonormal, self._along = scale, orthonormal, along
+        self._counts = antecedent.grid_counts
+        grid = (antecedent.grid_counts, antecedent.share_inputs)
+        self.components, self.component = _components(*grid, antecedent.n_rules, tuple(slopes))
+
+    @cached_property
+    def together(self):
+        """N' N, of all components alike."""
+        return np.diag(self._scale**2) - self._along @ self._along.T
+
+    @cached_property
+    def matrix(self):
+        """D, a departure in each row, (n_columns, n_columns)."""
+        found = np.diag(self._scale) - self._orthonormal @ self._along.T
+        if self._counts is None:
+            return found
+        contrasts = np.eye(1)
+        for m in self._counts:
+            contrasts = np.kron(contrasts, linalg.helmert(m, full=True))
+        by_rule = found.reshape(contrasts.shape[0], -1)
+        return np.ascontiguousarray((contrasts @ by_rule).reshape(found.shape))
+
+
+@lru_cache(maxsize=64)
+def _components(counts, axes, n_rules, slopes):
+    """All components, and which of them each row of D belongs to; not to be changed."""
+    functions = [(), *((j,) for j in slopes)]
+    if counts is None:
+        # Of scattered rules; by an input that is constant there is nothing to learn.
+        inputs = [() if None in by else by for by in functions] * n_rules
+    else:
+        contrasts = product(*map(range, counts))
+        inputs = [_concerned(axes, one, by) for one in contrasts for by in functions]
+    found = sorted(set(inputs), key=lambda own: (own == (), len(own), own))
+    place = {own: k for k, own in enumerate(found)}
+    return found, np.array([place[own] for own in inputs])
+
+
+def _concerned(axes, contrast, by):
+    """The inputs that a contrast along some axes concerns, in a value, (), or a slope, (j,)."""
+    if None in by:
+        return ()
+    along = {j for j, varies in zip(axes, contrast, strict=True) if varies}
+    inputs = along.union(by)
+    # A slope by an input without terms, the same for all rules, is the line's but for rounding.
+    is_own = len(inputs) <= _MOST_INPUTS and (along or inputs <= set(axes))
+    return tuple(sorted(inputs)) if is_own else ()

@@ -1,0 +1,383 @@
+r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
+
+The cost of ``penalty`` is, in units of the noise's variance sigma^2, minus the logarithm of a
+posterior: y = Phi beta + eps with eps ~ N(0, sigma^2 / s), consequents with the prior precision
+n P / sigma^2, displacements x of the premises with n kappa / sigma^2, where n is the number of rows
+(by weight) and kappa the stiffness. Laplace's method integrates over beta and x, and sigma^2 is put
+at its maximum (MacKay 1992; for the linear part alone this is restricted maximum likelihood):
+
+    -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
+
+    2F = MSE + beta' P beta + kappa |x|^2 ,    M = Phi' S Phi / W + P ,
+
+up to what is the same for all models of the same data; m is the number of outputs, R that of rules,
+H the reduced Gauss-Newton matrix by x. |P|+ leaves out the one direction on which no penalty acts,
+that in which all rules rise alike: it has a flat prior, for which n counts one less; its length in
+beta grows as sqrt(R), for which log R makes good.
+
+The weights tau of the penalty, P = sum_k tau_k P_k, are where the evidence is largest, which is
+where, for each, as much is paid as is determined (Fellner and Schall; Wood and Fasiolo 2017):
+
+    n / sigma^2  beta' tau_k P_k beta = m [ tr(P^- tau_k P_k) - tr(M^-1 tau_k P_k) ] ,
+
+    n / sigma^2  kappa (|x|^2 + nu x0^2) = tr H (H + kappa)^-1 + nu ,
+
+    sigma^2 = n 2F / ((n - 1) m) ,
+
+each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
+the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
+to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this
+takes no pass over the rows: for any weights, beta is one solve away.
+
+The pulls alpha_c on the components of the departures are weights like the others, but few
+departures may tell of one; and a single slope of each rho_j. What is expected beforehand is that
+those of a kind are alike: the logarithm of each is normally distributed about their mean, with the
+standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 / s^2 to -2 log p, alpha
+their geometric mean. The step of one is then that at which, what is paid growing with it and what
+is determined staying,
+
+    paid exp(t) - determined + 2 (log alpha_c / alpha + t) / s^2 = 0 ,
+
+which for s without end is the ratio above, and else a value of Wright's omega.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.special import wrightomega
+
+from ..consequent import NormalFactor
+from .objective import NormalEquations
+from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
+
+__all__ = [
+    "FREE",
+    "PRIOR_DISPLACEMENT",
+    "ROWS_EACH",
+    "Laplace",
+    "extrapolated",
+    "is_settled",
+    "laplace",
+    "least_weights",
+    "reestimated",
+]
+
+# The weights that the evidence can find.
+FREE = ("agreement", "alpha", "slope", "stiffness")
+# Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
+_SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
+_LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
+_AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
+_OTHERS = slice(len(WEIGHTS), None)
+# The premises' weight has a prior of its own, as if so many displacements of such a size had been
+# seen before: a fifth of a spacing is what a term is expected to move.
+PRIOR_DISPLACEMENT = 0.2
+_PRIOR_NUMBER = 100.0
+# The pulls on components of the departures, and those on slopes, are expected to be within a factor
+# of three of their mean, as one standard deviation s: 1 / s^2.
+_LIKENESS = 1.0 / np.log(3.0) ** 2
+# Least weights where there are fewer distinct rows than this per consequent.
+_UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
+# Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
+# and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
+# count leave half of the error, and planes of which all count 5 % more (tests/test_evidence.py);
+# with fewer rows than inputs noise is fitted (tests/structure/test_tuning.py).
+ROWS_EACH = 2.0
+# Most of a target lies within so many standard deviations of its mean.
+_FAR = 2.0
+# One step changes a weight by no more than this factor.
+_LONGEST_STEP = np.log(100.0)
+# Successive steps of a weight are alike from this ratio on; next to one, all the way is open.
+_ALIKE, _MOST_ALIKE = 0.5, 0.99
+# Below all weights: a logarithm can be taken of it.
+_NOTHING = 1e-30
+# What changes a weight by less leaves its second digit as it is.
+_SETTLED = 5e-3
+# The target of a fit that is exact to rounding has no more digits than this, squared.
+_LEAST_ERROR = 1e-22
+
+
+@dataclass(frozen=True)
+class Laplace:
+    """The posterior at a point: all that the evidence and its derivatives are made of.
+
+    Parameters
+    ----------
+    penalty : Penalty
+    n_rows : float
+        Rows by weight.
+    twice_cost : float
+        2F.
+    n_outputs : int
+        Those that vary.
+    determinants : float
+        log |M| - log |P|+ + log R.
+    paid : ndarray of shape (2 + n_slopes + n_components,)
+        Of each part of the penalty, in the order of ``Penalty.weights``, beta' tau P beta (or
+        kappa |x|^2).
+    disagreement : ndarray of shape (n_columns, n_columns)
+    line : CommonLine
+        These two make the penalty.
+    prior, factor : NormalFactor
+        Of P, its null space joined in at P's own size, and of M.
+    curvature : ndarray of shape (n_displacements,)
+        Eigenvalues of H.
+    n_columns : int
+        Consequent parameters of one output.
+    """
+
+    penalty: Penalty
+    n_rows: float
+    twice_cost: float
+    n_outputs: int
+    determinants: float
+    paid: np.ndarray
+    disagreement: np.ndarray
+    line: CommonLine
+    prior: NormalFactor
+    factor: NormalFactor
+    curvature: np.ndarray
+    n_columns: int
+
+    @cached_property
+    def held_before(self):
+        """Of each part of the penalty, by its weight, the trace in the prior.
+
+        These and ``held_after`` take as long as all the rest, and are seldom asked of the last of
+        several posteriors.
+        """
+        return self._held(self.prior, float(self.curvature.size))
+
+    @cached_property
+    def held_after(self):
+        """The same in the posterior: how many parameters each part holds."""
+        stiffness = self.penalty.stiffness
+        # Without stiffness nothing is held, not even where there is no curvature either.
+        held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
+        return self._held(self.factor, held)
+
+    def _held(self, factor, by_stiffness):
+        found = self.line.weights(self.penalty).copy()
+        found[_AGREEMENT] *= factor.trace(self.disagreement)
+        found[_OTHERS] *= self.line.traces(factor)
+        found[_STIFFNESS] = by_stiffness
+        return found
+
+    @property
+    def n_held(self):
+        """How many parameters the whole penalty holds."""
+        return float(np.sum(self.held_after))
+
+    @property
+    def freedom(self):
+        """Rows by weight times outputs, less what a constant takes."""
+        return max(self.n_rows - 1.0, 0.5) * self.n_outputs
+
+    @property
+    def noise_variance(self):
+        """sigma^2 of the standardised target, the mean over outputs."""
+        return self.n_rows * self.twice_cost / self.freedom
+
+    @property
+    def prior_precision(self):
+        """N kappa / sigma^2, in units of what is expected of it."""
+        ratio = self.n_rows / self.noise_variance * self.penalty.stiffness
+        return ratio * PRIOR_DISPLACEMENT**2
+
+    @property
+    def minus_twice_log(self):
+        """-2 log p, up to a constant of the data."""
+        consequents = self.freedom * np.log(self.twice_cost) + self.n_outputs * self.determinants
+        pulls = (*self.penalty.pulls.values(), *self.penalty.slope_pulls.values())
+        if pulls:
+            consequents += _LIKENESS * float(np.sum(np.log(pulls) ** 2))
+        if self.curvature.size == 0 or self.penalty.stiffness == 0.0:
+            return consequents
+        expected = self.prior_precision
+        return (
+            consequents
+            + np.sum(np.log1p(self.curvature / self.penalty.stiffness))
+            + _PRIOR_NUMBER * (expected - np.log(expected) - 1.0)
+        )
+
+    @property
+    def n_effective(self):
+        """Effective number of all parameters: of consequents, what the penalty leaves free."""
+        return self.n_columns + self.curvature.size - self.n_held
+
+    @property
+    def n_effective_premises(self):
+        """Effective number of the displacements: of each, the part that the data decide on."""
+        return self.curvature.size - float(self.held_after[_STIFFNESS])
+
+
+def laplace(
+    normal: NormalEquations,
+    line: CommonLine,
+    mean_squared_error: float,
+    penalty: Penalty,
+    n_rows: float,
+    n_rules: int,
+    displacement=None,
+    curvature=None,
+    n_outputs=None,
+):
+    """The posterior at fixed premises, for a penalty of any weights.
+
+    ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own;
+    ``n_outputs`` are those that vary, if not all do: a constant target says nothing about the noise
+    of another.
+    """
+    matrix = penalty.agreement * normal.disagreement
+    matrix += line.pull(penalty)
+    # Of one constant there is no penalty at all: any size will do.
+    size = np.trace(matrix) / matrix.shape[0] or 1.0
+    # ``matrix`` takes on the factor's shift.
+    own, _, error = normal.with_penalty(matrix, mean_squared_error)
+    factor, solved = own.factor, own.coefficients
+    # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
+    prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
+    has_premises = curvature is not None and curvature.size
+    paid = line.weights(penalty).copy()
+    paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
+    paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
+    paid[_OTHERS] *= line.squares(solved)
+    return Laplace(
+        penalty,
+        n_rows,
+        max(error + float(np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]), _LEAST_ERROR),
+        normal.coefficients.shape[1] if n_outputs is None else n_outputs,
+        factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
+        paid,
+        normal.disagreement,
+        line,
+        prior,
+        factor,
+        curvature if has_premises else np.empty(0),
+        matrix.shape[0],
+    )
+
+
+def least_weights(posterior: Laplace, n_rules, n_distinct):
+    """The penalty below whose weights the prior expects what no rule that can be read does.
+
+    A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
+    from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
+    of what is far for a target, two of its standard deviations.
+
+    Where there are hardly more distinct rows than consequents, a model that passes through every
+    row explains them without noise, and nothing in the data speaks against it. And rounding errors
+    grow by 1 / alpha along what the data leave open. There the weights are never next to nothing.
+    """
+    rows_each = n_distinct / posterior.n_columns
+    least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
+    if n_rules == 1:
+        return Penalty(least, least, least)
+    noise = posterior.noise_variance / posterior.n_rows
+    agreement = max(least, posterior.n_columns * noise / _FAR**2)
+    return Penalty(agreement, max(least, noise / _FAR**2), least)
+
+
+def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
+    """The penalty after one step of every free weight, none below ``least``.
+
+    With too few distinct rows for so many consequents, one weight is found for all slopes: a weight
+    for each would make room for those that chance asks for, until noise is explained by them.
+    """
+    penalty, line = posterior.penalty, posterior.line
+    now = line.weights(penalty)
+    before, outputs = posterior.held_before, np.full(now.size, posterior.n_outputs)
+    outputs[_STIFFNESS] = 1
+    determined = outputs * np.maximum(before - posterior.held_after, 0.0)
+    # What next to nothing is paid for may come out negative.
+    cost = posterior.n_rows / posterior.noise_variance * np.maximum(posterior.paid, 0.0)
+    if posterior.curvature.size:
+        determined[_STIFFNESS] += _PRIOR_NUMBER
+        cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
+    step = np.log((determined + 1e-12) / (cost + 1e-12))
+    slopes, components = _blocks(line)
+    if n_distinct < ROWS_EACH * posterior.n_columns:
+        step[slopes] = np.log((determined[slopes].sum() + 1e-12) / (cost[slopes].sum() + 1e-12))
+    else:
+        step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
+    step[components] = _step_to_likeness(cost[components], determined[components], now[components])
+    moves = _is_free(free, line, now.size) & (before > 0.0)
+    ratio = np.exp(np.minimum(np.maximum(step, -_LONGEST_STEP), _LONGEST_STEP))
+    return _limited(penalty, line, now * ratio, moves, now, least)
+
+
+def _blocks(line):
+    """Where the weights on slopes are in a row, and where those on components."""
+    first = len(WEIGHTS)
+    after = first + len(line.slopes)
+    return slice(first, after), slice(after, None)
+
+
+def _step_to_likeness(cost, determined, weights):
+    """The root t of cost e^t - determined + 2 (log pulls + t) / s^2, for every weight.
+
+    Pulls are weights over their geometric mean. With z = determined s^2 / 2 - log pulls,
+    t = z - omega(z + log(cost s^2 / 2)).
+    """
+    if weights.size <= 1 or weights[0] == 0.0:
+        return np.log((determined + 1e-12) / (cost + 1e-12))
+    logs = np.log(weights)
+    z = determined / (2.0 * _LIKENESS) - (logs - logs.mean())
+    return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
+
+
+def _is_free(free, line, size):
+    """Of a row of weights, which of them may be found."""
+    found = np.full(size, "alpha" in free)
+    found[_AGREEMENT], found[_STIFFNESS] = "agreement" in free, "stiffness" in free
+    found[_blocks(line)[0]] = "slope" in free
+    return found
+
+
+def _limited(penalty, line, weights, moves, others, least):
+    """The penalty of weights within their limits where they move, and of others where not."""
+    slopes, components = _blocks(line)
+    # All of a block, or none.
+    moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
+    low, high = line.weights(_SMALLEST), line.weights(_LARGEST)
+    if least is not None:
+        low = np.maximum(low, line.weights(least))
+    found = np.where(moves, np.minimum(np.maximum(weights, low), high), others)
+    after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
+    if moves[slopes].any():
+        after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
+    if moves[components].any():
+        names = line.departures.components
+        after["alpha"], after["pulls"] = mean_and_parts(found[components], names)
+    return replace(penalty, **after)
+
+
+def extrapolated(line, before, now, after, free, least):
+    """Where steps that follow one another lead: ``after``, and beyond it where they are alike.
+
+    Where data hardly decide on a weight, as with more columns than rows, every step is a small part
+    of the way. By Aitken's rule, the logarithms being a geometric sequence, the rest of the way is
+    1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step.
+    ``before`` is None where there is no such step.
+    """
+    if before is None:
+        return after
+    weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
+    first, second, third = np.log(np.maximum(weights, _NOTHING))
+    step, last = third - second, second - first
+    moves = _is_free(free, line, step.size)
+    moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
+    if not moves.any():
+        return after
+    ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
+    jump = np.minimum(np.maximum(step / (1.0 - ratio), -_LONGEST_STEP), _LONGEST_STEP)
+    far = np.where(moves, np.exp(second + jump), weights[2])
+    return _limited(after, line, far, moves, weights[2], least)
+
+
+def is_settled(line, penalty, after):
+    """Whether no weight changes in its second digit."""
+    now, then = line.weights(penalty), line.weights(after)
+    return bool((np.abs(then - now) <= _SETTLED * now).all())

@@ -1,0 +1,466 @@
+r"""Training as a separable least-squares problem: cost, gradient and Gauss-Newton matrix.
+
+With premise parameters theta, design Phi(theta), weights S of sum W and consequents beta,
+
+    F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,   P = lambda Q(theta) + A ,
+
+where Q gives the disagreement of rules that fire together, A what else pulls on the consequents
+(see ``penalty``). beta is eliminated (variable projection: Golub and Pereyra 1973). With r the
+residual and D = (d Phi / d theta) beta its sensitivity at fixed beta, the envelope theorem gives
+the gradient exactly, and the Schur complement of the joint Gauss-Newton matrix that of the reduced
+problem (Kaufman 1975):
+
+    grad F = [- D' S r + lambda/2 dV] / W
+    H      = [D' S D + lambda K - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi + lambda L .
+
+The disagreement is a sum of squares too, of sqrt(w_r) e_r with e_r = f_r - y_hat, for every row
+and rule. Since sum_r w_r e_r = 0, what changes with theta at fixed beta are the w_r alone:
+
+    dV = sum over rows and rules of  s e_r^2 dw_r ,
+    K  = sum over rows and rules of  s (w_r e_r^2 / 4) (d log w_r) (d log w_r)' ,
+    L_(., r) = sum over rows of  s/2 (e_r dw_r - w_r D) b' .
+
+With g_r the derivatives of rule r's own log-strength (those of the terms it has) and N = sum_r w_r
+g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and products with N.
+
+Everything is a block of one Gram matrix and adds over rows. Two passes make one iteration:
+:meth:`SeparableProblem.evaluate` accumulates Phi' S [Phi, r] and gives cost and beta, which is all
+that a rejected step needs; :meth:`SeparableProblem.linearise` accumulates the rest at that very
+beta, so that the gradient is exact. Phi itself is never formed (see ``gram``). A pass holds one
+block of rows per worker, whatever the number of rows.
+
+The right side is the residual of *reference* coefficients, those of the last accepted point, not y:
+the cost of a nearly exact fit would otherwise be a small difference of large numbers.
+
+Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in ``premise``.
+"""
+
+import copy
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ..antecedent import Antecedent
+from ..blocks import BLOCK_ROWS
+from ..consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
+from .data import StandardisedData
+from .gram import DesignMoments
+from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
+from .penalty import CommonLine, Penalty, disagreement_matrix
+
+__all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "SeparableProblem"]
+
+_TINY = float(np.finfo(float).tiny)
+# A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
+_SMALLEST_FREEDOM = 1e-6
+# Columns up to which a product with an inverse is quicker than solving for every row; to invert
+# more takes as long, and memory.
+_MOST_INVERTED = 512
+# Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
+# a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
+_BLOCK_BYTES = 2**22
+_FEWEST_ROWS = 128
+
+
+def _keep_freed_memory():
+    """Have the C library keep what a block frees for the next block.
+
+    glibc hands freed memory back to the operating system beyond limits that grow with the largest
+    piece freed so far; without one of this size, every block gets its arrays page by page again,
+    and a pass takes up to twice as long. Nothing is written to it. Elsewhere this does nothing.
+    """
+    np.empty(2 * _BLOCK_BYTES // 8)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The problem at one theta, and at the coefficients solved for there or given."""
+
+    antecedent: Antecedent
+    cost: float
+    coefficients: np.ndarray  # on [1, z], (n_columns, n_outputs)
+    masses: np.ndarray  # part of the weight on which each rule fires
+    mean_squared_error: float  # of the standardised target, weighted, summed over outputs
+    normal: "NormalEquations | None"  # None where the coefficients were given, not solved for
+
+
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """What the consequents were solved with, in the local basis."""
+
+    gram: np.ndarray  # Phi' S Phi / W
+    disagreement: np.ndarray  # Q
+    penalty: np.ndarray  # P
+    factor: NormalFactor  # of Phi' S Phi / W + P
+    coefficients: np.ndarray  # local, (n_columns, n_outputs)
+
+    def with_penalty(self, penalty, error):
+        """The same with another penalty, which takes on the factor's shift; no pass over the rows.
+
+        And the change of the coefficients, and the mean squared error, which is ``error`` here.
+        """
+        factor = NormalFactor(self.gram + penalty)
+        penalty.flat[:: penalty.shape[0] + 1] += factor.shift
+        # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 and u_0 those of here.
+        slope = self.penalty @ self.coefficients
+        change = factor.solve(slope - penalty @ self.coefficients)
+        error += float(np.vdot(change, self.gram @ change - 2.0 * slope))
+        solved = self.coefficients + change
+        normal = replace(self, penalty=penalty, factor=factor, coefficients=solved)
+        return normal, change, max(error, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """Gradient and Gauss-Newton matrix of the reduced cost, by the antecedent's parameters."""
+
+    gradient: np.ndarray
+    gauss_newton: np.ndarray
+    cross: tuple[np.ndarray, ...]  # L^-1 C' / W of every output, L the factor of the consequents
+
+
+@dataclass(frozen=True, eq=False)
+class JointGradient:
+    """The cost at given coefficients, and its gradient by premises and coefficients together."""
+
+    evaluation: Evaluation
+    premises: np.ndarray  # by the antecedent's parameters
+    coefficients: np.ndarray  # by those on [1, z]
+
+
+class SeparableProblem:
+    """The reduced problem of one set of rows.
+
+    Parameters
+    ----------
+    rows : StandardisedData
+    antecedent : Antecedent
+        The rule base at the start, which freezes the consequents' local basis.
+    order : {0, 1}
+        Order of the consequents.
+    penalty : Penalty
+        What the consequents pay beside their errors.
+    map_ordered : callable
+        ``map``, or what stands in for it to spread chunks over workers; results in order.
+    consequent_inputs : ndarray of int, optional
+        The inputs that the consequents are linear in, if not all are.
+    """
+
+    def __init__(
+        self,
+        rows: StandardisedData,
+        antecedent: Antecedent,
+        order: int,
+        penalty: Penalty,
+        map_ordered: Callable[[Callable, Iterable], Iterable] = map,
+        consequent_inputs: np.ndarray | None = None,
+    ):
+        self.rows = rows
+        self.antecedent = antecedent
+        self.order = order
+        self.penalty = penalty
+        self.map_ordered = map_ordered
+        every_input = np.arange(rows.X.shape[1])
+        given = every_input if consequent_inputs is None else consequent_inputs
+        self.consequent_inputs = given if order == 1 else every_input[:0]
+        takes_every_input = self.consequent_inputs.size == every_input.size
+        self.n_basis = 1 + self.consequent_inputs.size
+        self.n_columns = antecedent.n_rules * self.n_basis
+        self.n_outputs = rows.y.shape[1]
+        self._design = Design(
+            None if takes_every_input else self.consequent_inputs,
+            self.n_basis,
+            self.n_outputs,
+            DesignMoments(antecedent.share_counts, self.n_basis),
+            own_parameters(antecedent),
+        )
+        self._block_rows = self._rows_of_block(antecedent)
+        self._weight = rows.total_weight
+        _keep_freed_memory()
+        no_coefficients = np.zeros((self.n_columns, self.n_outputs))
+        self._sums_at_start: tuple | None = self._first_pass(antecedent, no_coefficients)
+        gram = self._sums_at_start[0]
+        self.on_sample: SeparableProblem | None = None
+        self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
+        slopes = rows.inputs.varying(self.consequent_inputs)
+        self._common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
+
+    def _extent(self, antecedent):
+        """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
+        farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
+        for chunk in self.rows.chunks(self._block_rows):
+            for part in chunk:
+                Z, _, _ = self.rows.read(part)
+                root = np.sqrt(antecedent.strengths(Z))
+                for j, z in enumerate(self._design.basis(Z)[1:]):
+                    distance = root * np.abs(z - self.local.center[:, j, None])
+                    np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
+        return np.maximum(farthest, 1.0)
+
+    def with_penalty(self, penalty):
+        """Return the same problem with another penalty; no pass over the rows."""
+        other = copy.copy(self)
+        other.penalty = penalty
+        other.__dict__.pop("_pull", None)
+        return other
+
+    def on_all(self, rows):
+        """Return the problem of all rows of which this one's are a sample; no pass over them.
+
+        The local basis stays that of the sample. Cost, consequents and gradient are those of all
+        rows, the Gauss-Newton matrix is the sample's (subsampled Newton: Byrd et al. 2011): it
+        decides how long a step is and not where steps end, and of all sums it is the dearest.
+        """
+        other = copy.copy(self)
+        other.rows, other._weight, other.on_sample = rows, rows.total_weight, self
+        other._sums_at_start = None
+        return other
+
+    @property
+    def common_line(self):
+        """The line that all rules share, in the coordinates of the local basis."""
+        return self._common_line
+
+    def penalty_matrix(self, disagreement):
+        """P in the local basis, where Q is ``disagreement``."""
+        return self.penalty.agreement * disagreement + self._pull
+
+    @cached_property
+    def _pull(self):
+        return self._common_line.pull(self.penalty)
+
+    def _rows_of_block(self, antecedent):
+        values_per_row = (
+            sum(self._design.moments.shape)
+            + antecedent.parameters.size * (1 + self.n_basis)
+            + 2 * self._design.own_parameters.size
+            + 4 * (antecedent.n_terms + antecedent.n_rules)
+        )
+        fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
+        return int(np.clip(fitting, _FEWEST_ROWS, BLOCK_ROWS))
+
+    def _sum(self, one_pass):
+        """Means over the weight of what a pass sums."""
+        totals = self.rows.sum(one_pass, self._block_rows, self.map_ordered)
+        return [total / self._weight for total in totals]
+
+    def _first_pass(self, antecedent, reference):
+        """Phi' S Phi, Phi' S r and r' S r (per output), over W; r is the reference's residual."""
+        moments, slope, square = self._sum(FirstPass(self._design, antecedent, reference))
+        return self._design.moments.gram(moments), np.ascontiguousarray(slope), square
+
+    def evaluate(self, parameters, reference=None):
+        """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
+        antecedent = self.antecedent.with_parameters(parameters)
+        if reference is not None:
+            gram, slope, square = self._first_pass(antecedent, reference)
+        else:
+            reference = np.zeros((self.n_columns, self.n_outputs))
+            known = self._sums_at_start
+            if known is None or not np.array_equal(parameters, self.antecedent.parameters):
+                known = self._first_pass(antecedent, reference)
+            gram, slope, square = known
+            slope = slope.copy()  # it is changed below
+        masses = rule_masses(gram, antecedent.n_rules)
+        disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
+        penalty = self.penalty_matrix(disagreement)
+        factor = NormalFactor(gram + penalty)
+        penalty.flat[:: self.n_columns + 1] += factor.shift
+        reference_local = self.local.to_local(reference)
+        pull = penalty @ reference_local
+        slope = self.local.transform_rows(slope) - pull
+        change = factor.solve(slope)
+        cost = 0.5 * float(square.sum() + np.vdot(reference_local, pull) - np.vdot(slope, change))
+        solved = reference_local + change
+        return Evaluation(
+            antecedent,
+            cost,
+            reference + self.local.to_global(change),
+            masses,
+            max(2.0 * cost - float(np.vdot(solved, penalty @ solved)), 0.0),
+            NormalEquations(gram, disagreement, penalty, factor, solved),
+        )
+
+    def solved_again(self, evaluation):
+        """An evaluation of the same rows under this penalty; no pass over them."""
+        before = evaluation.normal
+        normal, change, error = before.with_penalty(
+            self.penalty_matrix(before.disagreement), evaluation.mean_squared_error
+        )
+        paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
+        return replace(
+            evaluation,
+            cost=0.5 * (error + paid),
+            coefficients=evaluation.coefficients + self.local.to_global(change),
+            mean_squared_error=error,
+            normal=normal,
+        )
+
+    def linearise(self, evaluation):
+        """Gradient and Gauss-Newton matrix at an evaluated point."""
+        if self.on_sample is not None:
+            return self._linearise_by_sample(evaluation)
+        antecedent = evaluation.antecedent
+        n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
+        gauss_newton, slope, *cross = self._sum(
+            SecondPass(self._design, antecedent, evaluation.coefficients, self.penalty.agreement)
+        )
+        halves = []
+        for one in cross:
+            by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
+            columns = np.ascontiguousarray(by_column).reshape(self.n_columns, n_raw)
+            half = evaluation.normal.factor.half_solve(self.local.transform_rows(columns))
+            gauss_newton -= half.T @ half
+            halves.append(half)
+        return Linearisation(-slope, gauss_newton, tuple(halves))
+
+    def curvature(self, evaluation):
+        """As :meth:`linearise`, the gradient not being asked for; of a sample if there is one."""
+        if self.on_sample is None:
+            return self.linearise(evaluation)
+        # The sample's own normal equations: D' S D and what is taken off are of the same rows.
+        sample, coefficients = self.on_sample, evaluation.coefficients
+        own = sample.evaluate(evaluation.antecedent.parameters, coefficients)
+        return sample.linearise(replace(own, coefficients=coefficients))
+
+    def _linearise_by_sample(self, evaluation):
+        antecedent, coefficients = evaluation.antecedent, evaluation.coefficients
+        slope, *_ = self._sum(
+            JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
+        )
+        return replace(self.curvature(evaluation), gradient=-slope)
+
+    def joint(self, parameters, coefficients):
+        """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
+        antecedent = self.antecedent.with_parameters(parameters)
+        premises, slope, square, apart, masses = self._sum(
+            JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
+        )
+        local = self.local.to_local(coefficients)
+        pull = self._pull @ local
+        cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
+        return JointGradient(
+            Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None),
+            -premises,
+            self._by_global(pull) - slope,
+        )
+
+    def residuals(self, evaluation):
+        """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
+        for chunk in self.rows.chunks(self._block_rows):
+            for part in chunk:
+                yield part, *self.residual(evaluation, part)
+
+    def residual(self, evaluation, part):
+        """Residual (n_outputs, n_rows) of the standardised target, and weights, of some rows."""
+        Z, target, weight = self.rows.read(part)
+        strengths, basis_rows = self._firing(evaluation, Z)
+        return self._residual_at(evaluation, strengths, basis_rows, target), weight
+
+    def _firing(self, evaluation, Z):
+        """Strengths of the rules and functions of the basis at some places."""
+        return evaluation.antecedent.strengths(Z), self._design.basis(Z)
+
+    def _residual_at(self, evaluation, strengths, basis_rows, target):
+        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
+        for k in range(self.n_outputs):
+            target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+        return target
+
+    def strongest_alone(self, evaluation):
+        """RMS of the strongest rule's distance from the model, of the output where it is largest.
+
+        In deviations of the target.
+        """
+        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
+        total, total_weight = np.zeros(self.n_outputs), 0.0
+        for chunk in self.rows.chunks(self._block_rows):
+            for part in chunk:
+                Z, _, weight = self.rows.read(part)
+                strengths = evaluation.antecedent.strengths(Z)
+                basis_rows = self._design.basis(Z)
+                strongest = strengths.argmax(axis=0)
+                for k in range(self.n_outputs):
+                    own = by_rule[:, :, k]
+                    distance = np.einsum("nb,bn->n", own[strongest], basis_rows)
+                    distance -= rule_outputs(own, strengths, basis_rows)[1]
+                    square = distance**2
+                    total[k] += square.sum() if weight is None else square @ weight
+                total_weight += strongest.size if weight is None else weight.sum()
+        return float(np.sqrt(total.max() / total_weight))
+
+    def mean_squares(self, evaluation):
+        """Mean square of the residual of every standardised output, (n_outputs,)."""
+        if self.n_outputs == 1:
+            return np.array([evaluation.mean_squared_error])
+        if self.on_sample is not None:
+            # How the outputs share it shows on the sample; all of it is known of all rows.
+            found = self.on_sample.mean_squares(evaluation)
+            return found * (evaluation.mean_squared_error / max(found.sum(), _TINY))
+        total, total_weight = np.zeros(self.n_outputs), 0.0
+        for _, residual, weight in self.residuals(evaluation):
+            total += (residual**2).sum(axis=1) if weight is None else residual**2 @ weight
+            total_weight += residual.shape[1] if weight is None else weight.sum()
+        return total / total_weight
+
+    def leave_one_out_error(self, evaluation, n_rows, held=None):
+        """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
+
+        The mean of (r_i / (1 - h_i))^2. The weights are those of so many rows: of a row that stands
+        for several, one is left out.
+
+        Coefficients that keep linear constraints are taken as they are, with ``held`` of every
+        output, orthonormal columns (n_columns, n_held) that span L^-1 A', where A has a row for
+        each constraint met with equality. Exact as long as these stay so: what moves without a row
+        is orthogonal to them, and h_i that of this smaller problem.
+        """
+        total, unit = 0.0, self._weight / n_rows
+        for chunk in self.rows.chunks(self._block_rows):
+            for part in chunk:
+                Z, target, weight = self.rows.read(part)
+                strengths, basis_rows = self._firing(evaluation, Z)
+                residual = self._residual_at(evaluation, strengths, basis_rows, target)
+                half = self._half_at(evaluation, strengths, basis_rows)
+                leverage = _leverage(half, held) / self._weight
+                residual /= np.maximum(1.0 - unit * leverage, _SMALLEST_FREEDOM)
+                squares = np.sum(residual**2, axis=0)
+                total += squares.sum() if weight is None else weight @ squares
+        return float(total / self._weight)
+
+    def half(self, evaluation, part):
+        """W^-1/2 L^-1 phi of some rows, (n_columns, n_rows), of which squares are leverages.
+
+        Those are h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i.
+        """
+        Z, _, _ = self.rows.read(part)
+        return self._half_at(evaluation, *self._firing(evaluation, Z)) / np.sqrt(self._weight)
+
+    def leverage_at(self, evaluation, Z, n_rows):
+        """Leverages of any places (n_inputs, n_places), where the weights are those of n rows."""
+        return _leverage(self._half_at(evaluation, *self._firing(evaluation, Z))) / n_rows
+
+    def _half_at(self, evaluation, strengths, basis_rows):
+        """L^-1 phi of some places."""
+        design = (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
+        factor = evaluation.normal.factor
+        if self.n_columns > _MOST_INVERTED:
+            return factor.half_solve(self.local.transform_rows(design))
+        # L^-1 T': what is changed is a matrix of few rows, and not the design.
+        return self.local.to_global(factor.root.T).T @ design
+
+    def _by_global(self, local):
+        """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""
+        blocks = local.reshape(-1, self.n_basis, self.n_outputs).copy()
+        blocks[:, 1:] *= self.local.spread[:, :, None]
+        blocks[:, 1:] += self.local.center[:, :, None] * blocks[:, :1]
+        return blocks.reshape(local.shape)
+
+
+def _leverage(half, held=None):
+    """Squares of some columns; where something is ``held``, of every output, (n_outputs, ...)."""
+    found = np.einsum("ij,ij->j", half, half)
+    if held is None:
+        return found
+    return np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])

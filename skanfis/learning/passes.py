@@ -1,0 +1,240 @@
+r"""What one pass adds up over the rows, a block at a time: the sums behind ``objective``.
+
+A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights or
+None, that adds to its sums, arrays of the pass's ``shapes``. It holds the point at which it is
+taken and nothing of the rows: it can be sent to where the rows are (``StandardisedData.sum``),
+and only the sums come back. The formulas are in ``objective``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..antecedent import Antecedent
+from ..consequent import basis, rule_outputs
+from .gram import DesignMoments
+
+__all__ = ["Design", "FirstPass", "JointPass", "SecondPass", "own_parameters"]
+
+_TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """The columns of the design: its basis functions, and the moments that its Gram matrix takes.
+
+    Parameters
+    ----------
+    consequent_inputs : ndarray of int or None
+        The inputs that the consequents are linear in; None is all.
+    n_basis, n_outputs : int
+    moments : DesignMoments
+    own_parameters : ndarray of int
+        Of the premises, see the function of this name.
+    """
+
+    consequent_inputs: np.ndarray | None
+    n_basis: int
+    n_outputs: int
+    moments: DesignMoments
+    own_parameters: np.ndarray
+
+    def basis(self, Z):
+        """Basis functions of the consequents at a block of rows."""
+        return basis(Z if self.consequent_inputs is None else Z[self.consequent_inputs])
+
+    def by_rule(self, coefficients):
+        """Coefficients (n_columns, n_outputs) as (n_rules, n_basis, n_outputs)."""
+        return coefficients.reshape(-1, self.n_basis, self.n_outputs)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstPass:
+    """Phi' S Phi (its moments), Phi' S r and r' S r; r is the residual of a reference."""
+
+    design: Design
+    antecedent: Antecedent
+    reference: np.ndarray  # coefficients on [1, z], (n_columns, n_outputs)
+
+    @property
+    def shapes(self):
+        """Of the sums."""
+        return [self.design.moments.shape, self.reference.shape, (self.design.n_outputs,)]
+
+    def __call__(self, Z, target, weight, sums):
+        moments, slope, square = sums
+        design, by_rule = self.design, self.design.by_rule(self.reference)
+        basis_rows = design.basis(Z)
+        weighted_basis = basis_rows if weight is None else basis_rows * weight
+        strengths, shares = self.antecedent.strengths_and_shares(Z)
+        design.moments.accumulate(moments, shares, basis_rows, weighted_basis)
+        for k in range(design.n_outputs):
+            residual = target[k] - rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+            slope[:, k] += (strengths @ (weighted_basis * residual).T).ravel()
+            square[k] += weighted_basis[0] @ residual**2  # the basis begins with 1
+
+
+@dataclass(frozen=True, eq=False)
+class SecondPass:
+    """D' S D + lambda K, the slope, and C of every output, at coefficients that were solved for."""
+
+    design: Design
+    antecedent: Antecedent
+    coefficients: np.ndarray
+    agreement: float
+
+    @property
+    def shapes(self):
+        """Of the sums."""
+        n_raw, n_rules = self.antecedent.parameters.size, self.antecedent.n_rules
+        cross = [(n_raw * self.design.n_basis, n_rules)] * self.design.n_outputs
+        return [(n_raw, n_raw), (n_raw,), *cross]
+
+    def __call__(self, Z, target, weight, sums):
+        square, slope, *cross = sums
+        design, antecedent, agreement = self.design, self.antecedent, self.agreement
+        by_rule = design.by_rule(self.coefficients)
+        basis_rows = design.basis(Z)
+        weighted_basis = basis_rows if weight is None else basis_rows * weight
+        log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
+        strengths, shares = antecedent.normalise(log_mu)
+        n_rows = Z.shape[1]
+        sensitivity = np.empty((slope.size, n_rows))
+        for k in range(design.n_outputs):
+            by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
+            by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
+            _chain(gradients, by_term, sensitivity)
+            # One product for D' S Phi and, the basis beginning with 1, the weighted D itself.
+            products = sensitivity[:, None, :] * weighted_basis
+            square += products[:, 0] @ sensitivity.T
+            slope += products[:, 0] @ (target[k] - output)
+            if agreement:
+                products *= 1.0 - 0.5 * agreement
+            cross[k] += products.reshape(-1, n_rows) @ strengths.T
+            if agreement:
+                excess = by_rule_k - strengths * output  # w_r e_r
+                self._disagree(
+                    square, slope, cross[k], excess, strengths, gradients, weighted_basis
+                )
+
+    def _disagree(self, square, slope, cross, excess, strengths, gradients, weighted_basis):
+        """Add the part of V: its dV, K and L."""
+        antecedent, agreement, n_raw = self.antecedent, self.agreement, slope.size
+        # w_r e_r^2, where w_r may be next to nothing.
+        squares = excess**2
+        squares /= np.maximum(strengths, _TINY)
+        weight, n_rows = weighted_basis[0], excess.shape[1]
+        total = squares.sum(axis=0)
+        every = np.concatenate([g.reshape(-1, n_rows) for g in gradients] or [excess[:0]])
+        mean, change = np.empty((2, n_raw, n_rows))
+        _chain(gradients, antecedent.sum_over_rules(strengths), mean)  # N
+        _chain(gradients, antecedent.sum_over_rules(squares), change)
+        change -= mean * total  # e_r^2 dw_r, summed over rules
+        slope -= 0.5 * agreement * (change @ weight)
+        # - (change N' + N change' + total N N') / 4
+        half = (0.25 * agreement * weight) * (change + 0.5 * total * mean)
+        product = half @ mean.T
+        square -= product + product.T
+        cross -= _outer_rows(mean, (0.5 * agreement) * weighted_basis) @ excess.T
+        # Of every rule, its own parameters; those that it lacks are a row of nothing at the end.
+        own, size = self.design.own_parameters, n_raw + 1
+        of_rule = np.concatenate([every, np.zeros((1, n_rows))])[own]
+        squares *= 0.25 * agreement * weight
+        blocks = (of_rule * squares[:, None]) @ of_rule.transpose(0, 2, 1)
+        places = (size * own[:, :, None] + own[:, None, :]).ravel()
+        whole = np.bincount(places, blocks.ravel(), size**2).reshape(size, size)
+        square += whole[:n_raw, :n_raw]
+        of_rule *= (0.5 * agreement) * excess[:, None]
+        apart = np.zeros((n_raw + 1, self.design.n_basis, antecedent.n_rules))
+        apart[own, :, np.arange(antecedent.n_rules)[:, None]] = of_rule @ weighted_basis.T
+        cross += apart[:n_raw].reshape(cross.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class JointPass:
+    """Slopes by theta and beta but for A, r' S r and V (per output), and the rules' masses."""
+
+    design: Design
+    antecedent: Antecedent
+    coefficients: np.ndarray
+    agreement: float
+
+    @property
+    def shapes(self):
+        """Of the sums."""
+        by_output = (self.design.n_outputs,)
+        n_raw, n_rules = self.antecedent.parameters.size, self.antecedent.n_rules
+        return [(n_raw,), self.coefficients.shape, by_output, by_output, (n_rules,)]
+
+    def __call__(self, Z, target, weight, sums):
+        premises, slope, square, apart, masses = sums
+        design, antecedent, agreement = self.design, self.antecedent, self.agreement
+        by_rule = design.by_rule(self.coefficients)
+        basis_rows = design.basis(Z)
+        log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
+        strengths, shares = antecedent.normalise(log_mu)
+        masses += strengths.sum(axis=1) if weight is None else strengths @ weight
+        for k in range(design.n_outputs):
+            by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
+            residual = target[k] - output
+            weighted = residual if weight is None else residual * weight
+            slope[:, k] += (strengths @ (basis_rows * weighted).T).ravel()
+            square[k] += weighted @ residual
+            by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
+            by_term *= weighted
+            if agreement:
+                excess = by_rule_k - strengths * output
+                squares = excess**2 / np.maximum(strengths, _TINY)
+                total = squares.sum(axis=0)
+                own = np.ones_like(total) if weight is None else weight
+                apart[k] += own @ total
+                slope[:, k] -= agreement * ((excess * own) @ basis_rows.T).ravel()
+                change = antecedent.sum_over_rules(squares)
+                change -= antecedent.sum_over_rules(strengths) * total
+                by_term -= (0.5 * agreement) * own * change
+            premises += _chain_sum(gradients, by_term)
+
+
+def _chain_sum(gradients, by_term):
+    """Sum over rows of what ``_chain`` gives, without an array of every parameter's rows."""
+    parts, term = [], 0
+    for gradient in gradients:
+        n_terms = gradient.shape[1]
+        own = by_term[term : term + n_terms]
+        parts.append(np.einsum("pti,ti->pt", gradient, own).ravel())
+        term += n_terms
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _chain(gradients, by_term, out):
+    """Sensitivity to every parameter: that to log mu times its derivative, group by group."""
+    row = term = 0
+    for gradient in gradients:
+        n_parameters, n_terms, _ = gradient.shape
+        target = out[row : row + n_parameters * n_terms].reshape(gradient.shape)
+        np.multiply(gradient, by_term[term : term + n_terms], out=target)
+        row, term = row + n_parameters * n_terms, term + n_terms
+
+
+def _outer_rows(rows, others):
+    """Products of every row with every one of others, (rows.shape[0] * others.shape[0], n)."""
+    return (rows[:, None, :] * others).reshape(-1, rows.shape[1])
+
+
+def own_parameters(antecedent):
+    """Of every rule, the positions of its terms' parameters in the vector of all.
+
+    Shape (n_rules, the most that a rule has); of rules that have fewer, the rest is one position
+    beyond the vector.
+    """
+    n_raw = antecedent.parameters.size
+    most = max([group.theta.shape[0] for group in antecedent.groups], default=0)
+    of_term = np.full((antecedent.n_terms + 1, most), n_raw)
+    start = term = 0
+    for group in antecedent.groups:
+        n_parameters, n_terms = group.theta.shape
+        rows = start + np.arange(group.theta.size).reshape(group.theta.shape)
+        of_term[term : term + n_terms, :n_parameters] = rows.T
+        start, term = start + group.theta.size, term + n_terms
+    # No term is the last.
+    return of_term[antecedent.rule_terms].reshape(antecedent.n_rules, -1)

@@ -1,0 +1,215 @@
+r"""What the consequents pay beside their errors: for disagreement, for standing alone, for slopes.
+
+With f_r the value of rule r and y_hat = sum_r w_r f_r, the cost of a model is
+
+    F = 1/2 [ MSE + lambda V + sum_c alpha_c |delta_c|^2 + sum_j rho_j b_j^2 ] ,
+
+    V = mean over rows of  sum_r w_r (f_r - y_hat)^2 ,
+
+and every part is quadratic in the consequents beta.
+
+*Agreement*, lambda. Because sum_r w_r = 1, for every row
+
+    sum_r w_r (y - f_r)^2 = (y - y_hat)^2 + sum_r w_r (f_r - y_hat)^2
+
+(the ambiguity decomposition of Krogh and Vedelsby 1995): local learning, in which every rule is a
+model of the rows on which it fires, is global learning plus V, the *disagreement* of rules that
+fire on the same row. lambda = 0 lets rules compensate one another at will, lambda = 1 is local
+learning, and as lambda grows beyond all rules become one line. With G the Gram matrix of the
+design, V = beta' Q beta with Q = B - G, where B is block diagonal and its block of rule r the row
+sum over r' of the blocks G_(r, r'): nothing else is accumulated.
+
+*The rules' common line*, alpha_c. Disagreement is weighed by the rows and says nothing where there
+are none. There a pull of each rule by itself holds it: delta_r is how much the rule differs from
+the rules' common line b, in its value at its own centre and in its slopes times the distance to
+the farthest row for which it stands (see ``SeparableProblem``). b is the line of least squares
+through all rules, that for which sum_r |delta_r|^2 is smallest. What a departure concerns, one
+input alone, or how one input's part depends on another, are components with a pull each (see
+``departures``): alpha times one of ``pulls``, whose geometric mean is one.
+
+*The slopes b_j of that line* have a plain ridge, rho_j, with a weight for the slope by each input:
+rho times one of ``slope_pulls``. Of a single rule it is all there is. Nothing pulls on the line's
+height: constants are free.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg
+
+from ..antecedent import Antecedent
+from ..consequent import LocalBasis, NormalFactor
+from .departures import Departures
+
+__all__ = [
+    "GREATEST_ALONE",
+    "WEIGHTS",
+    "CommonLine",
+    "Penalty",
+    "disagreement_matrix",
+    "mean_and_parts",
+]
+
+# In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
+# explains three quarters of the variance; beyond, the rule says too little of the model.
+GREATEST_ALONE = 0.5
+# What comes first in a row of weights; after these, those on all slopes and on all components.
+WEIGHTS = ("agreement", "stiffness")
+# Penalties whose weights are kept.
+_MOST_KNOWN = 8
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """Weights of the parts of the penalty, each zero or positive, relative to a mean over rows."""
+
+    agreement: float = 0.0  # lambda
+    alpha: float = 0.0  # pull of each rule to the common line, the mean of all components
+    slope: float | None = None  # rho, on the slopes of the common line, their mean; None is alpha
+    stiffness: float = 0.0  # kappa, on the displacements of the premises
+    # Of each component of the departures in alphas, and of the slope by each input in rhos; one
+    # where there is none. Those of some rows hold for others, where other inputs are constant.
+    pulls: dict[tuple[int, ...], float] = field(default_factory=dict)
+    slope_pulls: dict[int, float] = field(default_factory=dict)
+
+    @property
+    def rho(self):
+        """The weight of the common line's slopes."""
+        return self.alpha if self.slope is None else self.slope
+
+    def weights(self, slopes, components):
+        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
+        found = np.empty(len(WEIGHTS) + len(slopes) + len(components))
+        found[:2] = self.agreement, self.stiffness
+        first = 2 + len(slopes)
+        found[2:first] = [self.slope_pulls.get(j, 1.0) for j in slopes]
+        found[first:] = [self.pulls.get(component, 1.0) for component in components]
+        found[2:first] *= self.rho
+        found[first:] *= self.alpha
+        return found
+
+
+def mean_and_parts(weights, names):
+    """The geometric mean of some weights, and these in units of it by name, where there are two."""
+    if weights.size == 1:
+        return float(weights[0]), {}
+    mean = float(np.exp(np.log(weights).sum() / weights.size))
+    return mean, dict(zip(names, (weights / mean).tolist(), strict=True))
+
+
+def disagreement_matrix(gram, n_rules, local: LocalBasis):
+    """Q = B - G of the disagreement V = beta' Q beta, and G itself, in the local basis.
+
+    ``gram`` is that of the design on [1, z].
+    """
+    n_columns = gram.shape[0]
+    n_basis = n_columns // n_rules
+    sums = gram.reshape(n_rules, n_basis, n_rules, n_basis).sum(axis=2)
+    gram = local.transform_gram(gram)
+    matrix = -gram
+    blocks = matrix.reshape(n_rules, n_basis, n_rules, n_basis)
+    rules = np.arange(n_rules)
+    blocks[rules, :, rules, :] += local.transform_blocks(sums)
+    return matrix, gram
+
+
+class CommonLine:
+    """The line that all rules share, in the coordinates of their local basis.
+
+    Parameters
+    ----------
+    local : LocalBasis
+    extent : ndarray of shape (n_rules, n_basis - 1)
+        How far from its centre each rule stands for rows, along every input.
+    antecedent : Antecedent
+        The rules.
+    slopes : list of (int or None)
+        The inputs that the consequents are linear in; None for those that are constant.
+
+    Attributes
+    ----------
+    departures : Departures
+        From the line, of the local coefficients u.
+    slopes : list of int
+        The inputs, those that vary, by which b has slopes.
+    to_slopes : ndarray of shape (n_slopes, n_columns)
+        These slopes out of u.
+    height : ndarray of shape (n_columns,)
+        The unit vector along which all rules rise alike: the null space of the whole penalty.
+    """
+
+    def __init__(
+        self,
+        local: LocalBasis,
+        extent: np.ndarray,
+        antecedent: Antecedent,
+        slopes: list[int | None],
+    ):
+        n_rules, n_basis = local.center.shape[0], local.n_basis
+        n_columns = n_rules * n_basis
+        # In (value at the centre, slopes) of every rule, the rules of a common line b are A b.
+        line = np.zeros((n_rules, n_basis, n_basis))
+        line[:, np.arange(n_basis), np.arange(n_basis)] = 1.0
+        line[:, 0, 1:] = local.center
+        line[:, np.arange(1, n_basis), np.arange(1, n_basis)] = extent
+        orthonormal, triangle = np.linalg.qr(line.reshape(n_columns, n_basis))
+        # Local slopes are per spread of the rule; these are per unit of z.
+        scale = np.ones((n_rules, n_basis))
+        scale[:, 1:] = extent / local.spread
+        scale = scale.ravel()
+        along = orthonormal * scale[:, None]
+        self.departures = Departures(scale, orthonormal, along, antecedent, slopes)
+        # b = triangle^-1 along' u
+        is_varying = np.array([j is not None for j in slopes], dtype=bool)
+        to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
+        self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
+        self._to_none = to_slopes[~is_varying]
+        self._part = np.concatenate(
+            [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
+        )
+        self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
+        self.height = np.zeros(n_columns)
+        self.height[::n_basis] = n_rules**-0.5
+
+    @cached_property
+    def _rows(self):
+        """Slopes and departures out of u, (n_slopes + n_columns, n_columns)."""
+        return np.concatenate([self.to_slopes, self.departures.matrix])
+
+    def pull(self, penalty: Penalty):
+        """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
+        weights = self.weights(penalty)[len(WEIGHTS) :]
+        if penalty.pulls:
+            rooted = np.sqrt(weights)[self._part, None] * self._rows
+            matrix = rooted.T @ rooted
+        else:
+            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
+            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        if self._to_none.size:
+            # What is constant has no slope to learn, but one that is held.
+            matrix += penalty.rho * self._to_none.T @ self._to_none
+        return matrix
+
+    def weights(self, penalty: Penalty):
+        """All weights of a penalty, in a row; not to be changed."""
+        # The same few penalties are asked about again and again; kept, none is mistaken for them.
+        known = self._known.get(id(penalty))
+        if known is None:
+            while len(self._known) >= _MOST_KNOWN:
+                del self._known[next(iter(self._known))]
+            known = penalty, penalty.weights(self.slopes, self.departures.components)
+            self._known[id(penalty)] = known
+        return known[1]
+
+    def squares(self, coefficients):
+        """Of every slope, and of every component of the departures; local, summed over outputs."""
+        own = self._rows @ coefficients
+        return self._by_part(np.einsum("ij,ij->i", own, own))
+
+    def traces(self, factor: NormalFactor):
+        """The same of the columns of a root of the inverse of what is factorised."""
+        return self._by_part(factor.squares(self._rows))
+
+    def _by_part(self, values):
+        return np.bincount(self._part, values, len(self.slopes) + len(self.departures.components))

@@ -1,0 +1,101 @@
+r"""What a solver moves: premises as a vector of displacements from their start, within bounds.
+
+Every entry is without unit and zero at the start, and one means much the same for all of them, a
+change of some length by a factor of e. Terms stay what a person can read, by construction:
+
+* Terms that an input has in different places stay in order and where there are data, and of a width
+  that goes with their distance (``ordered_terms``).
+* Terms of scattered rules, and terms that share their place, move by themselves: a location by its
+  shift in units of the term's own width, at most one width beyond the data.
+
+Shape parameters are logarithms, and move as these.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..antecedent import Antecedent
+from .ordered_terms import LOG_FACTOR, LOG_FLATTER, OrderedTerms, terms_of
+
+__all__ = ["Premise"]
+
+# Displacements this near to an edge of the box are on it.
+_ON_EDGE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Premise:
+    """The map from displacements to the antecedent's parameters, and the box they live in."""
+
+    antecedent: Antecedent
+    lower: np.ndarray
+    upper: np.ndarray
+    _unit: np.ndarray  # raw units per unit of displacement of what moves by itself
+    _ordered: tuple[OrderedTerms, ...]
+
+    @classmethod
+    def of(cls, antecedent, minimum, maximum, is_free=False):
+        """The premise of an antecedent; ``minimum`` and ``maximum`` of each input's data."""
+        raw = antecedent.parameters
+        lower, upper = np.full(raw.size, -LOG_FACTOR), np.full(raw.size, LOG_FACTOR)
+        unit, ordered = np.ones(raw.size), []
+        terms = terms_of(antecedent)
+        is_ordered = antecedent.is_ordered
+        for j in sorted({term.input for term in terms}):
+            own = sorted((t for t in terms if t.input == j), key=lambda t: raw[t.location])
+            locations = np.array([term.location for term in own])
+            if is_ordered and len(own) > 1 and (np.diff(raw[locations]) > 0.0).all():
+                row = OrderedTerms.of(own, raw, minimum[j], maximum[j], is_free)
+                if not is_free:
+                    lower[locations], upper[locations] = row.bounds()
+                    row, least, most = row.within_reach(own, raw)
+                    lower[row.widths], upper[row.widths] = least[row.terms], most[row.terms]
+                    upper[np.concatenate([term.shapes for term in own])] = LOG_FLATTER
+                ordered.append(row)
+                continue
+            widths = np.exp([raw[term.widths[0]] for term in own])
+            unit[locations] = widths
+            # Up to one width beyond the data, or where the term stands already.
+            lower[locations] = np.minimum((minimum[j] - raw[locations]) / widths - 1.0, 0.0)
+            upper[locations] = np.maximum((maximum[j] - raw[locations]) / widths + 1.0, 0.0)
+        return cls(antecedent, lower, upper, unit, tuple(ordered))
+
+    @property
+    def size(self):
+        """Number of displacements."""
+        return self.lower.size
+
+    def parameters(self, displacement):
+        """The antecedent's parameters at a displacement."""
+        if not np.any(displacement):
+            # What is not moved is as it was given, to the last bit.
+            return self.antecedent.parameters
+        raw = self.antecedent.parameters + self._unit * displacement
+        for row in self._ordered:
+            gaps = row.gaps(displacement)
+            raw[row.locations] = row.low + np.cumsum(gaps)[:-1]
+            raw[row.widths] += row.widening(displacement, gaps)
+        return raw
+
+    def displacement(self, parameters):
+        """The displacement at which the antecedent has these parameters."""
+        x = (parameters - self.antecedent.parameters) / self._unit
+        for row in self._ordered:
+            gaps = row.gaps_of(parameters[row.locations])
+            x[row.locations] = row.from_gaps(gaps)
+            x[row.widths] = row.from_widths(x[row.widths], gaps)
+        # What stands on an edge stays there whatever rounding says: it is what does not move.
+        for edge in (self.lower, self.upper):
+            x = np.where(np.abs(x - edge) < _ON_EDGE, edge, x)
+        return x
+
+    def pull_back(self, displacement, gradient, gauss_newton):
+        """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
+        jacobian = np.diag(self._unit)
+        for row in self._ordered:
+            by_location, by_gaps, own = row.jacobian(displacement)
+            jacobian[row.locations[:, None], row.locations] = by_location
+            jacobian[row.widths[:, None], row.locations] = by_gaps
+            jacobian[row.widths, row.widths] = own
+        return jacobian.T @ gradient, jacobian.T @ gauss_newton @ jacobian

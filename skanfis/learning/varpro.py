@@ -1,0 +1,260 @@
+r"""Variable projection: trust-region Gauss-Newton steps on the reduced problem, within a box.
+
+With g and H the gradient and Gauss-Newton matrix of the reduced cost F by the premises'
+displacements x, the step minimises the model
+
+    m(s) = g's + s'Hs / 2    over |s| <= radius ,
+
+exactly, from the eigenvalues of H, among the displacements that are free to move (a displacement at
+a bound whose gradient points outward is not); what would then leave the box is put on its edge.
+With rho the ratio of the actual decrease to the model's, the radius falls to a quarter of the step
+where rho < 1/4 and doubles where rho > 3/4 and the step ends on the region's edge; the step is
+taken where rho > 1e-4 (Nocedal and Wright 2006, algorithm 4.1 and section 4.3).
+
+To the curvature that a step sees is added what keeps rounding errors from deciding it. Normalised
+strengths do not change at all along some directions (two Gaussian terms have four parameters, their
+log ratio has three coefficients), and hardly along others: slope and curvature are both noise
+there, and so would their ratio be. The addition is a small part of the largest curvature, plus the
+curvature with which moving by one must pay: a decrease of the cost by a twentieth of itself. Two
+fits to the same data in other units so take the same path (tests/test_invariance.py).
+
+A rejected step costs one pass over the data, an accepted one two (see ``objective``).
+
+``stiffness`` adds stiffness/2 |x|^2 to the cost, which draws the premises to their start. There is
+nothing to choose otherwise: displacements have no unit, so that one radius serves all problems.
+"""
+
+from numbers import Real
+from typing import ClassVar
+
+import numpy as np
+
+from .._sklearn import Interval, StrOptions
+from .solver import Solver
+from .solver_result import SolverResult
+
+__all__ = ["VariableProjection", "trust_region_step", "varpro"]
+
+# Displacements are in spacings and logarithms: steps beyond about a third of a spacing skip from
+# one arrangement of the terms to another, and the bad minima are met that way.
+_FIRST_RADIUS = 0.3
+# However well the steps before have done: a whole spacing.
+_LARGEST_RADIUS = 1.0
+# Below this the decrease that a step promises is lost in the rounding of the cost.
+_SMALLEST_RADIUS = 1e-9
+# Nocedal and Wright's eta: as good as any decrease is taken.
+_ACCEPTED_RATIO = 1e-4
+# Steps up to this much longer than the radius count as on its edge: the radius itself is a guess.
+_LENGTH_SLACK = 1.01
+# Newton's method converges quadratically here; the bound is for rounding alone.
+_MOST_NEWTON_STEPS = 50
+# Added to every curvature: this part of the largest, far above what rounding leaves where there is
+# none and far below what data give; and this part of the cost, which a step of one must pay for.
+_SMALLEST_CURVATURE = 1e-6
+_WORTH = 0.1
+# The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
+_GRADIENT_FACTOR = 1e-2
+
+
+def trust_region_step(gradient, hessian, radius, damping=0.0):
+    """Minimise g's + s'(H + damping I)s/2 over |s| <= radius (1 %), H positive semi-definite."""
+    values, vectors = np.linalg.eigh(hessian)
+    slope = vectors.T @ gradient
+    size = np.linalg.norm(slope)
+    if size == 0.0:
+        return np.zeros_like(gradient)
+    # A damping of |g| / radius alone bounds the step's length, and no smaller one than what the
+    # largest curvature leaves of it can be needed.
+    values = np.maximum(values, 0.0)
+    values += damping + _SMALLEST_CURVATURE * max(values[-1], np.finfo(float).tiny)
+    damping = max(size / radius - values[-1], 0.0)
+    for _ in range(_MOST_NEWTON_STEPS):
+        step = slope / (values + damping)
+        length = np.linalg.norm(step)
+        if length <= _LENGTH_SLACK * radius:
+            break
+        # Newton on 1 / |s(damping)| = 1 / radius, which converges from this side without overshoot.
+        damping += (length / radius - 1.0) * length**2 / np.sum(step**2 / (values + damping))
+    return -vectors @ step
+
+
+class _ReducedCost:
+    """F(x) + stiffness/2 |x|^2 over displacements."""
+
+    def __init__(self, problem, premise, stiffness):
+        self.problem, self.premise, self.stiffness = problem, premise, stiffness
+
+    def evaluate(self, x, reference=None):
+        evaluation = self.problem.evaluate(self.premise.parameters(x), reference)
+        return evaluation, self.of(x, evaluation)
+
+    def of(self, x, evaluation):
+        return evaluation.cost + 0.5 * self.stiffness * (x @ x)
+
+    def linearise(self, x, evaluation):
+        raw = self.problem.linearise(evaluation)
+        gradient, curvature = self.premise.pull_back(x, raw.gradient, raw.gauss_newton)
+        return gradient + self.stiffness * x, curvature
+
+
+def _free(x, gradient, premise):
+    """Displacements that a descent may move without leaving the box."""
+    stuck_low = (x <= premise.lower) & (gradient > 0.0)
+    stuck_high = (x >= premise.upper) & (gradient < 0.0)
+    return ~(stuck_low | stuck_high)
+
+
+def _propose(x, gradient, hessian, premise, free, radius, damping):
+    """A point within box and region, the step to it, and the decrease that the model promises."""
+    step = np.zeros_like(x)
+    step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius, damping)
+    # The point and not the step is what meets an edge of the box to the last bit.
+    trial_x = np.clip(x + step, premise.lower, premise.upper)
+    step = trial_x - x
+    return trial_x, step, -(gradient @ step + 0.5 * step @ hessian @ step)
+
+
+def varpro(
+    problem,
+    premise,
+    *,
+    max_iter,
+    tol,
+    stiffness=0.0,
+    start=None,
+    on_iteration=None,
+    patience=2,
+    evaluation=None,
+):
+    """Minimise the reduced cost over the premises.
+
+    Parameters
+    ----------
+    problem : SeparableProblem
+    premise : Premise
+    max_iter : int
+        Most iterations (accepted steps).
+    tol : float
+        Stop when expected and actual relative decrease of the cost stay below ``tol``, so many
+        times in a row as ``patience`` says.
+    stiffness : float
+        Weight of the pull of the premises to their start.
+    start : ndarray of shape (premise.size,), optional
+        Displacements to start from, inside the box; zero if not given.
+    on_iteration : callable, optional
+        Called with (n_iter, evaluation) after every accepted step; what is true ends the training.
+    patience : int
+        Twice, where nothing is known of the start; once, where a sample of the rows has settled.
+    evaluation : Evaluation, optional
+        That of the start, where it is known.
+
+    Returns
+    -------
+    SolverResult
+    """
+    cost_of = _ReducedCost(problem, premise, stiffness)
+    x = np.zeros(premise.size) if start is None else start
+    current = problem.evaluate(premise.parameters(x)) if evaluation is None else evaluation
+    cost = cost_of.of(x, current)
+    loss_curve = [current.mean_squared_error]
+    status = "max_iter" if premise.size else "no_premise"
+    radius, settled, n_iter = _FIRST_RADIUS, 0, 0
+    curvature = None
+    while premise.size and n_iter < max_iter:
+        gradient, curvature = cost_of.linearise(x, current)
+        hessian = curvature + stiffness * np.eye(x.size)
+        free = _free(x, gradient, premise)
+        steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
+        if steepest <= _GRADIENT_FACTOR * tol * cost:
+            status = "gradient"
+            break
+        while True:
+            damping = _WORTH * cost
+            trial_x, step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
+            length = float(np.linalg.norm(step))
+            trial, trial_cost = cost_of.evaluate(trial_x, current.coefficients)
+            ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
+            accepted = ratio > _ACCEPTED_RATIO
+            if not ratio >= 0.25:  # also where the trial is not finite
+                radius = 0.25 * min(length, radius)
+            elif ratio > 0.75 and length > 0.9 * radius:
+                radius = min(2.0 * radius, _LARGEST_RADIUS)
+            if accepted or radius < _SMALLEST_RADIUS:
+                break
+        if not accepted:
+            status = "step"
+            break
+        decrease = cost - trial_cost
+        x, current, cost, n_iter = trial_x, trial, trial_cost, n_iter + 1
+        loss_curve.append(current.mean_squared_error)
+        if on_iteration is not None and on_iteration(n_iter, current):
+            status = "stopped"
+            break
+        settled = settled + 1 if max(decrease, expected) <= tol * cost else 0
+        if settled == patience:
+            status = "cost"
+            break
+    return SolverResult(current, np.array(loss_curve), n_iter, status, curvature)
+
+
+class VariableProjection(Solver):
+    """Variable projection: trust-region Gauss-Newton steps on the premises alone.
+
+    The default. The consequents are the solution of a linear least-squares problem at every step.
+
+    Parameters
+    ----------
+    tol : float, default=1e-3
+        Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
+        or when the gradient says as much. Zero or positive.
+    stiffness : "auto" or float, default="auto"
+        Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
+        of their displacements (in spacings of terms and logarithms of widths) is added to the cost.
+        "auto": found by the evidence.
+
+    See Also
+    --------
+    skanfis.ANFISRegressor : Takes it as ``solver``.
+
+    References
+    ----------
+    .. [1] G. H. Golub and V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least
+       squares problems whose variables separate", SIAM Journal on Numerical Analysis 10 (1973)
+       413-432.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.learning import VariableProjection
+    >>> X, y = make_jang_sinc()
+    >>> default = ANFISRegressor(n_mfs=4).fit(X, y)
+    >>> longer = ANFISRegressor(n_mfs=4, solver=VariableProjection(tol=1e-6)).fit(X, y)
+    >>> longer.n_iter_ > default.n_iter_
+    True
+    """
+
+    goes_on_from_tuning: ClassVar[bool] = True
+    _parameter_constraints: ClassVar[dict] = {
+        "tol": [Interval(Real, 0, None, closed="left")],
+        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+    }
+
+    def __init__(self, *, tol: float = 1e-3, stiffness: str | float = "auto") -> None:
+        self.tol = tol
+        self.stiffness = stiffness
+
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
+        return varpro(
+            problem,
+            premise,
+            max_iter=max_iter,
+            tol=self.tol,
+            stiffness=stiffness,
+            start=start,
+            on_iteration=on_iteration,
+            # What a sample of the rows has settled is settled at once.
+            patience=2 if problem.on_sample is None else 1,
+        )

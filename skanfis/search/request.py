@@ -1,0 +1,274 @@
+"""Where training starts: the partition that was asked for, in standardised units."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from sklearn import get_config
+from sklearn.base import clone
+from sklearn.utils.validation import has_fit_parameter
+
+from .._callers import names_in_pipeline
+from .._validation import warn_user
+from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
+from ..learning.data import StandardisedData
+from ..learning.evidence import FREE
+from ..membership import Membership
+from ..model import TSKModel
+from .between import is_told
+from .clusters import clustered_antecedent
+from .given import tuned_start
+from .grid import Spacing, grid_antecedent
+from .imported import imported_antecedent
+from .sample import ENOUGH_ROWS, SampleSize, effective_weight
+from .search import SEARCHED, StructureSearch
+from .size import GridSize, RuleBaseSize, term_counts
+from .start import Start
+from .tuning import scaled
+
+__all__ = ["OVERLAP", "StructureRequest", "report_constant"]
+
+# Neighbouring terms of a grid cross at this membership at the start. From the customary 0.5, Jang's
+# sinc gets stuck; elsewhere it makes little difference (benchmarks/start.py).
+OVERLAP = 0.6
+_MIB = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class StructureRequest:
+    """What was asked for.
+
+    Parameters
+    ----------
+    n_mfs, partition : object
+        As given to the estimator; a model in place of the estimator that holds it.
+    families : sequence of type of Membership
+        One per input.
+    order : {0, 1}
+    premise_inputs, consequent_inputs : ndarray of int
+    weights : dict of str to float
+        The weights of the penalty that are given, by their names in ``evidence.FREE``; the evidence
+        finds the others.
+    premises_move : bool
+        Whether what is trained afterwards moves the premises.
+    seed : int
+        Of clusterings that have none of their own.
+    names : sequence of str
+        Of the inputs.
+    other_families : sequence of type of Membership
+        For all inputs in place of ``families``, where they promise a smaller error.
+    is_noisy : bool
+        Whether it is known already that what rules that are given leave of the target is noise.
+    """
+
+    n_mfs: Any
+    partition: Any
+    families: Sequence[type[Membership]]
+    order: int
+    premise_inputs: np.ndarray
+    consequent_inputs: np.ndarray
+    weights: dict[str, float]
+    premises_move: bool
+    seed: int
+    names: Sequence[str]
+    other_families: Sequence[type[Membership]] = ()
+    is_noisy: bool = False
+
+    @property
+    def is_searched(self):
+        """Whether the data decide on the structure."""
+        return (
+            isinstance(self.n_mfs, str)
+            and isinstance(self.partition, str)
+            and self.partition in SEARCHED
+        )
+
+    def start(self, rows: StandardisedData, size: SampleSize) -> Start:
+        """Where to start from, for these rows."""
+        self._check_combination()
+        if self.is_searched:
+            return StructureSearch(
+                rows,
+                self.families,
+                self.order,
+                self.premise_inputs,
+                self.consequent_inputs,
+                self.seed,
+                self.weights,
+                OVERLAP,
+                self.other_families,
+            ).run(self.partition)
+        if isinstance(self.partition, TSKModel):
+            antecedent = imported_antecedent(self.partition, rows)
+            names = self.partition.term_names
+            warned = self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+            start = self._tuned(antecedent, rows, is_compared=False)
+            _warn_if_unknown_between(start, warned)
+            return replace(start, term_names=names)
+        antecedent = self._antecedent(self.families, rows)
+        warned = self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+        is_compared = bool(self.other_families)
+        best = self._tuned(antecedent, rows, is_compared)
+        for family in self.other_families:
+            antecedent = self._antecedent([family] * len(self.families), rows)
+            other = self._tuned(antecedent, rows, is_compared)
+            best = other if other.expected_error < best.expected_error else best
+        _warn_if_unknown_between(best, warned)
+        return best
+
+    def _antecedent(self, families, rows):
+        """The rules that were asked for."""
+        if not isinstance(self.n_mfs, str):
+            return self._grid(families, rows)
+        label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
+        return clustered_antecedent(families, rows, label, self.premise_inputs)
+
+    def _tuned(self, antecedent, rows, is_compared):
+        return tuned_start(
+            antecedent,
+            rows,
+            self.order,
+            self.consequent_inputs,
+            self.weights,
+            self.premises_move,
+            is_compared,
+            self.is_noisy,
+        )
+
+    def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
+        """A start found on a sample, with the weights that were not given those of all rows."""
+        free = [key for key in FREE if key not in self.weights]
+        ratio = effective_weight(sample) / effective_weight(rows)
+        return replace(start, penalty=scaled(start.penalty, free, ratio, start.is_held))
+
+    def _check_combination(self):
+        """Raise ValueError where two parameters contradict each other."""
+        is_grid = isinstance(self.partition, str) and self.partition in ("auto", "grid")
+        if isinstance(self.n_mfs, str) or is_grid:
+            return
+        what = "the imported rules" if isinstance(self.partition, TSKModel) else "scattered rules"
+        raise ValueError(
+            f"n_mfs={self.n_mfs!r} asks for a grid, partition={self.partition!r} for {what}: "
+            "leave n_mfs at 'auto', or use partition='grid'."
+        )
+
+    def _checked(self, label, rows):
+        """A labeller whose clusters are counted before any rule is made of them."""
+
+        def checked(table, weight):
+            labels = np.asarray(label(table, weight))
+            n_rules = np.unique(labels[labels >= 0]).size
+            size = RuleBaseSize(
+                n_rules,
+                n_rules * self.premise_inputs.size,
+                1 + self.consequent_inputs.size,
+                rows.y.shape[1],
+            )
+            size.check_fits(f"partition={self.partition!r}", _memory_limit())
+            return labels
+
+        return checked
+
+    def _grid(self, families, rows):
+        counts = self._grid_counts(rows)
+        n_basis = 1 + self.consequent_inputs.size
+        GridSize(counts, n_basis, rows.y.shape[1]).check_grid_fits(
+            self.n_mfs, _memory_limit(), self.names
+        )
+        return grid_antecedent(families, counts, Spacing(rows), OVERLAP)
+
+    def _grid_counts(self, rows):
+        """Terms per input; none on an input that never changes or has no part in the premises."""
+        has_terms = ~rows.inputs.is_constant
+        has_terms[np.setdiff1d(np.arange(has_terms.size), self.premise_inputs)] = False
+        counts = term_counts(self.n_mfs, self.names)
+        if np.ndim(self.n_mfs) == 0:
+            return [count if has else 1 for has, count in zip(has_terms, counts, strict=True)]
+        for j, (name, count) in enumerate(zip(self.names, counts, strict=True)):
+            if has_terms[j] or count == 1:
+                continue
+            why = (
+                "is constant in the training data: give it 1, or drop the column"
+                if rows.inputs.is_constant[j]
+                else "is not among premise_features: give it 1, or name it there"
+            )
+            raise ValueError(
+                f"n_mfs={self.n_mfs!r} asks for {count} terms on column {name!r}, which {why}."
+            )
+        return counts
+
+    def _warn_if_underdetermined(self, n_rules, rows, size):
+        """Warn where there is less than one distinct row per consequent parameter; whether so."""
+        n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
+        n_columns = n_rules * n_basis
+        n_distinct = size.n_distinct_inputs
+        if n_distinct == ENOUGH_ROWS < n_columns:
+            n_distinct = SampleSize.of(rows, n_columns).n_distinct_inputs
+        is_underdetermined = n_columns > n_distinct
+        if is_underdetermined:
+            warn_user(
+                f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
+                f"parameters for {n_distinct} distinct training rows: most of what the model says "
+                "between them is its prior, that rules agree. Judge it on rows held out, or use "
+                "fewer rules.",
+                UnderdeterminedWarning,
+            )
+        return is_underdetermined
+
+
+def _warn_if_unknown_between(start, is_warned_already):
+    """Warn where rules that are given say between the rows what no row tells."""
+    if is_warned_already or is_told(start.unknown_between):
+        return
+    warn_user(
+        f"At {start.unknown_between:.0%} of places half-way between training rows the rules are "
+        "less certain than a single row there would make them: rows on few curves, as those of a "
+        "few runs, or too few, do not tell so many terms. Give terms to fewer inputs (n_mfs, "
+        "premise_features), or leave the structure to the default; judge the model on whole runs "
+        "or groups held out.",
+        UnderdeterminedWarning,
+    )
+
+
+def _memory_limit():
+    """Bytes that training may take."""
+    return get_config()["working_memory"] * _MIB
+
+
+def _labeller(clusterer, weighted):
+    """Labels of weighted rows by a scikit-learn clusterer; ValueError if it takes no weights."""
+
+    def label(table, weight):
+        if has_fit_parameter(clusterer, "sample_weight"):
+            return clone(clusterer).fit(table, sample_weight=weight).labels_
+        if weighted:
+            raise ValueError(
+                f"partition={clusterer!r} takes no sample_weight, but fit was given one: use a "
+                "clusterer that does, such as KMeans, or partition='grid'."
+            )
+        repeated = np.repeat(np.arange(weight.size), weight.astype(int))
+        labels = np.empty(weight.size, dtype=int)
+        labels[repeated] = clone(clusterer).fit_predict(table[repeated])
+        return labels
+
+    return label
+
+
+def report_constant(rows, names):
+    """Warn of inputs that never change."""
+    scale = rows.inputs
+    if not scale.is_constant.any():
+        return
+    given = names_in_pipeline(names)
+    names, where = (names, "") if given is None else (given, " after the steps in front")
+    flat = [
+        f"{name!r} (always {value + 0.0:.6g}{where})"  # 0, not -0
+        for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
+        if is_flat
+    ]
+    warn_user(
+        f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
+        "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",
+        ConstantInputWarning,
+    )

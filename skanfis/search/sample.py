@@ -1,0 +1,125 @@
+r"""How many rows there are, and which of them a search looks at.
+
+There is no one number of rows. *Weight* is what a criterion counts: a whole weight is so many
+copies of a row. Weights that are less than whole cannot be copies; then the size of an unweighted
+sample of the same precision stands for it, W^2 / sum s^2 (Kish 1965), where that is more. *Distinct
+rows* and *distinct inputs* bound what can be told apart: calibration tables repeat their inputs
+many times, and each repeat is information on the noise, but none on the shape.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..blocks import BLOCK_ROWS, row_blocks
+from ..learning.data import Scale, StandardisedData, fingerprint
+
+__all__ = [
+    "ENOUGH_ROWS",
+    "SampleSize",
+    "representative_rows",
+    "search_sample",
+    "unit_scale",
+    "weighted_quantile",
+]
+
+# More rows than this tell a clustering nothing new.
+_MOST_ROWS = 20_000
+# Distinct rows are counted up to here, unless more are asked for.
+ENOUGH_ROWS = 20_000
+
+
+@dataclass(frozen=True)
+class SampleSize:
+    """The sizes of one set of rows; the distinct ones as far as they have been counted."""
+
+    n_rows: int
+    n_distinct_rows: int
+    n_distinct_inputs: int
+    weight: float
+
+    @classmethod
+    def of(cls, rows: StandardisedData, enough=ENOUGH_ROWS):
+        """Count, up to ``enough`` distinct ones."""
+        inputs, whole = np.empty(0), np.empty(0)
+        for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+            Z, target, _ = rows.read(part)
+            inputs = np.union1d(inputs, fingerprint(Z))
+            whole = np.union1d(whole, fingerprint(np.vstack([Z, target])))
+            if inputs.size >= enough:
+                break
+        return cls(
+            rows.n_rows, min(whole.size, enough), min(inputs.size, enough), effective_weight(rows)
+        )
+
+
+def effective_weight(rows: StandardisedData):
+    """Rows by weight: their sum, or as many as their spread leaves, whichever are more."""
+    if not isinstance(rows, StandardisedData):
+        return rows.total_weight  # on a cluster, where no squares are summed
+    if rows.sample_weight is None:
+        return float(rows.n_rows)
+    # By the largest: squares of tiny weights would vanish.
+    largest = float(np.max(rows.sample_weight))
+    share = rows.sample_weight / largest
+    return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
+
+
+def _fingerprints(rows: StandardisedData):
+    """A number for every row of standardised inputs and target."""
+    numbers = np.empty(rows.n_rows)
+    for chunk in rows.chunks(_MOST_ROWS):
+        for part in chunk:
+            numbers[part] = fingerprint(rows.table(part).T)
+    return numbers
+
+
+def representative_rows(rows: StandardisedData, most=_MOST_ROWS):
+    """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
+
+    Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
+    Neither the order of the rows nor whether one is repeated or weighted makes any difference.
+
+    Returns
+    -------
+    table : ndarray of shape (n_distinct, n_inputs + n_outputs)
+    weight : ndarray of shape (n_distinct,)
+    indices : ndarray of shape (n_distinct,)
+        The first row of each.
+    """
+    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+    numbers = _fingerprints(rows)
+    order = np.argsort(numbers, kind="stable")
+    first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
+    distinct, weight = order[first], np.add.reduceat(weight[order], first)
+    if distinct.size > most:
+        upto = np.cumsum(weight)
+        wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
+        chosen, times = np.unique(np.searchsorted(upto, wanted), return_counts=True)
+        distinct, weight = distinct[chosen], times.astype(float)
+    table = rows.table(distinct)
+    order = np.lexsort(table.T[::-1])
+    return table[order], weight[order], distinct[order]
+
+
+def weighted_quantile(column, weight, part, side):
+    """The first value, from below (side 1) or above (-1), with a part of the weight up to it."""
+    order = np.argsort(column, kind="stable")[::side]
+    upto = np.cumsum(weight[order])
+    # From either side alike, whatever the last bit of a sum.
+    return column[order[np.searchsorted(upto, (1.0 - 1e-9) * part * upto[-1])]]
+
+
+def unit_scale(values):
+    """The scale of values that are standardised already."""
+    n_columns = values.shape[1]
+    return Scale(np.zeros(n_columns), np.ones(n_columns), values.min(axis=0), values.max(axis=0))
+
+
+def search_sample(rows: StandardisedData, most):
+    """At most so many representative rows, already in the standardised units of all rows."""
+    table, weight, indices = representative_rows(rows, most)
+    n_inputs = rows.X.shape[1]
+    X, y = table[:, :n_inputs], table[:, n_inputs:]
+    groups = None if rows.groups is None else rows.groups[indices]
+    return StandardisedData(X, y, weight, unit_scale(X), unit_scale(y), groups)

@@ -1,0 +1,347 @@
+"""Constraints of the estimator: kept everywhere, proven, the least change, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import lsq_linear
+from sklearn.base import clone
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.bounds import FixedPoint, OutputLimits, bounds, exchange, monotonicity
+from skanfis.exceptions import ConstraintWarning
+from skanfis.export import export_json
+from skanfis.export.json_reader import parse_json
+from skanfis.learning import GradientDescent, VariableProjection
+from skanfis.membership import Gaussian
+from skanfis.options import LinearExtrapolation
+
+QUICK = {
+    "n_mfs": 3,
+    "max_iter": 5,
+    "agreement": 0.0,
+    "alpha": 1e-3,
+    "solver": VariableProjection(tol=0.1, stiffness=0.01),
+}
+pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+
+
+def planted(rng, n_rows=120, noise=0.3):
+    """Rising with the first input, anything with the second; noise that the fit follows."""
+    X = rng.uniform(-1.0, 1.0, (n_rows, 2))
+    truth = np.tanh(3.0 * X[:, 0]) + 0.3 * X[:, 1] ** 2
+    return X, truth, truth + noise * rng.normal(size=n_rows)
+
+
+def falls(model, j, rng, n_rows=4000):
+    """The most that predictions fall over steps up along an input, in the range."""
+    low, high = model.model_.minimum, model.model_.maximum
+    X = rng.uniform(low, high, (n_rows, 2))
+    higher = X.copy()
+    higher[:, j] = np.minimum(X[:, j] + rng.uniform(0.0, 0.3, n_rows), high[j])
+    return (model.predict(X) - model.predict(higher)).max()
+
+
+@pytest.mark.parametrize(
+    "params",
+    [
+        {},
+        {"order": 0, "n_mfs": 4},
+        {"mf": "bell", "out_of_bounds": "clip"},
+        {"loss": "huber"},
+        {"solver": GradientDescent(error_goal=0.5)},
+        {"n_mfs": "auto", "max_iter": 500},
+    ],
+    ids=str,
+)
+def test_predictions_rise_everywhere(params, rng):
+    X, _, y = planted(rng)
+    quick = QUICK | params
+    free = ANFISRegressor(**quick).fit(X, y)
+    assert free.constraints_ is None
+    if params.get("n_mfs") != "auto":
+        assert falls(free, 0, rng) > 1e-3
+    held = ANFISRegressor(**quick, monotonic_cst=[1, 0]).fit(X, y)
+    assert held.constraints_["certified"]
+    assert held.constraints_["loss_after"] >= held.constraints_["loss_before"] * (1.0 - 1e-12)
+    assert falls(held, 0, rng) <= 1e-12
+    assert monotonicity(held, 0) == 1
+    # A structure that is found may grow under what is held.
+    if params.get("n_mfs") != "auto":
+        assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
+
+
+def test_what_is_held_is_certain_and_is_so_in_a_file(rng):
+    X, _, y = planted(rng)
+    held = {"monotonic_cst": [1, 0], "constraints": [FixedPoint([0.2, -0.4], 0.5)]}
+    model = ANFISRegressor(**QUICK, **held).fit(X, y)
+    unheld = replace(model.model_.posterior, pinned=np.zeros((0, 0, 0)))
+    new = rng.uniform(-1.3, 1.3, (200, 2))
+    free = replace(model.model_, posterior=unheld)
+    before, after = (one.standard_deviation(new) for one in (free, model.model_))
+    inside = free.in_bounds(new)
+    assert (after <= before * (1.0 + 1e-9))[inside].all()
+    assert (after < 0.99 * before)[inside].sum() > 20
+    at = np.array([[0.2, -0.4]])
+    assert_allclose(model.model_.standard_deviation(at)[:, 0], model.noise_std_, rtol=1e-5)
+    assert_allclose(model.predict(at, return_std=True)[1], model.noise_std_, rtol=1e-3)
+    read = parse_json(export_json(model, posterior=True))
+    assert_allclose(read.standard_deviation(new), after, rtol=1e-9)
+
+
+def test_data_that_contradict_are_told(rng):
+    X, _, y = planted(rng)
+    # Noise that a fit follows is no contradiction: the other tests turn warnings into errors.
+    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
+        ANFISRegressor(**QUICK, monotonic_cst=[-1, 0]).fit(X, y)
+
+
+def test_noise_that_breaks_the_rule_is_not_followed():
+    errors = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        X, _, y = planted(rng, 80)
+        X_test, _, _ = planted(rng, 1000)
+        X_test = np.clip(X_test, X.min(axis=0), X.max(axis=0))
+        truth = np.tanh(3.0 * X_test[:, 0]) + 0.3 * X_test[:, 1] ** 2
+        errors.append(
+            [
+                np.mean((ANFISRegressor(**QUICK, **known).fit(X, y).predict(X_test) - truth) ** 2)
+                for known in ({}, {"monotonic_cst": {"x0": 1}})
+            ]
+        )
+    free, held = np.sqrt(np.mean(errors, axis=0))
+    assert held < 0.95 * free
+
+
+def test_what_holds_already_is_left_alone(rng):
+    X, truth, _ = planted(rng)
+    free = ANFISRegressor(**QUICK).fit(X, X[:, 0] + 0.1 * truth)
+    held = ANFISRegressor(**QUICK, monotonic_cst=[1, 0]).fit(X, X[:, 0] + 0.1 * truth)
+    assert held.constraints_["certified"]
+    assert held.constraints_["rows"] == 0
+    assert_allclose(held.consequents_, free.consequents_, rtol=1e-12)
+
+
+def test_a_constant_target_is_proven_at_once(rng):
+    """Slopes of nothing but rounding."""
+    X = planted(rng)[0]
+    model = ANFISRegressor(**QUICK, monotonic_cst=[1, -1]).fit(X, np.full(len(X), 0.1))
+    assert model.constraints_["certified"]
+    assert model.constraints_["boxes"] == 0
+    assert_allclose(model.predict(X), 0.1, rtol=1e-14)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+def test_proofs_are_not_what_finds_violations(monkeypatch):
+    """A staircase, whose rules fall between the points of the sample wherever they are not held."""
+    proofs, largest = [], exchange.largest
+
+    def counted(*args, **kwargs):
+        proofs.append(largest(*args, **kwargs))
+        return proofs[-1]
+
+    monkeypatch.setattr(exchange, "largest", counted)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        X = rng.uniform(-1.0, 1.0, (100, 2))
+        y = np.digitize(X[:, 0], [-0.3, 0.4]) + np.sin(X[:, 1]) + 0.1 * rng.normal(size=100)
+        model = ANFISRegressor(**QUICK | {"n_mfs": [6, 3]}, monotonic_cst=[1, 0]).fit(X, y)
+        assert model.constraints_["certified"]
+        assert falls(model, 0, rng) <= 0.0
+    assert len(proofs) <= 5
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+def test_one_rule_is_bounded_least_squares(rng):
+    """Without terms: a ridge of nearly nothing with the sign of each slope given."""
+    X = rng.normal(size=(60, 3))
+    y = X @ [1.0, -0.5, 0.2] + rng.normal(size=60)
+    signs = np.array([-1, 1, 1])
+    held = ANFISRegressor(n_mfs=1, alpha=1e-9, agreement=0.0, monotonic_cst=signs).fit(X, y)
+    centred = X - X.mean(axis=0)
+    ends = np.where(signs > 0, 0.0, -np.inf), np.where(signs > 0, np.inf, 0.0)
+    expected = lsq_linear(centred, y - y.mean(), bounds=ends).x
+    # Slopes are kept off zero by a margin of 0.001 standard deviations.
+    assert_allclose(held.consequents_[0, 1:], expected, atol=3e-3)
+    assert (held.consequents_[0, 1:] * signs > 0.0).all()
+
+
+def test_limits_hold(rng):
+    X, _, y = planted(rng)
+    y = np.column_stack([y, -2.0 * y])
+    known = [OutputLimits(lower=[-0.9, -np.inf], upper=[1.0, 1.7])]
+    held = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[[0, 0], [-1, 0]]).fit(X, y)
+    found = bounds(held, tol=1e-3)
+    assert held.constraints_["certified"]
+    assert found.highest[0] <= 1.0
+    assert found.lowest[0] >= -0.9
+    assert found.highest[1] <= 1.7
+    assert found.highest[1] > 1.6
+    assert monotonicity(held, 0)[1] == -1
+
+
+@pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
+def test_limits_hold_beyond_the_range(rng, policy):
+    """A tangent is followed up to them; so it is in a file, and the box of it is proven."""
+    X, _, y = planted(rng)
+    params = QUICK | {"out_of_bounds": policy}
+    known = OutputLimits(lower=-0.9, upper=y.max())
+    held = ANFISRegressor(**params, constraints=[known]).fit(X, y)
+    free = replace(held.model_, target=None)
+    beyond = rng.uniform(-9.0, 9.0, (2000, 2))
+    told = held.predict(beyond)
+    if policy == "linear":
+        limits = held.model_.output_limits[:, 0]
+        # The upper one is nearer than what the target holds by.
+        assert_allclose(limits, [-0.9, y.max()], rtol=1e-12)
+    assert_allclose(told, np.clip(free.predict(beyond)[:, 0], -0.9, y.max()), rtol=1e-12)
+    crosses = free.predict(beyond)[:, 0] > y.max()
+    assert crosses.any() == (policy != "clip")
+    assert_array_equal(parse_json(export_json(held)).predict(beyond)[:, 0], told)
+    if policy == "linear":
+        found = bounds(held, [(-9.0, 9.0)] * 2)
+        assert -0.9 <= found.lower[0] <= found.upper[0] <= y.max()
+
+
+def test_points_are_met_and_rows_weigh(rng):
+    X, _, y = planted(rng)
+    known = [FixedPoint([0.0, 0.0], 0.0), FixedPoint({"x0": 0.7, "x1": 0.5}, 0.9)]
+    params = QUICK | {"constraints": known, "monotonic_cst": [1, 0]}
+    held = ANFISRegressor(**params).fit(X, y)
+    assert_allclose(held.predict([[0.0, 0.0], [0.7, 0.5]]), [0.0, 0.9], atol=1e-9)
+    assert monotonicity(held, 0) == 1
+    weight = rng.integers(1, 3, len(y))
+    weighted = ANFISRegressor(**params).fit(X, y, sample_weight=weight)
+    repeated = ANFISRegressor(**params).fit(np.repeat(X, weight, 0), np.repeat(y, weight))
+    assert_allclose(weighted.predict(X), repeated.predict(X), atol=1e-6)
+
+
+@pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
+def test_points_beyond_the_range_are_met_by_the_policy(rng, policy):
+    """Zero rate of a campaign that began at some: what is predicted there, not at the edge."""
+    X, _, y = planted(rng)
+    points = np.stack([X.max(axis=0), X.min(axis=0)]) + np.array([[0.4, -0.3], [0.0, -0.1]])
+    known = [FixedPoint(point, value) for point, value in zip(points, (0.2, -0.1), strict=True)]
+    params = QUICK | {"out_of_bounds": policy}
+    held = ANFISRegressor(**params, constraints=known).fit(X, y)
+    free = ANFISRegressor(**params).fit(X, y)
+    assert_allclose(held.predict(points), [0.2, -0.1], atol=1e-9)
+    std = held.model_.standard_deviation(np.clip(points, X.min(axis=0), X.max(axis=0)))[:, 0]
+    assert (std[0] < held.noise_std_ * (1.0 + 1e-9)) == (policy == "clip")
+    # Two numbers of 27 are given away.
+    assert held.score(X, y) > free.score(X, y) - (0.3 if policy == "clip" else 0.1)
+
+
+@pytest.mark.parametrize("policy", ["nan", "raise"])
+def test_points_where_nothing_is_predicted_are_refused(rng, policy):
+    X, _, y = planted(rng)
+    held = ANFISRegressor(**QUICK, out_of_bounds=policy, constraints=[FixedPoint([0.0, 9.0], 0.0)])
+    with pytest.raises(ValueError, match=r"FixedPoint at \[0. 9.\].* predicts nothing: .*'x1'"):
+        held.fit(X, y)
+
+
+def test_units_do_not_matter(rng):
+    X, _, y = planted(rng)
+    known = [OutputLimits(upper=1.0)]
+    one = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[1, 0]).fit(X, y)
+    known = [OutputLimits(upper=1e6 + 1e3)]
+    scaled = X * [1e-4, 1e5] + [3.0, -7e5]
+    other = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[1, 0])
+    other.fit(scaled, 1e6 + 1e3 * y)
+    assert_allclose(other.predict(scaled), 1e6 + 1e3 * one.predict(X), rtol=1e-8)
+
+
+def test_searches_and_pipelines(rng):
+    X, _, y = planted(rng)
+    known = [OutputLimits(upper=1.2), FixedPoint([0.0, 0.0], 0.0)]
+    step = ANFISRegressor(**QUICK, constraints=known)
+    whole = make_pipeline(StandardScaler(), step)
+    grid = {"anfisregressor__monotonic_cst": [None, [1, 0]]}
+    search = GridSearchCV(whole, grid, cv=2).fit(X, y)
+    assert bounds(search.best_estimator_).highest[0] <= 1.2
+    copy = clone(step)
+    assert copy.get_params()["constraints"][0] == known[0]
+    assert_allclose(copy.fit(X, y).predict([[0.0, 0.0]]), 0.0, atol=1e-9)
+
+
+def test_what_is_not_proven_is_said(rng):
+    class Own(Gaussian):
+        name = "own"
+
+    X, _, y = planted(rng)
+    held = ANFISRegressor(**QUICK, mf=Own, monotonic_cst=[1, 0])
+    with pytest.warns(ConvergenceWarning, match=r"Not proven .*: monotonic_cst=1 of 'y' by 'x0'"):
+        held.fit(X, y)
+    assert not held.constraints_["certified"]
+    assert falls(held, 0, rng) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"monotonic_cst": [1]}, r"monotonic_cst has shape \(1,\), but X has 2 columns"),
+        ({"monotonic_cst": [2, 0]}, r"must hold -1 \(falling\), 0 \(free\) and 1"),
+        ({"monotonic_cst": {"rate": 1}}, "monotonic_cst names 'rate', which is no column of X"),
+        ({"constraints": [3.0]}, "constraints holds 3.0: it must be OutputLimits and FixedPoints"),
+        ({"constraints": [OutputLimits(1.0, 0.0)]}, r"limits the output to \[1, 0\]"),
+        ({"constraints": [OutputLimits(lower="a")]}, "lower in constraints='a' must hold numbers"),
+        ({"constraints": [FixedPoint("abc", 1.0)]}, "FixedPoint.x='abc' must hold numbers"),
+        ({"monotonic_cst": ["a", 1]}, r"monotonic_cst=\['a', 1\] must hold numbers alone"),
+        ({"constraints": [OutputLimits([0.0, 1.0])]}, "must be a number, or one for each of the 1"),
+        ({"constraints": [FixedPoint([0.0], 1.0)]}, "a number for each of the 2 columns of X"),
+        ({"constraints": [FixedPoint({"x0": 0.0}, 1.0)]}, "it must name every column of X"),
+        ({"constraints": [FixedPoint([0.0, np.nan], 1.0)]}, "must be of finite numbers"),
+        (
+            {"constraints": [OutputLimits(upper=1.0), FixedPoint([0.0, 0.0], 1.0)]},
+            "is not within the OutputLimits",
+        ),
+        (
+            {"constraints": [FixedPoint([0.0, 0.0], 1.0), FixedPoint([0.0, 0.0], 2.0)]},
+            r"fixes 'y' at 2 points, which 9 rules cannot all meet: two are the same",
+        ),
+        (
+            {
+                "monotonic_cst": [1, 0],
+                "constraints": [FixedPoint([-0.5, 0.0], 1.0), FixedPoint([0.5, 0.0], 0.0)],
+            },
+            r"contradict one another: output 0 is fixed to 1 at \[-0.5  0. \], and to 0 at",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused(known, message, rng):
+    X, _, y = planted(rng)
+    estimator = ANFISRegressor(**QUICK, **known)
+    with pytest.raises(ValueError, match=message):
+        estimator.fit(X, y)
+    assert not hasattr(estimator, "model_")
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+def test_what_the_rules_cannot_keep_is_named(rng):
+    X, _, y = planted(rng)
+    known = {"monotonic_cst": [0, -1], "constraints": [FixedPoint([0.0, x], x) for x in (0.0, 0.2)]}
+    with pytest.raises(ValueError, match="contradict one another"):
+        ANFISRegressor(**QUICK, **known).fit(X, y)
+    known = {"constraints": [FixedPoint([0.0, x], x) for x in np.linspace(-0.5, 0.5, 40)]}
+    with pytest.raises(ValueError, match="fixes 'y' at 40 points, which 9 rules cannot all meet"):
+        ANFISRegressor(**QUICK, **known).fit(X, y)
+    # Of order zero with one rule: a constant.
+    known = {"constraints": [OutputLimits(lower=5.0)]}
+    constant = ANFISRegressor(n_mfs=1, order=0, **known).fit(X, y)
+    assert_allclose(constant.predict(X), 5.0, atol=2e-3 * y.std())
+
+
+def test_rules_taken_as_they_are_are_not_constrained(rng):
+    X, _, y = planted(rng)
+    model = ANFISRegressor(**QUICK).fit(X, y).model_
+    again = ANFISRegressor(partition=model, max_iter=0, monotonic_cst=[1, 0])
+    with pytest.raises(ValueError, match="mean nothing where imported rules are taken as they are"):
+        again.fit(X, y)
+    learnt = ANFISRegressor(partition=model, solver="lse", monotonic_cst=[1, 0], alpha=1e-3)
+    assert monotonicity(learnt.fit(X, y), 0) == 1

@@ -1,0 +1,296 @@
+"""What every solver has to do, whatever its method: one set of tests over all of ``SOLVERS``."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.antecedent import GridAntecedent
+from skanfis.learning import SOLVERS, SolverResult
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
+from skanfis.learning.solver_result import MESSAGES
+
+from .. import oracles
+from .test_varpro import Recording, planted, start_of
+
+ITERATIVE = sorted(set(SOLVERS) - {"lse"})
+KINDS = ["one input", "grid", "bells", "two families", "scattered"]
+# Those whose cost may rise on the way: Jang's step has a given length.
+RESTLESS = {"hybrid", "gradient"}
+
+every_solver = pytest.mark.parametrize("name", SOLVERS)
+every_iterative_solver = pytest.mark.parametrize("name", ITERATIVE)
+
+
+def solve(name, rows, premise, alpha=1e-8, order=1, agreement=0.0, **settings):
+    penalty = Penalty(agreement=agreement, alpha=alpha)
+    problem = SeparableProblem(rows, premise.antecedent, order, penalty)
+    solver = SOLVERS[name]()
+    own = {key: settings.pop(key) for key in ("tol", "step_size") if key in settings}
+    if "tol" in solver.get_params():
+        solver.set_params(**({"tol": 1e-6} | own))
+    return solver.solve(problem, premise, **({"max_iter": 15} | settings))
+
+
+def noisy(kind="grid", seed=0, **settings):
+    rows, premise, *_ = planted(kind, seed, displaced=0.5, noise=0.1, **settings)
+    return rows, premise
+
+
+def predict(result, Z, order=1):
+    antecedent = result.evaluation.antecedent
+    phi = oracles.dense_design(antecedent, antecedent.parameters, Z, order)
+    return phi @ result.evaluation.coefficients
+
+
+def dense_error(rows, result, order=1):
+    """Mean squared error of the standardised target, by the dense design."""
+    Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
+    target = (rows.y - rows.targets.offset) / rows.targets.scale
+    squares = np.sum((target - predict(result, Z, order)) ** 2, axis=1)
+    return np.average(squares, weights=rows.sample_weight)
+
+
+@every_solver
+@pytest.mark.parametrize("kind", KINDS)
+def test_at_the_truth_there_is_nothing_to_gain(name, kind):
+    rows, premise, truth, beta = planted(kind, 0, displaced=0.0)
+    result = solve(name, rows, premise, alpha=1e-14)
+    # The first evaluation is a difference of numbers of size one.
+    assert result.loss_curve[0] < 1e-13
+    assert result.evaluation.mean_squared_error < 1e-13
+    Z = np.random.default_rng(9).uniform(-1.5, 1.5, (len(rows.X.T), 100))
+    expected = oracles.dense_design(premise.antecedent, truth, Z, 1) @ beta
+    found = rows.targets.offset + rows.targets.scale * predict(result, Z)
+    assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
+
+
+@pytest.mark.theory
+@every_solver
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("n_outputs", "agreement"), [(1, 0.2), (2, 0.0)])
+def test_result_is_what_it_says(name, kind, n_outputs, agreement):
+    rows, premise = noisy(kind, n_outputs=n_outputs)
+    result = solve(name, rows, premise, agreement=agreement)
+    assert isinstance(result, SolverResult)
+    assert result.message == MESSAGES[result.status]
+    assert result.loss_curve.shape == (result.n_iter + 1,)
+    assert_allclose(result.evaluation.mean_squared_error, dense_error(rows, result), rtol=1e-9)
+    assert_allclose(result.evaluation.masses.sum(), 1.0)
+    assert result.evaluation.coefficients.shape[1] == n_outputs
+
+
+@every_solver
+@pytest.mark.parametrize("kind", KINDS)
+def test_best_point_is_returned(name, kind):
+    rows, premise = noisy(kind)
+    result = solve(name, rows, premise, alpha=0.0)
+    assert_allclose(result.evaluation.mean_squared_error, result.loss_curve.min(), rtol=1e-9)
+    if name not in RESTLESS:
+        assert (np.diff(result.loss_curve) <= 0.0).all()
+
+
+@pytest.mark.theory
+@every_iterative_solver
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("agreement", [0.05, 1.0])
+def test_cost_falls_where_rules_must_agree(name, kind, agreement):
+    rows, premise = noisy(kind)
+    settings = {"step_size": 1e-3} if name in RESTLESS else {}
+    result = solve(name, rows, premise, alpha=1e-3, agreement=agreement, **settings)
+    penalty = Penalty(agreement=agreement, alpha=1e-3)
+    dense = oracles.DenseProblem(rows, premise.antecedent, 1, penalty)
+    start = dense.cost(premise.antecedent.parameters)
+    evaluation = result.evaluation
+    end = dense.cost_at(evaluation.antecedent.parameters, evaluation.coefficients)
+    assert_allclose(evaluation.cost, end, rtol=1e-9)
+    assert end < start
+
+
+@every_iterative_solver
+@pytest.mark.parametrize("kind", KINDS)
+def test_training_gains(name, kind):
+    rows, premise = noisy(kind)
+    result = solve(name, rows, premise, **({"step_size": 1e-3} if name in RESTLESS else {}))
+    assert result.evaluation.mean_squared_error < result.loss_curve[0]
+
+
+@every_solver
+def test_loss_curve_begins_at_the_start(name, rng):
+    rows, premise = noisy()
+    for start in (None, 0.1 * rng.normal(size=premise.size)):
+        result = solve(name, rows, premise, start=start)
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
+        there = problem.evaluate(
+            premise.parameters(np.zeros(premise.size) if start is None else start)
+        )
+        assert_allclose(result.loss_curve[0], there.mean_squared_error, rtol=1e-9)
+
+
+@every_solver
+def test_start_is_left_as_it_was(name, rng):
+    rows, premise = noisy()
+    start = 0.1 * rng.normal(size=premise.size)
+    before = start.copy()
+    solve(name, rows, premise, start=start)
+    assert_array_equal(start, before)
+
+
+@every_solver
+@pytest.mark.parametrize("kind", ["grid", "bells", "scattered"])
+def test_no_point_is_out_of_the_box(name, kind):
+    rows, premise = noisy(kind)
+    tight = replace(premise, lower=0.02 * premise.lower, upper=0.02 * premise.upper)
+    at = []
+    # So long a step leaves any box.
+    long = {"step_size": 10.0} if name in RESTLESS else {}
+    result = solve(name, rows, Recording(tight, at), max_iter=30, **long)
+    zero, one = np.zeros(tight.size), np.ones(tight.size)
+    at = [x for x in at if not (np.array_equal(x, zero) or np.array_equal(x, one))]
+    if name != "lse":
+        assert any((x == tight.lower).any() or (x == tight.upper).any() for x in at)
+    for x in at:
+        assert (x >= tight.lower).all()
+        assert (x <= tight.upper).all()
+    assert np.isfinite(result.evaluation.antecedent.parameters).all()
+
+
+@every_solver
+def test_caller_hears_of_every_iteration(name):
+    rows, premise = noisy()
+    seen = []
+    result = solve(name, rows, premise, on_iteration=lambda *arguments: seen.append(arguments))
+    assert [n for n, _ in seen] == list(range(1, result.n_iter + 1))
+    errors = [evaluation.mean_squared_error for _, evaluation in seen]
+    assert_array_equal(result.loss_curve[1:], errors)
+    assert any(evaluation is result.evaluation for _, evaluation in seen)
+
+
+@every_iterative_solver
+@pytest.mark.parametrize("max_iter", [1, 4])
+def test_max_iter_is_the_number_of_iterations(name, max_iter):
+    rows, premise = noisy()
+    result = solve(name, rows, premise, tol=0.0, max_iter=max_iter)
+    assert result.n_iter == max_iter
+    assert result.status == ("epochs" if name in RESTLESS else "max_iter")
+    assert result.converged is (name in RESTLESS)
+
+
+@every_solver
+@pytest.mark.parametrize("kind", ["grid", "scattered"])
+def test_weights_are_repeated_rows(name, kind):
+    rows, premise = noisy(kind)
+    counts = np.random.default_rng(1).integers(1, 4, rows.n_rows)
+    weighted = StandardisedData.of(rows.X, rows.y, counts.astype(float))
+    repeated = StandardisedData.of(*(np.repeat(a, counts, axis=0) for a in (rows.X, rows.y)))
+    antecedent = start_of(kind, repeated)
+    premise = Premise.of(antecedent, *oracles.box(repeated))
+    one, other = (solve(name, some, premise, alpha=1e-6) for some in (weighted, repeated))
+    assert one.n_iter == other.n_iter
+    assert_allclose(one.loss_curve, other.loss_curve, rtol=1e-6)
+    assert_allclose(
+        one.evaluation.coefficients, other.evaluation.coefficients, rtol=1e-4, atol=1e-4
+    )
+
+
+@every_solver
+def test_units_do_not_matter(name):
+    rows, premise = noisy()
+    moved = StandardisedData.of(3.0 - 1e4 * rows.X, 7.0 + 1e-5 * rows.y)
+    mirrored = Premise.of(start_of("grid", moved), *oracles.box(moved))
+    one, other = (
+        solve(name, *of, alpha=1e-6, max_iter=6) for of in ((rows, premise), (moved, mirrored))
+    )
+    # The terms of an input are numbered from its other end: another vector, but for those solvers
+    # whose step does not depend on how the box is parametrised the same model.
+    assert_allclose(one.loss_curve[0], other.loss_curve[0], rtol=1e-9)
+    if name in {"hybrid", "gradient", "lse"}:
+        assert_allclose(one.loss_curve, other.loss_curve, rtol=1e-6)
+
+
+@every_iterative_solver
+def test_stiffness_holds_the_premises(name):
+    rows, premise = noisy()
+    moved = []
+    for stiffness in (0.0, 1e3):
+        result = solve(name, rows, premise, stiffness=stiffness)
+        parameters = result.evaluation.antecedent.parameters
+        moved.append(np.linalg.norm(parameters - premise.antecedent.parameters))
+    assert moved[1] < 0.1 * moved[0]
+
+
+@every_solver
+def test_order_zero(name):
+    rows, premise = noisy()
+    result = solve(name, rows, premise, order=0)
+    assert_allclose(result.evaluation.mean_squared_error, dense_error(rows, result, 0), rtol=1e-9)
+    assert name == "lse" or result.evaluation.mean_squared_error < result.loss_curve[0]
+
+
+@every_solver
+def test_one_rule_has_nothing_to_iterate_on(name):
+    rows, _ = noisy()
+    premise = Premise.of(GridAntecedent((), counts=()), *oracles.box(rows))
+    result = solve(name, rows, premise)
+    assert result.status == "no_premise"
+    assert result.converged
+    Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
+    target = (rows.y - rows.targets.offset) / rows.targets.scale
+    line, *_ = np.linalg.lstsq(np.vstack([np.ones(Z.shape[1]), Z]).T, target, rcond=None)
+    assert_allclose(result.evaluation.coefficients, line, atol=1e-6)
+
+
+@every_solver
+def test_constant_target(name):
+    rows, premise = noisy()
+    flat = StandardisedData.of(rows.X, np.full_like(rows.y, 3.0))
+    result = solve(name, flat, premise)
+    assert result.evaluation.mean_squared_error == 0.0
+    assert result.status == ("no_premise" if name == "lse" else "gradient")
+    assert_array_equal(result.evaluation.coefficients, 0.0)
+
+
+@every_solver
+def test_two_runs_are_the_same_to_the_last_bit(name):
+    rows, premise = noisy()
+    one, other = (solve(name, rows, premise) for _ in range(2))
+    assert_array_equal(one.loss_curve, other.loss_curve)
+    assert_array_equal(one.evaluation.coefficients, other.evaluation.coefficients)
+
+
+@every_solver
+def test_workers_do_not_matter(name, monkeypatch):
+    monkeypatch.setattr("skanfis.learning.data._BLOCKS_PER_CHUNK", 1)
+    monkeypatch.setattr("skanfis.learning.objective.BLOCK_ROWS", 128)
+    rows, premise = noisy()
+    results = []
+    for map_ordered in (map, lambda function, items: [function(item) for item in items]):
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8), map_ordered)
+        results.append(SOLVERS[name]().solve(problem, premise, max_iter=5))
+    assert_array_equal(results[0].loss_curve, results[1].loss_curve)
+
+
+def test_every_message_belongs_to_a_status_tested():
+    by_solvers = {"gradient", "cost", "step", "max_iter", "no_premise", "error_goal", "epochs"}
+    from_outside = {"stopped", "as_given"}
+    assert set(MESSAGES) == by_solvers | from_outside
+
+
+@every_iterative_solver
+def test_what_watches_can_end_the_training(name):
+    rows, premise = noisy()
+    seen = []
+
+    def watch(n_iter, evaluation):
+        seen.append((n_iter, evaluation.mean_squared_error))
+        return n_iter == 3
+
+    result = solve(name, rows, premise, on_iteration=watch)
+    assert result.status == "stopped"
+    assert result.converged
+    assert [n for n, _ in seen] == [1, 2, 3]
+    assert_array_equal(result.loss_curve[1:], [loss for _, loss in seen])

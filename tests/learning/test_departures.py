@@ -1,0 +1,182 @@
+"""Parts of the departures: against means and differences, and functions whose parts are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.antecedent import GridAntecedent
+from skanfis.consequent import NormalFactor
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.departures import Departures
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.membership import Bell, Gaussian
+
+from .. import oracles
+
+CASES = {
+    # Rules, order, and the inputs of the consequents, of three.
+    "grid": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2], [0, 2]), 1, [0, 1, 2]),
+    "grid of three": (lambda g: oracles.random_grid(g, [Bell] * 3, [2, 3, 2]), 1, [0, 1, 2]),
+    "one input, slopes of others": (lambda g: oracles.random_grid(g, [Gaussian], [4], [1]), 1, [0]),
+    "constants": (lambda g: oracles.random_grid(g, [Gaussian] * 3, [2, 2, 3]), 0, []),
+    "one rule": (lambda g: GridAntecedent((), counts=()), 1, [0, 1, 2]),
+    "scattered": (lambda g: oracles.random_scattered(g, Gaussian, 4, [0, 1]), 1, [0, 2]),
+    "table": (lambda g: oracles.random_table(g, inputs=2), 1, [0, 1, 2]),
+}
+ON_ALL = pytest.mark.parametrize("case", CASES)
+
+
+class Problem:
+    def __init__(self, case):
+        g = np.random.default_rng(7)
+        build, order, inputs = CASES[case]
+        self.antecedent, self.inputs = build(g), np.array(inputs, dtype=int)
+        self.rows = oracles.bumpy_rows(g, 80, 3, 2, True)
+        plain = Penalty(agreement=0.01, alpha=0.02, slope=0.1)
+        problem = SeparableProblem(
+            self.rows, self.antecedent, order, plain, consequent_inputs=self.inputs
+        )
+        self.line = problem.common_line
+        self.departures = self.line.departures
+        self.components = self.departures.components
+        pulls = {one: 10.0 ** g.uniform(-2.0, 2.0) for one in self.components}
+        slope_pulls = {j: 10.0 ** g.uniform(-2.0, 2.0) for j in inputs}
+        penalty = replace(plain, pulls=pulls, slope_pulls=slope_pulls)
+        self.problem = problem.with_penalty(penalty)
+        self.dense = oracles.DenseProblem(self.rows, self.antecedent, order, penalty, self.inputs)
+
+
+@ON_ALL
+class TestComponents:
+    def test_they_are_those_of_means_and_differences(self, case):
+        one = Problem(case)
+        values = np.zeros((one.problem.n_columns,) * 2)
+        for r, block in enumerate(one.dense.blocks):
+            own = slice(r * len(block), (r + 1) * len(block))
+            values[own, own] = block
+        to_line, *_ = np.linalg.lstsq(one.dense.line, values, rcond=None)
+        departures = values - one.dense.line @ to_line
+        parts = oracles.departure_projectors(one.antecedent, one.inputs.tolist())
+        assert set(one.components) == set(parts)
+        g = np.random.default_rng(0)
+        beta = g.normal(size=(one.problem.n_columns, 2))
+        local = one.problem.local.to_local(beta)
+        expected = [np.sum((parts[key] @ departures @ beta) ** 2) for key in one.components]
+        n_slopes = len(one.line.slopes)
+        squares = one.line.squares(local)
+        assert_allclose(squares[n_slopes:], expected, rtol=1e-9, atol=1e-12)
+        slopes = np.sum((one.line.to_slopes @ local) ** 2, axis=1)
+        assert_allclose(squares[:n_slopes], slopes, rtol=1e-12)
+        # All of them together are all that there is.
+        assert_allclose(sum(expected), np.sum((departures @ beta) ** 2), rtol=1e-10, atol=1e-14)
+        together = np.sum(local * (one.departures.together @ local))
+        assert_allclose(together, sum(expected), rtol=1e-9, atol=1e-12)
+
+    def test_cost_and_solution_are_those_of_the_dense_problem(self, case):
+        one = Problem(case)
+        parameters = one.antecedent.parameters
+        found = one.problem.evaluate(parameters)
+        assert_allclose(found.cost, one.dense.cost(parameters), rtol=1e-9)
+        # At any consequents, as the solvers by gradients have it.
+        g = np.random.default_rng(1)
+        beta = g.normal(size=(one.problem.n_columns, 2))
+        joint = one.problem.joint(parameters, beta)
+        residuals = one.dense.residual_matrix(parameters)
+        right = one.dense.right_side(len(residuals))
+        expected = 0.5 * np.sum((residuals @ beta - right) ** 2)
+        assert_allclose(joint.evaluation.cost, expected, rtol=1e-10)
+        assert_allclose(joint.coefficients, residuals.T @ (residuals @ beta - right), rtol=1e-8)
+
+    def test_traces_are_sums_over_the_columns_of_a_root(self, case):
+        one = Problem(case)
+        n, g = one.problem.n_columns, np.random.default_rng(2)
+        root = np.tril(g.normal(size=(n, n)) / n) + np.eye(n)
+        # Columns of a root of M^-1 are directions whose squares add up.
+        expected = one.line.squares(np.linalg.inv(root).T)
+        factor = NormalFactor(root @ root.T)
+        assert_allclose(one.line.traces(factor), expected, rtol=1e-9, atol=1e-12)
+
+    def test_weights_of_one_are_no_weights(self, case):
+        one = Problem(case)
+        plain = Penalty(alpha=0.3, slope=0.2)
+        pulls = dict.fromkeys(one.components, 1.0)
+        equal = one.line.pull(replace(plain, pulls=pulls))
+        assert_allclose(equal, one.line.pull(plain), atol=1e-12)
+
+
+def of_a_function(value, slopes):
+    """Squares of every component of rules that follow a function; rows are a grid, evenly."""
+    levels = np.linspace(-1.0, 1.0, 9)
+    X = np.stack(np.meshgrid(levels, levels, levels, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = StandardisedData.of(X, X[:, :1])
+    centers = [np.array([-1.0, 0.2, 1.1]), np.array([-0.9, 0.8])]
+    thetas = [Gaussian.start(c, np.ones(c.size), 0.6) for c in centers]
+    antecedent = GridAntecedent.build([Gaussian] * 2, [0, 1], thetas)
+    problem = SeparableProblem(rows, antecedent, 1, Penalty())
+    center = problem.local.center
+    local = np.column_stack([value(*center.T), *slopes(*center.T)])
+    local[:, 1:] *= problem.local.spread
+    line = problem.common_line
+    squares = line.squares(local.reshape(-1, 1))[len(line.slopes) :]
+    return dict(zip(line.departures.components, squares, strict=True))
+
+
+class TestKnownFunctions:
+    """Rules that are the tangents of a function at their centres."""
+
+    def only(self, squares, *concerned, atol=1e-20):
+        total = sum(squares.values())
+        for key, square in squares.items():
+            assert square > 1e-3 * total if key in concerned else square < atol * total, key
+
+    def test_a_sum_of_functions_of_one_input_each(self):
+        squares = of_a_function(
+            lambda x, y, z: np.sin(2.0 * x) + y**2 + 3.0 * z,
+            lambda x, y, z: [2.0 * np.cos(2.0 * x), 2.0 * y, np.full_like(z, 3.0)],
+        )
+        self.only(squares, (0,), (1,))
+
+    def test_a_product_of_two_inputs_with_terms(self):
+        squares = of_a_function(lambda x, y, z: x * y, lambda x, y, z: [y, x, 0.0 * z])
+        # Where terms are not in the middle, x * y has a part in x alone: that of the mean of y.
+        assert squares[0, 1] > 10.0 * (squares[0,] + squares[1,])
+        assert squares[()] + squares[0, 2] + squares[1, 2] < 1e-20 * squares[0, 1]
+
+    def test_a_slope_by_an_input_without_terms_that_changes(self):
+        # Such as a scale factor that depends on temperature.
+        squares = of_a_function(
+            lambda x, y, z: z * np.exp(x), lambda x, y, z: [z * np.exp(x), 0.0 * y, np.exp(x)]
+        )
+        # How far a rule stands for rows, the unit of its slopes, may depend on more.
+        self.only(squares, (0, 2), atol=1e-4)
+
+    def test_what_concerns_three_inputs_is_the_rest(self):
+        def slope(x, y):
+            return (x - x.mean()) * (y - y.mean())
+
+        squares = of_a_function(
+            lambda x, y, z: 0.0 * x, lambda x, y, z: [0.0 * x, 0.0 * y, slope(x, y)]
+        )
+        self.only(squares, (), atol=1e-4)
+
+
+def components(antecedent, slopes):
+    n_basis = 1 + len(slopes)
+    zeros = np.zeros((antecedent.n_rules * n_basis, n_basis))
+    return Departures(zeros[:, 0], zeros, zeros, antecedent, slopes).components
+
+
+def test_inputs_of_components():
+    g = np.random.default_rng(0)
+    grid = oracles.random_grid(g, [Gaussian] * 2, [3, 2], [0, 2])
+    assert components(grid, [0, 1, 2]) == [(0,), (2,), (0, 1), (0, 2), (1, 2), ()]
+    assert components(grid, []) == [(0,), (2,), (0, 2), ()]
+    scattered = oracles.random_scattered(g, Gaussian, 4, [0, 1])
+    assert components(scattered, [0, 2]) == [(0,), (2,), ()]
+    assert components(GridAntecedent((), counts=()), [0, 1, 2]) == [()]
+    # What is constant has no slope to depart, and no component.
+    assert components(grid, [0, None, 2]) == components(grid, [0, 2])
+    assert components(scattered, [0, None, 2]) == components(scattered, [0, 2])

@@ -1,0 +1,755 @@
+"""The evidence against integrals: sums over grids, the normal distribution's own, quadrature."""
+
+from dataclasses import astuple, replace
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import integrate, optimize, special, stats
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.evidence import (
+    PRIOR_DISPLACEMENT,
+    extrapolated,
+    is_settled,
+    laplace,
+    least_weights,
+    reestimated,
+)
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
+from skanfis.membership import Gaussian
+
+from .. import oracles
+
+ONE_RULE = GridAntecedent((), counts=())
+CONSEQUENTS = ("agreement", "alpha", "slope")
+FIRST = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2)
+PENALTIES = [
+    Penalty(agreement=0.1, alpha=0.01, slope=0.3),
+    Penalty(agreement=1e-3, alpha=2e-3, slope=1e-2),
+    Penalty(agreement=0.0, alpha=1.0, slope=1e-4),
+    Penalty(agreement=1.0, alpha=1e-5),
+]
+# Pulls of components are expected to be within this factor of one another, as one deviation.
+LIKENESS = np.log(3.0)
+
+
+def rules(rng, n_rules):
+    return oracles.random_grid(rng, [Gaussian], [n_rules]) if n_rules > 1 else ONE_RULE
+
+
+def posterior(rows, antecedent, order, penalty, at=FIRST, n_rows=None):
+    """The posterior at the start, from an evaluation at weights of its own."""
+    problem = SeparableProblem(rows, antecedent, order, at)
+    evaluation = problem.evaluate(antecedent.parameters)
+    return laplace(
+        evaluation.normal,
+        problem.common_line,
+        evaluation.mean_squared_error,
+        penalty,
+        rows.total_weight if n_rows is None else n_rows,
+        antecedent.n_rules,
+    )
+
+
+def n_effective(found):
+    """Effective number of parameters, consequents of one output and premises."""
+    return found.n_columns + found.curvature.size - found.held_after.sum()
+
+
+def with_pulls(penalty, line, g):
+    """The penalty with a pull for every slope and component, whose geometric means are one."""
+
+    def around_one(names):
+        logs = g.normal(size=len(names))
+        pulls = np.exp(logs - logs.mean()) if len(names) > 1 else []
+        return dict(zip(names, pulls, strict=False))
+
+    components, slopes = around_one(line.departures.components), around_one(line.slopes)
+    return replace(penalty, slope=penalty.rho, pulls=components, slope_pulls=slopes)
+
+
+def prior_of_pulls(penalty):
+    """Minus twice the logarithm of the prior of the pulls, but for a constant."""
+    pulls = [*penalty.pulls.values(), *penalty.slope_pulls.values()]
+    return np.sum(np.log(pulls) ** 2) / LIKENESS**2 if pulls else 0.0
+
+
+def in_full(found):
+    """-2 log p but for (n - 1) log 2 pi per output, with what depends on n alone put back."""
+    n, freedom = found.n_rows, found.freedom
+    left_out = freedom * (1.0 + np.log(n / freedom)) + found.n_outputs * np.log(n)
+    return found.minus_twice_log + left_out
+
+
+class Dense:
+    """A problem written out: design, penalty and rows."""
+
+    def __init__(self, rows, antecedent, order, penalty):
+        problem = oracles.DenseProblem(rows, antecedent, order, penalty)
+        matrix = problem.residual_matrix(antecedent.parameters)
+        self.y, self.n = problem.y, rows.total_weight
+        self.weight = self.n * problem.weight
+        self.phi = problem.design(antecedent.parameters)
+        self.roots = matrix[len(self.y) :]
+        self.penalty = self.roots.T @ self.roots
+        # All rules rise by one.
+        self.height = np.zeros(matrix.shape[1])
+        self.height[:: matrix.shape[1] // antecedent.n_rules] = 1.0
+
+    def at_its_noise(self, minus_twice_log):
+        """The least over sigma^2, and where."""
+        found = optimize.minimize_scalar(
+            lambda log_variance: minus_twice_log(np.exp(log_variance)),
+            bounds=(-15.0, 5.0),
+            method="bounded",
+            options={"xatol": 1e-7},
+        )
+        return found.fun, np.exp(found.x)
+
+    def by_the_normal_distribution(self, variance):
+        """Of y alone: N(height, V) with a flat prior of the height, the consequents summed out."""
+        prior = np.linalg.pinv(self.penalty, rcond=1e-11, hermitian=True) / self.n
+        spread = variance * (np.diag(1.0 / self.weight) + self.phi @ prior @ self.phi.T)
+        one = np.ones(len(self.y))
+        precise = np.linalg.solve(spread, one)
+        total = 0.0
+        for y in self.y.T:
+            height = precise @ y / (precise @ one)
+            # Over the height, the density is its value at the best one times a normal integral.
+            total -= 2.0 * stats.multivariate_normal.logpdf(y, np.full(len(y), height), spread)
+            total += np.log(precise @ one / (2.0 * np.pi))
+            total -= (len(y) - 1.0) * np.log(2.0 * np.pi)
+        return total
+
+    def by_summing(self, variance, n_steps):
+        """The same of one output, by the trapezoidal rule over all consequents, one by one."""
+        y, half = self.y[:, 0], 0.5 / variance
+
+        def logarithm(beta):
+            """Log of what is integrated, by residuals: (..., n_columns)."""
+            squares = np.sum(self.weight * (y - beta @ self.phi.T) ** 2, axis=-1)
+            return -half * (squares + self.n * np.sum((beta @ self.roots.T) ** 2, axis=-1))
+
+        def of_prior(rest):
+            """The same of the prior alone, where the first rule's height is zero."""
+            beta = np.concatenate([np.zeros((*rest.shape[:-1], 1)), rest], axis=-1)
+            return -half * self.n * np.sum((beta @ self.roots.T) ** 2, axis=-1)
+
+        log_posterior = log_integral(logarithm, self.phi.shape[1], n_steps)
+        log_prior = log_integral(of_prior, self.phi.shape[1] - 1, n_steps)
+        return -2.0 * (log_posterior - log_prior) + y.size * np.log(variance) + np.log(2.0 * np.pi)
+
+
+def log_integral(logarithm, n_variables, n_steps):
+    """Log of the integral of exp(logarithm) over all of its variables, by nothing but its values.
+
+    Variables are stretched and sheared to where its quadratic form, found by differences, is round.
+    """
+    if n_variables == 0:
+        return float(logarithm(np.zeros(0)))
+    origin, unit = np.zeros(n_variables), np.eye(n_variables)
+    at_origin = logarithm(origin)
+    ahead, back = logarithm(unit), logarithm(-unit)
+    both = logarithm(unit[:, None] + unit)
+    curvature = ahead[:, None] + ahead - both - at_origin
+    curvature[np.diag_indices(n_variables)] = 2.0 * at_origin - ahead - back
+    mode = np.linalg.solve(curvature, 0.5 * (ahead - back))
+    axes = np.linalg.inv(np.linalg.cholesky(curvature))
+    steps = np.linspace(-7.0, 7.0, n_steps)
+    points = np.stack(np.meshgrid(*[steps] * n_variables, indexing="ij"), axis=-1)
+    values = logarithm(mode + points.reshape(-1, n_variables) @ axes)
+    cell = n_variables * np.log(steps[1] - steps[0]) + np.linalg.slogdet(axes)[1]
+    return float(special.logsumexp(values)) + cell
+
+
+class TestAtGivenPremises:
+    @pytest.mark.theory
+    @pytest.mark.parametrize("n_rules", [1, 2, 3])
+    @pytest.mark.parametrize("order", [0, 1])
+    @pytest.mark.parametrize("n_outputs", [1, 2])
+    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, n_rules, n_outputs):
+        # To the last constant, so that rule bases of any size and order can be compared.
+        g = np.random.default_rng(n_rules)
+        rows = oracles.bumpy_rows(g, 14, 1, n_outputs)
+        antecedent = rules(g, n_rules)
+        for penalty in PENALTIES:
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+            assert_allclose(in_full(found), expected, atol=1e-7)
+            assert_allclose(found.noise_variance, variance, rtol=1e-5)
+
+    @pytest.mark.theory
+    @pytest.mark.parametrize(
+        ("n_rules", "order", "n_rows"), [(1, 0, 9), (1, 1, 8), (2, 0, 12), (3, 0, 20), (2, 1, 10)]
+    )
+    def test_it_is_the_integral_over_all_consequents(self, n_rules, order, n_rows):
+        g = np.random.default_rng(n_rules)
+        rows, antecedent = oracles.bumpy_rows(g, n_rows, 1), rules(g, n_rules)
+        for penalty in PENALTIES[:2]:
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            assert_allclose(dense.phi @ dense.height, 1.0, rtol=1e-12)
+            assert_allclose(dense.roots @ dense.height, 0.0, atol=1e-12)
+            # Steps of one deviation: the trapezoidal rule is off by exp(-2 pi^2), 3e-9.
+            expected, variance = dense.at_its_noise(partial(dense.by_summing, n_steps=15))
+            assert_allclose(in_full(found), expected, atol=1e-6)
+            assert_allclose(found.noise_variance, variance, rtol=1e-4)
+
+    @pytest.mark.parametrize("n_outputs", [1, 2])
+    def test_whole_weights_are_repeated_rows(self, n_outputs):
+        g = np.random.default_rng(5)
+        X, times = oracles.bumpy_rows(g, 30, 2, n_outputs), g.integers(1, 5, 30)
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+        weighted = StandardisedData.of(X.X, X.y, times.astype(float))
+        repeated = StandardisedData.of(np.repeat(X.X, times, axis=0), np.repeat(X.y, times, axis=0))
+        for penalty in PENALTIES:
+            one, other = (posterior(r, antecedent, 1, penalty) for r in (weighted, repeated))
+            assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-9)
+            assert_allclose(n_effective(one), n_effective(other), rtol=1e-9)
+            assert_allclose(one.noise_variance, other.noise_variance, rtol=1e-9)
+
+    def test_weights_of_the_evaluation_do_not_matter(self):
+        # The normal equations of any weights give the posterior at all others.
+        g = np.random.default_rng(2)
+        rows = oracles.bumpy_rows(g, 60, 2, 2)
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 3])
+        for penalty in PENALTIES:
+            own = posterior(rows, antecedent, 1, penalty, at=penalty)
+            for at in PENALTIES:
+                found = posterior(rows, antecedent, 1, penalty, at=at)
+                assert_allclose(found.minus_twice_log, own.minus_twice_log, atol=1e-6)
+                assert_allclose(n_effective(found), n_effective(own), rtol=1e-6)
+
+    @pytest.mark.parametrize("factor", [1e-6, -1e6])
+    def test_units_do_not_matter(self, factor):
+        g = np.random.default_rng(2)
+        rows, antecedent = oracles.bumpy_rows(g, 60, 2), oracles.random_grid(g, [Gaussian], [3])
+        moved = StandardisedData.of(rows.X, 7.0 + factor * rows.y)
+        one, other = (posterior(r, antecedent, 1, PENALTIES[0]) for r in (rows, moved))
+        assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-8)
+
+    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self):
+        g = np.random.default_rng(4)
+        rows, antecedent = oracles.bumpy_rows(g, 40, 2, 1, True), rules(g, 3)
+        for penalty in PENALTIES:
+            dense = Dense(rows, antecedent, 1, penalty)
+            weighted = dense.phi.T * (dense.weight / dense.n)
+            matrix = weighted @ dense.phi + dense.penalty
+            hat = dense.phi @ np.linalg.solve(matrix, weighted)
+            found = posterior(rows, antecedent, 1, penalty)
+            assert_allclose(n_effective(found), np.trace(hat), rtol=1e-7)
+
+    @pytest.mark.parametrize("order", [0, 1])
+    @pytest.mark.parametrize("is_grid", [True, False])
+    def test_so_it_is_with_a_pull_for_every_component(self, order, is_grid):
+        g = np.random.default_rng(6)
+        rows = oracles.bumpy_rows(g, 25, 2, 2)
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [3, 2])
+        if not is_grid:
+            antecedent = oracles.random_scattered(g, Gaussian, 4, [0, 1])
+        problem = SeparableProblem(rows, antecedent, order, FIRST)
+        for plain in PENALTIES:
+            penalty = with_pulls(plain, problem.common_line, g)
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+            expected += prior_of_pulls(penalty)
+            assert_allclose(in_full(found), expected, atol=1e-6)
+            assert_allclose(found.noise_variance, variance, rtol=1e-5)
+
+
+class TestLimits:
+    def alike(self, n_rules):
+        theta = Gaussian.from_center_and_width(np.zeros((n_rules, 1)), np.ones((n_rules, 1)))
+        return ScatteredAntecedent.build(Gaussian, np.arange(1), theta)
+
+    @pytest.mark.parametrize("order", [0, 1])
+    @pytest.mark.parametrize("n_rules", [2, 5])
+    def test_rules_that_are_the_same_are_one_rule(self, order, n_rules):
+        # Their differences change no prediction: neither learnt nor paid for, at any weights.
+        rows = oracles.bumpy_rows(np.random.default_rng(0), 40, 1, 2)
+        for penalty in PENALTIES[:2]:
+            one = posterior(rows, ONE_RULE, order, penalty)
+            many = posterior(rows, self.alike(n_rules), order, penalty)
+            assert_allclose(many.minus_twice_log, one.minus_twice_log, atol=1e-7)
+            assert_allclose(n_effective(many), n_effective(one), rtol=1e-8)
+
+    @pytest.mark.parametrize("key", ["agreement", "alpha"])
+    def test_rules_that_must_agree_are_one_rule(self, key):
+        g = np.random.default_rng(1)
+        rows, antecedent = oracles.bumpy_rows(g, 60, 1), rules(g, 3)
+        gaps = []
+        for size in (1e2, 1e4, 1e6):
+            penalty = replace(Penalty(agreement=1e-3, alpha=1e-3, slope=0.02), **{key: size})
+            one = posterior(rows, ONE_RULE, 1, penalty)
+            gaps.append(
+                posterior(rows, antecedent, 1, penalty).minus_twice_log - one.minus_twice_log
+            )
+        # Its departure is in proportion to what there is left to disagree, until rounding.
+        assert_allclose(gaps[0], 100.0 * gaps[1], rtol=0.05)
+        assert_allclose(gaps[2], 0.0, atol=1e-4)
+
+    def test_of_a_line_and_a_constant_the_data_decide(self):
+        # Slopes that must vanish leave a constant; data on a line ask for the line.
+        g = np.random.default_rng(1)
+        x = g.normal(size=(50, 1))
+        for signal, wins in ((0.0, False), (1.0, True)):
+            rows = StandardisedData.of(x, signal * x + g.normal(size=(50, 1)))
+            constant = posterior(rows, ONE_RULE, 0, FIRST)
+            flat = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e7))
+            line = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e-2))
+            assert_allclose(flat.minus_twice_log, constant.minus_twice_log, atol=1e-4)
+            assert bool(line.minus_twice_log < constant.minus_twice_log) is wins
+
+
+def at_fixed_premises(seed):
+    """The posterior as a function of the penalty, of problems of many kinds."""
+    g = np.random.default_rng(seed)
+    rows = oracles.bumpy_rows(g, [30, 100, 300][seed % 3], 2, 1 + seed % 2, seed % 5 == 0)
+    if seed % 4:
+        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2 + seed % 2])
+    else:
+        antecedent = oracles.random_scattered(g, Gaussian, 5, [0, 1])
+    problem = SeparableProblem(rows, antecedent, 0 if seed % 7 == 0 else 1, FIRST)
+    evaluation = problem.evaluate(antecedent.parameters)
+
+    def at(penalty, **premises):
+        return laplace(
+            evaluation.normal,
+            problem.common_line,
+            evaluation.mean_squared_error,
+            penalty,
+            rows.total_weight,
+            antecedent.n_rules,
+            **premises,
+        )
+
+    penalty = Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
+    return at, with_pulls(penalty, problem.common_line, g)
+
+
+def slope_of(function, penalty, key, step=1e-3):
+    """Derivative by the logarithm of a weight."""
+    penalty = replace(penalty, slope=penalty.rho)
+    ends = [
+        function(replace(penalty, **{key: getattr(penalty, key) * np.exp(side * step)}))
+        for side in (1.0, -1.0)
+    ]
+    return (ends[0] - ends[1]) / (2.0 * step)
+
+
+BLOCKS = {"slope": "slope_pulls", "alpha": "pulls"}
+
+
+def logs_of(penalty, block):
+    """Logarithms of the weights on every slope, or on every component."""
+    mean = getattr(penalty, block)
+    return np.log([mean * pull for pull in getattr(penalty, BLOCKS[block]).values()])
+
+
+def with_logs(penalty, block, logs):
+    """The penalty with such weights."""
+    names, mean = getattr(penalty, BLOCKS[block]), float(np.exp(np.mean(logs)))
+    pulls = dict(zip(names, np.exp(logs - np.mean(logs)).tolist(), strict=True))
+    return replace(penalty, **{block: mean, BLOCKS[block]: pulls})
+
+
+def slopes_of_pulls(function, penalty, block, step=1e-3):
+    """Derivatives by the logarithms of all weights of a block."""
+    logs = logs_of(penalty, block)
+    ends = [
+        [function(with_logs(penalty, block, logs + side * step * unit)) for side in (1.0, -1.0)]
+        for unit in np.eye(logs.size)
+    ]
+    return np.array([(high - low) / (2.0 * step) for high, low in ends])
+
+
+class TestReestimated:
+    @pytest.mark.theory
+    @pytest.mark.parametrize("seed", range(6))
+    def test_no_step_lowers_the_evidence_and_the_last_is_stationary(self, seed):
+        at, penalty = at_fixed_premises(seed)
+        before = at(penalty).minus_twice_log
+        for _ in range(200):
+            penalty = reestimated(at(penalty), CONSEQUENTS)
+            after = at(penalty).minus_twice_log
+            assert after < before + 1e-6
+            before = after
+        for key in CONSEQUENTS:
+            slope = slope_of(lambda p: at(p).minus_twice_log, penalty, key)
+            # At an edge the evidence may rise still, but not by anything.
+            assert abs(slope) < 1e-3
+        for block, pulls in BLOCKS.items():
+            if getattr(penalty, pulls):
+                slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
+                assert np.abs(slopes).max() < 2e-3
+
+    @pytest.mark.parametrize("block", BLOCKS)
+    @pytest.mark.parametrize("seed", [1, 2, 4, 8])
+    def test_step_of_the_pulls_is_where_what_is_paid_for_them_is_made_good(self, seed, block):
+        at, penalty = at_fixed_premises(seed)
+        now, stepped = at(penalty), reestimated(at(penalty), [block])
+        own = slice(2, 2 + len(now.line.slopes))
+        if block == "alpha":
+            own = slice(own.stop, None)
+        cost = now.n_rows / now.noise_variance * now.paid[own]
+        determined = now.n_outputs * (now.held_before - now.held_after)[own]
+        before, after = logs_of(penalty, block), logs_of(stepped, block)
+        pulls = before - before.mean()
+        slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
+        # The prior has a part in it, 2 log(pull) / s^2, whose mean is zero.
+        expected = cost - determined + 2.0 * pulls / LIKENESS**2
+        assert_allclose(slopes, expected, rtol=1e-4, atol=1e-5)
+        assert_allclose(after.mean(), np.log(getattr(stepped, block)), rtol=1e-10)
+        step = after - before
+        left = cost * np.exp(step) - determined + 2.0 * (pulls + step) / LIKENESS**2
+        moved = np.abs(step) < np.log(100.0) - 1e-9
+        assert_allclose(left[moved], 0.0, atol=1e-8 * max(cost.max(), 1.0))
+        assert moved.any()
+        others = {block: getattr(penalty, block), BLOCKS[block]: getattr(penalty, BLOCKS[block])}
+        assert replace(stepped, **others) == penalty
+
+    @pytest.mark.parametrize("seed", [1, 2, 8])
+    def test_step_is_up_the_evidence_and_by_its_derivative(self, seed):
+        # d(-2 log p) / d log tau is what is paid less what is determined: their ratio is the step.
+        at, penalty = at_fixed_premises(seed)
+        now = at(penalty)
+        stepped = reestimated(now, ["agreement"])
+        cost = now.n_rows / now.noise_variance * now.paid[0]
+        determined = now.n_outputs * (now.held_before - now.held_after)[0]
+        slope = slope_of(lambda p: at(p).minus_twice_log, penalty, "agreement")
+        assert_allclose(cost - determined, slope, rtol=1e-4, atol=1e-5)
+        ratio = np.clip(determined / cost, 0.01, 100.0)
+        assert_allclose(stepped.agreement / penalty.agreement, ratio, rtol=1e-6)
+        assert replace(stepped, agreement=penalty.agreement) == penalty
+
+    def test_no_weight_falls_below_its_own_least_or_moves_by_more_than_a_step(self):
+        at, penalty = at_fixed_premises(1)
+        found = at(penalty)
+        free = reestimated(found, CONSEQUENTS)
+        none = Penalty(slope=0.0)
+        least = replace(none, agreement=1.2 * free.agreement)
+        assert reestimated(found, CONSEQUENTS, least) == replace(free, agreement=least.agreement)
+        # Of the pulls every one is held.
+        for block in BLOCKS:
+            logs = logs_of(free, block)
+            least = replace(none, **{block: float(np.exp(np.median(logs)))})
+            held = reestimated(found, CONSEQUENTS, least)
+            assert_allclose(logs_of(held, block), np.maximum(logs, np.median(logs)), rtol=1e-10)
+        # Where nothing is paid at all, the weight rises as far as a step goes.
+        risen = reestimated(replace(found, paid=np.zeros_like(found.paid)), ["agreement"])
+        assert_allclose(risen.agreement, min(100.0 * penalty.agreement, 1.0), rtol=1e-12)
+
+    def test_it_is_where_the_evidence_is_largest(self):
+        at, penalty = at_fixed_premises(12)
+        for _ in range(300):
+            penalty = reestimated(at(penalty), CONSEQUENTS)
+        found = at(penalty).minus_twice_log
+        n_slopes = len(penalty.slope_pulls)
+
+        def function(logs):
+            logs = np.clip(logs, -27.0, 9.0)
+            moved = replace(penalty, agreement=float(np.exp(logs[0])))
+            moved = with_logs(moved, "slope", logs[1 : 1 + n_slopes])
+            return at(with_logs(moved, "alpha", logs[1 + n_slopes :])).minus_twice_log
+
+        blocks = [logs_of(penalty, block) for block in BLOCKS]
+        start = np.concatenate([[np.log(penalty.agreement)], *blocks])
+        around = optimize.minimize(
+            function, start + 0.5, method="Nelder-Mead", options={"maxiter": 2000}
+        )
+        assert found <= around.fun + 1e-3
+
+    def of_slopes(self, slopes):
+        """Noise of one is added to a plane over 2,000 rows: the noise and the weights found."""
+        g = np.random.default_rng(0)
+        X = g.normal(size=(2000, slopes.size))
+        y = X @ slopes + g.normal(size=2000)
+        rows, penalty = StandardisedData.of(X, y[:, None]), FIRST
+        problem = SeparableProblem(rows, ONE_RULE, 1, penalty)
+        evaluation = problem.evaluate(np.empty(0))
+        for _ in range(100):
+            error = evaluation.mean_squared_error
+            found = laplace(evaluation.normal, problem.common_line, error, penalty, 2000.0, 1)
+            penalty = reestimated(found, ["slope"])
+        return found.noise_variance * y.var(), penalty
+
+    def test_known_noise_and_slope_are_found(self):
+        noise, penalty = self.of_slopes(np.tile([0.1, -0.1], 50))
+        assert_allclose(noise, 1.0, rtol=0.05)
+        # n rho / sigma^2 is the precision of the slopes, where inputs have a deviation of one.
+        assert_allclose(noise / (2000 * penalty.rho), 0.01, rtol=0.15)
+        assert max(map(abs, np.log(list(penalty.slope_pulls.values())))) < 1.0
+
+    @pytest.mark.parametrize(("n_matter", "least", "most"), [(6, 0.0, 0.6), (60, 0.9, 1.15)])
+    def test_what_a_weight_for_every_slope_is_worth(self, n_matter, least, most):
+        # Planes of 60 slopes and three rows each, over one weight for all slopes.
+        errors = []
+        for seed in range(4):
+            g = np.random.default_rng(seed)
+            slopes = np.zeros(60)
+            slopes[:n_matter] = g.normal(size=n_matter) / np.sqrt(n_matter)
+            X = g.normal(size=(180, 60))
+            y = X @ slopes + 0.7 * g.normal(size=180)
+            rows = StandardisedData.of(X, y[:, None])
+            problem = SeparableProblem(rows, ONE_RULE, 1, FIRST)
+            evaluation = problem.evaluate(np.empty(0))
+            for n_distinct in (180, 0):
+                penalty, error = FIRST, evaluation.mean_squared_error
+                for _ in range(60):
+                    line = problem.common_line
+                    found = laplace(evaluation.normal, line, error, penalty, 180.0, 1)
+                    penalty = reestimated(found, ["slope"], n_distinct=n_distinct)
+                solved = problem.with_penalty(penalty).solved_again(evaluation)
+                own = solved.coefficients[1:, 0] * rows.targets.scale / rows.inputs.scale
+                errors.append(np.sum((own - slopes) ** 2))
+        each, one = np.reshape(errors, (4, 2)).sum(axis=0)
+        assert least < each / one < most
+
+    def test_inputs_that_matter_are_pulled_less_than_those_that_do_not(self):
+        slopes = np.zeros(40)
+        slopes[::8] = 0.5
+        noise, penalty = self.of_slopes(slopes)
+        assert_allclose(noise, 1.0, rtol=0.05)
+        pulls = np.array(list(penalty.slope_pulls.values()))
+        assert pulls[slopes != 0.0].max() < 0.1 * pulls[slopes == 0.0].min()
+
+
+# Distinct rows for every consequent, and what that asks of all weights.
+@pytest.mark.parametrize(("rows_each", "least"), [(0.9, 1e-4), (1.0, 1e-6), (1.9, 1e-6), (2.0, 0)])
+def test_least_weights_are_those_at_which_rules_are_as_far_apart_as_a_target(rows_each, least):
+    at, penalty = at_fixed_premises(1)
+    found = at(penalty)
+    # Of the prior: a disagreement, and a rule's departure from the line, of two deviations squared.
+    departure = found.noise_variance / found.n_rows / 4.0
+    expected = [max(found.n_columns * departure, least), max(departure, least), least]
+    assert departure > 1e-4
+    n_distinct = rows_each * found.n_columns
+    assert_allclose(astuple(least_weights(found, 4, n_distinct))[:3], expected, rtol=1e-12)
+    # A single rule agrees with itself.
+    assert least_weights(found, 1, n_distinct) == Penalty(least, least, least)
+
+
+STEPS = np.array([-0.01, 0.0, 0.01])
+
+
+class TestExtrapolated:
+    """Logarithms of a weight that come nearer to their limit by the same factor every step."""
+
+    line = SeparableProblem(
+        oracles.bumpy_rows(np.random.default_rng(0), 20, 1), ONE_RULE, 1, FIRST
+    ).common_line
+
+    @staticmethod
+    def steps(ratio, first=1e-3, limit=2.0):
+        """Three penalties on the way to a limit, of the agreement."""
+        logs = np.log(limit) + np.log(first / limit) * ratio ** np.arange(3)
+        return [Penalty(agreement=float(np.exp(one)), alpha=1.0, slope=1.0) for one in logs]
+
+    @pytest.mark.parametrize("ratio", [0.55, 0.7])
+    def test_a_geometric_sequence_is_taken_to_its_limit(self, ratio):
+        found = extrapolated(
+            self.line, *self.steps(ratio, limit=0.05), ("agreement", "alpha"), None
+        )
+        assert_allclose(found.agreement, 0.05, rtol=1e-12)
+        assert found.alpha == 1.0
+
+    @pytest.mark.parametrize("ratio", [0.45, -0.9])
+    def test_steps_that_are_not_alike_are_left(self, ratio):
+        before, now, after = self.steps(ratio)
+        assert extrapolated(self.line, before, now, after, ("agreement",), None) == after
+        assert extrapolated(self.line, None, now, after, ("agreement",), None) == after
+
+    def test_a_long_way_is_a_hundredfold_and_within_limits(self):
+        before, now, after = (Penalty(agreement=a, alpha=1.0) for a in (1e-4, 2e-4, 4e-4))
+        assert_allclose(
+            extrapolated(self.line, before, now, after, ("agreement",), None).agreement, 2e-2
+        )
+        downward = extrapolated(
+            self.line, after, now, before, ("agreement",), Penalty(1e-5, slope=0.0)
+        )
+        assert downward.agreement == 1e-5
+        assert extrapolated(self.line, before, now, after, (), None) == after
+
+    def test_settled_is_what_changes_by_less_than_half_a_hundredth(self):
+        penalty = Penalty(agreement=1.0, alpha=2.0, slope=3.0, stiffness=4.0)
+        assert is_settled(self.line, penalty, replace(penalty, stiffness=4.0 * 1.004))
+        assert not is_settled(self.line, penalty, replace(penalty, slope=3.0 * 0.994))
+
+
+class OneWidth:
+    """A grid whose premises move along one displacement, the width of a term."""
+
+    def __init__(self, n_rows, noise=0.3):
+        g = np.random.default_rng(0)
+        X = g.uniform(-1.0, 1.0, (n_rows, 1))
+        y = np.sin(3.0 * X) + 0.4 * X**2 + noise * g.normal(size=X.shape)
+        self.rows = StandardisedData.of(X, y)
+        low, high = oracles.box(self.rows)
+        self.antecedent = oracles.even_grid([Gaussian], [3], low, high, 0.6)
+        self.premise = Premise.of(self.antecedent, low, high)
+        self.unit = np.zeros(self.premise.size)
+        self.unit[4] = 1.0  # the middle term's width
+
+    def laplace(self, penalty):
+        """By the module: with the curvature of Gauss and Newton, and with the cost's own."""
+        problem = SeparableProblem(self.rows, self.antecedent, 1, penalty)
+
+        def cost(x):
+            evaluation = problem.evaluate(self.premise.parameters(x * self.unit))
+            return evaluation.cost + 0.5 * penalty.stiffness * x**2
+
+        x = optimize.minimize_scalar(cost, bounds=(-1, 1), options={"xatol": 1e-9}).x
+        evaluation = problem.evaluate(self.premise.parameters(x * self.unit))
+        raw = problem.linearise(evaluation)
+        _, hessian = self.premise.pull_back(x * self.unit, raw.gradient, raw.gauss_newton)
+        costs = [problem.evaluate(self.premise.parameters((x + h) * self.unit)).cost for h in STEPS]
+        for curvature in (hessian[4, 4], np.diff(costs, 2)[0] / STEPS[-1] ** 2):
+            yield laplace(
+                evaluation.normal,
+                problem.common_line,
+                evaluation.mean_squared_error,
+                penalty,
+                self.rows.total_weight,
+                self.antecedent.n_rules,
+                np.array([x]),
+                np.array([curvature]),
+            )
+
+    def by_quadrature(self, penalty, variance):
+        """The integral over the displacement of what is left of the consequents'."""
+        dense = oracles.DenseProblem(self.rows, self.antecedent, 1, penalty)
+        n = self.rows.total_weight
+
+        def minus_log(x):
+            parameters = self.premise.parameters(x * self.unit)
+            matrix = dense.residual_matrix(parameters)
+            roots = matrix[self.rows.n_rows :]
+            penalised = np.linalg.eigvalsh(roots.T @ roots)[1:]
+            determinants = np.linalg.slogdet(matrix.T @ matrix)[1] - np.sum(np.log(penalised))
+            paid = 2.0 * dense.cost(parameters) + penalty.stiffness * x**2
+            return 0.5 * (n * paid / variance + determinants + np.log(self.antecedent.n_rules))
+
+        x = np.linspace(-1.0, 1.0, 201)
+        values = np.array([minus_log(one) for one in x])
+        height = values.min()
+        integral = integrate.simpson(np.exp(height - values), x=x)
+        prior = 0.5 * np.log(n * penalty.stiffness / (2.0 * np.pi * variance))
+        return 2.0 * (height - np.log(integral) - prior) + (n - 1.0) * np.log(variance) + np.log(n)
+
+
+class TestPremises:
+    def prior_of_weight(self, found):
+        """As a hundred displacements seen before would do."""
+        expected = found.n_rows * found.penalty.stiffness / found.noise_variance
+        expected *= PRIOR_DISPLACEMENT**2
+        return 100.0 * (expected - np.log(expected) - 1.0)
+
+    @pytest.mark.theory
+    def test_a_displacement_is_integrated_over(self):
+        case, errors, sizes = OneWidth(1500), [], []
+        for stiffness in (1e-4, 1.0):
+            penalty = Penalty(agreement=0.05, alpha=0.01, slope=0.01, stiffness=stiffness)
+            found = list(case.laplace(penalty))
+            own = np.array([in_full(one) - self.prior_of_weight(one) for one in found])
+            sizes.append(np.log1p(found[1].curvature[0] / stiffness))
+            errors.append(own - case.by_quadrature(penalty, found[0].noise_variance))
+        rough, exact = np.array(errors).T
+        assert max(sizes) > 5.0
+        assert_allclose(exact, 0.0, atol=0.05)
+        # That of Gauss and Newton leaves out what residuals and disagreement bring.
+        assert_allclose(rough, 0.0, atol=1.0)
+
+    @pytest.mark.parametrize("seed", [1, 2, 8])
+    def test_weight_is_reestimated_where_its_own_evidence_is_largest(self, seed):
+        # The noise is held where the prior of the weight is concerned.
+        at, penalty = at_fixed_premises(seed)
+        g = np.random.default_rng(seed)
+        premises = {
+            "displacement": 0.2 * g.normal(size=6),
+            "curvature": 10.0 ** g.uniform(-4.0, 0.0, 6),
+        }
+        penalty = replace(penalty, stiffness=1e-3)
+        for _ in range(100):
+            penalty = reestimated(at(penalty, **premises), ["stiffness"])
+        found = at(penalty, **premises)
+
+        def own(p):
+            there = at(p, **premises)
+            return there.minus_twice_log - self.prior_of_weight(there)
+
+        slope = slope_of(own, penalty, "stiffness")
+        assert_allclose(slope + 100.0 * (found.prior_precision - 1.0), 0.0, atol=1e-4)
+        assert 0.5 < found.prior_precision < 2.0
+
+    def test_effective_parameters_are_those_that_move(self):
+        at, penalty = at_fixed_premises(1)
+        curvature = np.array([1.0, 1e-3, 0.0])
+        penalty = replace(penalty, stiffness=1e-3)
+        there = at(penalty, displacement=np.zeros(3), curvature=curvature)
+        gain = n_effective(there) - n_effective(at(penalty))
+        assert_allclose(gain, 1.0 / 1.001 + 0.5, rtol=1e-12)
+
+
+def surface(n_rows, noise, seed=0):
+    g = np.random.default_rng(seed)
+    X = g.uniform(-1.0, 1.0, (n_rows, 2))
+    return X, np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + noise * g.normal(size=n_rows)
+
+
+def effective_parameters(model, X, y):
+    """Trace of the hat matrix of the consequents where the fit ended."""
+    rows = StandardisedData.of(X, y[:, None])
+    antecedent = model.model_.antecedent.change_units(
+        -rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale
+    )
+    penalty = Penalty(model.agreement_, model.alpha_, model.slope_alpha_)
+    return n_effective(posterior(rows, antecedent, 1, penalty))
+
+
+class TestWholeFits:
+    @pytest.mark.theory
+    def test_the_noisier_the_fewer_parameters(self):
+        counts = []
+        for noise in (0.03, 0.3, 3.0):
+            X, y = surface(300, noise)
+            counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
+        assert (np.diff(counts) < -1.0).all()
+
+    @pytest.mark.theory
+    def test_the_more_rows_the_more_parameters(self):
+        counts = []
+        for n_rows in (50, 200, 1000):
+            X, y = surface(n_rows, 0.3)
+            counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
+        assert (np.diff(counts) > 0.5).all()
+
+    @pytest.mark.theory
+    @pytest.mark.parametrize("seed", range(2))
+    def test_the_noisier_the_simpler_the_structure(self, seed):
+        rules, parameters = [], []
+        for noise in (0.3, 2.0, 20.0):
+            X, y = surface(200, noise, seed)
+            model = ANFISRegressor().fit(X, y)
+            rules.append(model.n_rules_)
+            parameters.append(effective_parameters(model, X, y))
+        # In between there may be more rules, of which each then says less.
+        assert rules[2] == 1 < rules[0]
+        assert (np.diff(parameters) < 0.0).all()
+
+    @pytest.mark.theory
+    def test_repeated_rows_and_whole_weights_are_the_same_fit(self):
+        X, y = surface(80, 0.2)
+        times = np.random.default_rng(1).integers(1, 4, 80)
+        weighted = ANFISRegressor(n_mfs=2).fit(X, y, sample_weight=times)
+        repeated = ANFISRegressor(n_mfs=2).fit(np.repeat(X, times, axis=0), np.repeat(y, times))
+        for name in ("agreement_", "alpha_", "slope_alpha_", "stiffness_"):
+            assert_allclose(getattr(weighted, name), getattr(repeated, name), rtol=1e-6)
+        assert_allclose(weighted.predict(X), repeated.predict(X), rtol=0, atol=1e-9)

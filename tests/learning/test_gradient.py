@@ -1,0 +1,166 @@
+"""The joint cost's gradient by complex steps, and descent along it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.learning import GradientDescent
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
+
+from .. import oracles
+from .test_objective import CASES, FULL, PLAIN, Case
+from .test_varpro import planted
+
+
+def gradient(problem, premise, *, max_iter, on_iteration=None, **settings):
+    """A run of back-propagation with settings of its own."""
+    solver = GradientDescent(**settings)
+    return solver.solve(problem, premise, max_iter=max_iter, on_iteration=on_iteration)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[(name, penalty) for name in CASES for penalty in (PLAIN, FULL)],
+    ids=lambda param: f"{param[0]}{', agreeing' if param[1] is FULL else ''}",
+)
+def case(request):
+    return Case.named(*request.param)
+
+
+def any_coefficients(case):
+    shape = (case.problem.n_columns, case.problem.n_outputs)
+    return np.random.default_rng(8).normal(size=shape)
+
+
+class TestJointGradient:
+    def test_cost(self, case):
+        coefficients = any_coefficients(case)
+        joint = case.problem.joint(case.point, coefficients)
+        expected = case.dense.cost_at(case.point, coefficients)
+        assert_allclose(joint.evaluation.cost, expected, rtol=1e-12)
+        residual = case.dense.y - case.dense.design(case.point) @ coefficients
+        error = np.sum(case.dense.weight[:, None] * residual**2)
+        assert_allclose(joint.evaluation.mean_squared_error, error, rtol=1e-11)
+        assert joint.evaluation.coefficients is coefficients
+        assert_array_equal(joint.evaluation.antecedent.parameters, case.point)
+
+    @pytest.mark.theory
+    def test_gradient_by_premises(self, case):
+        coefficients = any_coefficients(case)
+        found = case.problem.joint(case.point, coefficients).premises
+        expected = oracles.complex_step(lambda p: case.dense.cost_at(p, coefficients), case.point)
+        assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+    @pytest.mark.theory
+    def test_gradient_by_coefficients(self, case):
+        coefficients = any_coefficients(case)
+        found = case.problem.joint(case.point, coefficients).coefficients
+        expected = oracles.complex_step(
+            lambda flat: case.dense.cost_at(case.point, flat.reshape(coefficients.shape)),
+            coefficients.ravel(),
+        )
+        expected = expected.reshape(coefficients.shape)
+        assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
+
+    def test_at_solved_coefficients_it_is_the_reduced_gradient(self, case):
+        evaluation, linearisation = case.at_point()
+        joint = case.problem.joint(case.point, evaluation.coefficients)
+        size = np.abs(linearisation.gradient).max()
+        assert_allclose(joint.premises, linearisation.gradient, rtol=0, atol=1e-10 * size)
+        assert_allclose(joint.coefficients, 0.0, atol=1e-10)
+        assert_allclose(joint.evaluation.cost, evaluation.cost, rtol=1e-10)
+        assert_allclose(joint.evaluation.masses, evaluation.masses, rtol=1e-10, atol=1e-14)
+
+    def test_blocks_of_rows_add_up(self, monkeypatch):
+        whole = Case.named("grid of both")
+        coefficients = any_coefficients(whole)
+        expected = whole.problem.joint(whole.point, coefficients)
+        monkeypatch.setattr("skanfis.learning.objective._FEWEST_ROWS", 8)
+        monkeypatch.setattr("skanfis.learning.objective._BLOCK_BYTES", 1)
+        monkeypatch.setattr("skanfis.learning.data._BLOCKS_PER_CHUNK", 3)
+        found = Case.named("grid of both").problem.joint(whole.point, coefficients)
+        assert_allclose(found.premises, expected.premises, rtol=1e-10)
+        assert_allclose(found.coefficients, expected.coefficients, rtol=1e-10, atol=1e-14)
+
+
+AGREEING = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+
+
+def problem_of(kind="grid", seed=0, penalty=AGREEING, order=1):
+    rows, premise, *_ = planted(kind, seed, displaced=0.5, noise=0.1)
+    return SeparableProblem(rows, premise.antecedent, order, penalty), premise
+
+
+@pytest.mark.theory
+@pytest.mark.parametrize("kind", ["one input", "grid", "bells", "scattered"])
+@pytest.mark.parametrize("order", [0, 1])
+def test_short_steps_only_go_down(kind, order):
+    problem, premise = problem_of(kind, order=order)
+    costs = []
+    gradient(
+        problem,
+        premise,
+        max_iter=30,
+        tol=0.0,
+        step_size=1e-6,
+        on_iteration=lambda n, evaluation: costs.append(evaluation.cost),
+    )
+    assert (np.diff(costs) < 0.0).all()
+
+
+def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
+    problem, premise = problem_of("bells")
+    rows, antecedent = problem.rows, premise.antecedent
+    dense = oracles.DenseProblem(rows, antecedent, 1, problem.penalty)
+    (group,) = antecedent.groups
+    solved = problem.evaluate(antecedent.parameters).coefficients
+    numbers = group.family.natural(group.theta)
+    start = np.concatenate([numbers.ravel(), solved.ravel()])
+
+    def cost(variables):
+        center, width, slope = variables[: numbers.size].reshape(numbers.shape)
+        parameters = np.concatenate([center, np.log(width), np.log(slope)])
+        beta = variables[numbers.size :].reshape(solved.shape)
+        return dense.cost_at(parameters, beta)
+
+    slope = oracles.complex_step(cost, start)
+    expected = start - 0.01 * slope / np.linalg.norm(slope)
+    seen = []
+    gradient(problem, premise, max_iter=1, tol=0.0, on_iteration=lambda n, e: seen.append(e))
+    found = seen[0].antecedent.groups[0]
+    variables = [found.family.natural(found.theta).ravel(), seen[0].coefficients.ravel()]
+    assert_allclose(np.concatenate(variables), expected, rtol=0, atol=1e-9)
+
+
+def test_consequents_are_solved_for_once():
+    problem, premise = problem_of()
+    calls = []
+    evaluate = problem.evaluate
+    problem.evaluate = lambda *arguments: calls.append(arguments) or evaluate(*arguments)
+    gradient(problem, premise, max_iter=5, tol=0.0)
+    assert len(calls) == 1
+
+
+@pytest.mark.theory
+def test_given_time_it_comes_near_the_optimum():
+    # Order 0 and one input: a small problem, on which even this gets somewhere.
+    rows = oracles.bumpy_rows(np.random.default_rng(0), n_inputs=1)
+    _, premise, *_ = planted("one input", 0)
+    premise = Premise.of(premise.antecedent, *oracles.box(rows))
+    problem = SeparableProblem(rows, premise.antecedent, 0, Penalty(alpha=1e-6))
+    result = gradient(problem, premise, max_iter=600, tol=0.0)
+    assert result.loss_curve.min() < 0.8 * result.loss_curve[0]
+    assert result.status == "epochs"
+
+
+def test_error_goal_ends_it():
+    problem, premise = problem_of("bells")
+    free = gradient(problem, premise, max_iter=40, tol=0.0, step_size=1e-3)
+    goal = np.sqrt(free.loss_curve[20])
+    result = gradient(problem, premise, max_iter=40, tol=0.0, step_size=1e-3, error_goal=goal)
+    assert result.status == "error_goal"
+    assert 0 < result.n_iter <= 20
+    missed = gradient(problem, premise, max_iter=3, tol=0.0, error_goal=1e-9)
+    assert missed.status == "max_iter"

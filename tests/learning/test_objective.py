@@ -1,0 +1,491 @@
+"""Cost, gradient and Gauss-Newton matrix against the dense problem of tests/oracles.py.
+
+The points at which they are compared are far from any optimum. Gradients are complex steps of the
+dense cost, with beta eliminated inside it: nothing is left out of the derivative.
+"""
+
+from multiprocessing.pool import ThreadPool
+
+import numpy as np
+import pytest
+from joblib import Parallel, delayed
+from numpy.testing import assert_allclose, assert_array_equal
+from threadpoolctl import threadpool_limits
+
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.learning import data as rows
+from skanfis.learning import objective
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.membership import Bell, Gaussian
+
+from .. import oracles
+
+# Of the two: the ridge that every problem has, and all that there is at once.
+PLAIN = Penalty(alpha=1e-4)
+FULL = Penalty(agreement=0.3, alpha=1e-3, slope=1e-2)
+
+
+def dead_rule(rng):
+    """Four rules, one of them fifty deviations away from all data."""
+    theta = Gaussian.from_center_and_width(rng.normal(size=(4, 2)), np.ones((4, 2)))
+    theta[0, 1] = 50.0
+    return ScatteredAntecedent.build(Gaussian, np.arange(2), theta)
+
+
+def dead_term(rng):
+    """A grid whose last term on the first input lies outside the data."""
+    thetas = [
+        Gaussian.start(c, np.ones(c.size), 0.6) for c in (np.array([-1, 1, 90]), np.array([-1, 1]))
+    ]
+    return GridAntecedent.build([Gaussian, Gaussian], [0, 1], thetas)
+
+
+def duplicated_rule(rng):
+    """Four rules, two of them the same."""
+    theta = Bell.from_center_and_width(rng.normal(size=(4, 2)), rng.uniform(0.5, 1.5, (4, 2)))
+    theta[:, 3] = theta[:, 1]
+    return ScatteredAntecedent.build(Bell, np.arange(2), theta)
+
+
+CASES = {
+    # antecedent from rng, order, outputs, weighted, and the consequents' inputs if not all
+    "consequents in one input": (
+        lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]),
+        1,
+        2,
+        True,
+        [1],
+    ),
+    "rules listed one by one": (lambda g: oracles.random_table(g, inputs=2), 1, 1, True),
+    "grid of gaussians": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]), 1, 1, False),
+    "grid of bells": (lambda g: oracles.random_grid(g, [Bell] * 2, [2, 3]), 1, 1, True),
+    "grid of both": (lambda g: oracles.random_grid(g, [Bell, Gaussian], [3, 2]), 1, 2, True),
+    "grid on one input": (lambda g: oracles.random_grid(g, [Gaussian], [4], [1]), 1, 1, True),
+    "grid, order 0": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 3]), 0, 1, False),
+    "grid, order 0, outputs": (lambda g: oracles.random_grid(g, [Bell] * 2, [2, 2]), 0, 3, True),
+    "scattered": (lambda g: oracles.random_scattered(g, Gaussian, 4, [0, 1]), 1, 1, True),
+    "scattered bells": (lambda g: oracles.random_scattered(g, Bell, 3, [0, 1]), 1, 2, False),
+    "scattered, order 0": (lambda g: oracles.random_scattered(g, Bell, 5, [1]), 0, 1, True),
+    "dead rule": (dead_rule, 1, 1, True),
+    "dead term": (dead_term, 1, 1, False),
+    "duplicated rule": (duplicated_rule, 1, 1, False),
+    "duplicated rule, outputs": (duplicated_rule, 1, 2, True),
+}
+
+
+class Case:
+    """A problem, its dense form, and a point away from the start."""
+
+    def __init__(self, antecedent, order, rows, penalty=PLAIN, **settings):
+        self.rows, self.order, self.penalty = rows, order, penalty
+        self.problem = SeparableProblem(rows, antecedent, order, penalty, **settings)
+        consequent_inputs = settings.get("consequent_inputs")
+        self.dense = oracles.DenseProblem(rows, antecedent, order, penalty, consequent_inputs)
+        g = np.random.default_rng(5)
+        self.point = antecedent.parameters + 0.2 * g.normal(size=antecedent.parameters.size)
+
+    @classmethod
+    def named(cls, name, penalty=PLAIN):
+        g = np.random.default_rng(3)
+        build, order, n_outputs, weighted, *inputs = CASES[name]
+        settings = {"consequent_inputs": np.array(inputs[0])} if inputs else {}
+        rows = oracles.bumpy_rows(g, 250, 2, n_outputs, weighted)
+        return cls(build(g), order, rows, penalty, **settings)
+
+    def at_point(self):
+        evaluation = self.problem.evaluate(self.point)
+        return evaluation, self.problem.linearise(evaluation)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[(name, penalty) for name in CASES for penalty in (PLAIN, FULL)],
+    ids=lambda param: f"{param[0]}{', agreeing' if param[1] is FULL else ''}",
+)
+def case(request):
+    return Case.named(*request.param)
+
+
+def assert_all_close(one, other, rtol):
+    """Close on the scale of the largest entry."""
+    assert_allclose(one, other, rtol=0, atol=rtol * np.abs(other).max())
+
+
+def arrays(evaluation, linearisation):
+    return [
+        np.array([evaluation.cost, evaluation.mean_squared_error]),
+        evaluation.coefficients,
+        evaluation.masses,
+        linearisation.gradient,
+        linearisation.gauss_newton,
+    ]
+
+
+def many_small_chunks(monkeypatch):
+    monkeypatch.setattr(objective, "_FEWEST_ROWS", 8)
+    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
+    monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
+
+
+def test_cost_is_that_of_the_dense_ridge_regression(case):
+    evaluation = case.problem.evaluate(case.point)
+    assert_allclose(evaluation.cost, case.dense.cost(case.point), rtol=1e-11)
+
+
+def test_coefficients_are_those_of_the_dense_ridge_regression(case):
+    found = case.problem.evaluate(case.point).coefficients
+    assert_all_close(found, case.dense.coefficients(case.point), 1e-9)
+
+
+def test_mean_squared_error_is_that_of_the_predictions(case):
+    evaluation = case.problem.evaluate(case.point)
+    residual = case.dense.y - case.dense.design(case.point) @ evaluation.coefficients
+    expected = np.sum(case.dense.weight[:, None] * residual**2)
+    assert_allclose(evaluation.mean_squared_error, expected, rtol=1e-10)
+
+
+def test_masses_are_the_weight_on_which_rules_fire(case):
+    expected = oracles.strengths(case.problem.antecedent, case.point, case.dense.Z)
+    found = case.problem.evaluate(case.point).masses
+    assert_allclose(found, expected @ case.dense.weight, rtol=1e-11, atol=1e-15)
+
+
+@pytest.mark.theory
+def test_gradient_is_exact_far_from_the_optimum(case):
+    _, linearisation = case.at_point()
+    expected = case.dense.gradient(case.point)
+    assert np.abs(expected).max() > 1e-3
+    assert_all_close(linearisation.gradient, expected, 1e-10)
+
+
+def test_gauss_newton_is_the_schur_complement(case):
+    _, linearisation = case.at_point()
+    expected = case.dense.gauss_newton(case.point)
+    assert_all_close(linearisation.gauss_newton, expected, 1e-10)
+    assert_all_close(linearisation.gauss_newton, linearisation.gauss_newton.T, 1e-14)
+
+
+@pytest.mark.theory
+def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
+    # Without residuals the second derivatives of the model drop out: H is the Hessian itself.
+    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])
+    X = rng.normal(size=(200, 2))
+    plain = StandardisedData.of(X, X)
+    Z = plain.inputs.apply(X.T, np.empty((2, 200)))
+    phi = oracles.dense_design(antecedent, antecedent.parameters, Z, 1)
+    exact = StandardisedData.of(X, phi @ rng.normal(size=(phi.shape[1], 1)))
+    problem = SeparableProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
+    at = antecedent.parameters
+    evaluation = problem.evaluate(at)
+    evaluation = problem.evaluate(at, evaluation.coefficients)
+    assert evaluation.mean_squared_error < 1e-18
+    dense = oracles.DenseProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
+    hessian = oracles.central_difference(dense.gradient, at, 1e-3)
+    assert_all_close(problem.linearise(evaluation).gauss_newton, hessian, 1e-5)
+
+
+@pytest.mark.parametrize("alpha", [1e-6, 1e-8, 1e-10])
+def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
+    # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
+    g = np.random.default_rng(3)
+    case = Case(duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), Penalty(alpha=alpha))
+    point = case.problem.antecedent.parameters  # the two rules are the same still
+    linearisation = case.problem.linearise(case.problem.evaluate(point))
+    # Rounding grows by 1 / alpha along what the two rules leave open, in the dense problem too.
+    assert_all_close(linearisation.gradient, case.dense.gradient(point), 1e-13 / alpha)
+
+
+def test_two_rules_that_are_alike_learn_as_one_another():
+    # Exchanging the two changes nothing, so neither may the gradient tell them apart.
+    g = np.random.default_rng(3)
+    antecedent, data = duplicated_rule(g), oracles.bumpy_rows(g, 250)
+    problem = SeparableProblem(data, antecedent, 1, Penalty(alpha=1e-6))
+    linearisation = problem.linearise(problem.evaluate(antecedent.parameters))
+    by_rule = linearisation.gradient.reshape(3, 4, 2)
+    assert_all_close(by_rule[:, 1], by_rule[:, 3], 1e-8)
+
+
+@pytest.mark.parametrize("penalty", [PLAIN, FULL])
+def test_dead_rule_has_no_gradient(penalty):
+    evaluation, linearisation = Case.named("dead rule", penalty).at_point()
+    assert_array_equal(linearisation.gradient.reshape(2, 4, 2)[:, 1], 0.0)
+    assert evaluation.masses[1] == 0.0
+
+
+def test_dead_rule_lies_on_the_line_of_the_others():
+    # With a center at zero and an extent of one: what is left to minimise is its own departure.
+    case = Case.named("dead rule", Penalty(agreement=0.1, alpha=1e-3, slope=0.0))
+    evaluation, _ = case.at_point()
+    dense, found = case.dense, evaluation.coefficients.reshape(4, 3)
+    assert_array_equal(dense.blocks[1], np.eye(3))
+    others = [0, 2, 3]
+    line, *_ = np.linalg.lstsq(
+        np.concatenate([dense.blocks[r] for r in others]),
+        np.concatenate([dense.blocks[r] @ found[r] for r in others]),
+        rcond=None,
+    )
+    assert_allclose(found[1], line, rtol=1e-9)
+
+
+@pytest.mark.theory
+def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
+    whole = arrays(*case.at_point())
+    many_small_chunks(monkeypatch)
+    split = Case(
+        case.problem.antecedent,
+        case.order,
+        case.rows,
+        case.penalty,
+        consequent_inputs=case.problem.consequent_inputs,
+    )
+    assert len(split.rows.chunks(split.problem._block_rows)) > 10
+    for one, other in zip(arrays(*split.at_point()), whole, strict=True):
+        assert_all_close(one, other, 1e-9)
+
+
+def pool_map(function, items):
+    with ThreadPool(3) as pool:
+        yield from pool.imap(function, items)
+
+
+def joblib_map(function, items):
+    parallel = Parallel(n_jobs=2, backend="threading", return_as="generator")
+    yield from parallel(delayed(function)(item) for item in items)
+
+
+def backward_map(function, items):
+    """The last chunk is done first, but handed over last."""
+    return reversed([function(item) for item in reversed(items)])
+
+
+@pytest.mark.parametrize("map_ordered", [pool_map, joblib_map, backward_map])
+@pytest.mark.parametrize("name", ["grid of both", "scattered"])
+def test_workers_change_not_one_bit(monkeypatch, name, map_ordered):
+    many_small_chunks(monkeypatch)
+    alone = Case.named(name)
+    shared = Case(alone.problem.antecedent, alone.order, alone.rows, map_ordered=map_ordered)
+    with threadpool_limits(limits=1, user_api="blas"):
+        for one, other in zip(arrays(*shared.at_point()), arrays(*alone.at_point()), strict=True):
+            assert_array_equal(one, other)
+
+
+def test_reference_coefficients_do_not_change_the_answer(case, rng):
+    plain = case.problem.evaluate(case.point)
+    for size in (0.0, 1.0, 30.0):
+        reference = size * rng.normal(size=plain.coefficients.shape)
+        other = case.problem.evaluate(case.point, reference)
+        # The reference costs the digits by which its own cost exceeds the least.
+        assert_allclose(other.cost, plain.cost, rtol=1e-11 * (1.0 + size**2))
+        assert_all_close(other.coefficients, plain.coefficients, 1e-9 * (1.0 + size))
+
+
+def test_other_weights_of_the_penalty_need_no_pass(case, monkeypatch):
+    before = case.problem.evaluate(case.point)
+    other = case.problem.with_penalty(Penalty(agreement=0.02, alpha=3e-3, slope=1e-3))
+    expected = other.evaluate(case.point)
+    slope = other.linearise(expected).gradient
+    with monkeypatch.context() as patched:
+        patched.delattr(SeparableProblem, "_sum")
+        found = other.solved_again(before)
+    assert_allclose(found.cost, expected.cost, rtol=1e-10)
+    assert_allclose(found.mean_squared_error, expected.mean_squared_error, rtol=1e-9)
+    assert_all_close(found.coefficients, expected.coefficients, 1e-8)
+    assert_all_close(found.normal.penalty, expected.normal.penalty, 1e-12)
+    assert_all_close(other.linearise(found).gradient, slope, 1e-8)
+
+
+def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
+    # |r|^2 is 1e-18 of |y|^2: out of y'y it would come as nothing but rounding.
+    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])
+    X = rng.normal(size=(400, 2))
+    Z = ((X - X.mean(axis=0)) / X.std(axis=0)).T
+    phi = oracles.dense_design(antecedent, antecedent.parameters, Z, 1)
+    y = phi @ rng.normal(size=(12, 1))
+    y = (y - y.mean()) / y.std()
+    noise = 1e-9 * rng.normal(size=(400, 1))
+    data = StandardisedData.of(X, y + noise)
+    problem = SeparableProblem(data, antecedent, 1, Penalty())
+    blind = problem.evaluate(antecedent.parameters)
+    seeing = problem.evaluate(antecedent.parameters, blind.coefficients)
+    residual = noise - phi @ np.linalg.lstsq(phi, noise, rcond=None)[0]
+    least = np.mean(residual**2)
+    assert_allclose(seeing.mean_squared_error, least, rtol=0.02)
+    assert abs(blind.mean_squared_error - least) > 0.1 * least
+
+
+@pytest.mark.parametrize("name", ["grid of gaussians", "scattered bells"])
+def test_whole_weights_are_repeated_rows(name):
+    g = np.random.default_rng(3)
+    build, order, n_outputs, _ = CASES[name]
+    antecedent, data = build(g), oracles.bumpy_rows(g, 120, 2, n_outputs)
+    times = g.integers(1, 5, 120)
+    weighted = StandardisedData.of(data.X, data.y, times.astype(float))
+    repeated = StandardisedData.of(
+        np.repeat(data.X, times, axis=0), np.repeat(data.y, times, axis=0)
+    )
+    one, other = (Case(antecedent, order, r).at_point() for r in (weighted, repeated))
+    for found, expected in zip(arrays(*one), arrays(*other), strict=True):
+        assert_all_close(found, expected, 1e-9)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_units_and_sizes_of_weights_do_not_matter(factor):
+    g = np.random.default_rng(3)
+    antecedent, data = (
+        oracles.random_grid(g, [Gaussian] * 2, [3, 2]),
+        oracles.bumpy_rows(g, 250, 2, 2),
+    )
+    weight = g.uniform(0.5, 2.0, 250)
+    plain = StandardisedData.of(data.X, data.y, weight)
+    other = StandardisedData.of(data.X * factor, data.y / factor, weight * factor)
+    one, two = (Case(antecedent, 1, r).at_point() for r in (plain, other))
+    for found, expected in zip(arrays(*one), arrays(*two), strict=True):
+        assert_all_close(found, expected, 1e-9)
+
+
+def test_outputs_add_up(rng):
+    # Cost, gradient and curvature of two outputs are the sums of those of each alone.
+    data = oracles.bumpy_rows(rng, 250, 2, 2, weighted=True)
+    antecedent = oracles.random_grid(rng, [Gaussian] * 2, [3, 2])
+    both = Case(antecedent, 1, data).at_point()
+    singles = [
+        Case(
+            antecedent, 1, StandardisedData.of(data.X, data.y[:, [k]], data.sample_weight)
+        ).at_point()
+        for k in range(2)
+    ]
+    assert_allclose(both[0].cost, sum(e.cost for e, _ in singles), rtol=1e-12)
+    assert_all_close(both[1].gradient, sum(s.gradient for _, s in singles), 1e-11)
+    assert_all_close(both[1].gauss_newton, sum(s.gauss_newton for _, s in singles), 1e-11)
+
+
+def test_without_terms_the_cost_is_that_of_a_linear_model(rng):
+    data = oracles.bumpy_rows(rng, 200, 2, 1, weighted=True)
+    antecedent = GridAntecedent((), counts=())
+    evaluation = SeparableProblem(data, antecedent, 1, Penalty()).evaluate(np.empty(0))
+    phi = np.column_stack([np.ones(200), (data.X - data.X.mean(axis=0)) / data.X.std(axis=0)])
+    y = (data.y - data.targets.offset) / data.targets.scale
+    root = np.sqrt(data.sample_weight / data.sample_weight.sum())[:, None]
+    _, residual, *_ = np.linalg.lstsq(root * phi, root * y, rcond=None)
+    assert_allclose(evaluation.mean_squared_error, residual[0], rtol=1e-9)
+
+
+def test_constant_input_changes_nothing(rng):
+    data = oracles.bumpy_rows(rng, 200, 2)
+    antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
+    padded = StandardisedData.of(np.column_stack([data.X, np.full(200, 7.0)]), data.y)
+    one, two = (SeparableProblem(r, antecedent, 1, FULL) for r in (data, padded))
+    first, second = (p.evaluate(antecedent.parameters) for p in (one, two))
+    assert_allclose(second.cost, first.cost, rtol=1e-12)
+    coefficients = second.coefficients.reshape(4, 4)
+    assert_array_equal(coefficients[:, 3], 0.0)
+    assert_all_close(coefficients[:, :3].reshape(-1, 1), first.coefficients, 1e-10)
+    assert_all_close(two.linearise(second).gradient, one.linearise(first).gradient, 1e-10)
+
+
+def test_residuals_are_those_of_the_dense_design(case):
+    evaluation = case.problem.evaluate(case.point)
+    expected = case.dense.y - case.dense.design(case.point) @ evaluation.coefficients
+    found = np.empty_like(expected)
+    for part, residual, weight in case.problem.residuals(evaluation):
+        found[part] = residual.T
+        if weight is not None:
+            assert_array_equal(weight, case.rows.sample_weight[part])
+    assert_allclose(found, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["grid of both", "scattered bells", "grid, order 0, outputs"])
+@pytest.mark.parametrize("most_inverted", [0, 512])
+def test_leverage_and_mean_squares_are_those_of_the_dense_design(monkeypatch, name, most_inverted):
+    monkeypatch.setattr("skanfis.learning.objective._MOST_INVERTED", most_inverted)
+    case = Case.named(name, FULL)
+    evaluation = case.problem.evaluate(case.point)
+    matrix, phi = case.dense.residual_matrix(case.point), case.dense.design(case.point)
+    hat = phi @ np.linalg.solve(matrix.T @ matrix, phi.T) / case.rows.total_weight
+    part = slice(3, 40)
+    half = case.problem.half(evaluation, part)
+    assert_allclose(np.sum(half**2, axis=0), np.diag(hat)[part], rtol=1e-8)
+    Z, _, _ = case.rows.read(part)
+    anywhere = case.problem.leverage_at(evaluation, Z, case.rows.total_weight)
+    assert_allclose(anywhere, np.diag(hat)[part], rtol=1e-8)
+    squares = (case.dense.y - phi @ evaluation.coefficients) ** 2
+    found = case.problem.mean_squares(evaluation)
+    assert_allclose(found, case.dense.weight @ squares, rtol=1e-9)
+
+
+def test_outputs_share_the_error_of_all_rows_as_they_share_that_of_the_sample():
+    case = Case.named("grid of both", FULL)
+    sample = case.rows.part(np.arange(0, 250, 2))
+    alone = SeparableProblem(sample, case.problem.antecedent, 1, FULL)
+    problem = alone.on_all(case.rows)
+    evaluation = problem.evaluate(case.point)
+    found, of_sample = problem.mean_squares(evaluation), alone.mean_squares(evaluation)
+    assert_allclose(found.sum(), evaluation.mean_squared_error, rtol=1e-12)
+    assert_allclose(found / found.sum(), of_sample / of_sample.sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["grid of both", "consequents in one input", "scattered"])
+def test_the_strongest_rule_alone_is_that_of_the_dense_design(name):
+    case = Case.named(name)
+    evaluation = case.problem.evaluate(case.point)
+    Z = np.stack([case.rows.read(slice(k, k + 1))[0][:, 0] for k in range(250)], axis=1)
+    strengths = evaluation.antecedent.strengths(Z)
+    strongest = np.repeat(strengths == strengths.max(axis=0), case.problem.n_basis, axis=0)
+    phi = case.dense.design(case.point)
+    share = np.repeat(strengths, case.problem.n_basis, axis=0).T
+    alone = np.where(strongest.T, phi / share, 0.0) - phi
+    squares = case.dense.weight @ (alone @ evaluation.coefficients) ** 2
+    found = case.problem.strongest_alone(evaluation)
+    assert_allclose(found, np.sqrt(squares.max() / case.dense.weight.sum()), rtol=1e-9)
+
+
+def test_rows_are_not_read_again_for_the_sums_at_the_start(case, monkeypatch):
+    problem = case.problem
+    start = problem.antecedent.parameters
+    expected = problem.evaluate(start, np.zeros((problem.n_columns, problem.n_outputs)))
+    monkeypatch.setattr(problem, "_sum", None)
+    for _ in range(2):
+        found = problem.evaluate(start)
+        assert_array_equal(found.coefficients, expected.coefficients)
+        assert (found.cost, found.mean_squared_error) == (
+            expected.cost,
+            expected.mean_squared_error,
+        )
+
+
+def test_reference_leaves_nothing_behind_where_only_the_shift_holds():
+    # Two rules that are the same, and no penalty: their difference changes no residual. What it is
+    # in the reference must not come back.
+    g = np.random.default_rng(3)
+    problem = SeparableProblem(oracles.bumpy_rows(g, 250), duplicated_rule(g), 1, Penalty())
+    start = problem.antecedent.parameters
+    reference = np.zeros((4, 3, 1))
+    reference[1, 0], reference[3, 0] = 1.0, -1.0
+    found = problem.evaluate(start, reference.reshape(12, 1)).coefficients.reshape(4, 3)
+    # Of the shift, which is at the level of rounding, rounding leaves the first digit.
+    assert abs(found[1, 0] - found[3, 0]) < 0.5
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs):
+    g = np.random.default_rng(1)
+    rows = oracles.bumpy_rows(g, 40, 2, n_outputs, weighted)
+    penalty = Penalty(agreement=0.3, alpha=1e-2, slope=0.1)
+    antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    evaluation = problem.evaluate(antecedent.parameters)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
+    phi, total = dense.design(antecedent.parameters), 0.0
+    held = dense.residual_matrix(antecedent.parameters)[40:]
+    # The weights may be those of other numbers of rows than there are of them.
+    n_rows = 0.8 * rows.total_weight
+    for i in range(40):
+        weight = dense.weight.copy()
+        weight[i] -= 1.0 / n_rows  # as much as one row has
+        gram = (phi.T * weight) @ phi + held.T @ held
+        beta = np.linalg.solve(gram, (phi.T * weight) @ dense.y)
+        total += dense.weight[i] * np.sum((dense.y[i] - phi[i] @ beta) ** 2)
+    assert_allclose(problem.leave_one_out_error(evaluation, n_rows), total, rtol=1e-8)

@@ -1,0 +1,338 @@
+"""What consequents pay: sums over rows and rules by definition, and regressions by others."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from sklearn.linear_model import LinearRegression, Ridge
+
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import CommonLine, Penalty, disagreement_matrix
+from skanfis.membership import Bell, Gaussian
+
+from .. import oracles
+
+BUILD = {
+    "grid": lambda g: oracles.random_grid(g, [Gaussian, Bell], [3, 2]),
+    "scattered": lambda g: oracles.random_scattered(g, Gaussian, 4, [0, 1]),
+    "table": lambda g: oracles.random_table(g, inputs=2),
+}
+ON_ALL = pytest.mark.parametrize("kind", BUILD)
+ORDERS = pytest.mark.parametrize("order", [0, 1])
+ALL_AT_ONCE = Penalty(agreement=0.3, alpha=0.02, slope=0.1)
+
+
+class Model:
+    """Rows, rules, and any consequents: f_r, w_r and their sum on every row, by hand."""
+
+    def __init__(self, kind, order, n_outputs=1, weighted=True):
+        g = np.random.default_rng(3)
+        self.antecedent, self.order = BUILD[kind](g), order
+        self.rows = oracles.bumpy_rows(g, 200, 2, n_outputs, weighted)
+        self.Z = self.rows.inputs.apply(self.rows.X.T, np.empty((2, 200)))
+        self.y = (self.rows.y - self.rows.targets.offset) / self.rows.targets.scale
+        weight = self.rows.sample_weight if weighted else np.ones(200)
+        self.share = weight / weight.sum()
+        self.basis = np.vstack([np.ones((1, 200)), self.Z]) if order else np.ones((1, 200))
+        self.w = oracles.strengths(self.antecedent, self.antecedent.parameters, self.Z)
+        shape = (self.antecedent.n_rules, self.basis.shape[0], n_outputs)
+        self.beta = g.normal(size=shape)
+        self.f = np.einsum("rbo,bn->rno", self.beta, self.basis)
+        self.output = np.einsum("rn,rno->no", self.w, self.f)
+
+    @property
+    def flat(self):
+        return self.beta.reshape(-1, self.beta.shape[-1])
+
+    @property
+    def disagreement(self):
+        """V, summed over outputs."""
+        return np.einsum("n,rn,rno->", self.share, self.w, (self.f - self.output) ** 2)
+
+    def problem(self, penalty):
+        return SeparableProblem(self.rows, self.antecedent, self.order, penalty)
+
+    def evaluate(self, penalty):
+        return self.problem(penalty).evaluate(self.antecedent.parameters)
+
+
+@ON_ALL
+@ORDERS
+@pytest.mark.parametrize("n_outputs", [1, 2])
+class TestDisagreement:
+    def test_local_error_is_global_error_and_disagreement(self, kind, order, n_outputs):
+        # On every row: sum_r w_r (y - f_r)^2 = (y - y_hat)^2 + sum_r w_r (f_r - y_hat)^2.
+        model = Model(kind, order, n_outputs)
+        local = np.einsum("rn,rno->no", model.w, (model.y - model.f) ** 2)
+        apart = np.einsum("rn,rno->no", model.w, (model.f - model.output) ** 2)
+        assert_allclose(local, (model.y - model.output) ** 2 + apart, rtol=1e-10)
+        # At a weight of one, the cost of any consequents is that of local learning.
+        joint = model.problem(Penalty(agreement=1.0)).joint(model.antecedent.parameters, model.flat)
+        assert_allclose(2.0 * joint.evaluation.cost, model.share @ local.sum(axis=1), rtol=1e-11)
+
+    def test_matrix_gives_it_for_any_consequents(self, kind, order, n_outputs):
+        model = Model(kind, order, n_outputs)
+        design = (model.w[:, None] * model.basis).reshape(-1, 200)
+        gram = (design * model.share) @ design.T
+        before = gram.copy()
+        basis = model.problem(Penalty()).local
+        matrix, local_gram = disagreement_matrix(gram, model.antecedent.n_rules, basis)
+        assert_allclose(gram, before, rtol=0, atol=0)
+        assert_allclose(local_gram, basis.transform_gram(gram), rtol=1e-12, atol=1e-14)
+        local = basis.to_local(model.flat)
+        assert_allclose(np.sum(local * (matrix @ local)), model.disagreement, rtol=1e-11)
+        assert_allclose(matrix, matrix.T, atol=1e-14)
+        assert np.linalg.eigvalsh(matrix).min() > -1e-14
+
+    def test_cost_has_it_times_its_weight(self, kind, order, n_outputs):
+        model = Model(kind, order, n_outputs)
+        costs = [
+            model.problem(Penalty(agreement=agreement))
+            .joint(model.antecedent.parameters, model.flat)
+            .evaluation.cost
+            for agreement in (0.0, 0.7)
+        ]
+        assert_allclose(costs[1] - costs[0], 0.35 * model.disagreement, rtol=1e-10)
+
+
+@ON_ALL
+@ORDERS
+class TestWeightOfAgreement:
+    def test_at_one_every_rule_is_a_regression_of_its_own(self, kind, order):
+        model = Model(kind, order, 2)
+        solved = model.evaluate(Penalty(agreement=1.0)).coefficients.reshape(model.beta.shape)
+        for r, w in enumerate(model.w):
+            own = LinearRegression(fit_intercept=False)
+            own.fit(model.basis.T, model.y, sample_weight=w * model.share)
+            assert_allclose(solved[r], own.coef_.T, rtol=1e-6, atol=1e-8)
+
+    def test_at_zero_it_is_the_regression_on_the_design(self, kind, order):
+        model = Model(kind, order, 2)
+        solved = model.evaluate(Penalty()).coefficients
+        design = (model.w[:, None] * model.basis).reshape(-1, 200).T
+        root = np.sqrt(model.share)[:, None]
+        expected, *_ = np.linalg.lstsq(root * design, root * model.y, rcond=None)
+        assert_allclose(design @ solved, design @ expected, atol=1e-7)
+
+    def test_without_end_all_rules_are_one_line(self, kind, order):
+        model = Model(kind, order, 2)
+        solved = model.evaluate(Penalty(agreement=1e7)).coefficients.reshape(model.beta.shape)
+        line = LinearRegression(fit_intercept=False)
+        line.fit(model.basis.T, model.y, sample_weight=model.share)
+        for rule in solved:
+            assert_allclose(rule, line.coef_.T, atol=1e-5)
+
+    def test_the_more_the_less_they_disagree(self, kind, order):
+        model, apart, error = Model(kind, order), [], []
+        for agreement in (1e-6, 1e-3, 1e-1, 1.0, 1e2):
+            evaluation = model.evaluate(Penalty(agreement=agreement))
+            model.beta = evaluation.coefficients.reshape(model.beta.shape)
+            model.f = np.einsum("rbo,bn->rno", model.beta, model.basis)
+            model.output = np.einsum("rn,rno->no", model.w, model.f)
+            apart.append(model.disagreement)
+            error.append(evaluation.mean_squared_error)
+        assert (np.diff(apart) < 0.0).all()
+        assert (np.diff(error) > 0.0).all()
+
+
+class TestCommonLine:
+    def parts(self, model):
+        """Each rule's value at its center and rise over its extent; and the line's, by lstsq."""
+        dense = oracles.DenseProblem(model.rows, model.antecedent, model.order, Penalty())
+        line, values = [], []
+        for center, extent, beta in zip(dense.centers, dense.extent, model.beta, strict=True):
+            matrix = np.diag([1.0, *extent])
+            matrix[0, 1:] = center
+            line.append(matrix)
+            values.append(matrix @ beta)
+        line, values = np.concatenate(line), np.concatenate(values)
+        common, *_ = np.linalg.lstsq(line, values, rcond=None)
+        return values - line @ common, common
+
+    @ON_ALL
+    @ORDERS
+    def test_departures_from_it_and_its_slopes(self, kind, order):
+        model = Model(kind, order, 2)
+        line = model.problem(Penalty()).common_line
+        local = model.problem(Penalty()).local.to_local(model.flat)
+        departures, common = self.parts(model)
+        paid = np.sum(local * (line.departures.together @ local))
+        assert_allclose(paid, np.sum(departures**2), rtol=1e-10)
+        assert_allclose(line.to_slopes @ local, common[1:], rtol=1e-9, atol=1e-12)
+
+    @ON_ALL
+    @ORDERS
+    def test_rules_on_one_line_pay_for_its_slopes_alone(self, kind, order):
+        model = Model(kind, order)
+        model.beta[:] = model.beta[0]
+        problem = model.problem(Penalty())
+        local = problem.local.to_local(model.flat)
+        paid = np.sum(local * (problem.common_line.departures.together @ local))
+        assert_allclose(paid, 0.0, atol=1e-12)
+        paid = np.sum((problem.common_line.to_slopes @ local) ** 2)
+        assert_allclose(paid, np.sum(model.beta[0, 1:] ** 2), rtol=1e-10, atol=1e-14)
+
+    @ON_ALL
+    @ORDERS
+    def test_height_is_free(self, kind, order):
+        # And nothing else is: along every other direction something is paid.
+        model = Model(kind, order)
+        evaluation, problem = model.evaluate(ALL_AT_ONCE), model.problem(ALL_AT_ONCE)
+        matrix = problem.penalty_matrix(evaluation.normal.disagreement)
+        height = problem.common_line.height
+        assert_allclose(height @ height, 1.0, rtol=1e-12)
+        assert_allclose(matrix @ height, 0.0, atol=1e-12)
+        rise = problem.local.to_global(height[:, None]).reshape(model.beta.shape)
+        assert_allclose(rise[:, 0], model.antecedent.n_rules**-0.5, rtol=1e-12)
+        assert_allclose(rise[:, 1:], 0.0, atol=1e-15)
+        eigenvalues = np.linalg.eigvalsh(matrix)
+        assert abs(eigenvalues[0]) < 1e-12
+        assert eigenvalues[1] > 1e-6
+
+    def model_with_a_dead_rule(self, penalty):
+        g = np.random.default_rng(0)
+        theta = Gaussian.from_center_and_width(g.normal(size=(4, 2)), np.ones((4, 2)))
+        theta[0, 1] = 50.0
+        model = Model("scattered", 1)
+        model.antecedent = ScatteredAntecedent.build(Gaussian, np.arange(2), theta)
+        model.beta = model.evaluate(penalty).coefficients.reshape(4, 3, 1)
+        return model
+
+    @pytest.mark.parametrize("alpha", [1e-4, 1e-1])
+    def test_rule_without_rows_lies_on_it(self, alpha):
+        # Nothing else pulls on the rule: its departure is zero.
+        model = self.model_with_a_dead_rule(Penalty(agreement=0.1, alpha=alpha, slope=0.0))
+        departures, common = self.parts(model)
+        assert_allclose(departures.reshape(4, 3)[1], 0.0, atol=1e-9)
+        assert_allclose(model.beta[1], common, atol=1e-8)
+        assert np.abs(model.beta[0] - common).max() > 1e-3
+
+    @pytest.mark.parametrize("slope", [1e-3, 1e-1])
+    def test_ridge_on_its_slopes_turns_rules_without_rows(self, slope):
+        # They have a part in the line: the line's slopes are made smaller at their expense.
+        model = self.model_with_a_dead_rule(Penalty(agreement=0.1, alpha=0.01, slope=slope))
+        departures, common = self.parts(model)
+        dense = oracles.DenseProblem(model.rows, model.antecedent, 1, Penalty())
+        pull = np.linalg.solve(dense.line.T @ dense.line, np.concatenate([[[0.0]], common[1:]]))
+        expected = -slope / 0.01 * dense.blocks[1] @ pull
+        assert_allclose(departures.reshape(4, 3, 1)[1], expected, rtol=1e-6, atol=1e-12)
+
+    def test_pull_is_without_end_the_ridge_of_one_line(self):
+        model = Model("grid", 1)
+        solved = model.evaluate(Penalty(alpha=1e7, slope=0.3)).coefficients.reshape(6, 3)
+        ridge = Ridge(alpha=0.3, tol=1e-12).fit(model.Z.T, model.y[:, 0], model.share)
+        assert_allclose(solved, np.tile([ridge.intercept_, *ridge.coef_], (6, 1)), atol=1e-5)
+
+    def test_order_zero_is_pulled_to_the_mean_of_the_rules(self):
+        model = Model("grid", 0)
+        line = model.problem(Penalty()).common_line
+        beta = model.beta[:, 0, 0]
+        assert_allclose(
+            beta @ line.departures.together @ beta, np.sum((beta - beta.mean()) ** 2), rtol=1e-12
+        )
+        assert line.to_slopes.shape == (0, 6)
+
+    def test_extent_is_the_unit_of_a_departing_slope(self):
+        # A rule that stands for rows far away may not turn by as much: what counts is where it
+        # ends. One slope changed by t of two rules departs by half of it each, and so do values.
+        model = Model("scattered", 1)
+        problem = model.problem(Penalty())
+        rules = model.antecedent, [0, 1]
+        wide = CommonLine(problem.local, 10.0 * np.ones((4, 2)), *rules)
+        narrow = CommonLine(problem.local, np.ones((4, 2)), *rules)
+        model.beta[:] = 0.0
+        model.beta[0, 1], model.beta[1, 1] = 1.0, -1.0
+        centers = problem.local.center
+        # No values at the centers: departures of slopes alone, whose mean is zero.
+        model.beta[:, 0] = -np.sum(centers * model.beta[:, 1:, 0], axis=1)[:, None]
+        local = problem.local.to_local(model.flat)
+        paid = [np.sum(local * (line.departures.together @ local)) for line in (narrow, wide)]
+        assert_allclose(paid, [2.0, 200.0], rtol=1e-10)
+
+
+class TestOneRule:
+    @pytest.mark.parametrize("alpha", [1e-3, 0.1, 10.0])
+    @pytest.mark.parametrize("weighted", [False, True])
+    def test_it_is_ridge_with_a_free_intercept(self, rng, alpha, weighted):
+        data = oracles.bumpy_rows(rng, 120, 3, 2, weighted)
+        moved = StandardisedData.of(data.X, data.y + 1e3, data.sample_weight)
+        weight = np.ones(120) if data.sample_weight is None else data.sample_weight
+        for rows in (data, moved):
+            problem = SeparableProblem(
+                rows, GridAntecedent((), counts=()), 1, Penalty(agreement=0.5, alpha=alpha)
+            )
+            z = (rows.X - rows.inputs.offset) / rows.inputs.scale
+            y = (rows.y - rows.targets.offset) / rows.targets.scale
+            # scikit-learn's penalty is relative to a sum over rows, this one to their mean.
+            ridge = Ridge(alpha=alpha * weight.sum(), solver="cholesky")
+            ridge.fit(z, y, sample_weight=weight)
+            solved = problem.evaluate(np.empty(0)).coefficients
+            assert_allclose(solved[1:], ridge.coef_.T, rtol=1e-9)
+            assert_allclose(solved[0], ridge.intercept_, atol=1e-12)
+
+    def test_pull_of_rules_is_nothing_to_it(self, rng):
+        rows = oracles.bumpy_rows(rng, 50, 2)
+        solved = [
+            SeparableProblem(
+                rows, GridAntecedent((), counts=()), 1, Penalty(agreement, alpha, slope=0.1)
+            )
+            .evaluate(np.empty(0))
+            .coefficients
+            for agreement, alpha in ((0.0, 0.0), (5.0, 7.0))
+        ]
+        assert_allclose(solved[0], solved[1], rtol=1e-12, atol=1e-15)
+
+
+@ON_ALL
+@ORDERS
+class TestInvariance:
+    def prediction(self, model, rows, antecedent):
+        evaluation = SeparableProblem(rows, antecedent, model.order, ALL_AT_ONCE).evaluate(
+            antecedent.parameters
+        )
+        Z = rows.inputs.apply(rows.X.T, np.empty(rows.X.T.shape))
+        design = oracles.dense_design(antecedent, antecedent.parameters, Z, model.order)
+        return evaluation.cost, design @ evaluation.coefficients
+
+    def test_units(self, kind, order):
+        model = Model(kind, order)
+        rows = model.rows
+        moved = StandardisedData.of(
+            1e6 * rows.X - 3e5, 1e-6 * rows.y + 2.0, 1e3 * rows.sample_weight
+        )
+        one, other = (self.prediction(model, r, model.antecedent) for r in (rows, moved))
+        assert_allclose(one[0], other[0], rtol=1e-8)
+        assert_allclose(one[1], other[1], atol=1e-7)
+
+    def test_mirrored_inputs_and_target(self, kind, order):
+        model = Model(kind, order)
+        rows = model.rows
+        turned = StandardisedData.of(-rows.X, -rows.y, rows.sample_weight)
+        mirrored = model.antecedent
+        theta = []
+        for group in mirrored.groups:
+            one = group.theta.copy()
+            one[0] *= -1.0
+            theta.append(one.ravel())
+        mirrored = mirrored.with_parameters(np.concatenate(theta))
+        one = self.prediction(model, rows, model.antecedent)
+        other = self.prediction(model, turned, mirrored)
+        assert_allclose(one[0], other[0], rtol=1e-10)
+        assert_allclose(one[1], -other[1], atol=1e-9)
+
+    def test_whole_weights_are_repeated_rows(self, kind, order):
+        model = Model(kind, order)
+        times = np.random.default_rng(1).integers(1, 5, 200)
+        rows = model.rows
+        weighted = StandardisedData.of(rows.X, rows.y, times.astype(float))
+        repeated = StandardisedData.of(*(np.repeat(a, times, axis=0) for a in (rows.X, rows.y)))
+        one, other = (self.prediction(model, r, model.antecedent) for r in (weighted, repeated))
+        assert_allclose(one[0], other[0], rtol=1e-10)
+        assert_allclose(np.repeat(one[1], times, axis=0), other[1], atol=1e-9)
+
+
+def test_slopes_have_the_weight_of_departures_unless_given():
+    assert Penalty(alpha=0.3).rho == 0.3
+    assert Penalty(alpha=0.3, slope=0.0).rho == 0.0
+    assert Penalty(alpha=0.3, slope=2.0).rho == 2.0

@@ -1,0 +1,62 @@
+"""The sample of many rows is the one that brute force picks, however the rows are cut."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.learning.data import StandardisedData, fingerprint
+from skanfis.learning.sampling import with_sample
+
+N_ROWS, N_WANTED = 9000, 400
+
+
+@pytest.fixture
+def rows():
+    g = np.random.default_rng(0)
+    X = g.normal(size=(N_ROWS, 2)) * [1.0, 30.0] + [0.0, 1e4]
+    return StandardisedData.of(X, X[:, :1] * X[:, 1:] + g.normal(size=(N_ROWS, 1)))
+
+
+def table(rows):
+    """Rows with their weights, in lexical order."""
+    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+    whole = np.column_stack([rows.X, rows.y, weight])
+    return whole[np.lexsort(whole.T)]
+
+
+def test_sample_is_the_rows_of_the_smallest_numbers(rows):
+    numbers = (8192.0 * fingerprint(rows.table(slice(None)).T)) % 1.0
+    picked = np.argsort(numbers)[:N_WANTED]
+    assert_array_equal(table(with_sample(rows, N_WANTED).sample), table(rows.part(picked)))
+
+
+def test_order_and_units_of_the_rows_do_not_matter(rows):
+    found = table(with_sample(rows, N_WANTED).sample)
+    mixed = np.random.default_rng(1).permutation(N_ROWS)
+    other = StandardisedData.of(rows.X[mixed] * [1e3, 1e-6], rows.y[mixed])
+    assert_allclose(
+        table(with_sample(other, N_WANTED).sample)[:, :3] / [1e3, 1e-6, 1.0],
+        found[:, :3],
+        rtol=1e-12,
+    )
+
+
+@pytest.mark.parametrize("n_distinct", [300, 2000])
+def test_repeats_are_one_row_of_their_weight(rows, n_distinct):
+    g = np.random.default_rng(2)
+    which = np.concatenate([np.arange(n_distinct), g.integers(0, n_distinct, N_ROWS - n_distinct)])
+    weight = g.uniform(0.5, 1.5, N_ROWS)
+    repeated = StandardisedData.of(rows.X[which], rows.y[which], weight)
+    sample = with_sample(repeated, N_WANTED).sample
+    assert sample.n_rows == min(N_WANTED, n_distinct)
+    places = [np.flatnonzero((rows.X[:n_distinct] == x).all(axis=1))[0] for x in sample.X]
+    totals = np.bincount(which, weights=weight)
+    assert_allclose(sample.sample_weight, totals[places], rtol=1e-12)
+
+
+def test_sample_is_representative(rows):
+    # Kolmogorov's distance of 400 of 9,000 rows is below 1.63 / sqrt(400) in 99 of 100 draws.
+    sample = with_sample(rows, N_WANTED).sample
+    for column, drawn in zip(rows.table(slice(None)).T, sample.table(slice(None)).T, strict=True):
+        below = np.searchsorted(np.sort(column), np.sort(drawn)) / N_ROWS
+        assert np.max(np.abs(below - np.arange(N_WANTED) / N_WANTED)) < 1.63 / np.sqrt(N_WANTED)

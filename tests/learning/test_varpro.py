@@ -1,0 +1,541 @@
+"""The trust region by its optimality conditions; the solver by planted truth and by SciPy."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy import optimize
+
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
+from skanfis.learning.solver_result import MESSAGES
+from skanfis.learning.varpro import trust_region_step, varpro
+from skanfis.membership import Bell, Gaussian
+
+from .. import oracles
+
+# The smallest curvature that a step sees, as part of the largest.
+FLOOR = 1e-6
+
+
+def semidefinite(rng, n, rank):
+    root = rng.normal(size=(rank, n)) * np.geomspace(1.0, 1e-3, rank)[:, None]
+    return root.T @ root
+
+
+def model(gradient, hessian, step):
+    return step @ gradient + 0.5 * np.einsum("...i,ij,...j", step, hessian, step)
+
+
+class TestTrustRegionStep:
+    @pytest.mark.parametrize("rank", [1, 3, 6])
+    @pytest.mark.parametrize("radius", [1e-8, 1e-3, 0.3, 1.0, 1e3])
+    @pytest.mark.parametrize("damping", [0.0, 0.1])
+    def test_step_meets_the_optimality_conditions(self, rng, rank, radius, damping):
+        # (H + mu I) s = -g with mu >= 0, and mu = 0 unless s ends on the edge
+        for _ in range(10):
+            gradient, hessian = rng.normal(size=6), semidefinite(rng, 6, rank)
+            if damping == 0.0:
+                gradient = hessian @ gradient  # else the floor alone would decide the length
+            step = trust_region_step(gradient, hessian, radius, damping)
+            length = np.linalg.norm(step)
+            assert length <= 1.01 * radius * (1.0 + 1e-9)
+            seen = hessian + (damping + FLOOR * np.linalg.eigvalsh(hessian)[-1]) * np.eye(6)
+            force = -(gradient + seen @ step)
+            multiplier = force @ step / length**2
+            assert_allclose(force, multiplier * step, atol=1e-9 * np.linalg.norm(gradient))
+            assert multiplier >= -1e-9 * np.linalg.norm(seen)
+            if length < 0.99 * radius:
+                assert_allclose(multiplier, 0.0, atol=1e-9 * np.linalg.norm(seen))
+
+    def test_no_other_step_is_better(self, rng):
+        angle, size = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 721), np.linspace(0.0, 1.0, 201))
+        circle = np.stack([size * np.cos(angle), size * np.sin(angle)], axis=-1)
+        for _ in range(10):
+            gradient, hessian = rng.normal(size=2), semidefinite(rng, 2, 2)
+            for radius in (0.01, 0.3, 3.0):
+                step = trust_region_step(gradient, hessian, radius)
+                best = model(gradient, hessian, radius * circle).min()
+                assert model(gradient, hessian, step) <= best * (1.0 - 1e-3)
+
+    def test_inside_the_region_it_is_newtons_step(self, rng):
+        gradient, hessian = rng.normal(size=4), semidefinite(rng, 4, 4) + np.eye(4)
+        step = trust_region_step(gradient, hessian, 100.0)
+        assert_allclose(step, -np.linalg.solve(hessian, gradient), rtol=1e-4)
+
+    def test_damping_shortens_newtons_step(self, rng):
+        gradient, hessian = rng.normal(size=4), semidefinite(rng, 4, 4) + np.eye(4)
+        step = trust_region_step(gradient, hessian, 100.0, damping=2.0)
+        expected = -np.linalg.solve(hessian + 2.0 * np.eye(4), gradient)
+        assert_allclose(step, expected, rtol=1e-4)
+
+    def test_without_curvature_it_is_steepest_descent_to_the_edge(self, rng):
+        gradient = rng.normal(size=5)
+        step = trust_region_step(gradient, np.zeros((5, 5)), 0.3)
+        assert_allclose(step, -0.3 * gradient / np.linalg.norm(gradient), rtol=0.011)
+
+    def test_slope_without_curvature_beside_strong_curvature(self):
+        # The flat direction leads to the edge; the steep one to its own minimum.
+        step = trust_region_step(np.array([1.0, 1.0]), np.diag([0.0, 1e4]), 1.0)
+        assert_allclose(step, [-1.0, -1e-4], rtol=0.02)
+
+    @pytest.mark.parametrize("hessian", [np.zeros((3, 3)), np.diag([1.0, 0.0, 2.0])])
+    def test_no_gradient_no_step(self, hessian):
+        assert_array_equal(trust_region_step(np.zeros(3), hessian, 1.0), 0.0)
+
+    def test_rounding_may_make_the_hessian_indefinite(self, rng):
+        hessian = semidefinite(rng, 5, 2)
+        hessian -= 1e-15 * np.eye(5)
+        step = trust_region_step(rng.normal(size=5), hessian, 0.3)
+        assert np.linalg.norm(step) <= 0.3 * 1.011
+
+    @pytest.mark.parametrize("scale", [1e-30, 1e-12, 1e12])
+    def test_size_of_the_cost_does_not_matter(self, rng, scale):
+        gradient, hessian = rng.normal(size=4), semidefinite(rng, 4, 3)
+        expected = trust_region_step(gradient, hessian, 0.3)
+        assert_allclose(
+            trust_region_step(scale * gradient, scale * hessian, 0.3), expected, rtol=1e-6
+        )
+
+
+@dataclass
+class Point:
+    """What the solver asks of an evaluation, and where it is."""
+
+    x: np.ndarray
+    cost: float
+    gradient: np.ndarray = None
+    gauss_newton: np.ndarray = None
+
+    @property
+    def mean_squared_error(self):
+        return 2.0 * self.cost
+
+    @property
+    def coefficients(self):
+        return self.x
+
+
+class Residuals:
+    """|r(x)|^2 / 2 in place of a separable problem, with a note of all that is asked of it."""
+
+    def __init__(self, residuals, jacobian):
+        self.residuals, self.jacobian = residuals, jacobian
+        self.evaluated, self.references, self.linearised = [], [], []
+
+    def evaluate(self, x, reference=None):
+        self.evaluated.append(x)
+        self.references.append(reference)
+        return Point(x, 0.5 * np.sum(self.residuals(x) ** 2))
+
+    def linearise(self, point):
+        self.linearised.append(point.x)
+        J = self.jacobian(point.x)
+        return Point(point.x, point.cost, J.T @ self.residuals(point.x), J.T @ J)
+
+
+class Box:
+    """Displacements that are the parameters themselves."""
+
+    def __init__(self, lower, upper):
+        self.lower, self.upper = np.array(lower, dtype=float), np.array(upper, dtype=float)
+        self.size = self.lower.size
+
+    def parameters(self, x):
+        return x
+
+    def pull_back(self, x, gradient, gauss_newton):
+        return gradient, gauss_newton
+
+
+def rosenbrock():
+    """(10 (x2 - x1^2), 1 - x1): a curved valley with its minimum, zero, at (1, 1)."""
+    return Residuals(
+        lambda x: np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]),
+        lambda x: np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]),
+    )
+
+
+class TestOnKnownProblems:
+    def test_rosenbrock_is_solved(self):
+        result = varpro(rosenbrock(), Box([-3, -3], [3, 3]), max_iter=200, tol=1e-10)
+        assert_allclose(result.evaluation.x, 1.0, atol=1e-6)
+
+    @pytest.mark.parametrize(
+        ("lower", "upper", "optimum"),
+        [
+            ([-3, -3], [0.5, 3], [0.5, 0.25]),
+            # 200 x1^3 + (1 - 200 x2) x1 = 1 along the edge of x2
+            ([-3, -3], [3, 0.5], [0.7085595, 0.5]),
+            ([-3, -3], [0.4, 0.1], [0.3317691, 0.1]),
+            ([-1, 0.0], [0.0, 1.0], [0.0, 0.0]),
+        ],
+    )
+    def test_rosenbrock_in_a_box_ends_on_its_edge(self, lower, upper, optimum):
+        start = np.array([-1.0, 0.05])
+        result = varpro(rosenbrock(), Box(lower, upper), max_iter=500, tol=1e-10, start=start)
+        assert_allclose(result.evaluation.x, optimum, atol=1e-6)
+
+    def test_edge_is_met_to_the_last_bit(self, rng):
+        # One ulp beyond leaves the box; one ulp short, and the edge does not hold the displacement.
+        for start in rng.uniform(-1.0, 0.0, 100):
+            problem = Residuals(lambda x: x - 2.0, lambda x: np.array([[1.0]]))
+            box = Box([-3.0], [0.1])
+            result = varpro(problem, box, max_iter=20, tol=1e-6, start=np.array([start]))
+            assert max(problem.evaluated) <= 0.1
+            assert_array_equal(result.evaluation.x, 0.1)
+            assert result.status == "gradient"
+
+    def test_direction_without_effect_stays_where_it_was(self):
+        # r depends on x1 + x2 alone
+        problem = Residuals(
+            lambda x: np.array([x[0] + x[1] - 1.0, 0.1]), lambda x: np.array([[1, 1], [0, 0]])
+        )
+        result = varpro(problem, Box([-3, -3], [3, 3]), max_iter=50, tol=1e-8)
+        assert_allclose(result.evaluation.x, 0.5, atol=1e-6)
+
+    def test_trials_without_a_finite_cost_are_rejected(self):
+        # log x, with no value for x <= -1 + 0.9 of the first radius: the start is at zero
+        def residuals(x):
+            with np.errstate(invalid="ignore", divide="ignore"):
+                return np.array([np.log(x[0] + 0.2) - np.log(1e-3)])
+
+        problem = Residuals(residuals, lambda x: np.array([[1.0 / (x[0] + 0.2)]]))
+        result = varpro(problem, Box([-3], [3]), max_iter=100, tol=1e-10)
+        assert any(not np.isfinite(problem.residuals(x)).all() for x in problem.evaluated)
+        assert_allclose(result.evaluation.x, 1e-3 - 0.2, atol=1e-9)
+
+    def test_reference_is_that_of_the_last_accepted_point(self):
+        problem, accepted = rosenbrock(), [np.zeros(2)]
+        varpro(
+            problem,
+            Box([-3, -3], [3, 3]),
+            max_iter=20,
+            tol=0.0,
+            start=accepted[0],
+            on_iteration=lambda n, point: accepted.append(point.x),
+        )
+        # The costs of a trial and of the point before it are compared with one reference.
+        first, *references = problem.references
+        assert first is None
+        assert all(any(r is point for point in accepted) for r in references)
+        for trial, reference in zip(problem.evaluated[1:], references, strict=True):
+            assert np.linalg.norm(trial - reference) <= 1.011
+
+    def test_region_grows_to_one_and_no_further(self):
+        problem = Residuals(lambda x: x - 2.8, lambda x: np.array([[1.0]]))
+        result = varpro(problem, Box([-3], [3]), max_iter=50, tol=1e-9, start=np.array([-2.8]))
+        lengths = np.abs(np.diff(np.ravel(problem.evaluated)))
+        assert_allclose(lengths[:6], [0.3, 0.6, 1.0, 1.0, 1.0, 1.0], rtol=0.011)
+        assert result.n_iter <= 10
+
+    def test_settled_is_only_what_was_expected_to_be(self):
+        # A Jacobian thirty times too large: little comes of each step, but much was promised.
+        problem = Residuals(
+            lambda x: np.array([1.0, x[0] - 1.0]), lambda x: np.array([[0.0], [30.0]])
+        )
+        costs, settings = [], {"max_iter": 50, "tol": 0.01}
+        result = varpro(
+            problem, Box([-3], [3]), **settings, on_iteration=lambda n, p: costs.append(p.cost)
+        )
+        decreases = -np.diff([1.0, *costs])
+        assert np.count_nonzero(decreases < 0.01) > 2
+        assert result.n_iter >= 5
+
+    def test_rejected_step_costs_no_linearisation(self):
+        problem = rosenbrock()
+        result = varpro(problem, Box([-3, -3], [3, 3]), max_iter=10, tol=0.0)
+        assert result.n_iter == 10
+        assert len(problem.linearised) == 10
+        assert len(problem.evaluated) > 11  # the valley rejects some
+
+    @pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e4])
+    def test_stiffness_is_a_ridge_on_the_displacements(self, stiffness):
+        # |A x - b|^2 / 2 + stiffness |x|^2 / 2
+        A, b = np.array([[2.0, 1.0], [0.0, 1.0], [1.0, 1.0]]), np.array([1.0, -0.5, 0.7])
+        problem = Residuals(lambda x: A @ x - b, lambda x: A)
+        result = varpro(
+            problem, Box([-3, -3], [3, 3]), max_iter=100, tol=1e-12, stiffness=stiffness
+        )
+        expected = np.linalg.solve(A.T @ A + stiffness * np.eye(2), A.T @ b)
+        assert_allclose(result.evaluation.x, expected, rtol=1e-5, atol=1e-7)
+        assert result.n_iter < 12  # its curvature is known too
+        assert_allclose(result.gauss_newton, A.T @ A, rtol=1e-12)
+
+    def test_curvature_is_that_of_the_last_linearisation(self):
+        problem = rosenbrock()
+        result = varpro(problem, Box([-3, -3], [3, 3]), max_iter=4, tol=0.0)
+        J = problem.jacobian(problem.linearised[-1])
+        assert_allclose(result.gauss_newton, J.T @ J, rtol=1e-12)
+
+
+def spread_rows(kind, rng, n_rows=300):
+    X = rng.uniform(-2.0, 2.0, (n_rows, 1 if kind == "one input" else 2))
+    return StandardisedData.of(X, X[:, :1])
+
+
+def start_of(kind, rows):
+    low, high = oracles.box(rows)
+    if kind == "scattered":
+        centers = np.array([[-1.0, -1.0], [1.0, -0.8], [0.0, 1.0]])
+        theta = Gaussian.from_center_and_width(centers, np.ones_like(centers))
+        return ScatteredAntecedent.build(Gaussian, np.arange(2), theta)
+    families, counts = {
+        "one input": ([Gaussian], [3]),
+        "grid": ([Gaussian, Gaussian], [2, 3]),
+        "bells": ([Bell, Bell], [2, 2]),
+        "two families": ([Bell, Gaussian], [2, 2]),
+    }[kind]
+    return oracles.even_grid(families, counts, low, high, 0.6)
+
+
+def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
+    """Rows that obey a TSK model, whose premises are displaced from those of the start."""
+    g = np.random.default_rng(seed)
+    rows = spread_rows(kind, g)
+    antecedent = start_of(kind, rows)
+    # A truth that is displaced at random lies in the box of free terms, whatever the start.
+    premise = Premise.of(antecedent, *oracles.box(rows), is_free=True)
+    truth = premise.parameters(displaced * g.uniform(-1.0, 1.0, premise.size))
+    Z = rows.inputs.apply(rows.X.T, np.empty(rows.X.T.shape))
+    phi = oracles.dense_design(antecedent, truth, Z, 1)
+    beta = g.normal(size=(phi.shape[1], n_outputs))
+    y = phi @ beta + noise * g.normal(size=(len(phi), n_outputs))
+    return StandardisedData.of(rows.X, y), premise, truth, beta
+
+
+def solve(rows, premise, alpha=1e-8, agreement=0.0, **settings):
+    penalty = Penalty(agreement=agreement, alpha=alpha)
+    problem = SeparableProblem(rows, premise.antecedent, 1, penalty)
+    return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
+
+
+class TestOnRuleBases:
+    @pytest.mark.theory
+    @pytest.mark.parametrize("seed", range(4))
+    @pytest.mark.parametrize("kind", ["one input", "grid", "bells", "two families", "scattered"])
+    def test_planted_model_is_recovered(self, kind, seed):
+        rows, premise, truth, beta = planted(kind, seed)
+        _, result = solve(rows, premise, alpha=1e-14, max_iter=500)
+        assert result.loss_curve[0] > 1e-6
+        Z = np.random.default_rng(9).uniform(-1.5, 1.5, (len(rows.X.T), 100))
+        expected = oracles.dense_design(premise.antecedent, truth, Z, 1) @ beta
+        phi = oracles.dense_design(
+            premise.antecedent, result.evaluation.antecedent.parameters, Z, 1
+        )
+        found = rows.targets.offset + rows.targets.scale * (phi @ result.evaluation.coefficients)
+        assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
+
+    @pytest.mark.theory
+    @pytest.mark.parametrize("kind", ["grid", "two families", "scattered"])
+    @pytest.mark.parametrize("agreement", [0.0, 0.1])
+    def test_result_is_stationary(self, kind, agreement):
+        # By the dense gradient, pulled back by finite differences: nothing of the solver's own.
+        rows, premise, *_ = planted(kind, 0, displaced=0.5, noise=0.1, n_outputs=2)
+        at = []
+        recording = Recording(premise, at)
+        problem, result = solve(rows, recording, agreement=agreement, tol=1e-9, max_iter=1000)
+        assert result.status in {"cost", "gradient", "step"}
+        x = next(
+            x
+            for x in reversed(at)
+            if np.array_equal(premise.parameters(x), result.evaluation.antecedent.parameters)
+        )
+        dense = oracles.DenseProblem(rows, premise.antecedent, 1, problem.penalty)
+
+        def projected(x):
+            jacobian = oracles.central_difference(premise.parameters, x, 1e-2)
+            gradient = jacobian.T @ dense.gradient(premise.parameters(x))
+            gradient[(x <= premise.lower) & (gradient > 0.0)] = 0.0
+            gradient[(x >= premise.upper) & (gradient < 0.0)] = 0.0
+            return np.abs(gradient).max()
+
+        assert projected(x) < 1e-4 * projected(np.zeros_like(x))
+
+    @pytest.mark.parametrize("kind", ["grid", "bells", "scattered"])
+    def test_no_bounded_minimiser_of_scipy_finds_less(self, kind):
+        rows, premise, *_ = planted(kind, 1, displaced=0.5, noise=0.1)
+        tight = replace(premise, lower=0.2 * premise.lower, upper=0.2 * premise.upper)
+        problem, result = solve(rows, tight, tol=1e-9, max_iter=500)
+
+        def cost(x):
+            evaluation = problem.evaluate(tight.parameters(x))
+            raw = problem.linearise(evaluation)
+            return evaluation.cost, tight.pull_back(x, raw.gradient, raw.gauss_newton)[0]
+
+        bounds = optimize.Bounds(tight.lower, tight.upper)
+        other = optimize.minimize(cost, np.zeros(tight.size), jac=True, bounds=bounds)
+        assert result.evaluation.cost <= other.fun * (1.0 + 1e-6)
+
+    @pytest.mark.parametrize("stiffness", [0.0, 1e-3])
+    def test_cost_falls_and_is_reported_as_it_is(self, stiffness):
+        rows, premise, *_ = planted("grid", 2, displaced=0.5, noise=0.1)
+        seen = []
+        _, result = solve(
+            rows,
+            premise,
+            alpha=0.0 if stiffness == 0.0 else 1e-3,
+            stiffness=stiffness,
+            on_iteration=lambda n, evaluation: seen.append((n, evaluation)),
+        )
+        assert [n for n, _ in seen] == list(range(1, result.n_iter + 1))
+        assert seen[-1][1] is result.evaluation
+        errors = [evaluation.mean_squared_error for _, evaluation in seen]
+        assert_array_equal(result.loss_curve[1:], errors)
+        if stiffness == 0.0:
+            assert (np.diff(result.loss_curve) <= 0.0).all()
+        assert result.loss_curve[-1] < result.loss_curve[0]
+
+    def test_every_point_tried_lies_in_the_box(self):
+        rows, premise, *_ = planted("grid", 3, displaced=0.8, noise=0.1)
+        tight = replace(premise, lower=0.1 * premise.lower, upper=0.1 * premise.upper)
+        at = []
+        solve(rows, Recording(tight, at), tol=1e-8)
+        assert len(at) > 5
+        assert any((x == tight.lower).any() or (x == tight.upper).any() for x in at)
+        for x in at:  # one ulp apart: test_edge_is_met_to_the_last_bit
+            assert (x >= tight.lower - 1e-15).all()
+            assert (x <= tight.upper + 1e-15).all()
+
+    def test_strong_stiffness_leaves_the_first_step_of_a_descent(self):
+        # x -> -grad F(0) / stiffness as the stiffness grows
+        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
+        at = []
+        problem, result = solve(rows, Recording(premise, at), stiffness=1e4, tol=1e-12)
+        zero = np.zeros(premise.size)
+        raw = problem.linearise(problem.evaluate(premise.parameters(zero)))
+        gradient, _ = premise.pull_back(zero, raw.gradient, raw.gauss_newton)
+        expected = premise.parameters(-gradient / 1e4)
+        moved = result.evaluation.antecedent.parameters - premise.parameters(zero)
+        assert_allclose(moved, expected - premise.parameters(zero), rtol=1e-2, atol=1e-9)
+
+    def test_the_stiffer_the_nearer_to_the_start(self):
+        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
+        distances = []
+        for stiffness in (1e-5, 1e-3, 1e-1, 10.0):
+            _, result = solve(rows, premise, stiffness=stiffness)
+            moved = result.evaluation.antecedent.parameters - premise.antecedent.parameters
+            distances.append(np.linalg.norm(moved))
+        assert (np.diff(distances) < 0.0).all()
+        assert distances[-1] < 0.01 * distances[0]
+
+    def test_start_is_where_it_starts(self, rng):
+        rows, premise, *_ = planted("grid", 0, noise=0.1)
+        start = 0.1 * rng.normal(size=premise.size)
+        before = start.copy()
+        problem, result = solve(rows, premise, start=start)
+        there = problem.evaluate(premise.parameters(start))
+        assert_allclose(result.loss_curve[0], there.mean_squared_error, rtol=1e-12)
+        assert_array_equal(start, before)
+
+    @pytest.mark.theory
+    def test_from_its_own_result_it_goes_nowhere(self):
+        rows, premise, *_ = planted("grid", 0, noise=0.1)
+        at = []
+        _, first = solve(rows, Recording(premise, at), tol=1e-9, max_iter=2000)
+        best = min(
+            at,
+            key=lambda x: np.abs(
+                premise.parameters(x) - first.evaluation.antecedent.parameters
+            ).max(),
+        )
+        _, second = solve(rows, premise, tol=1e-4, start=best)
+        assert second.n_iter <= 2
+        assert_allclose(second.evaluation.cost, first.evaluation.cost, rtol=1e-6)
+
+    def test_two_runs_are_the_same_to_the_last_bit(self):
+        rows, premise, *_ = planted("grid", 0, noise=0.1)
+        one, other = (solve(rows, premise)[1] for _ in range(2))
+        assert_array_equal(one.loss_curve, other.loss_curve)
+        assert_array_equal(one.evaluation.coefficients, other.evaluation.coefficients)
+
+
+class Recording:
+    """A premise that notes every displacement it is asked about."""
+
+    def __init__(self, premise, at):
+        self.premise, self.at = premise, at
+
+    def __getattr__(self, name):
+        return getattr(self.premise, name)
+
+    def parameters(self, x):
+        self.at.append(x.copy())
+        return self.premise.parameters(x)
+
+
+class TestStatus:
+    """Every reason to stop, each reached by a small problem."""
+
+    def check(self, result, status, converged=True):
+        assert result.status == status
+        assert result.message == MESSAGES[status]
+        assert result.converged is converged
+        assert result.loss_curve.shape == (result.n_iter + 1,)
+
+    def test_cost_settles_on_noisy_data(self):
+        rows, premise, *_ = planted("grid", 0, noise=0.1)
+        costs = []
+        _, result = solve(rows, premise, tol=1e-4, on_iteration=lambda n, e: costs.append(e.cost))
+        self.check(result, "cost")
+        decreases = -np.diff(costs) / costs[1:]
+        assert (decreases[-2:] <= 1e-4).all()
+        assert decreases[-3] > 1e-4
+
+    def test_gradient_vanishes_where_the_target_is_constant(self, rng):
+        X = rng.normal(size=(50, 2))
+        rows = StandardisedData.of(X, np.full((50, 1), 3.0))
+        premise = Premise.of(start_of("grid", rows), *oracles.box(rows))
+        _, result = solve(rows, premise)
+        self.check(result, "gradient")
+        assert result.n_iter == 0
+
+    def test_gradient_vanishes_at_an_earlier_result(self):
+        rows, premise, *_ = planted("scattered", 0, noise=0.1)
+        at = []
+        _, first = solve(rows, Recording(premise, at), tol=1e-12, max_iter=2000)
+        best = min(
+            at,
+            key=lambda x: np.abs(
+                premise.parameters(x) - first.evaluation.antecedent.parameters
+            ).max(),
+        )
+        _, result = solve(rows, premise, tol=1e-2, start=best)
+        self.check(result, "gradient")
+        assert result.n_iter == 0
+
+    def test_gradient_vanishes_where_all_displacements_are_stuck(self):
+        # The minimum of Rosenbrock's valley in this box is its corner.
+        result = varpro(rosenbrock(), Box([-1.0, 0.0], [0.0, 0.0]), max_iter=9, tol=1e-6)
+        self.check(result, "gradient")
+
+    def test_step_is_the_end_where_nothing_is_tolerated(self):
+        rows, premise, *_ = planted("scattered", 0, noise=0.1)
+        _, result = solve(rows, premise, tol=0.0, max_iter=5000)
+        self.check(result, "step")
+
+    def test_step_is_the_end_where_the_gradient_is_wrong(self):
+        # A gradient that points uphill: no step decreases the cost.
+        problem = Residuals(lambda x: np.array([x[0] - 1.0]), lambda x: np.array([[-1.0]]))
+        result = varpro(problem, Box([-3], [3]), max_iter=10, tol=1e-6)
+        self.check(result, "step")
+        assert_array_equal(result.evaluation.x, 0.0)
+
+    @pytest.mark.parametrize("max_iter", [1, 3])
+    def test_max_iter_is_the_number_of_accepted_steps(self, max_iter):
+        rows, premise, *_ = planted("grid", 0, noise=0.1, displaced=0.5)
+        _, result = solve(rows, premise, tol=0.0, max_iter=max_iter)
+        self.check(result, "max_iter", converged=False)
+        assert result.n_iter == max_iter
+
+    def test_no_premise_leaves_one_linear_solve(self, rng):
+        rows = spread_rows("grid", rng)
+        premise = Premise.of(GridAntecedent((), counts=()), *oracles.box(rows))
+        _, result = solve(rows, premise)
+        self.check(result, "no_premise")
+        # y is the first column itself.
+        assert_allclose(result.evaluation.coefficients[:, 0], [0.0, 1.0, 0.0], atol=1e-7)

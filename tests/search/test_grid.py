@@ -1,0 +1,155 @@
+"""Where the terms of a grid start, and how they are spaced."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.learning.data import StandardisedData
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, SigmoidDifference, SigmoidProduct
+from skanfis.search import Spacing, grid_antecedent
+from skanfis.search.grid import _EDGE, _QUANTISER
+
+N_ROWS = 1001
+
+
+def rows_of(*columns, weight=None):
+    X = np.column_stack(columns)
+    return StandardisedData.of(X, np.arange(len(X), dtype=float)[:, None], weight)
+
+
+def evenly(n_inputs, n_rows=N_ROWS):
+    """Even values on every input, in orders of their own; the spacing and its box."""
+    g = np.random.default_rng(7)
+    rows = rows_of(*(g.permutation(np.linspace(-1.0, 3.0, n_rows)) for _ in range(n_inputs)))
+    z = np.sort(rows.table(slice(None))[:, 0])
+    low, high = (z[int(np.ceil(q * n_rows)) - 1] for q in (_EDGE, 1.0 - _EDGE))
+    return Spacing(rows), low, high
+
+
+def terms(antecedent):
+    """(input, theta of one term) for every term."""
+    for group in antecedent.groups:
+        for t, j in enumerate(group.inputs):
+            yield int(j), group.family, group.theta[:, [t]]
+
+
+def test_even_values_give_even_terms_between_the_outer_quantiles():
+    spacing, low, high = evenly(2)
+    antecedent = grid_antecedent([Gaussian] * 2, [3, 2], spacing, 0.6)
+    found = [(j, theta[0, 0]) for j, _, theta in terms(antecedent)]
+    assert [j for j, _ in found] == [0, 0, 0, 1, 1]
+    centers = [low, 0.5 * (low + high), high, low, high]
+    assert_allclose([center for _, center in found], centers, rtol=1e-9, atol=1e-9)
+    assert antecedent.counts == (3, 2)
+    assert antecedent.n_rules == 6
+
+
+@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+@pytest.mark.parametrize("overlap", [0.3, 0.5, 0.8])
+@pytest.mark.parametrize("count", [2, 3, 7])
+def test_neighbours_cross_half_way_at_the_overlap(family, overlap, count):
+    spacing, low, high = evenly(1)
+    antecedent = grid_antecedent([family], [count], spacing, overlap)
+    centers = np.linspace(low, high, count)
+    between = 0.5 * (centers[1:] + centers[:-1])
+    mu = np.exp(antecedent.log_memberships(between[None]))
+    # "At least" and "at most" stay one on the side to which they are open.
+    crossing = {"s_shaped": (1.0, overlap), "z_shaped": (overlap, 1.0)}.get(family.name, overlap)
+    for k in range(count - 1):
+        # A floor where mu is zero takes 1e-10 off it elsewhere.
+        assert_allclose(mu[k : k + 2, k], crossing, rtol=1e-8)
+    top = np.diag(np.exp(antecedent.log_memberships(centers[None])))
+    if family in (SigmoidDifference, SigmoidProduct):
+        assert (top > overlap).all()
+    else:
+        assert_allclose(top, 1.0, rtol=1e-12)
+
+
+def test_equal_terms_share_alike_half_way():
+    spacing, low, high = evenly(2)
+    antecedent = grid_antecedent([Gaussian, Bell], [2, 2], spacing, 0.6)
+    middle = np.full((2, 1), 0.5 * (low + high))
+    assert_allclose(antecedent.strengths(middle), 0.25, rtol=1e-9)
+
+
+def test_every_input_has_its_own_family_and_inputs_without_terms_are_left_out():
+    families = [Bell, Gaussian, Bell, Gaussian]
+    antecedent = grid_antecedent(families, [2, 1, 3, 2], evenly(4)[0], 0.6)
+    found = [(j, family) for j, family, _ in terms(antecedent)]
+    assert found == [(0, Bell)] * 2 + [(2, Bell)] * 3 + [(3, Gaussian)] * 2
+    assert len(antecedent.groups) == 2  # the bells of two inputs are computed together
+
+
+def test_one_term_everywhere_is_one_rule_without_terms(rng):
+    antecedent = grid_antecedent([Gaussian] * 3, [1, 1, 1], evenly(3)[0], 0.6)
+    assert antecedent.n_rules == 1
+    assert antecedent.n_terms == 0
+    assert_array_equal(antecedent.strengths(rng.normal(size=(3, 5))), 1.0)
+
+
+class TestSpacing:
+    def test_terms_stand_at_even_steps_of_the_gaps_to_the_power_of_two_thirds(self):
+        # No outer quantile falls away from so few rows: G is 1, 8^(2/3), 27^(2/3) and so on.
+        values = np.cumsum([0.0, 1.0, 8.0, 27.0, 1.0, 64.0])
+        rows = rows_of(values)
+        levels = np.cumsum([0.0, 1.0, 4.0, 9.0, 1.0, 16.0])
+        expected = np.interp(np.linspace(0.0, 31.0, 4), levels, values)
+        found = Spacing(rows).centers(0, 4) * rows.inputs.scale + rows.inputs.offset
+        assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+    def test_density_of_terms_is_that_of_the_optimal_quantiser(self):
+        # Of exponential inputs f^(1/3) is exponential with a third of the rate.
+        share = (np.arange(20_000) + 0.5) / 20_000
+        rows = rows_of(-np.log1p(-share))
+        found = Spacing(rows).centers(0, 5) * rows.inputs.scale + rows.inputs.offset
+        edges = 1.0 - np.cbrt(1.0 - np.array([_EDGE, 1.0 - _EDGE]))
+        expected = -3.0 * np.log1p(-np.linspace(*edges, 5))
+        assert _QUANTISER == 2.0 / 3.0
+        assert_allclose(found, expected, rtol=1e-2)
+
+    @pytest.mark.parametrize("draw", ["lognormal", "standard_cauchy", "normal"])
+    def test_units_and_direction_of_an_input_make_no_difference(self, rng, draw):
+        x = getattr(rng, draw)(size=500)
+        plain, other, mirrored = rows_of(x), rows_of(1e4 + 250.0 * x), rows_of(-x)
+        for count in (2, 3, 6):
+            centers = Spacing(plain).centers(0, count)
+            assert_allclose(Spacing(other).centers(0, count), centers, rtol=1e-7, atol=1e-7)
+            assert_allclose(
+                -Spacing(mirrored).centers(0, count)[::-1], centers, rtol=1e-7, atol=1e-7
+            )
+
+    def test_order_repeats_and_weights_of_rows_make_no_difference_but_by_the_quantiles(self, rng):
+        x = rng.lognormal(size=200)
+        times = rng.integers(1, 5, 200)
+        turn = rng.permutation(200)
+        weighted = Spacing(rows_of_one(x, times)).centers(0, 5)
+        turned = Spacing(rows_of_one(x[turn], times[turn])).centers(0, 5)
+        repeated = Spacing(rows_of_one(np.repeat(x, times))).centers(0, 5)
+        assert_allclose(turned, weighted, rtol=1e-9)
+        assert_allclose(repeated, weighted, rtol=1e-9)
+
+    def test_a_single_far_row_draws_no_term_to_it(self, rng):
+        x = np.append(rng.uniform(size=500), 1000.0)
+        rows = rows_of(x)
+        found = Spacing(rows).centers(0, 3) * rows.inputs.scale + rows.inputs.offset
+        assert found[-1] < 1.0
+
+    def test_values_are_counted_between_the_quantiles_and_an_input_of_two_keeps_both(self):
+        rows = rows_of(np.arange(1000) % 5, np.arange(1000) < 3)
+        spacing = Spacing(rows)
+        assert [spacing.n_values(j) for j in range(2)] == [5, 2]
+        found = spacing.centers(1, 2) * rows.inputs.scale[1] + rows.inputs.offset[1]
+        assert_allclose(found, [0.0, 1.0], atol=1e-9)
+
+    @pytest.mark.parametrize("flip", [False, True])
+    def test_of_an_input_of_two_a_value_of_a_single_row_is_kept(self, flip):
+        x = np.arange(200) == 0
+        rows = rows_of(x ^ flip)
+        found = Spacing(rows).centers(0, 2) * rows.inputs.scale + rows.inputs.offset
+        assert_allclose(found, [0.0, 1.0], atol=1e-9)
+
+
+def rows_of_one(x, times=None):
+    """One input, and a target that goes with it."""
+    weight = None if times is None else times.astype(float)
+    return StandardisedData.of(x[:, None], np.sin(x)[:, None], weight)

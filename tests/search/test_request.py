@@ -1,0 +1,424 @@
+"""Starts: imported rules, named partitions, mixed families, chosen features."""
+
+from dataclasses import replace
+from inspect import signature
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
+from sklearn.cluster import HDBSCAN, AgglomerativeClustering, KMeans, MiniBatchKMeans
+from sklearn.datasets import make_friedman1
+from sklearn.mixture import GaussianMixture
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
+from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
+from skanfis.learning import VariableProjection
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.penalty import Penalty
+from skanfis.membership import Gaussian
+from skanfis.search import SampleSize, StructureRequest, request
+from skanfis.search.start import Start
+
+from ..quick import quick
+
+# Its default changes: to be quiet, newer versions have to be told.
+HDBSCAN_TAKES_COPY = "copy" in signature(HDBSCAN).parameters
+
+
+def surface(n_rows=300, seed=0):
+    g = np.random.default_rng(seed)
+    frame = pd.DataFrame(
+        {
+            "time": g.uniform(0, 600, n_rows),
+            "temperature": g.uniform(-40, 60, n_rows),
+            "rate": g.uniform(-100, 100, n_rows),
+        }
+    )
+    y = 0.01 * frame["rate"] * np.sin(frame["temperature"] / 20) + np.exp(-frame["time"] / 200)
+    return frame, y + 0.01 * g.normal(size=n_rows)
+
+
+@pytest.fixture(scope="module", name="data")
+def measured():
+    return surface()
+
+
+@pytest.fixture(
+    scope="module",
+    params=[{"n_mfs": [2, 3, 1]}, {"partition": FuzzyCMeans(3, random_state=0)}],
+)
+def known(request, data):
+    return quick(**request.param).fit(*data)
+
+
+class TestImported:
+    @pytest.mark.theory
+    @pytest.mark.filterwarnings("ignore:.*max_iter was reached")
+    def test_short_fits_one_after_another_go_on(self, data):
+        settings = {"solver": VariableProjection(tol=1e-9), "max_iter": 3}
+        model = ANFISRegressor(n_mfs=2, **settings).fit(*data)
+        before = model.loss_curve_
+        after = ANFISRegressor(partition=model, **settings).fit(*data).loss_curve_
+        assert_allclose(after[0], before[-1], rtol=0.2)
+        assert after[-1] < before[-1]
+
+    @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+    def test_without_iterations_nothing_is_learnt(self, data, known):
+        X, y = surface(50, seed=1)
+        for given in (known, known.model_):
+            model = ANFISRegressor(partition=given, max_iter=0).fit(X, y + 5.0)
+            assert_array_equal(model.predict(data[0]), known.predict(data[0]))
+            assert model.memberships_ == model.initial_memberships_ == known.memberships_
+            loss = np.mean((model.predict(X) - y - 5.0) ** 2) / np.var(y)
+            assert_allclose(model.loss_curve_, loss, rtol=1e-9)
+            assert "as they were given" in model.status_
+
+    def test_with_least_squares_the_consequents_alone_are_learnt(self, data, known):
+        X, y = data
+        model = ANFISRegressor(partition=known, solver="lse").fit(X, 3.0 * y - 1.0)
+        for one, other in zip(model.memberships_, known.memberships_, strict=True):
+            assert one["name"] == other["name"]
+            assert_allclose(
+                [v for v in one.values() if isinstance(v, float)],
+                [v for v in other.values() if isinstance(v, float)],
+                rtol=1e-9,
+            )
+        again = ANFISRegressor(partition=known, solver="lse").fit(X, y)
+        assert_allclose(model.predict(X), 3.0 * again.predict(X) - 1.0, atol=1e-8)
+
+    @pytest.mark.theory
+    def test_training_goes_on_from_there(self, data, known):
+        # With weights that are given nothing moves before the training does.
+        solver = VariableProjection(stiffness=1e-4)
+        weights = {"agreement": 1e-4, "alpha": 1e-6, "solver": solver}
+        first = clone(known).set_params(**weights).fit(*data)
+        model = ANFISRegressor(partition=first.model_, **weights).fit(*data)
+        assert_allclose(model.loss_curve_[0], first.loss_curve_[-1], rtol=0.02)
+        assert model.loss_curve_[-1] <= model.loss_curve_[0]
+
+    @pytest.mark.theory
+    def test_weights_are_found_for_imported_rules_too(self, data, known):
+        model = ANFISRegressor(partition=known.model_).fit(*data)
+        for name in ("agreement_", "alpha_", "stiffness_"):
+            assert getattr(model, name) > 0.0
+        assert model.n_rules_ == known.n_rules_
+        assert model.loss_curve_[-1] < 1.1 * known.loss_curve_[-1]
+
+    def test_other_data_may_have_another_range(self, known):
+        X, y = surface(300, seed=2)
+        X["rate"] *= 10.0
+        model = ANFISRegressor(partition=known.model_, solver="lse").fit(X, y)
+        first, second = (m.memberships_[0] for m in (model, known))
+        assert_allclose(first["center"], second["center"])
+
+    def test_a_grid_whose_terms_are_not_in_order_can_be_trained(self, data):
+        X, y = data
+        model = ANFISRegressor(n_mfs=[3, 1, 1], max_iter=0).fit(X, y).model_
+        theta = model.antecedent.groups[0].theta.copy()
+        theta[0] = theta[0, [1, 0, 2]]
+        turned = model.antecedent.with_parameters(theta.ravel())
+        object.__setattr__(model, "antecedent", turned)
+        trained = ANFISRegressor(partition=model, solver=VariableProjection(tol=1e-2)).fit(X, y)
+        assert trained.loss_curve_[-1] < trained.loss_curve_[0]
+
+    def test_a_clone_has_lost_its_rules_and_says_so(self, data, known):
+        model = clone(ANFISRegressor(partition=known))
+        with pytest.raises(ValueError, match=r"has no rules: .* Give its model_ instead"):
+            model.fit(*data)
+        clone(ANFISRegressor(partition=known.model_, max_iter=0)).fit(*data)
+
+    def test_inputs_must_be_the_same(self, data, known):
+        X, y = data
+        with pytest.raises(ValueError, match=r"rules on 3 inputs .* but X has 2 columns"):
+            ANFISRegressor(partition=known).fit(X[["time", "rate"]], y)
+        with pytest.raises(ValueError, match="give them in this order and by these names"):
+            ANFISRegressor(partition=known).fit(X[["time", "rate", "temperature"]], y)
+        ANFISRegressor(partition=known, max_iter=0).fit(X.to_numpy(), y)
+
+    def test_outputs_must_be_as_many_where_nothing_is_learnt(self, data, known):
+        X, y = data
+        with pytest.raises(ValueError, match="a model of 1 outputs, but y has 2"):
+            ANFISRegressor(partition=known, max_iter=0).fit(X, np.column_stack([y, y]))
+
+    @pytest.mark.parametrize(
+        "settings",
+        [{"premise_features": ["rate"]}, {"consequent_features": ["rate"], "max_iter": 0}],
+    )
+    def test_what_imported_rules_cannot_heed_is_refused(self, data, known, settings):
+        with pytest.raises(ValueError, match=r"features=.* means nothing"):
+            ANFISRegressor(partition=known, **settings).fit(*data)
+
+    def test_a_number_of_terms_contradicts_it(self, data, known):
+        with pytest.raises(ValueError, match=r"n_mfs=3 .* for the imported rules"):
+            ANFISRegressor(n_mfs=3, partition=known).fit(*data)
+
+
+def friedman(n_rows):
+    X, y = make_friedman1(n_rows, n_features=5, noise=1.0, random_state=0)
+    return X, y
+
+
+@pytest.mark.theory
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+@pytest.mark.parametrize("partition", ["subtractive", "fcm"])
+def test_named_clusterings_find_rules_that_generalise(partition):
+    X, y = friedman(1000)
+    model = ANFISRegressor(partition=partition).fit(X[:300], y[:300])
+    assert 2 <= model.n_rules_ <= 36
+    # The noise is 1, a linear model leaves 2.6.
+    assert np.sqrt(np.mean((model.predict(X[300:]) - y[300:]) ** 2)) < 1.4
+
+
+@pytest.mark.theory
+def test_radius_of_clusters_is_reported_and_is_that_of_the_clusterer(data):
+    X, y = (part[:150] for part in data)
+    found = ANFISRegressor(partition="subtractive").fit(X, y)
+    best = found.structures_[0]
+    radius = float(best["structure"].removeprefix("clusters of radius "))
+    clusterer = SubtractiveClustering(radius=radius * np.sqrt(4 / 2))
+    given = ANFISRegressor(partition=clusterer).fit(X, y)
+    assert_array_equal(found.rules_, given.rules_)
+    for one, other in zip(found.initial_memberships_, given.initial_memberships_, strict=True):
+        assert [one[key] for key in TERM] == [other[key] for key in TERM]
+    # Both find their weights by the evidence, from premises that have moved by their own steps.
+    assert_allclose(given.score(X, y), found.score(X, y), atol=2e-3)
+
+
+TERM = ("input", "function", "center", "width")
+
+
+def test_number_of_fuzzy_clusters_is_reported(data):
+    model = ANFISRegressor(partition="fcm").fit(*(part[:150] for part in data))
+    assert model.structures_[0]["structure"] == f"{model.n_rules_} fuzzy clusters"
+
+
+@pytest.mark.theory
+def test_families_may_differ_from_input_to_input(data):
+    X, y = (part[:150] for part in data)
+    mixed = ["bell", "gaussian", "triangular"]
+    for settings in ({"n_mfs": 2}, {"partition": KMeans(3, random_state=0)}, {}):
+        model = quick(**{"n_mfs": "auto", "mf": mixed} | settings).fit(X, y)
+        found = {term["input"]: term["function"] for term in model.memberships_}
+        expected = dict(zip(X.columns, mixed, strict=True))
+        assert found.items() <= expected.items()
+        assert model.loss_curve_[-1] < 0.5
+
+
+def test_a_family_of_ones_own_by_its_class(data):
+    one, other = (quick(n_mfs=2, mf=mf).fit(*data) for mf in (Gaussian, "gaussian"))
+    assert_array_equal(one.predict(data[0]), other.predict(data[0]))
+
+
+@pytest.mark.parametrize(
+    ("mf", "message"),
+    [
+        (["bell"], "has 1 entries, but X has 3 columns"),
+        (["bell", "gaussian", "square"], "mf holds 'square': it must be one of 'gaussian'"),
+        (int, "mf holds <class 'int'>"),
+    ],
+)
+def test_families_that_are_none_are_refused(data, mf, message):
+    with pytest.raises(ValueError, match=message):
+        ANFISRegressor(n_mfs=2, mf=mf).fit(*data)
+
+
+class TestFeatures:
+    @pytest.mark.theory
+    @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "fcm"}, {}])
+    def test_rules_are_on_their_features_and_consequents_in_theirs_alone(self, data, settings):
+        X, y = (part[:150] for part in data)
+        premises = ["time", "temperature"]
+        chosen = {"premise_features": premises, "consequent_features": ["rate"]}
+        model = quick(**{"n_mfs": "auto"} | chosen | settings).fit(X, y)
+        assert {term["input"] for term in model.memberships_} <= set(premises)
+        assert model.n_rules_ > 1
+        assert_array_equal(model.consequents_[:, 1:3], 0.0)
+        assert (model.consequents_[:, 3] != 0.0).all()
+        assert_allclose(
+            np.mean((model.predict(X) - y) ** 2) / np.var(y), model.loss_curve_[-1], rtol=1e-8
+        )
+        # Each alone: the others are on all inputs.
+        if "n_mfs" in settings:
+            for key, n_terms, n_slopes in (
+                ("premise_features", 4, 3),
+                ("consequent_features", 6, 1),
+            ):
+                model = quick(**settings | {key: chosen[key]}).fit(X, y)
+                assert len(model.memberships_) == n_terms
+                assert np.count_nonzero(model.consequents_[0, 1:]) == n_slopes
+
+    def test_a_scheduled_scale_factor_is_found(self):
+        # y = K(T) rate: rules on temperature, consequents in rate.
+        X, _ = surface(400)
+        y = (1.0 + 1e-3 * X["temperature"]) * X["rate"]
+        model = ANFISRegressor(
+            n_mfs=[1, 2, 1], premise_features=[1], consequent_features=[False, False, True]
+        ).fit(X, y)
+        assert_allclose(model.predict(X), y, atol=0.05)
+        assert_allclose(model.model_.coverage(X.to_numpy()), 1.0)
+
+    def test_they_may_be_masks_positions_or_names(self, data):
+        given = (["rate", "time"], [0, 2], [-1, 0], [True, False, True], np.array([0, 2]))
+        found = [
+            quick(n_mfs=2, max_iter=0, consequent_features=f).fit(*data).predict(data[0])
+            for f in given
+        ]
+        for one, other in pairwise(found):
+            assert_array_equal(one, other)
+
+    @pytest.mark.parametrize(
+        ("settings", "message"),
+        [
+            ({"premise_features": ["speed"]}, "'speed', which is no column of X; .*'time'"),
+            ({"premise_features": [3]}, "premise_features names 3, which is no column"),
+            ({"premise_features": [0, 0]}, "names a column twice"),
+            ({"premise_features": []}, "names no column"),
+            ({"premise_features": [True, False]}, "a mask of 2 entries, but X has 3"),
+            ({"consequent_features": [0], "order": 0}, "means nothing with order=0"),
+            (
+                {"n_mfs": [2, 1, 1], "premise_features": ["rate"]},
+                "'time', which is not among premise_features",
+            ),
+        ],
+    )
+    def test_what_does_not_fit_is_refused(self, data, settings, message):
+        with pytest.raises(ValueError, match=message):
+            ANFISRegressor(**settings).fit(*data)
+
+    def test_a_name_that_a_step_in_front_has_taken_away(self, data):
+        model = make_pipeline(StandardScaler(), ANFISRegressor(premise_features="rate"))
+        with pytest.raises(ValueError, match=r"'rate'.*set_output\(transform='pandas'\)"):
+            model.fit(*data)
+        model.set_output(transform="pandas").set_params(anfisregressor__n_mfs=[1, 1, 2])
+        assert model.fit(*data)[-1].n_rules_ == 2
+
+
+def test_names_of_terms_are_carried(data):
+    X, y = data
+    solver = VariableProjection(tol=1e-1)
+    model = ANFISRegressor(n_mfs=[3, 2, 1], solver=solver).fit(X, y)
+    assert model.rename_terms({"temperature": ["cold", "hot"]}) is model
+    assert model.model_.term_names == ("low", "medium", "high", "cold", "hot")
+    assert [term["name"] for term in model.memberships_] == list(model.model_.term_names)
+    later = ANFISRegressor(partition=model.model_, max_iter=0).fit(X, y)
+    assert later.model_.term_names == model.model_.term_names
+    with pytest.raises(ValueError, match="3 names for input 'temperature', which has 2 terms"):
+        model.rename_terms({"temperature": ["a", "b", "c"]})
+    assert model.model_.term_names == later.model_.term_names
+
+
+def test_outputs_are_named_by_the_target(data):
+    X, y = data
+    model = ANFISRegressor(n_mfs=1)
+    assert model.fit(X, y.rename("error")).model_.output_names == ("error",)
+    both = pd.DataFrame({"bias": y, "scale": -y})
+    assert model.fit(X, both).model_.output_names == ("bias", "scale")
+    assert model.fit(X, y.to_numpy()).model_.output_names == ("y",)
+    assert model.fit(X, both.to_numpy()).model_.output_names == ("y0", "y1")
+
+
+def test_imported_rules_warn_of_rows_out_of_their_own_range(data, known):
+    X, y = data
+    model = ANFISRegressor(partition=known, max_iter=0).fit(X[:5], y[:5])
+    far = X[:2].assign(rate=1e4)
+    with pytest.warns(OutOfBoundsWarning, match="'rate'"):
+        model.predict(far)
+
+
+@pytest.mark.parametrize(
+    "clusterer",
+    [
+        KMeans(3, random_state=0),
+        MiniBatchKMeans(3, random_state=0),
+        GaussianMixture(3, random_state=0),
+        AgglomerativeClustering(3),
+        HDBSCAN(min_cluster_size=15, **({"copy": True} if HDBSCAN_TAKES_COPY else {})),
+        FuzzyCMeans(3, random_state=0),
+    ],
+    ids=lambda clusterer: type(clusterer).__name__,
+)
+def test_any_clusterer_gives_a_rule_per_cluster(clusterer):
+    # Three clumps with planes of their own, and a few rows between them.
+    g = np.random.default_rng(8)
+    clump = np.arange(300) % 3
+    X = np.array([[0, 0], [8, 0], [0, 8]])[clump] + 0.5 * g.normal(size=(300, 2))
+    X[:9] = g.uniform(0, 8, (9, 2))
+    y = np.choose(clump, [X[:, 0], 5.0 - X[:, 1], X[:, 0] + X[:, 1]])
+    model = ANFISRegressor(partition=clusterer).fit(X[9:], y[9:])
+    assert model.n_rules_ == 3
+    assert_allclose(model.predict(X[9:]), y[9:], atol=0.05)
+
+
+def test_a_class_in_place_of_an_object_is_refused(data):
+    with pytest.raises(ValueError, match=r"is a class: give an object of it, KMeans\(\.\.\.\)"):
+        ANFISRegressor(partition=KMeans).fit(*data)
+
+
+@pytest.mark.parametrize("missing", [None, np.nan])
+def test_rows_without_a_group_are_refused(data, missing):
+    groups = [1.0] * 299 + [missing]
+    with pytest.raises(ValueError, match="no value for 1 of 300 rows, first at row 299"):
+        ANFISRegressor(early_stopping=True).fit(*data, groups=groups)
+
+
+def test_groups_may_have_names(data):
+    numbers = np.arange(300) // 50
+    names = np.array(["a", "b", "c", "d", "e", "f"])[numbers]
+    X, y = data[0][["rate"]], data[1]
+    grid = ANFISRegressor(partition="grid")
+    one, other = (clone(grid).fit(X, y, groups=g) for g in (numbers, list(names)))
+    assert_array_equal(one.predict(X), other.predict(X))
+    assert "held_out_error" in other.structures_[0]
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_parameters_of_a_clusterer_can_be_searched(data):
+    model = quick(partition=KMeans(random_state=0))
+    search = GridSearchCV(model, {"partition__n_clusters": [1, 4]}, cv=3).fit(*data)
+    assert search.best_estimator_.n_rules_ == search.best_params_["partition__n_clusters"] == 4
+
+
+def request_for(counts, weights):
+    inputs = np.arange(len(counts))
+    names = [f"x{j}" for j in inputs]
+    return StructureRequest(
+        counts, "grid", [Gaussian] * len(counts), 1, inputs, inputs, weights, True, 0, names
+    )
+
+
+@pytest.mark.parametrize("is_held", [False, True])
+def test_weights_found_on_a_sample_are_for_all_rows(data, is_held, rng):
+    X, y = data[0].to_numpy(), data[1].to_numpy()[:, None]
+    weight = rng.uniform(0.5, 1.5, len(y))
+    rows = StandardisedData.of(X, y, weight)
+    sample = replace(rows, X=X[:60], y=y[:60], sample_weight=weight[:60])
+    found = Penalty(agreement=0.01, alpha=0.02, slope=0.03, stiffness=0.04)
+    start = Start(None, found, is_held=is_held)
+    asked = request_for([2, 1, 1], {"alpha": 0.02}).for_all(start, sample, rows).penalty
+    # Relative to a mean over rows they fall with their number; one that is given stays as it is.
+    ratio = weight[:60].sum() / weight.sum()
+    assert asked.alpha == 0.02
+    assert_allclose(asked.agreement, 0.01 * (1.0 if is_held else ratio), rtol=5e-3)
+    assert_allclose([asked.slope, asked.stiffness], np.multiply([0.03, 0.04], ratio), rtol=5e-3)
+
+
+@pytest.mark.parametrize("n_distinct", [11, 12, 30])
+def test_distinct_rows_are_counted_as_far_as_there_are_coefficients(n_distinct, monkeypatch, rng):
+    # Those of a long table up to some number only, unless there are more coefficients.
+    monkeypatch.setattr(request, "ENOUGH_ROWS", 10)
+    X = np.repeat(rng.standard_normal((n_distinct, 2)), 3, axis=0)
+    rows = StandardisedData.of(X, rng.standard_normal((len(X), 1)))
+    size, asked = SampleSize.of(rows, 10), request_for([2, 2], {})
+    assert size.n_distinct_inputs == 10
+    if n_distinct >= 12:
+        assert not asked._warn_if_underdetermined(4, rows, size)
+        return
+    with pytest.warns(UnderdeterminedWarning, match="4 rules with 3 .* are 12 .* for 11 distinct"):
+        assert asked._warn_if_underdetermined(4, rows, size)

@@ -1,0 +1,368 @@
+"""Rows in chunks make the model that one least-squares fit of all rows makes."""
+
+import pickle
+from copy import deepcopy
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.base import clone
+
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_jang_sinc
+from skanfis.exceptions import ForgottenRowsWarning
+from skanfis.learning import VariableProjection
+
+# Of standard deviations of the target.
+EXACT = 1e-10
+CHUNKINGS = {
+    "one": [300],
+    "rows": [1] * 15 + [285],
+    "a row, then most": [1, 298, 1],
+    "uneven": [7, 150, 2, 141],
+}
+KINDS = {
+    "weights by evidence": {},
+    "weights given": {"agreement": 0.01, "alpha": 0.02},
+    "no penalty": {"agreement": 0.0, "alpha": 0.0},
+    "order 0": {"order": 0},
+    "some inputs": {"consequent_features": [1]},
+}
+
+
+def surface(n_rows=300, n_outputs=1, seed=0):
+    """Rows whose columns lie far from the origin, on scales of their own."""
+    g = np.random.default_rng(seed)
+    Z = g.uniform(-1.0, 1.0, (n_rows, 2))
+    y = np.sin(3.0 * Z[:, 0]) + Z[:, 0] * Z[:, 1] + 0.05 * g.normal(size=n_rows)
+    y = np.column_stack([5e3 + y, 1e-6 * y**2])[:, :n_outputs]
+    return 1e6 + Z * [300.0, 1e-2] + [0.0, -1e6], y if n_outputs > 1 else y[:, 0]
+
+
+@pytest.fixture(scope="module")
+def premises():
+    """A model that has seen other rows."""
+    return ANFISRegressor(
+        n_mfs=[3, 2], agreement=1e-3, alpha=1e-4, solver=VariableProjection(stiffness=0.1)
+    ).fit(*surface(seed=1))
+
+
+def in_chunks(model, X, y, sizes, weight=None, **options):
+    start = 0
+    for size in sizes:
+        part = slice(start, start + size)
+        own = None if weight is None else weight[part]
+        model.partial_fit(X[part], y[part], own, **options)
+        start += size
+    return model
+
+
+def difference(one, other, X):
+    """Largest difference of predictions, in the deviations of each output."""
+    found, expected = (model.model_.predict(X) for model in (one, other))
+    return np.max(np.abs(found - expected) / expected.std(axis=0))
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def whole_and_settings(request, premises):
+    """One fit of all rows."""
+    settings = {"partition": premises, "solver": "lse", **KINDS[request.param]}
+    return ANFISRegressor(**settings).fit(*surface()), settings
+
+
+@pytest.mark.parametrize("chunking", CHUNKINGS)
+def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
+    X, y = surface()
+    whole, settings = whole_and_settings
+    model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS[chunking])
+    assert difference(model, whole, X) < EXACT
+    assert (model.agreement_, model.alpha_) == (whole.agreement_, whole.alpha_)
+    assert model.loss_curve_[-1] == pytest.approx(whole.loss_curve_[-1], rel=1e-9)
+    assert model.redundant_rules_ == whole.redundant_rules_
+    for name in ("minimum", "maximum", "reference", "spread", "rule_weights", "rule_rows"):
+        found, expected = getattr(model.model_, name), getattr(whole.model_, name)
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
+    support, expected = model.model_.support, whole.model_.support
+    assert np.array_equal(support.share, expected.share)
+    assert support.center == pytest.approx(expected.center, rel=1e-9)
+    # The farthest row of a rule may be gone: then another one, hardly nearer, stands for it.
+    assert np.all(support.radius <= expected.radius * (1.0 + 1e-9))
+    assert np.all(support.radius >= 0.9 * expected.radius)
+    assert model.n_samples_seen_ == 300
+
+
+def test_weights_zeros_and_several_outputs(premises):
+    X, y = surface(n_outputs=2)
+    weight = np.random.default_rng(3).integers(0, 4, len(X)).astype(float)
+    settings = {"partition": premises, "solver": "lse"}
+    whole = ANFISRegressor(**settings).fit(X, y, weight)
+    model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS["uneven"], weight)
+    assert difference(model, whole, X) < EXACT
+    repeated = np.repeat(np.arange(len(X)), weight.astype(int))
+    again = ANFISRegressor(**settings).partial_fit(X[repeated], y[repeated])
+    assert difference(model, again, X) < EXACT
+    assert model.n_samples_seen_ == np.count_nonzero(weight)
+    before = model.predict(X[:5])
+    model.partial_fit(X[:3], 1e9 * y[:3], np.zeros(3))
+    assert np.array_equal(model.predict(X[:5]), before)
+
+
+def test_forgetting_is_a_fit_with_fading_weights(premises):
+    X, y = surface()
+    factor = 0.98
+    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
+    whole = ANFISRegressor(**settings).fit(X, y, factor ** np.arange(299.0, -1.0, -1.0))
+    for sizes in ([300], [1] * 20 + [280], [100, 200]):
+        model = in_chunks(ANFISRegressor(**settings), X, y, sizes, forgetting=factor)
+        assert difference(model, whole, X) < EXACT
+    assert model.noise_std_ > 0.0
+
+
+@pytest.mark.parametrize("kind", ["given", "weighted", "auto"])
+def test_window_is_a_fit_of_its_rows(premises, kind):
+    X, y = surface()
+    # What leaves is far larger than what stays, and of other scales: nothing of it may be left.
+    X[:120, 0] *= 3.0
+    y[:120] *= 1e9
+    settings = {"partition": premises, "solver": "lse"}
+    if kind != "auto":
+        settings |= {"agreement": 0.01, "alpha": 0.01}
+    weight = np.linspace(1.0, 2.0, 300) if kind == "weighted" else None
+    latest = None if weight is None else weight[-170:]
+    whole = ANFISRegressor(**settings).fit(X[-170:], y[-170:], latest)
+    for sizes in ([300], [1] * 20 + [280], [100, 30, 150, 20]):
+        model = in_chunks(ANFISRegressor(**settings), X, y, sizes, weight, window=170)
+        assert difference(model, whole, X[-170:]) < EXACT
+        for name in ("minimum", "maximum", "spread", "rule_rows", "output_limits"):
+            found, expected = getattr(model.model_, name), getattr(whole.model_, name)
+            assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
+        found, expected = model.model_.support.radius, whole.model_.support.radius
+        assert np.all(found >= 0.9 * expected)
+        assert np.all(found <= expected * (1.0 + 1e-9))
+        assert model.n_samples_seen_ == 300
+
+
+def test_window_may_change_and_its_memory_does_not_grow(premises):
+    X, y = surface()
+    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
+    model, sizes = ANFISRegressor(**settings), []
+    for start in range(0, 300, 50):
+        model.partial_fit(X[start : start + 50], y[start : start + 50], window=80)
+        sizes.append(len(pickle.dumps(model)))
+    assert max(sizes[2:]) < 1.1 * sizes[1]
+    model = pickle.loads(pickle.dumps(model)).partial_fit(X[:10], y[:10], window=60)
+    rows = np.r_[250:300, :10]
+    assert difference(model, ANFISRegressor(**settings).fit(X[rows], y[rows]), X[rows]) < EXACT
+    # Without a window nothing leaves any more; the rows in it go along to a merge.
+    other = ANFISRegressor(**settings).partial_fit(X[30:60], y[30:60])
+    rows = np.r_[rows, 10:60]
+    expected = ANFISRegressor(**settings).fit(X[rows], y[rows])
+    merged = model.partial_fit(X[10:30], y[10:30]).merge(other)
+    assert difference(merged, expected, X[rows]) < EXACT
+    with pytest.raises(ValueError, match="sums that no row can leave"):
+        merged.partial_fit(X, y, window=60)
+
+
+def test_window_after_a_first_call_that_is_a_fit():
+    X, y = surface()
+    settings = {"agreement": 1e-3, "alpha": 1e-3}
+    model = ANFISRegressor(n_mfs=2, **settings).partial_fit(X, y, window=100)
+    held = ANFISRegressor(partition=model, solver="lse", **settings)
+    assert difference(model, held.fit(X[200:], y[200:]), X[200:]) < EXACT
+    assert model.model_.minimum == pytest.approx(X[200:].min(axis=0))
+    assert model.n_samples_seen_ == 300
+
+
+@pytest.mark.parametrize("window", [1, 0, -5, 10.0, True, "10"])
+def test_window_out_of_range(premises, window):
+    X, y = surface()
+    with pytest.raises(ValueError, match=r"window=.* must be a whole number of 2 or more"):
+        ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y, window=window)
+
+
+def test_window_beside_forgetting_is_refused(premises):
+    X, y = surface()
+    with pytest.raises(ValueError, match="two ways to let old rows go"):
+        ANFISRegressor(partition=premises).partial_fit(X, y, window=50, forgetting=0.9)
+
+
+def test_drift_of_inputs_costs_no_digits(premises):
+    """The first chunk lies a million of its own deviations from the rest."""
+    X, y = surface()
+    near = X.copy()
+    near[:150, 0] = 0.0 + 1e-4 * np.arange(150)
+    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
+    whole = ANFISRegressor(**settings).fit(near, y)
+    model = in_chunks(ANFISRegressor(**settings), near, y, [150, 150])
+    assert difference(model, whole, near) < EXACT
+
+
+def test_first_call_is_a_fit_and_premises_stay():
+    X, y = surface(600)
+    settings = {
+        "n_mfs": [3, 2],
+        "agreement": 1e-3,
+        "alpha": 1e-4,
+        "solver": VariableProjection(stiffness=0.1),
+    }
+    fitted = ANFISRegressor(**settings).fit(X[:200], y[:200])
+    model = ANFISRegressor(**settings).partial_fit(X[:200], y[:200])
+    assert np.array_equal(model.predict(X[:200]), fitted.predict(X[:200]))
+    assert model.n_samples_seen_ == 200
+    model.partial_fit(X[200:], y[200:])
+    assert model.memberships_ == fitted.memberships_
+    held = ANFISRegressor(partition=fitted, solver="lse", agreement=1e-3, alpha=1e-4).fit(X, y)
+    assert difference(model, held, X) < EXACT
+    # And what fit says afterwards is of its own rows.
+    model.fit(X[:200], y[:200])
+    assert not hasattr(model, "n_samples_seen_")
+
+
+def test_after_fit_premises_stay_and_rows_are_new(premises):
+    X, y = surface()
+    model = deepcopy(premises)
+    with pytest.warns(ForgottenRowsWarning, match="no sums over its 300 rows"):
+        model.partial_fit(X, y)
+    held = ANFISRegressor(partition=premises, solver="lse", agreement=1e-3, alpha=1e-4).fit(X, y)
+    assert difference(model, held, X) < EXACT
+    assert model.n_samples_seen_ == 300
+
+
+def test_nearly_exact_data_stay_so():
+    """A fit without noise found weights of next to nothing: another row does not change that."""
+    X, y = make_jang_sinc()
+    model = ANFISRegressor(n_mfs=4).partial_fit(X[:-1], y[:-1])
+    before = np.sqrt(np.mean((model.predict(X[:-1]) - y[:-1]) ** 2))
+    model.partial_fit(X[-1:], y[-1:])
+    assert np.sqrt(np.mean((model.predict(X) - y) ** 2)) < 2.0 * before
+
+
+def test_noise_of_one_rule_is_that_of_a_line():
+    """n / (n - k) times the mean square, as in the textbook."""
+    X, y = surface()
+    model = ANFISRegressor(n_mfs=1, agreement=0.0, alpha=0.0, solver="lse")
+    model = in_chunks(model, X, y, [200, 100])
+    design = np.column_stack([np.ones(300), X - X.mean(axis=0)])
+    residual = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    assert model.noise_std_**2 == pytest.approx(residual @ residual / 297.0, rel=1e-6)
+
+
+def test_merged_equals_all_rows(premises):
+    X, y = surface()
+    settings = {"partition": premises, "solver": "lse"}
+    whole = ANFISRegressor(**settings).partial_fit(X, y)
+    parts = [slice(0, 90), slice(90, 91), slice(91, 300)]
+    models = [ANFISRegressor(**settings).partial_fit(X[part], y[part]) for part in parts]
+    before = models[0].predict(X[:90])
+    for order in ([0, 1, 2], [2, 0, 1]):
+        first, *others = (models[i] for i in order)
+        merged = first.merge(*others)
+        assert difference(merged, whole, X) < EXACT
+        assert merged.n_samples_seen_ == 300
+        assert merged.noise_std_ == pytest.approx(whole.noise_std_, rel=1e-9)
+    assert np.array_equal(models[0].predict(X[:90]), before)
+
+
+def test_merge_says_how_premises_differ(premises):
+    X, y = surface()
+    model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y)
+    other = ANFISRegressor(n_mfs=[3, 2], solver="lse").partial_fit(X[:100], y[:100])
+    with pytest.raises(ValueError, match=r"term 0, 'low' of 'x0', has center .* in one and"):
+        model.merge(other)
+    with pytest.raises(ValueError, match="6 and 4 rules"):
+        model.merge(ANFISRegressor(n_mfs=2, solver="lse").partial_fit(X, y))
+    with pytest.raises(ValueError, match="linear in x0, x1 and in none"):
+        model.merge(ANFISRegressor(partition=premises, solver="lse", order=0).partial_fit(X, y))
+    frame = pd.DataFrame(X, columns=["a", "b"])
+    named = ANFISRegressor(partition=premises, solver="lse").partial_fit(frame, y)
+    with pytest.raises(ValueError, match="inputs are x0, x1 and a, b"):
+        model.merge(named)
+    with pytest.raises(ValueError, match="Model 1 of merge has not been trained by partial_fit"):
+        model.merge(premises)
+
+
+def test_state_survives_a_file_and_not_a_clone(premises):
+    X, y = surface()
+    model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X[:200], y[:200])
+    loaded = pickle.loads(pickle.dumps(model))
+    for one in (model, loaded):
+        one.partial_fit(X[200:], y[200:])
+    assert np.array_equal(loaded.predict(X), model.predict(X))
+    assert not hasattr(clone(model), "n_samples_seen_")
+    deep = deepcopy(model).partial_fit(X[:1], y[:1] + 1e3)
+    assert deep.n_samples_seen_ == 301
+    assert model.n_samples_seen_ == 300
+
+
+def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
+    X, y = surface()
+    model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y)
+    beyond = np.add(X[:1], [900.0, 0.0])
+    assert not model.in_bounds(beyond)[0]
+    assert model.coverage(beyond)[0] < 0.1
+    rows = beyond + [[0.1 * i, 1e-3 * (i % 7 - 3)] for i in range(-20, 20)]
+    model.partial_fit(rows, np.full(40, y[0]))
+    assert model.in_bounds(beyond)[0]
+    assert model.coverage(beyond)[0] > 0.9
+
+
+def chunk(premises, **settings):
+    return ANFISRegressor(partition=premises, solver="lse", **settings)
+
+
+@pytest.mark.parametrize("forgetting", [0.0, -0.1, 1.01, np.nan, "0.9", True, None])
+def test_forgetting_out_of_range(premises, forgetting):
+    with pytest.raises(ValueError, match=r"forgetting=.*above 0 and at most 1"):
+        chunk(premises).partial_fit(*surface(), forgetting=forgetting)
+
+
+BAD_CHUNKS = {
+    "NaN": (lambda X: X.replace(X.iloc[4, 0], np.nan), "column 'a', first at row 4"),
+    "empty": (lambda X: X[:0], "0 sample"),
+    "other order": (lambda X: X[["b", "a"]], "must be in the same order"),
+    "other names": (lambda X: X.rename(columns={"a": "c"}), "unseen at fit time"),
+    "fewer columns": (lambda X: X[["a"]], r"missing|1 features"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_CHUNKS)
+def test_bad_chunk_leaves_the_model_as_it_was(premises, case):
+    X, y = surface(50)
+    X = pd.DataFrame(X, columns=["a", "b"])
+    model = chunk(premises).partial_fit(X, y)
+    before, n_seen = model.predict(X), model.n_samples_seen_
+    damage, message = BAD_CHUNKS[case]
+    bad = damage(X)
+    with pytest.raises(ValueError, match=message):
+        model.partial_fit(bad, y[: len(bad)])
+    assert np.array_equal(model.predict(X), before)
+    assert model.n_samples_seen_ == n_seen
+
+
+def test_what_chunks_cannot_be_asked(premises):
+    X, y = surface(60, n_outputs=2)
+    one = y[:, 0]
+    for settings, message in [
+        ({"loss": "huber"}, "loss='huber' weighs rows anew"),
+        ({"early_stopping": True}, "early_stopping=True"),
+        ({"monotonic_cst": [1, 0]}, "monotonic_cst=[1, 0]"),
+    ]:
+        model = chunk(premises, **settings)
+        with pytest.raises(AttributeError) as caught:
+            model.partial_fit(X, one)
+        assert message in str(caught.value.__cause__)
+    with pytest.raises(ValueError, match="max_iter=0 takes the imported model as it is"):
+        chunk(premises, max_iter=0).partial_fit(X, one)
+    with pytest.raises(ValueError, match="first chunk has 1 row;"):
+        ANFISRegressor().partial_fit(X[:1], one[:1])
+    with pytest.raises(ValueError, match="no row with a positive weight"):
+        chunk(premises).partial_fit(X, one, np.zeros(60))
+    model = chunk(premises).partial_fit(X, pd.DataFrame(y, columns=["u", "v"]))
+    with pytest.raises(ValueError, match="y has 1 outputs, but the chunks before had 2"):
+        model.partial_fit(X, one)
+    with pytest.raises(ValueError, match="columns of y are v, u"):
+        model.partial_fit(X, pd.DataFrame(y[:, ::-1], columns=["v", "u"]))
+    with pytest.raises(ValueError, match="weights that count against those of other chunks"):
+        model.partial_fit(X, y, np.full(60, 1e200))
+    with pytest.raises(ValueError, match="order was 1 at the first partial_fit"):
+        model.set_params(order=0).partial_fit(X, y)
