@@ -106,7 +106,7 @@ class SettingsMixin(BaseEstimator):
                 raise ValueError(
                     f"{key} is a setting of an object, but {name}={given!r} is a word for its "
                     f"defaults: give {name}={of_word.__name__}(), of "
-                    f"skanfis.{'solvers' if name == 'solver' else 'options'}, in its place."
+                    f"skanfis.{'learning' if name == 'solver' else 'options'}, in its place."
                 )
         return super().set_params(**params)
 

@@ -8,16 +8,14 @@ import skanfis
 MODULES = [
     "bounds",
     "cluster",
-    "constraints",
     "dask",
     "datasets",
     "export",
     "gyro",
     "inspection",
     "intervals",
+    "learning",
     "options",
-    "solvers",
-    "streaming",
 ]
 
 
