@@ -108,9 +108,6 @@ class StructureSearch:
         self.trials.beat(best)
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
-            loose = self.trials.loosely(best) if max(best.counts) > 1 else None
-            if loose is not None:
-                best = self._grow_grid(loose)
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
             clusters = self._best_clusters(clustering, best)
@@ -131,7 +128,7 @@ class StructureSearch:
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
-            grown_best = trials.leading(self._worth_training(small, best), best)
+            grown_best = trials.leading(small[: self._n_trained(small[0], best)], best)
             if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best
             best = grown_best
@@ -151,23 +148,6 @@ class StructureSearch:
         counts = list(candidate.counts)
         counts[j] += 1
         return replace(candidate, counts=tuple(counts))
-
-    def _worth_training(self, promising, best):
-        """The most promising, one of them with one more term where the best has several.
-
-        Such a one promises less than it keeps: the terms of that input begin anew, where those of
-        one that gives another input terms are where the best has trained them.
-        """
-        chosen = promising[: self._n_trained(promising[0], best)]
-        anew = [c for c in promising if self._begins_anew(c, best)]
-        if len(chosen) > 1 and anew and anew[0] not in chosen:
-            chosen[-1] = anew[0]
-        return chosen
-
-    @staticmethod
-    def _begins_anew(candidate, best):
-        pairs = zip(candidate.counts, best.counts, strict=True)
-        return any(count > before > 1 for count, before in pairs)
 
     def _n_trained(self, candidate, best):
         """How many of the promising candidates are trained."""
