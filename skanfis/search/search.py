@@ -16,13 +16,12 @@ import numpy as np
 
 from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
-from ..learning.premise import Premise
 from ..membership import Membership
 from .candidate import MOST_RULES, Candidate
 from .screening import residual_asks_for
 from .start import Start
 from .trials import Trials
-from .tuning import held_for_nothing, scaled, settled
+from .tuning import scaled, settled
 
 __all__ = ["SEARCHED", "StructureSearch"]
 
@@ -221,8 +220,6 @@ class StructureSearch:
     def _start(self, best):
         trials, tuned = self.trials, self.trials.tuned(best)
         n_sample, n_all, free = trials.n_sample, trials.n_all, trials.free
-        premise = Premise.of(tuned.problem.antecedent, *trials.sample.inputs.box)
-        tuned = held_for_nothing(tuned, premise, free, n_sample, n_all)
         return Start(
             tuned.problem.antecedent,
             scaled(tuned.penalty, free, n_sample / n_all, tuned.is_held),
