@@ -20,7 +20,6 @@ from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
-from ..antecedent import Antecedent
 from ..bounds.exchange import constrained
 from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
 from ..learning.data import StandardisedData
@@ -35,9 +34,6 @@ from ..search import (
     Start,
     StructureRequest,
     effective_weight,
-    has_idle_term,
-    is_affordable,
-    more_agreement,
     report_constant,
     with_premises,
 )
@@ -60,8 +56,6 @@ _THOROUGH = 0.1
 # The way there begins on a part of the sample, an iteration of which costs as much less; but no
 # fewer rows than so many per consequent.
 _PART_OF_SAMPLE, _ROWS_EACH = 4, 20
-# Tenfold stiffer premises, while a term is hardly true on any row.
-_MOST_STIFFER = 6
 # Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
 # them, and what has not after these goes to and fro.
 _MOST_TURNS = 20
@@ -109,7 +103,7 @@ def _fitted(estimator, data, request, callbacks, is_trial=False) -> Fitted:
     report_constant(fit.rows, data.input_names)
     weights = None
     if fit.huber is None:
-        run = fit.readable_run(fit.rows, fit.start(fit.rows))
+        run = fit.run_from(fit.rows, fit.start(fit.rows))
     else:
         run, row_weights = fit.robust_run(fit.huber.epsilon)
         weights = data.spread_over_rows(row_weights, fit.trained_on)
@@ -166,17 +160,17 @@ class _Fit:
             self.printer.tell_start(start)
         return start
 
-    def readable_run(self, rows: StandardisedData, start: Start) -> SolverRun:
-        """The run from a start, to rules that can be read one by one.
+    def run_from(self, rows: StandardisedData, start: Start) -> SolverRun:
+        """The run from a start.
 
         Of many rows a sample decides on how much premises are held and rules agree, and where the
         premises are: what is left to do on all rows is a step or two.
         """
         if rows.sample is None:
-            return self.run_until_readable(rows, start)
+            return self.run(rows, start)
         for part in self.parts_of_sample(rows.sample, start):
             # Iterations on a sample are not told.
-            found = self.run_until_readable(part, start, is_watched=False)
+            found = self.run(part, start, is_watched=False)
             start = found.start
             if self.is_projecting:
                 start = replace(start, displacement=found.displacement)
@@ -197,54 +191,8 @@ class _Fit:
         # The first rows of a sample are a sample.
         return [sample.part(slice(few)), sample]
 
-    def run_until_readable(self, rows, start: Start, is_watched=True) -> SolverRun:
-        """The run from a start, repeated until its rules can be read; unwatched then.
-
-        Rows that the search has not seen may draw a term into a gap between them, out of which no
-        gradient leads. The premises are then held ten times as much, from the start again, unless
-        it was asked for how much they are held, or terms were freed beyond all reading because that
-        is worth it (``structure.given``). Likewise agreement rises, unless it was asked for, until
-        the strongest rule holds alone, if that is cheap.
-        """
-        run = self.run(rows, start, is_watched)
-        if self.was_stopped(run):
-            return run
-        given = self.request.weights
-        first = _as_tuned(rows, start) if start.is_free else start.antecedent
-        if "stiffness" not in given and not has_idle_term(rows, first):
-            run = self.without_idle_terms(rows, run)
-        if "agreement" not in given and not start.is_apart:
-            run = self.with_rules_that_hold(rows, run)
-        return run
-
-    def was_stopped(self, run: SolverRun) -> bool:
-        """Whether a callback has asked for the end."""
-        return self.callbacks is not None and run.result.status == "stopped"
-
-    def without_idle_terms(self, rows, run: SolverRun) -> SolverRun:
-        """The run with premises as stiff as leaves every term true somewhere."""
-        for _ in range(_MOST_STIFFER):
-            if not has_idle_term(rows, run.evaluation.antecedent):
-                break
-            penalty = run.start.penalty
-            penalty = replace(penalty, stiffness=10.0 * penalty.stiffness)
-            run = self.run(rows, replace(run.start, penalty=penalty), is_watched=False)
-        return run
-
-    def with_rules_that_hold(self, rows, apart: SolverRun) -> SolverRun:
-        """The run with so much agreement that the strongest rule holds alone, if that is cheap."""
-        run = apart
-        while (penalty := more_agreement(run.problem, run.evaluation)) is not None:
-            start = replace(run.start, penalty=penalty)
-            if self.solver.goes_on_from_tuning:
-                start = replace(start, displacement=run.displacement)
-            run = self.run(rows, start, is_watched=False, is_settled=True)
-            if not is_affordable(run.evaluation, apart.evaluation):
-                return apart
-        return run
-
     def run(
-        self, rows: StandardisedData, start: Start, is_watched=True, is_settled=False
+        self, rows: StandardisedData, start: Start, is_watched=True
     ) -> SolverRun:
         """One run of the solver from a start; its iterations are told where it is watched."""
         estimator, displacement = self.estimator, start.displacement
@@ -265,7 +213,7 @@ class _Fit:
         solver = self.solver
         if rows.sample is not None:
             problem = problem.on_all(rows)
-        elif self.rows.sample is not None and not is_settled and self.is_projecting:
+        elif self.rows.sample is not None and self.is_projecting:
             solver = clone(solver).set_params(tol=_THOROUGH * solver.tol)
         result = solver.solve(
             problem,
@@ -322,7 +270,7 @@ class _Fit:
                 break
             # What the first start makes of outliers need not be read.
             is_kept = turn > 0 or n_starts == 1
-            first_run = self.readable_run if is_kept else self.run
+            first_run = self.run_from if is_kept else self.run
             run = first_run(reweighted(rows, weights), start)
             run, weights = self.settled(rows, run, weights, epsilon)
         assert run is not None
@@ -454,13 +402,6 @@ def _premise(rows: StandardisedData, start: Start) -> Premise:
     """What moves at a start, within the box of the data."""
     low, high = rows.inputs.box
     return Premise.of(start.antecedent, low, high, start.is_free)
-
-
-def _as_tuned(rows: StandardisedData, start: Start) -> Antecedent:
-    """The rule base with its premises where tuning has found them."""
-    premise = _premise(rows, start)
-    x = np.zeros(premise.size) if start.displacement is None else start.displacement
-    return start.antecedent.with_parameters(premise.parameters(x))
 
 
 def _is_of_one_size(one: Start, other: Start) -> bool:
