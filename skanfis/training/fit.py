@@ -11,7 +11,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,19 +27,16 @@ from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
-from ..posterior import Posterior, effective_premises
+from ..posterior import Posterior
 from ..search import (
     SampleSize,
     Start,
     StructureRequest,
     effective_weight,
     report_constant,
-    with_premises,
 )
 from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
-from .knowing import grown
-from .left_out import leave_group_out_error
 from .outermost import told_by_outermost
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
@@ -85,20 +81,6 @@ def fit_rules(
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
 
-    may_grow = request.is_searched and request.partition in ("auto", "grid")
-    if data.wishes is None or not may_grow:
-        return _fitted(estimator, data, request, callbacks)
-
-    def fit(counts=None, is_noisy=False):
-        if counts is None:
-            return _fitted(estimator, data, request, callbacks, is_trial=True)
-        grid = replace(request, n_mfs=counts, partition="grid", is_noisy=is_noisy)
-        return _fitted(estimator, data, grid, None, is_trial=True)
-
-    return grown(data.wishes, request.premise_inputs, fit)
-
-
-def _fitted(estimator, data, request, callbacks, is_trial=False) -> Fitted:
     fit = _Fit(estimator, data, request, callbacks)
     report_constant(fit.rows, data.input_names)
     weights = None
@@ -110,9 +92,6 @@ def _fitted(estimator, data, request, callbacks, is_trial=False) -> Fitted:
     fit.warn_unless_converged(run)
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
     fitted = fit.frozen(run, weights)
-    if is_trial:
-        trial = fit.constrained(fitted, run, is_trial)
-        return replace(trial, proven=partial(fit.sure, fitted, run, robust))
     return fit.sure(fitted, run, robust)
 
 
@@ -322,12 +301,6 @@ class _Fit:
         n_rows = effective_weight(run.problem.rows)
         return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
 
-    @property
-    def n_units(self):
-        """How many rows there are by weight, or, where they are given, groups."""
-        groups = (self.rows.sample or self.rows).groups
-        return effective_weight(self.rows) if groups is None else np.unique(groups).size
-
     def frozen(self, run, weights) -> Fitted:
         """What the run leaves, of which no deviations are known yet."""
         firing = self.builder.firing(run.evaluation)
@@ -338,7 +311,6 @@ class _Fit:
             redundant_rules(rule_statistics(self.rows, firing)),
             weights,
             run.validation_losses,
-            n_units=self.n_units,
         )
 
     def sure(self, fitted, run, robust) -> Fitted:
@@ -349,7 +321,7 @@ class _Fit:
         fitted = replace(fitted, model=model)
         return fitted if self.data.wishes is None else self.constrained(fitted, run)
 
-    def constrained(self, fitted, run, is_trial=False) -> Fitted:
+    def constrained(self, fitted, run) -> Fitted:
         """The nearest model that keeps what is known, its result, and a report."""
         evaluation, model, wishes = run.evaluation, fitted.model, self.data.wishes
         if evaluation.normal is None:
@@ -357,7 +329,7 @@ class _Fit:
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         in_user_units = self.builder.in_user_units
         evaluation, report, solved = constrained(
-            model, evaluation, run.problem, wishes, in_user_units, is_trial
+            model, evaluation, run.problem, wishes, in_user_units
         )
         model = replace(model, coefficients=in_user_units(evaluation.coefficients))
         target = model.target.within(wishes.lower, wishes.upper, wishes.values)
@@ -369,25 +341,7 @@ class _Fit:
             model=model,
             result=replace(run.result, evaluation=evaluation),
             constraints=report,
-            expected_error=partial(self.expected_error, run, evaluation, solved),
         )
-
-    def expected_error(self, run, evaluation, solved):
-        """Mean squared error on new rows of consequents that keep what is known.
-
-        That of rows left out one by one, or of groups, with what holds the consequents back held.
-        """
-        rows, problem = run.problem.rows, run.problem.on_sample or run.problem
-        n_rows = effective_weight(rows)
-        held = solved.held(evaluation.normal.factor)
-        if problem.rows.groups is None or self.n_units == 1:
-            left_out = problem.leave_one_out_error(evaluation, n_rows, held)
-        else:
-            left_out = leave_group_out_error(problem, evaluation, held)
-        n_premises = 0.0
-        if self.solver.moves_premises:
-            n_premises = effective_premises(run.problem, run.premise, evaluation)
-        return with_premises(left_out, n_premises / n_rows)
 
 
 def _object_for(given, by_word):
