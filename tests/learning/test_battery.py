@@ -7,12 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
-from skanfis.learning import SOLVERS, SolverResult
+from skanfis.learning import MESSAGES, SOLVERS, SolverResult
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
-from skanfis.learning.solver_result import MESSAGES
 
 from .. import oracles
 from .test_varpro import Recording, planted, start_of

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.learning import Hybrid
 from skanfis.learning.data import Scale, StandardisedData
-from skanfis.learning.hybrid import NaturalPremise, StepSize
+from skanfis.learning.descent import NaturalPremise, StepSize
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise

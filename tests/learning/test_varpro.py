@@ -8,11 +8,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import optimize
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.learning import MESSAGES
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
-from skanfis.learning.solver_result import MESSAGES
 from skanfis.learning.varpro import trust_region_step, varpro
 from skanfis.membership import Bell, Gaussian
 
