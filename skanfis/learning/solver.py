@@ -1,4 +1,4 @@
-"""What a solver is: an object with settings of its own that finds the premises; and what it returns.
+"""What a solver is, an object with settings of its own that finds the premises; what it returns.
 
 The simplest is here too: least squares alone, which leaves the premises where they start.
 """
