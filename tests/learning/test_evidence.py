@@ -626,5 +626,3 @@ def surface(n_rows, noise, seed=0):
     g = np.random.default_rng(seed)
     X = g.uniform(-1.0, 1.0, (n_rows, 2))
     return X, np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + noise * g.normal(size=n_rows)
-
-
