@@ -105,8 +105,13 @@ class OrderedTerms:
         low, high = low - margin, high + margin
         gaps = np.diff(np.concatenate([[low], values, [high]]))
         n = gaps.size
-        basis = _LOG_UNIT * np.tril(np.ones((n, n - 1)), -1)
-        inverse = np.diff(np.eye(n), axis=0) / _LOG_UNIT
+        if is_free:
+            # Orthonormal columns that sum to zero: right singular vectors of ones.
+            basis = np.linalg.svd(np.ones((1, n)))[2][1:].T
+            inverse = basis.T
+        else:
+            basis = _LOG_UNIT * np.tril(np.ones((n, n - 1)), -1)
+            inverse = np.diff(np.eye(n), axis=0) / _LOG_UNIT
         return cls(locations, widths, terms, low, high, np.log(gaps), basis, inverse)
 
     def width_bounds(self, own, parameters):
