@@ -9,27 +9,18 @@ from shlex import join
 from .fresh import alone, run_benchmark
 from .report import Results, machine, markdown
 
-ALWAYS = ("jang", "gyro", "campaign", "one_pass", "memory", "one_row", "file_size", "command")
+ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "file_size", "command")
 ON_REQUEST = (
-    "compensation",
-    "solvers",
-    "partitions",
-    "certain",
-    "deviation",
-    "structure",
     "real_sets",
     "battery",
-    "blow_ups",
-    "how_sure",
     "small_problems",
-    "between",
-    "start",
-    "peers",
-    "fuzz_fis",
-    "compiled",
+    "how_sure",
+    "certain",
+    "compensation",
+    "solvers",
+    "c_code",
     "large_data",
     "long_logs",
-    "workers",
 )
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
@@ -54,11 +45,9 @@ def parse():
         type=int,
         default=10_000_000,
         metavar="N",
-        help="large_data, workers: rows on the cluster (0: none); long_logs: rows of a log",
+        help="long_logs: rows of a log",
     )
-    many = parser.add_argument_group(
-        "real_sets, battery, blow_ups, small_problems, between, how_sure"
-    )
+    many = parser.add_argument_group("real_sets, battery, small_problems, how_sure")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")

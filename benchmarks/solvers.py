@@ -21,7 +21,6 @@ from skanfis.learning.objective import SeparableProblem
 
 from .gyro import SIGMA, make_surface, score
 from .jang import PROBLEMS
-from .lbfgs import LBFGS
 from .report import Measure, Results, Row, Table
 from .timing import side_by_side
 
@@ -33,8 +32,6 @@ _STEP_SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SOLVERS = [
     ("varpro", VariableProjection(), _EPOCHS),
     ("varpro, tol=1e-6", VariableProjection(tol=1e-6), _EPOCHS),
-    ("lbfgs", LBFGS(), _EPOCHS),
-    ("lbfgs, tol=1e-6", LBFGS(tol=1e-6), 10 * _EPOCHS),
     ("lse", LeastSquares(), 1),
 ]
 _ROUNDS = 2
