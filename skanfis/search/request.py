@@ -9,29 +9,22 @@ from sklearn import get_config
 from sklearn.base import clone
 from sklearn.utils.validation import has_fit_parameter
 
-from .._callers import names_in_pipeline
 from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..learning.data import StandardisedData
 from ..learning.evidence import FREE
 from ..membership import Membership
 from ..model import TSKModel
-from .between import is_told
 from .clusters import clustered_antecedent
-from .given import tuned_start
 from .grid import Spacing, grid_antecedent
-from .imported import imported_antecedent
-from .sample import ENOUGH_ROWS, SampleSize, effective_weight
+from .sample import effective_weight, n_distinct_inputs
 from .search import SEARCHED, StructureSearch
-from .size import GridSize, RuleBaseSize, term_counts
-from .start import Start
+from .size import check_clusters_fit, check_grid_fits, term_counts
+from .start import Start, imported_antecedent, tuned_start
 from .tuning import scaled
 
-__all__ = ["OVERLAP", "StructureRequest", "report_constant"]
+__all__ = ["StructureRequest", "report_constant"]
 
-# Neighbouring terms of a grid cross at this membership at the start. From the customary 0.5, Jang's
-# sinc gets stuck; elsewhere it makes little difference (benchmarks/start.py).
-OVERLAP = 0.6
 _MIB = 2**20
 
 
@@ -58,8 +51,6 @@ class StructureRequest:
         Of the inputs.
     other_families : sequence of type of Membership
         For all inputs in place of ``families``, where they promise a smaller error.
-    is_noisy : bool
-        Whether it is known already that what rules that are given leave of the target is noise.
     """
 
     n_mfs: Any
@@ -73,7 +64,6 @@ class StructureRequest:
     seed: int
     names: Sequence[str]
     other_families: Sequence[type[Membership]] = ()
-    is_noisy: bool = False
 
     @property
     def is_searched(self):
@@ -84,7 +74,7 @@ class StructureRequest:
             and self.partition in SEARCHED
         )
 
-    def start(self, rows: StandardisedData, size: SampleSize) -> Start:
+    def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
         if self.is_searched:
@@ -96,25 +86,21 @@ class StructureRequest:
                 self.consequent_inputs,
                 self.seed,
                 self.weights,
-                OVERLAP,
                 self.other_families,
             ).run(self.partition)
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
-            warned = self._warn_if_underdetermined(antecedent.n_rules, rows, size)
-            start = self._tuned(antecedent, rows, is_compared=False)
-            _warn_if_unknown_between(start, warned)
-            return replace(start, term_names=names)
+            self._warn_if_underdetermined(antecedent.n_rules, rows)
+            return replace(self._tuned(antecedent, rows, is_compared=False), term_names=names)
         antecedent = self._antecedent(self.families, rows)
-        warned = self._warn_if_underdetermined(antecedent.n_rules, rows, size)
+        self._warn_if_underdetermined(antecedent.n_rules, rows)
         is_compared = bool(self.other_families)
         best = self._tuned(antecedent, rows, is_compared)
         for family in self.other_families:
             antecedent = self._antecedent([family] * len(self.families), rows)
             other = self._tuned(antecedent, rows, is_compared)
             best = other if other.expected_error < best.expected_error else best
-        _warn_if_unknown_between(best, warned)
         return best
 
     def _antecedent(self, families, rows):
@@ -133,7 +119,6 @@ class StructureRequest:
             self.weights,
             self.premises_move,
             is_compared,
-            self.is_noisy,
         )
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
@@ -159,24 +144,23 @@ class StructureRequest:
         def checked(table, weight):
             labels = np.asarray(label(table, weight))
             n_rules = np.unique(labels[labels >= 0]).size
-            size = RuleBaseSize(
+            check_clusters_fit(
+                f"partition={self.partition!r}",
                 n_rules,
-                n_rules * self.premise_inputs.size,
+                self.premise_inputs.size,
                 1 + self.consequent_inputs.size,
                 rows.y.shape[1],
+                _memory_limit(),
             )
-            size.check_fits(f"partition={self.partition!r}", _memory_limit())
             return labels
 
         return checked
 
     def _grid(self, families, rows):
         counts = self._grid_counts(rows)
-        n_basis = 1 + self.consequent_inputs.size
-        GridSize(counts, n_basis, rows.y.shape[1]).check_grid_fits(
-            self.n_mfs, _memory_limit(), self.names
-        )
-        return grid_antecedent(families, counts, Spacing(rows), OVERLAP)
+        n_basis, n_outputs = 1 + self.consequent_inputs.size, rows.y.shape[1]
+        check_grid_fits(self.n_mfs, counts, n_basis, n_outputs, _memory_limit(), self.names)
+        return grid_antecedent(families, counts, Spacing(rows))
 
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""
@@ -198,15 +182,12 @@ class StructureRequest:
             )
         return counts
 
-    def _warn_if_underdetermined(self, n_rules, rows, size):
-        """Warn where there is less than one distinct row per consequent parameter; whether so."""
+    def _warn_if_underdetermined(self, n_rules, rows):
+        """Warn where there is less than one distinct row per consequent parameter."""
         n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
         n_columns = n_rules * n_basis
-        n_distinct = size.n_distinct_inputs
-        if n_distinct == ENOUGH_ROWS < n_columns:
-            n_distinct = SampleSize.of(rows, n_columns).n_distinct_inputs
-        is_underdetermined = n_columns > n_distinct
-        if is_underdetermined:
+        n_distinct = n_distinct_inputs(rows, enough=n_columns)
+        if n_distinct < n_columns:
             warn_user(
                 f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
                 f"parameters for {n_distinct} distinct training rows: most of what the model says "
@@ -214,21 +195,6 @@ class StructureRequest:
                 "fewer rules.",
                 UnderdeterminedWarning,
             )
-        return is_underdetermined
-
-
-def _warn_if_unknown_between(start, is_warned_already):
-    """Warn where rules that are given say between the rows what no row tells."""
-    if is_warned_already or is_told(start.unknown_between):
-        return
-    warn_user(
-        f"At {start.unknown_between:.0%} of places half-way between training rows the rules are "
-        "less certain than a single row there would make them: rows on few curves, as those of a "
-        "few runs, or too few, do not tell so many terms. Give terms to fewer inputs (n_mfs, "
-        "premise_features), or leave the structure to the default; judge the model on whole runs "
-        "or groups held out.",
-        UnderdeterminedWarning,
-    )
 
 
 def _memory_limit():
@@ -260,10 +226,8 @@ def report_constant(rows, names):
     scale = rows.inputs
     if not scale.is_constant.any():
         return
-    given = names_in_pipeline(names)
-    names, where = (names, "") if given is None else (given, " after the steps in front")
     flat = [
-        f"{name!r} (always {value + 0.0:.6g}{where})"  # 0, not -0
+        f"{name!r} (always {value + 0.0:.6g})"  # 0, not -0
         for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
         if is_flat
     ]

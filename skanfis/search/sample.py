@@ -1,13 +1,10 @@
 r"""How many rows there are, and which of them a search looks at.
 
-There is no one number of rows. *Weight* is what a criterion counts: a whole weight is so many
-copies of a row. Weights that are less than whole cannot be copies; then the size of an unweighted
-sample of the same precision stands for it, W^2 / sum s^2 (Kish 1965), where that is more. *Distinct
-rows* and *distinct inputs* bound what can be told apart: calibration tables repeat their inputs
-many times, and each repeat is information on the noise, but none on the shape.
+*Weight* is what a criterion counts: a whole weight is so many copies of a row. Weights that are
+less than whole cannot be copies; then the size of an unweighted sample of the same precision stands
+for it, W^2 / sum s^2 (Kish 1965), where that is more. *Distinct inputs* bound what can be told
+apart: calibration tables repeat their inputs, and each repeat is information on the noise alone.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +12,8 @@ from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import Scale, StandardisedData, fingerprint
 
 __all__ = [
-    "ENOUGH_ROWS",
-    "SampleSize",
+    "effective_weight",
+    "n_distinct_inputs",
     "representative_rows",
     "search_sample",
     "unit_scale",
@@ -25,32 +22,16 @@ __all__ = [
 
 # More rows than this tell a clustering nothing new.
 _MOST_ROWS = 20_000
-# Distinct rows are counted up to here, unless more are asked for.
-ENOUGH_ROWS = 20_000
 
 
-@dataclass(frozen=True)
-class SampleSize:
-    """The sizes of one set of rows; the distinct ones as far as they have been counted."""
-
-    n_rows: int
-    n_distinct_rows: int
-    n_distinct_inputs: int
-    weight: float
-
-    @classmethod
-    def of(cls, rows: StandardisedData, enough=ENOUGH_ROWS):
-        """Count, up to ``enough`` distinct ones."""
-        inputs, whole = np.empty(0), np.empty(0)
-        for part in row_blocks(rows.n_rows, BLOCK_ROWS):
-            Z, target, _ = rows.read(part)
-            inputs = np.union1d(inputs, fingerprint(Z))
-            whole = np.union1d(whole, fingerprint(np.vstack([Z, target])))
-            if inputs.size >= enough:
-                break
-        return cls(
-            rows.n_rows, min(whole.size, enough), min(inputs.size, enough), effective_weight(rows)
-        )
+def n_distinct_inputs(rows: StandardisedData, enough: int) -> int:
+    """How many different inputs the rows have, counted up to ``enough``."""
+    inputs = np.empty(0)
+    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+        inputs = np.union1d(inputs, fingerprint(rows.read(part)[0]))
+        if inputs.size >= enough:
+            return enough
+    return inputs.size
 
 
 def effective_weight(rows: StandardisedData):

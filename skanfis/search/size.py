@@ -1,86 +1,63 @@
-"""How many terms and rules: what the user asked for, what fits into memory, what data hold."""
+"""How many terms and rules: what the user asked for, and what fits into memory."""
 
-from collections.abc import Sequence
 from math import prod
 from numbers import Integral
 
 import numpy as np
 
-__all__ = ["GridSize", "RuleBaseSize", "term_counts"]
+__all__ = ["check_clusters_fit", "check_grid_fits", "term_counts"]
 
 # Of one term, whatever its family: what a limit on memory reckons with.
 _MOST_PREMISE_PARAMETERS = 4
-# Square matrices over all consequent parameters that exist at one time.
+# Square matrices over all consequent parameters that exist at one time: the Gram matrix, its
+# moments, local form and factor; the disagreement, the parts of the penalty, and copies of these.
 _SQUARES = 14
 
 
-class RuleBaseSize:
-    """What a rule base amounts to, found without building any of it.
-
-    Parameters
-    ----------
-    n_rules, n_terms : int
-        Rules, and terms of all inputs.
-    n_basis, n_outputs : int
-        Coefficients per rule and output; outputs.
-    """
-
-    def __init__(self, n_rules: int, n_terms: int, n_basis: int, n_outputs: int = 1):
-        self.n_rules = n_rules
-        self.n_columns = n_rules * n_basis
-        side = self.n_columns + n_outputs
-        n_premise = _MOST_PREMISE_PARAMETERS * n_terms
-        # The Gram matrix, its moments, local form and factor; the disagreement, the three parts of
-        # the penalty and their sum, and copies of these; the table of terms against rules; the
-        # same for the premises, and their products with the design.
-        self.n_bytes = 8 * (
-            _SQUARES * side**2
-            + n_terms * n_rules
-            + 4 * n_premise**2
-            + 2 * n_premise * self.n_columns
-        )
-
-    def check_fits(self, what, limit):
-        """Raise ValueError where training would need more than ``limit`` bytes."""
-        if self.n_bytes > limit:
-            raise ValueError(
-                f"{what} makes {_count(self.n_rules)} rules with {_count(self.n_columns)} "
-                f"consequent parameters; training them would take {_bytes(self.n_bytes)}, and the "
-                f"limit is {_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). Use "
-                "fewer clusters, or constants as consequents (order=0)."
-            )
+def n_bytes(n_rules: int, n_terms: int, n_basis: int, n_outputs: int) -> int:
+    """What training so many rules takes, of ``n_terms`` of all inputs."""
+    n_columns, n_premise = n_rules * n_basis, _MOST_PREMISE_PARAMETERS * n_terms
+    squares = _SQUARES * (n_columns + n_outputs) ** 2 + 4 * n_premise**2
+    return 8 * (squares + n_terms * n_rules + 2 * n_premise * n_columns)
 
 
-class GridSize(RuleBaseSize):
-    """What a full grid amounts to.
-
-    Parameters
-    ----------
-    counts : sequence of int
-        Terms per input.
-    n_basis, n_outputs : int
-        Coefficients per rule and output; outputs.
-    """
-
-    def __init__(self, counts: Sequence[int], n_basis: int, n_outputs: int = 1):
-        n_terms = sum(count for count in counts if count > 1)
-        super().__init__(prod(counts), n_terms, n_basis, n_outputs)
-
-    def check_grid_fits(self, n_mfs, limit, names):
-        """Raise ValueError where training would need more than ``limit`` bytes."""
-        if self.n_bytes <= limit:
-            return
-        smallest = GridSize([2] * len(names), 1 + len(names))
-        hint = f"n_mfs=2 makes {smallest.n_rules:,} rules; " if smallest.n_bytes <= limit else ""
+def check_clusters_fit(what, n_rules, n_premise_inputs, n_basis, n_outputs, limit):
+    """Raise ValueError where training scattered rules would need more than ``limit`` bytes."""
+    needed = n_bytes(n_rules, n_rules * n_premise_inputs, n_basis, n_outputs)
+    if needed > limit:
         raise ValueError(
-            f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {_count(self.n_rules)} rules "
-            f"with {_count(self.n_columns)} consequent parameters; training it would take "
-            f"{_bytes(self.n_bytes)}, and the limit is {_bytes(limit)} "
-            "(sklearn.set_config(working_memory=...), in MiB). Use fewer terms: "
-            f"{hint}give one number per input, 1 for an input that needs no fuzzy terms; or use "
-            "scattered rules, whose number does not grow with the inputs: partition=KMeans("
-            "n_clusters=...)."
+            f"{what} makes {_too_large(n_rules, n_basis, 'them', needed, limit)} Use fewer "
+            "clusters, or constants as consequents (order=0)."
         )
+
+
+def check_grid_fits(n_mfs, counts, n_basis, n_outputs, limit, names):
+    """Raise ValueError where training a grid of ``counts`` would need more than ``limit`` bytes."""
+    needed = _bytes_of_grid(counts, n_basis, n_outputs)
+    if needed <= limit:
+        return
+    smallest = [2] * len(names)
+    fits = _bytes_of_grid(smallest, 1 + len(names), 1) <= limit
+    hint = f"n_mfs=2 makes {prod(smallest):,} rules; " if fits else ""
+    size = _too_large(prod(counts), n_basis, "it", needed, limit)
+    raise ValueError(
+        f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {size} Use fewer terms: "
+        f"{hint}give one number per input, 1 for an input that needs no fuzzy terms; or use "
+        "scattered rules, whose number does not grow with the inputs: partition=KMeans("
+        "n_clusters=...)."
+    )
+
+
+def _bytes_of_grid(counts, n_basis, n_outputs):
+    return n_bytes(prod(counts), sum(c for c in counts if c > 1), n_basis, n_outputs)
+
+
+def _too_large(n_rules, n_basis, what, needed, limit):
+    return (
+        f"{_count(n_rules)} rules with {_count(n_rules * n_basis)} consequent parameters; training "
+        f"{what} would take {_bytes(needed)}, and the limit is {_bytes(limit)} "
+        "(sklearn.set_config(working_memory=...), in MiB)."
+    )
 
 
 def _count(number):

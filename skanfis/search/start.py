@@ -1,13 +1,42 @@
-"""Where a training starts from."""
+"""Where training starts: rules in standardised units, weights of the penalty, premises so far.
 
-from dataclasses import dataclass, field
+Rules come from a search, or are given: by terms per input, by a clusterer, by a model. Of rules
+that are given the weights are found in the same way, on a sample. Their terms may leave their
+bounds, as in classic ANFIS, where that leaves less than a tenth of the expected squared error:
+for data next to exact.
+"""
+
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..antecedent import Antecedent
+from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent
+from ..learning.data import StandardisedData
+from ..learning.evidence import FREE, ROWS_EACH
+from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
+from ..learning.premise import Premise
+from ..model import TSKModel
+from .sample import effective_weight, search_sample
+from .tuning import (
+    ARRIVING,
+    FIRST_PENALTY,
+    FIRST_STEPS,
+    MOST_COLUMNS,
+    MOST_TURNS,
+    scaled,
+    settled,
+    tune,
+    tune_unbounded,
+    with_rules_that_hold,
+)
 
-__all__ = ["Start"]
+__all__ = ["Start", "check_inputs", "imported_antecedent", "tuned_start"]
+
+# The weights of rules that are given are found on at most so many representative rows.
+_MOST_ROWS = 1000
+# What terms without bounds must leave of the expected squared error.
+_LESS_ERROR = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,11 +46,90 @@ class Start:
     antecedent: Antecedent
     penalty: Penalty
     displacement: np.ndarray | None = None  # of the premises; None is zero
-    is_free: bool = False  # whether terms may become what nobody can read (see ``premise``)
-    is_apart: bool = False  # the strongest rule does not hold alone, and making it would be dear
+    is_free: bool = False  # whether terms have no bounds (see ``premise``)
     # Agreement is such that the strongest rule holds alone: it does not fall as the rows rise.
     is_held: bool = False
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
     expected_error: float = np.nan  # mean square on new rows, as far as it was sought
-    unknown_between: float = 0.0  # part of the places between the rows (see ``between``)
+
+
+def tuned_start(
+    antecedent: Antecedent,
+    rows: StandardisedData,
+    order,
+    consequent_inputs,
+    weights,
+    premises_move,
+    is_compared=False,
+) -> Start:
+    """A start from rules that are given, with the weights that are not given found on the rows.
+
+    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``;
+    ``is_compared`` says that the error to be expected is wanted even where all of them are given.
+    """
+    free = [key for key in FREE if key not in weights]
+    penalty = replace(FIRST_PENALTY, **weights)
+    if not premises_move:
+        free = [key for key in free if key != "stiffness"]
+        penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
+    if not free and not is_compared:
+        return Start(antecedent, penalty)
+    sample = search_sample(rows, _MOST_ROWS)
+    problem = SeparableProblem(
+        sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
+    )
+    n_sample, box = effective_weight(sample), sample.inputs.box
+    premise, is_free = Premise.of(antecedent, *box), False
+    turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move else (0, ARRIVING)
+    best = tune(problem, premise, free, n_sample, turns, steps)
+    # Any freedom passes through hardly more rows than there are coefficients.
+    has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
+    if premises_move and premise.size and has_rows and problem.n_columns <= MOST_COLUMNS:
+        unbounded = Premise.of(antecedent, *box, is_free=True)
+        freed = tune_unbounded(problem, unbounded, free, n_sample)
+        if freed.expected_error < _LESS_ERROR * best.expected_error:
+            best, premise, is_free = freed, unbounded, True
+    if premises_move and not is_free:
+        best = with_rules_that_hold(best, premise, free, n_sample)
+    return Start(
+        antecedent,
+        scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held),
+        settled(best.displacement),
+        is_free,
+        best.is_held,
+        expected_error=best.expected_error,
+    )
+
+
+def check_inputs(model: TSKModel, names, what):
+    """ValueError where a model is of other inputs than the data; names count if both have them."""
+    if model.n_inputs != len(names):
+        raise ValueError(
+            f"{what} has rules on {model.n_inputs} inputs ({', '.join(model.input_names)}), but X "
+            f"has {len(names)} columns ({', '.join(names)})."
+        )
+    numbered = [f"x{j}" for j in range(len(names))]
+    if list(model.input_names) != list(names) and numbered not in (
+        list(model.input_names),
+        list(names),
+    ):
+        raise ValueError(
+            f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
+            f"are {', '.join(names)}: give them in this order and by these names."
+        )
+
+
+def imported_antecedent(model: TSKModel, rows: StandardisedData) -> Antecedent:
+    """The rule base of a model in the rows' standardised units, ready to be moved."""
+    scale = rows.inputs
+    antecedent = model.antecedent.change_units(-scale.offset / scale.scale, 1.0 / scale.scale)
+    is_in_order = all(
+        (np.diff(group.theta[0, group.inputs == j]) > 0.0).all()
+        for group in antecedent.groups
+        for j in np.unique(group.inputs)
+    )
+    if isinstance(antecedent, GridAntecedent) and not is_in_order:
+        # Terms of a grid move with their distances, which must be positive.
+        return RuleTableAntecedent(antecedent.groups, antecedent.rule_terms)
+    return antecedent

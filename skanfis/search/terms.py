@@ -8,7 +8,6 @@ import numpy as np
 from .._threads import one_blas_thread
 from ..learning.data import StandardisedData
 from ..membership import Gaussian
-from .request import OVERLAP
 from .search import StructureSearch
 
 __all__ = ["TermsFound", "search_terms"]
@@ -45,9 +44,8 @@ def search_terms(
 ) -> TermsFound:
     """Find how many Gaussian terms each input needs, as ``ANFISRegressor`` does with ``groups``.
 
-    The regressor cuts its folds by one kind of groups. Where rows are alike in two ways, as those
-    of a run and those of a rate level are, a fold holds out both, and some rows are neither trained
-    on nor held out: such folds have to be given.
+    The regressor cuts its folds by one kind of groups; where a fold holds out groups of two kinds,
+    and some rows are neither trained on nor held out, such folds have to be given.
 
     Parameters
     ----------
@@ -69,13 +67,8 @@ def search_terms(
     inputs = np.arange(X.shape[1])
 
     def split(kept):
-        return [
-            (train, test)
-            for train, test in (
-                [np.flatnonzero(np.isin(kept, part)) for part in fold] for fold in folds
-            )
-            if train.size > 1 and test.size
-        ]
+        parts = [[np.flatnonzero(np.isin(kept, part)) for part in fold] for fold in folds]
+        return [(train, test) for train, test in parts if train.size > 1 and test.size]
 
     with one_blas_thread():
         search = StructureSearch(
@@ -86,13 +79,10 @@ def search_terms(
             consequent_inputs=inputs,
             seed=0,
             fixed={},
-            overlap=OVERLAP,
             max_rules=max_rules,
             split=split,
         )
         best = search.choose("grid")
-    tried: dict = {}
-    for candidate in search.trials.scores:
-        error = float(rows.targets.scale[0] * search.trials.error(candidate))
-        tried[candidate.counts] = min(error, tried.get(candidate.counts, np.inf))
-    return TermsFound(best.counts, tuple(tried.items()))
+    scale, trials = float(rows.targets.scale[0]), search.trials
+    tried = tuple((one.counts, scale * float(trials.error(one))) for one in trials.scores)
+    return TermsFound(best.counts, tried)

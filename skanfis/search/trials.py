@@ -1,22 +1,13 @@
 r"""Short trainings of candidate structures on a sample of the rows, and what each is worth.
 
-No row is held out where the rows are all that is known: the weights of every candidate's penalty
-are found by the evidence (``tuning``), and its error on rows that are left out one by one follows
-from the training on all of them (``Tuned.expected_error``). A candidate with a term that is hardly
-true on any row is out of the running, as is one that the rows do not tell between them
-(``between``); one whose strongest rule does not hold alone must be as much better as rules that
-hold are worth. docs/mathematics.rst has the other criteria on the same data: the evidence itself,
-which ranks penalties well, but is too sparing with rules, and the final prediction error.
-
-Those that are tried together are begun where they promise most, before any premise moves, and
-trained out where they lead after a turn.
+No row is held out: the weights of every candidate's penalty are found by the evidence (``tuning``),
+and its error on rows left out one by one follows from the training on all of them
+(``Tuned.expected_error``). Out of the running are candidates with a term that is hardly true on any
+row, and those that the rows do not tell between them (``_unknown_between``).
 
 Rows that come in groups, runs of an instrument say, are more alike within a group than any
 criterion on the same rows can know. Where the groups are given, the score is instead the error of
 short trainings on the groups that are left out, a fifth of them at a time.
-
-Beyond two thousand rows, one thousand in groups, the candidates see representative rows only: all
-then takes no longer, whatever the number of rows.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,36 +16,36 @@ from dataclasses import replace
 import numpy as np
 from sklearn.model_selection import GroupKFold
 
+from ..antecedent import Antecedent
+from ..blocks import BLOCK_ROWS
+from ..consequent import basis, rule_outputs
 from ..learning.data import StandardisedData
 from ..learning.evidence import FREE
 from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
-from ..membership import Membership
-from .between import expected_between, is_told, places_between, unknown_between
-from .candidate import Candidate, RuleBases
+from ..membership import LEAST_TRUTH, Membership
+from .candidates import Candidate, RuleBases
 from .grid import Spacing
-from .held_out import held_out_loss
-from .readable_terms import has_idle_term
 from .sample import effective_weight, search_sample, unit_scale
-from .tuning import FIRST_PENALTY, FIRST_STEPS, HOLDING, Tuned, tune
+from .tuning import FIRST_PENALTY, FIRST_STEPS, Tuned, tune
 
-__all__ = ["Trials"]
+__all__ = ["Trials", "held_out_loss"]
 
-# Candidates are compared on at most so many representative rows. Twice as many as rules that are
-# given need: to tell candidates apart takes more than to find the weights of one. Rows of one group
-# are alike, and every candidate is trained once for each part that is left out.
+# Candidates are compared on at most so many representative rows. Rows of one group are alike, and
+# every candidate is trained once for each part that is left out.
 _MOST_ROWS, _MOST_ROWS_IN_GROUPS = 2000, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 2
-# Turns of weights and premises of a candidate; after the first of them, those whose expected error
-# is beyond the best one's by this factor are left as they are.
-_TURNS, _FIRST_TURNS = 4, 1
-_BEHIND = 1.15
-# But where less than this is left of the target's variance, premises have a long way to go, and the
-# first turn says little of the last.
-_NEARLY_EXACT = 0.01
+# Turns of weights and premises of a candidate.
+_TURNS = 4
 # As cross-validation has by custom: more cost time, and tell little more.
 _MOST_FOLDS = 5
+# Places between rows; each half-way between a row and the nearest of so many others, for between
+# rows far apart, as those of two clusters, lies what hardly any new row comes to.
+_MOST_PLACES, _OTHERS, _SEED = 200, 20, 0
+# Three rows far off among sixty come to a twentieth, structures told by three runs alone to a tenth
+# and more; docs/mathematics.rst has what other parts give.
+_MOST_UNKNOWN = 0.075
 
 
 class Trials:
@@ -73,8 +64,6 @@ class Trials:
         Of the clustering.
     fixed : dict
         The weights of the penalty that are given, by their names in ``evidence.FREE``.
-    overlap : float
-        Membership at which neighbouring terms of a grid cross.
     split : callable, optional
         From the groups of some rows to training and held-out positions of every fold; none where
         the groups say nothing.
@@ -85,8 +74,6 @@ class Trials:
         Of all that were tried, in the order of trial.
     sample : StandardisedData
         The rows that candidates see.
-    first : Penalty
-        The weights that candidates begin with, which may be set to the best so far.
     """
 
     def __init__(
@@ -98,7 +85,6 @@ class Trials:
         consequent_inputs: np.ndarray,
         seed,
         fixed: dict,
-        overlap: float,
         split: Callable | None = None,
     ):
         self.order, self.consequent_inputs = order, consequent_inputs
@@ -107,90 +93,57 @@ class Trials:
         most = _MOST_ROWS if rows.groups is None else _MOST_ROWS_IN_GROUPS
         self.sample = search_sample(rows, most)
         self.spacing = Spacing(self.sample)
-        self.rule_bases = RuleBases(families, inputs, self.spacing, overlap, seed)
-        self.places = places_between(self.sample)
-        self.n_sample = effective_weight(self.sample)
-        self.n_all = effective_weight(rows)
-        self._incumbent: Tuned | None = None
-        self._to_beat: np.ndarray | float = 0.0
-        self.scores: dict[Candidate, float] = {}
+        self.rule_bases = RuleBases(families, inputs, self.spacing, seed)
+        self.places = _places_between(self.sample)
+        self.n_sample, self.n_all = effective_weight(self.sample), effective_weight(rows)
         self.folds = (split or _folds)(self.sample.groups)
-        self._found: dict[Candidate, Tuned] = {}
-        self._untrained: dict[Candidate, Tuned] = {}  # of this round
+        self.scores: dict[Candidate, float] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        self._unknown: dict[Candidate, float] = {}
+        self._found: dict[Candidate, Tuned] = {}
+        self._to_beat: np.ndarray | float = 0.0
 
     def beat(self, best: Candidate):
-        """Have candidates compared with the best so far, and grids begin with its terms."""
-        incumbent = self.tuned(best)
-        if incumbent is not self._incumbent:
-            self._incumbent = incumbent
-            self._to_beat = expected_between(incumbent, self.places)
+        """Have candidates compared with the best so far at places between rows."""
+        self._to_beat = _error_between(self.tuned(best), self.places)[1]
 
     def promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
-        self._untrained = {
-            candidate: self.train(candidate, self.sample, turns=0, first_steps=_STEPS_TO_PROMISE)
+        self._begun = {
+            candidate: self._train(candidate, self.sample, 0, _STEPS_TO_PROMISE)
             for candidate in candidates
-            if not self._is_too_many(candidate, self.sample.n_rows)
+            if not _is_too_many(candidate, self.sample.n_rows)
         }
-        return sorted(self._untrained, key=lambda c: self._promise(self._untrained[c]))
+        return sorted(self._begun, key=lambda c: self.expected(self._begun[c]))
 
-    def _promise(self, tuned):
-        """What goes first: rules that the rows tell, and among these the least expected error."""
-        are_told = bool(self.folds) or is_told(unknown_between(tuned, self.places, self._to_beat))
-        return not are_told, self.expected(tuned)
+    def tuned(self, candidate: Candidate) -> Tuned:
+        """The end of a candidate's training."""
+        if candidate not in self._found:
+            begun = self._begun.get(candidate)
+            self._found[candidate] = self._train(candidate, self.sample, begun=begun)
+        return self._found[candidate]
 
-    def leading(self, candidates, before):
-        """The best of some candidates, of which only those are trained out that may still lead.
-
-        ``before`` is what they are to be better than.
-        """
-        if not self.folds:
-            for candidate in candidates:
-                if candidate not in self._found:
-                    tuned = self.train(candidate, self.sample, _FIRST_TURNS)
-                    # Without terms that move there is nothing to train out.
-                    (self._begun if tuned.is_trained else self._found)[candidate] = tuned
-            errors = [self.expected({**self._begun, **self._found}[c]) for c in candidates]
-            least = min(*errors, self.expected(self.tuned(before)))
-            for candidate, error in zip(candidates, errors, strict=True):
-                is_behind = error > _BEHIND * least > _NEARLY_EXACT
-                if is_behind and candidate in self._begun:
-                    self._found[candidate] = self._begun.pop(candidate)
-        return min(candidates, key=self.score)
-
-    def leaves_noise(self, best: Candidate):
-        """Whether the best so far leaves more than data next to exact do."""
-        return self.expected(self.tuned(best)) > _NEARLY_EXACT
-
-    def score(self, candidate):
+    def score(self, candidate: Candidate) -> float:
         """N log of the expected error, or the error on groups left out."""
         if candidate not in self.scores:
-            self.scores[candidate] = self._train_and_score(candidate)
+            self.scores[candidate] = self._scored(candidate)
         return self.scores[candidate]
 
-    def _train_and_score(self, candidate):
-        if self._is_too_many(candidate, self.sample.n_rows):
+    def _scored(self, candidate):
+        if _is_too_many(candidate, self.sample.n_rows):
             return np.inf
         if self.folds:
-            return self._held_out_score(candidate)
+            return self._held_out_error(candidate)
         tuned = self.tuned(candidate)
-        self._unknown[candidate] = unknown_between(tuned, self.places, self._to_beat)
-        if not is_told(self._unknown[candidate]):
+        if self._unknown_between(tuned) > _MOST_UNKNOWN:
             return np.inf
-        if has_idle_term(self.sample, tuned.evaluation.antecedent):
+        if _has_idle_term(self.sample, tuned.evaluation.antecedent):
             return np.inf
-        # What it would have cost is the least that rules which hold are worth.
-        error = (HOLDING if tuned.is_apart else 1.0) * self.expected(tuned)
         # As the evidence, in units of twice the logarithm of a probability.
         with np.errstate(divide="ignore"):
-            return self.n_sample * tuned.posterior.n_outputs * np.log(error)
+            return self.n_sample * tuned.posterior.n_outputs * np.log(self.expected(tuned))
 
-    def expected(self, tuned):
+    def expected(self, tuned: Tuned) -> float:
         """Squared error expected on new rows, of a training on all rows and not the sample.
-
-        The mean over rows, summed over outputs.
 
         What the parameters cost, k / n of the noise's variance, falls as the rows rise.
         """
@@ -198,51 +151,47 @@ class Trials:
         on_sample, on_all = n_effective / self.n_sample, n_effective / self.n_all
         return tuned.expected_error * (1.0 + on_all) / (1.0 + on_sample)
 
-    def error(self, candidate):
+    def error(self, candidate: Candidate) -> float:
         """RMS on the rows left out, or what is expected on new ones; of the standardised target."""
         if self.folds:
             return self.score(candidate)
         return np.sqrt(self.expected(self.tuned(candidate)))
 
-    def tuned(self, candidate):
-        """The end of a candidate's training."""
-        if candidate not in self._found:
-            begun = self._begun.pop(candidate, None)
-            self._found[candidate] = self.train(candidate, self.sample, begun=begun)
-        return self._found[candidate]
+    def _unknown_between(self, tuned):
+        """The part of the places between rows where a single row would tell more than all do.
 
-    @staticmethod
-    def _is_too_many(candidate, n_rows):
-        return candidate.clustering in ("k-means", "fcm") and candidate.size > n_rows
+        Unless the error to be expected there, (1 + leverage) sigma^2, is no more than that of the
+        smaller model which would be taken instead.
+        """
+        if tuned.problem.antecedent.n_rules == 1:
+            return 0.0
+        leverage, error = _error_between(tuned, self.places)
+        return float(np.mean((leverage > 1.0) & (error > self._to_beat)))
 
-    def _held_out_score(self, candidate):
+    def _held_out_error(self, candidate):
         """Root of the mean squared error on groups left out, in the range of the others.
 
-        What is beyond it is for the policy out of bounds, not for the structure: a handful of such
-        rows would otherwise decide.
+        What is beyond it is for the policy out of bounds, not for the structure.
         """
         total = weight = 0.0
         for training, held_out in self.folds:
             part, rest = self.sample.part(training), self.sample.part(held_out)
             low, high = part.X.min(axis=0), part.X.max(axis=0)
             rest = rest.part(((low <= rest.X) & (high >= rest.X)).all(axis=1))
-            if self._is_too_many(candidate, part.n_rows):
+            if _is_too_many(candidate, part.n_rows):
                 return np.inf
             if rest.n_rows == 0:
                 continue
             scale = unit_scale(part.X)
-            tuned = self.train(candidate, replace(part, inputs=scale))
+            tuned = self._train(candidate, replace(part, inputs=scale))
             rest = replace(rest, inputs=scale)
             loss = held_out_loss(rest, self.consequent_inputs, tuned.evaluation)
             total += rest.total_weight * loss
             weight += rest.total_weight
         return np.sqrt(total / weight) if weight else np.inf
 
-    def train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
-        """A short training on some rows, from the weights that were best so far."""
-        is_last = turns == _TURNS
-        if begun is None and rows is self.sample:
-            begun = self._untrained.get(candidate)
+    def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
+        """A short training on some rows."""
         if begun is None:
             problem = SeparableProblem(
                 rows,
@@ -251,39 +200,11 @@ class Trials:
                 self.first,
                 consequent_inputs=self.consequent_inputs,
             )
-        elif begun.is_trained:
-            problem, turns = begun.problem, turns - _FIRST_TURNS
         else:
             problem, first_steps = begun.problem, first_steps - _STEPS_TO_PROMISE
-        antecedent = problem.antecedent
-        premise = Premise.of(antecedent, rows.inputs.minimum, rows.inputs.maximum)
-        return tune(
-            problem,
-            premise,
-            self.free,
-            effective_weight(rows),
-            turns,
-            first_steps,
-            self._inherited(antecedent, premise) if begun is None else None,
-            begun=begun,
-            is_last=is_last,
-        )
-
-    def _inherited(self, antecedent, premise):
-        """Displacements at which a grid has the incumbent's terms, where it has as many of them."""
-        if self._incumbent is None or antecedent.grid_counts is None:
-            return None
-        before = self._incumbent.evaluation.antecedent
-        theta = [group.theta.copy() for group in antecedent.groups]
-        for group, own in zip(antecedent.groups, theta, strict=True):
-            for j in np.unique(group.inputs):
-                mine = group.inputs == j
-                for other in before.groups:
-                    its = other.inputs == j
-                    if other.family is group.family and its.sum() == mine.sum():
-                        own[:, mine] = other.theta[:, its]
-        raw = np.concatenate([own.ravel() for own in theta] or [np.empty(0)])
-        return np.clip(premise.displacement(raw), premise.lower, premise.upper)
+        premise = Premise.of(problem.antecedent, rows.inputs.minimum, rows.inputs.maximum)
+        weight = effective_weight(rows)
+        return tune(problem, premise, self.free, weight, turns, first_steps, begun=begun)
 
     def report(self):
         """Every candidate in words and numbers, best first."""
@@ -297,12 +218,31 @@ class Trials:
                 line["log_evidence"] = float(-0.5 * found.score)
                 for key in ("agreement", "alpha", "stiffness"):
                     line[key] = float(getattr(found.penalty, key))
-            if candidate in self._unknown:
-                line["unknown_between"] = self._unknown[candidate]
             if self.folds:
                 line["held_out_error"] = float(self.scores[candidate])
             lines.append(line)
         return lines
+
+
+def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
+    """Mean squared error of rows that were not trained on, standardised, summed over outputs.
+
+    Rows beyond the training rows' range count as predict holds them, at its edge.
+    """
+    low, high = (edge[:, None] for edge in rows.inputs.box)
+    coefficients = evaluation.coefficients
+    by_rule = coefficients.reshape(evaluation.antecedent.n_rules, -1, coefficients.shape[1])
+    total = 0.0
+    for chunk in rows.chunks(BLOCK_ROWS):
+        for part in chunk:
+            Z, target, weight = rows.read(part)
+            np.clip(Z, low, high, out=Z)
+            strengths = evaluation.antecedent.strengths(Z)
+            basis_rows = basis(Z[consequent_inputs])
+            for k, one in enumerate(by_rule.transpose(2, 0, 1)):
+                squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
+                total += squares.sum() if weight is None else weight @ squares
+    return total / rows.total_weight
 
 
 def _folds(groups):
@@ -311,3 +251,38 @@ def _folds(groups):
         return []
     n_folds = min(_MOST_FOLDS, np.unique(groups).size)
     return list(GroupKFold(n_folds).split(np.empty((groups.size, 0)), groups=groups))
+
+
+def _is_too_many(candidate, n_rows):
+    return candidate.clustering in ("k-means", "fcm") and candidate.size > n_rows
+
+
+def _places_between(rows: StandardisedData):
+    """Places half-way between rows and the nearest of twenty others, (n_inputs, n_places)."""
+    rng, X, n_places = np.random.default_rng(_SEED), rows.X, min(rows.n_rows, _MOST_PLACES)
+    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+    # Rows come as often as they count.
+    upto = np.cumsum(weight / weight.max())
+    quantiles = (np.arange(n_places) + 0.5) / n_places
+    own = np.searchsorted(upto, upto[-1] * quantiles, side="right")
+    others = np.searchsorted(upto, upto[-1] * rng.random((n_places, _OTHERS)), side="right")
+    distance = np.sum((X[others] - X[own][:, None]) ** 2, axis=2)
+    distance[others == own[:, None]] = np.inf
+    nearest = others[np.arange(n_places), distance.argmin(axis=1)]
+    return np.ascontiguousarray(0.5 * (X[own] + X[nearest]).T)
+
+
+def _error_between(tuned: Tuned, places):
+    """Leverage at some places, and the squared error to be expected there."""
+    leverage = tuned.problem.leverage_at(tuned.solved, places, tuned.posterior.n_rows)
+    return leverage, (1.0 + leverage) * tuned.posterior.noise_variance
+
+
+def _has_idle_term(rows: StandardisedData, antecedent: Antecedent) -> bool:
+    """Whether some term's membership is below one half on every row."""
+    greatest = np.full(antecedent.n_terms, -np.inf)
+    for chunk in rows.chunks(BLOCK_ROWS):
+        for part in chunk:
+            log_truth = antecedent.log_memberships(rows.read(part)[0])
+            np.maximum(greatest, log_truth.max(axis=1), out=greatest)
+    return bool((greatest < np.log(LEAST_TRUTH)).any())

@@ -29,7 +29,6 @@ from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
 from ..posterior import Posterior
 from ..search import (
-    SampleSize,
     Start,
     StructureRequest,
     effective_weight,
@@ -118,7 +117,6 @@ class _Fit:
             self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
         elif is_many(self.rows) and self.huber is None:
             self.rows = with_sample(self.rows)
-        self.size = SampleSize.of(self.rows.sample or self.rows)
         # A slope by a column that never changes is nothing that data could tell of.
         slopes, is_constant = request.consequent_inputs, self.rows.inputs.is_constant
         self.request = replace(request, consequent_inputs=slopes[~is_constant[slopes]])
@@ -130,7 +128,7 @@ class _Fit:
 
     def start(self, rows: StandardisedData) -> Start:
         """Where a run begins: rules, weights of the penalty, and the premises so far."""
-        start = self.request.start(rows.sample or rows, self.size)
+        start = self.request.start(rows.sample or rows)
         if rows.sample is not None:
             start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:

@@ -7,7 +7,7 @@ from sklearn.model_selection import GroupShuffleSplit
 
 from ..blocks import BLOCK_ROWS
 from ..learning.data import StandardisedData, fingerprint
-from ..search.held_out import held_out_loss
+from ..search import held_out_loss
 
 __all__ = ["ValidationLoss", "hold_out"]
 

@@ -1,4 +1,4 @@
-"""A structure that a search may try, and the rules that it begins with."""
+"""What a search may try: structures, the rules they begin with, the inputs worth a try."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,9 +10,10 @@ from ..cluster import FuzzyCMeans, SubtractiveClustering
 from ..learning.data import StandardisedData
 from ..membership import Membership
 from .clusters import clustered_antecedent
-from .grid import Spacing, grid_antecedent
+from .grid import OVERLAP, Spacing, grid_antecedent
+from .tuning import Tuned
 
-__all__ = ["MOST_RULES", "Candidate", "RuleBases"]
+__all__ = ["MOST_RULES", "Candidate", "RuleBases", "terms_asked_for"]
 
 # More nobody reads.
 MOST_RULES = 36
@@ -52,8 +53,6 @@ class RuleBases:
         Those that may have terms.
     spacing : Spacing
         Where the terms of grids stand.
-    overlap : float
-        Membership at which neighbours of a grid cross.
     seed : int or RandomState
         Of the clustering.
     """
@@ -61,7 +60,6 @@ class RuleBases:
     families: Sequence[type[Membership]]
     inputs: np.ndarray
     spacing: Spacing
-    overlap: float
     seed: int | np.random.RandomState
 
     def of(self, candidate: Candidate, rows: StandardisedData):
@@ -70,14 +68,13 @@ class RuleBases:
         if candidate.family is not None:
             families = [candidate.family] * len(families)
         if candidate.counts is not None:
-            return grid_antecedent(families, candidate.counts, self.spacing, self.overlap)
+            return grid_antecedent(families, candidate.counts, self.spacing)
         clusterer = self._clusterer(candidate, rows.y.shape[1])
         return clustered_antecedent(
             families,
             rows,
             lambda table, weight: clusterer.fit(table, sample_weight=weight).labels_,
             self.inputs,
-            candidate.clustering == "k-means",
         )
 
     def _clusterer(self, candidate, n_outputs):
@@ -88,3 +85,27 @@ class RuleBases:
         if candidate.clustering == "fcm":
             return FuzzyCMeans(candidate.size, m="auto", random_state=self.seed)
         return KMeans(candidate.size, n_init=1, random_state=self.seed)
+
+
+def terms_asked_for(tuned: Tuned, inputs: np.ndarray, centers: np.ndarray):
+    """How much the residual of a linear model asks for two terms on each input, (n_inputs,).
+
+    With w the share of the upper of two Gaussian terms on an input, at ``centers``, (n_inputs, 2),
+    and r the residual, the statistic is the sum over basis functions b of
+    (sum s w b r)^2 / sum s (w b)^2.
+    """
+    problem, rows = tuned.problem, tuned.problem.rows
+    weight, distance = rows.sample_weight, np.diff(centers, axis=1).ravel()
+    assert weight is not None  # a search sample has them
+    # The log of the ratio of two such Gaussians has this slope.
+    slope = -8.0 * np.log(OVERLAP) / distance
+    shares = 1.0 / (1.0 + np.exp(-slope * (rows.X[:, inputs] - centers.mean(axis=1))))
+    shares -= np.average(shares, axis=0, weights=weight)
+    basis = np.column_stack([np.ones(rows.n_rows), rows.X[:, problem.consequent_inputs]])
+    scale = (basis**2).T @ (weight[:, None] * shares**2)
+    statistic = np.zeros(inputs.size)
+    for part, residual, own in problem.residuals(tuned.evaluation):
+        for one in residual:
+            along = basis[part].T @ (shares[part] * (own * one)[:, None])
+            statistic += np.sum(along**2 / np.maximum(scale, np.finfo(float).tiny), axis=0)
+    return statistic
