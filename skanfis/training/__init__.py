@@ -1,11 +1,10 @@
 """Training: one fit in a straight line (``fit``), and what it uses on the way."""
 
-from .data import ValidatedData
+from .data import Fitted, SolverRun, ValidatedData
 from .fit import fit_rules
 from .information import Information
-from .progress import Callbacks
 from .pruning import RuleStatistics, model_without_rules, redundant_rules
-from .result import Fitted, SolverRun
+from .watching import Callbacks
 
 __all__ = [
     "Callbacks",

@@ -29,15 +29,12 @@ from sklearn.linear_model import HuberRegressor
 from ..blocks import BLOCK_ROWS
 from ..learning.data import column_statistics
 
-__all__ = ["MANY_ROWS", "huber_weights", "resistant", "reweighted", "some_rows", "without_outliers"]
+__all__ = ["huber_weights", "resistant", "reweighted", "without_outliers"]
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
-# Rows from which outliers are told where there are more: the median of so many residuals, and so
-# the scale, is good to one part in a hundred.
-MANY_ROWS = 20_000
-# Any fixed one: the same data give the same model.
-_SEED = 0
+# Rows that the linear model sees: the median of so many residuals is good to a hundredth.
+_MOST_ROWS, _SEED = 20_000, 0
 # Of the linear model, robust standard deviations that no shape of a sound target leaves.
 _FAR = 10.0
 # Of its minimiser: so tight that the first weights do not depend on the order of the rows.
@@ -61,17 +58,13 @@ def huber_weights(problem, evaluation, epsilon, sample_weight=None):
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
-def some_rows(n_rows):
-    """Which rows are looked at where there are many: drawn by a fixed seed, in order."""
-    if n_rows <= MANY_ROWS:
-        return slice(None)
-    return np.sort(np.random.default_rng(_SEED).choice(n_rows, MANY_ROWS, replace=False))
-
-
 def resistant(rows):
     """The rows with the target's scale as it is without what is far off, and their weights."""
     weights = np.ones(rows.n_rows)
-    some = rows.part(some_rows(rows.n_rows))
+    some = rows
+    if rows.n_rows > _MOST_ROWS:
+        rng = np.random.default_rng(_SEED)
+        some = rows.part(np.sort(rng.choice(rows.n_rows, _MOST_ROWS, replace=False)))
     lines = _robust_lines(some)
     if lines is None:
         return rows, weights
