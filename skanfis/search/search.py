@@ -104,6 +104,7 @@ class StructureSearch:
         """The best candidate; all that were tried are in ``trials.scores``."""
         best = Candidate((1,) * self.n_inputs)
         self.trials.beat(best)
+        self._screen(best)
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
         if partition != "grid" and self.inputs.size:
@@ -117,12 +118,12 @@ class StructureSearch:
         return best
 
     def _grow_grid(self, best):
-        trials, inputs = self.trials, self._screened(best)
+        trials = self.trials
         trials.score(best)
         while True:
             trials.beat(best)
             # One that promises little now may promise more beside others' terms: none is dropped.
-            grown = filter(self._is_small, [_with_one_more(best, j) for j in inputs])
+            grown = filter(self._is_small, [_with_one_more(best, j) for j in self.inputs])
             promising = trials.promising(grown)
             if not promising:
                 return best
@@ -131,13 +132,15 @@ class StructureSearch:
                 return best
             best = leading
 
-    def _screened(self, linear):
-        """Inputs that are worth a try: all, or those whose terms the linear model asks for most."""
+    def _screen(self, linear):
+        """Leave of many inputs those whose terms the linear model asks for most."""
         if self.inputs.size <= _MOST_UNSCREENED:
-            return list(self.inputs)
-        centers = np.array([self.trials.spacing.centers(j, 2) for j in self.inputs])
-        asked = terms_asked_for(self.trials.tuned(linear), self.inputs, centers)
-        return [int(j) for j in self.inputs[np.argsort(-asked, kind="stable")[:_SCREENED]]]
+            return
+        trials = self.trials
+        centers = np.array([trials.spacing.centers(j, 2) for j in self.inputs])
+        asked = terms_asked_for(trials.tuned(linear), self.inputs, centers)
+        self.inputs = self.inputs[np.argsort(-asked, kind="stable")[:_SCREENED]]
+        trials.rule_bases = replace(trials.rule_bases, inputs=self.inputs)
 
     def _n_trained(self, candidate):
         """How many of the promising candidates are trained."""
@@ -160,7 +163,9 @@ class StructureSearch:
     def _best_clusters(self, clustering):
         sizes = list(_RADII)
         if clustering != "subtractive":
-            most = min(_MOST_COLUMNS, 2.0 * self.trials.n_sample) / self.n_basis
+            # Every rule has terms of its own, a place and a width each: fewer parameters than rows.
+            of_rule = self.n_basis + 2 * self.inputs.size
+            most = min(_MOST_COLUMNS / self.n_basis, self.trials.n_sample / of_rule)
             sizes = [size for size in _RULE_NUMBERS if size <= most]
         promising = self.trials.promising([Candidate(None, size, clustering) for size in sizes])
         if not promising:

@@ -31,7 +31,13 @@ from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
 from .freezing import ModelBuilder, as_given, told_by_outermost
 from .pruning import redundant_rules, rule_statistics
-from .robust import huber_weights, resistant, reweighted, without_outliers
+from .robust import (
+    huber_weights,
+    resistant,
+    reweighted,
+    without_outliers,
+    without_weight,
+)
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
 
 __all__ = ["fit_rules"]
@@ -191,7 +197,8 @@ class _Fit:
     def _robust_turns(self, weights):
         rows, epsilon = self.rows, self.huber.epsilon
         start, change = self.start(without_outliers(rows, weights)), np.inf
-        run = self.run(reweighted(rows, weights), start)
+        # Those far off are not yet known for what they are: no rule is to go and meet them.
+        run = self.run(reweighted(rows, without_weight(weights)), start)
         for _ in range(_MOST_TURNS):
             before = weights
             weights = huber_weights(run.problem, run.evaluation, epsilon, rows.sample_weight)

@@ -130,3 +130,8 @@ def without_outliers(rows, weights):
     given = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     # What is said of most rows is said of none.
     return rows.part(kept) if 2.0 * given[kept].sum() >= given.sum() else rows
+
+
+def without_weight(weights):
+    """The weights with those of rows that have less than half next to nothing."""
+    return np.where(weights < _OUTLIER, np.finfo(float).eps, weights)
