@@ -34,7 +34,7 @@ _RULES_OF_MANY, _MOST_OF_MANY = 3, 1000
 # More names for one input nobody reads.
 _MOST_TERMS = 6
 # Of those that are tried in a round, so many are trained.
-_MOST_TRAINED = 3
+_MOST_TRAINED = 4
 # More inputs than this are screened before terms are tried on them, and so many are left.
 _MOST_UNSCREENED, _SCREENED = 16, 8
 # Of k-means and fuzzy c-means: each about half as many again.

@@ -18,12 +18,12 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
-from skanfis.exceptions import OutOfBoundsWarning, UnderdeterminedWarning
+from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Gaussian
-from skanfis.search import SampleSize, StructureRequest, request
+from skanfis.search import StructureRequest
 from skanfis.search.start import Start
 
 from ..quick import quick
@@ -407,18 +407,3 @@ def test_weights_found_on_a_sample_are_for_all_rows(data, is_held, rng):
     assert asked.alpha == 0.02
     assert_allclose(asked.agreement, 0.01 * (1.0 if is_held else ratio), rtol=5e-3)
     assert_allclose([asked.slope, asked.stiffness], np.multiply([0.03, 0.04], ratio), rtol=5e-3)
-
-
-@pytest.mark.parametrize("n_distinct", [11, 12, 30])
-def test_distinct_rows_are_counted_as_far_as_there_are_coefficients(n_distinct, monkeypatch, rng):
-    # Those of a long table up to some number only, unless there are more coefficients.
-    monkeypatch.setattr(request, "ENOUGH_ROWS", 10)
-    X = np.repeat(rng.standard_normal((n_distinct, 2)), 3, axis=0)
-    rows = StandardisedData.of(X, rng.standard_normal((len(X), 1)))
-    size, asked = SampleSize.of(rows, 10), request_for([2, 2], {})
-    assert size.n_distinct_inputs == 10
-    if n_distinct >= 12:
-        assert not asked._warn_if_underdetermined(4, rows, size)
-        return
-    with pytest.warns(UnderdeterminedWarning, match="4 rules with 3 .* are 12 .* for 11 distinct"):
-        assert asked._warn_if_underdetermined(4, rows, size)

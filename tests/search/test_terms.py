@@ -1,7 +1,6 @@
 """Terms per input by folds that the caller has cut."""
 
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +9,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import GroupKFold
 
 from skanfis import ANFISRegressor
-from skanfis.search import search_terms, terms
-from skanfis.search.candidate import Candidate
+from skanfis.search import search_terms
 
 pytestmark = pytest.mark.theory
 
@@ -88,13 +86,6 @@ def test_keeps_to_the_most_rules(max_rules):
     assert 1 < np.prod(found.terms) <= max_rules
 
 
-def test_without_folds_it_is_the_error_to_be_expected():
-    X, y, _, _ = campaign(0.0)
-    lines = ANFISRegressor(partition="grid").fit(X, y).structures_
-    errors = {tuple(line["n_mfs"]): y.std() * line["expected_error"] for line in lines}
-    assert dict(search_terms(X, y, []).tried) == pytest.approx(errors)
-
-
 def test_folds_without_two_rows_to_train_on_or_any_to_test_say_nothing():
     X, y, run, _ = campaign(0.0)
     X[1] = X[0]  # in the range of a fold that is trained on the first row alone
@@ -102,20 +93,3 @@ def test_folds_without_two_rows_to_train_on_or_any_to_test_say_nothing():
     useless = [(every[:0], every), (every[:1], every[1:]), (every, every[:0])]
     tried = search_terms(X, y, [*folds, *useless], max_rules=1).tried
     assert tried == search_terms(X, y, folds, max_rules=1).tried
-
-
-def test_of_terms_that_were_tried_twice_the_smaller_error_is_told(monkeypatch):
-    # With weights found first, and with premises trained first.
-    errors = {
-        Candidate((2, 1)): 0.1,
-        Candidate((1, 1)): 0.3,
-        Candidate((2, 1), is_loose=True): 0.2,
-        Candidate((1, 1), is_loose=True): 0.25,
-    }
-    trials = SimpleNamespace(scores=errors, error=errors.get)
-    search = SimpleNamespace(trials=trials, choose=lambda partition: Candidate((2, 1)))
-    monkeypatch.setattr(terms, "StructureSearch", lambda *args, **settings: search)
-    X, y, *_ = campaign(0.0)
-    found = terms.search_terms(X, y, [])
-    assert dict(found.tried) == pytest.approx({(2, 1): 0.1 * y.std(), (1, 1): 0.25 * y.std()})
-    assert found.terms == (2, 1)

@@ -17,7 +17,6 @@ from skanfis.search import Spacing, grid_antecedent, tuning
 
 def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
     # n kappa / sigma^2 x0^2 = 1; but where they come first, next to nothing holds them.
-    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
     noise = tuning.tune(*two_rules, FREE, 100.0, turns=0).posterior.noise_variance
     begun, varpro = [], tuning.varpro
     monkeypatch.setattr(
@@ -27,8 +26,8 @@ def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
             begun.append(problem.penalty) or varpro(problem, *args, **more)
         ),
     )
-    for is_loose in (False, True):
-        tuning.tune(*two_rules, FREE, 100.0, turns=1, is_loose=is_loose)
+    tuning.tune(*two_rules, FREE, 100.0, turns=1)
+    tuning.tune_unbounded(*two_rules, FREE, 100.0)
     assert_allclose(begun[0].stiffness, noise / (100.0 * PRIOR_DISPLACEMENT**2))
     assert begun[1] == Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-12)
 
@@ -44,7 +43,6 @@ def test_premises_start_where_they_are_told_to(two_rules):
 
 def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):
     problem, premise = two_rules
-    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
     made = []
     for name in ("varpro", "reestimated"):
         whole = getattr(tuning, name)
@@ -82,51 +80,6 @@ def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
     assert found.posterior.n_effective < 25.0
 
 
-def test_agreement_rises_until_the_strongest_rule_holds_or_the_price_is_too_high(
-    monkeypatch, two_rules
-):
-    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
-    apart = tuning.tune(*two_rules, FREE, 100.0)
-    alone = apart.problem.strongest_alone(apart.evaluation)
-    for limit, holds in ((0.8 * alone, True), (0.01 * alone, False)):
-        monkeypatch.setattr(tuning, "GREATEST_ALONE", limit / 0.9)
-        found = tuning.tune(*two_rules, FREE, 100.0)
-        error = found.evaluation.mean_squared_error / apart.evaluation.mean_squared_error
-        assert found.is_apart is not holds
-        assert (found.problem.strongest_alone(found.evaluation) <= limit) is holds
-        assert error == 1.0 if not holds else 1.0 < error < tuning.HOLDING
-        # The other weights are those that the evidence found.
-        raised = found.penalty.agreement
-        assert found.penalty == replace(apart.penalty, agreement=raised)
-        assert (raised > apart.penalty.agreement) is holds
-        # What is given is not changed.
-        fixed = tuning.tune(*two_rules, FREE[1:], 100.0)
-        assert fixed.penalty.agreement == tuning.FIRST_PENALTY.agreement
-
-
-def test_agreement_that_costs_next_to_nothing_is_had(monkeypatch, two_rules):
-    monkeypatch.setattr(tuning, "GREATEST_ALONE", np.inf)
-    apart = tuning.tune(*two_rules, FREE, 100.0)
-    alone = apart.problem.strongest_alone(apart.evaluation)
-    # Half of six parameters over 30 rows, and over two.
-    for wanted, n_all, price in ((0.9, 30.0, 0.1), (0.5, 2.0, 2.0)):
-        monkeypatch.setattr(tuning, "_HOLDS_WELL", wanted * alone)
-        monkeypatch.setattr(tuning, "_NEXT_TO_NOTHING", np.inf)
-        held = tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0, n_all)
-        assert held.is_held
-        assert held.expected_error <= (1.0 + price) * apart.expected_error
-        assert held.problem.strongest_alone(held.evaluation) <= wanted * alone
-    # The first step of it takes 5 % of the error: more than half of the parameters over 100 rows,
-    # and however few there are, no more than 2 % is next to nothing.
-    monkeypatch.setattr(tuning, "_HOLDS_WELL", 0.9 * alone)
-    assert tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0, 100.0) is apart
-    monkeypatch.undo()
-    monkeypatch.setattr(tuning, "_HOLDS_WELL", 0.9 * alone)
-    assert tuning.held_for_nothing(apart, two_rules[1], FREE, 100.0, 2.0) is apart
-    # Nor is anything had where agreement was given.
-    assert tuning.held_for_nothing(apart, two_rules[1], FREE[1:], 100.0, 2.0) is apart
-
-
 def test_agreement_that_holds_rules_does_not_fall_as_rows_rise():
     penalty = Penalty(agreement=1e-2, alpha=1e-3, slope=1e-4, stiffness=1e-5)
     for is_held, agreement in ((False, 1e-3), (True, 1e-2)):
@@ -138,7 +91,7 @@ def test_agreement_that_holds_rules_does_not_fall_as_rows_rise():
 def test_turns_go_on_from_where_they_were_left(two_rules):
     problem, premise = two_rules
     whole = tuning.tune(problem, premise, FREE, 100.0, turns=2)
-    begun = tuning.tune(problem, premise, FREE, 100.0, turns=1, is_last=False)
+    begun = tuning.tune(problem, premise, FREE, 100.0, turns=1)
     more = tuning.tune(begun.problem, premise, FREE, 100.0, turns=1, begun=begun)
     assert whole.penalty == more.penalty
     assert_allclose(more.displacement, whole.displacement, rtol=1e-12)
@@ -158,3 +111,24 @@ def test_turns_end_when_the_evidence_rises_no_further(monkeypatch, two_rules):
     found = tuning.tune(*two_rules, FREE, 100.0)
     assert len(seen) == 4
     assert found.evaluation is seen[3]
+
+
+@pytest.mark.parametrize(("limit", "worth", "is_held"), [(0.8, 1.2, True), (0.01, 1.2, False)])
+def test_agreement_rises_until_rules_hold_or_the_price_is_too_high(
+    limit, worth, is_held, monkeypatch, two_rules
+):
+    apart = tuning.tune(*two_rules, FREE, 100.0)
+    limit *= apart.problem.strongest_alone(apart.evaluation)
+    monkeypatch.setattr(tuning, "_HOLDS", limit)
+    monkeypatch.setattr(tuning, "_HOLDS_WELL", np.inf)
+    found = tuning.with_rules_that_hold(apart, two_rules[1], FREE, 100.0)
+    assert found.is_held is is_held
+    if not is_held:
+        assert found.problem.strongest_alone(found.evaluation) > limit
+        return
+    assert found.problem.strongest_alone(found.evaluation) <= limit
+    assert apart.expected_error < found.expected_error <= worth * apart.expected_error
+    # The other weights are those that the evidence found.
+    assert found.penalty == replace(apart.penalty, agreement=found.penalty.agreement)
+    # What is given is not changed.
+    assert tuning.with_rules_that_hold(apart, two_rules[1], FREE[1:], 100.0) is apart

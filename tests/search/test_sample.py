@@ -1,0 +1,138 @@
+"""Rows that stand for many, and how many there are."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.cluster import KMeans
+
+from skanfis import ANFISRegressor
+from skanfis.learning import VariableProjection
+from skanfis.learning.data import StandardisedData
+from skanfis.search import representative_rows
+from skanfis.search.sample import effective_weight, n_distinct_inputs, search_sample
+
+
+def many(rng, n_rows=300):
+    """Rows of whole numbers, some of them equal, with whole weights."""
+    X = rng.integers(0, 12, (n_rows, 2)).astype(float)
+    y = rng.integers(0, 3, (n_rows, 1)).astype(float)
+    return X, y, rng.integers(1, 6, n_rows)
+
+
+def standing_for(X, y, weight=None, most=10_000):
+    """Table in the user's units, and weight as part of the whole."""
+    rows = StandardisedData.of(X, y, None if weight is None else weight.astype(float))
+    table, share, _ = representative_rows(rows, most)
+    scales = np.concatenate([rows.inputs.scale, rows.targets.scale])
+    return table * scales + np.concatenate(
+        [rows.inputs.offset, rows.targets.offset]
+    ), share / share.sum()
+
+
+class TestRepresentativeRows:
+    @pytest.mark.parametrize("most", [10_000, 100])
+    def test_order_of_the_rows_does_not_matter(self, rng, most):
+        X, y, weight = many(rng)
+        turn = rng.permutation(len(X))
+        table, share = standing_for(X, y, weight, most)
+        turned, turned_share = standing_for(X[turn], y[turn], weight[turn], most)
+        assert_allclose(turned, table, atol=1e-9)
+        assert_allclose(turned_share, share, rtol=1e-9)
+
+    @pytest.mark.parametrize("most", [100_000, 100])
+    def test_weight_is_repetition(self, rng, most):
+        # Both more than ``most`` rows, or both fewer.
+        X, y, times = many(rng)
+        table, share = standing_for(X, y, times, most)
+        repeated = standing_for(
+            np.repeat(X, times, axis=0), np.repeat(y, times, axis=0), None, most
+        )
+        assert_allclose(repeated[0], table, atol=1e-9)
+        assert_allclose(repeated[1], share, rtol=1e-9)
+
+    def test_few_rows_stand_for_themselves(self, rng):
+        X, y, times = many(rng)
+        table, share = standing_for(X, y, times)
+        expected, group = np.unique(np.hstack([X, y]), axis=0, return_inverse=True)
+        assert_allclose(table, expected, atol=1e-9)
+        assert_allclose(share, np.bincount(group.ravel(), weights=times) / times.sum(), rtol=1e-12)
+        assert len(table) < len(X)
+
+    def test_many_rows_are_thinned_evenly(self, rng):
+        X = rng.normal(size=(5000, 2))
+        y = X.sum(axis=1, keepdims=True)
+        rows = StandardisedData.of(X, y)
+        table, weight, _ = representative_rows(rows, 500)
+        assert len(table) <= 500
+        assert weight.sum() == 500
+        every = {row.tobytes() for row in rows.table(slice(None))}
+        assert all(row.tobytes() in every for row in table)
+        # A sample of independent rows would be off by 1 / sqrt(500), 0.045.
+        assert_allclose(np.average(table, axis=0, weights=weight), 0.0, atol=0.15)
+        assert_allclose(np.average(table**2, axis=0, weights=weight), 1.0, atol=0.2)
+
+    def test_heavy_rows_stand_for_more(self, rng):
+        X = rng.normal(size=(1000, 1))
+        weight = np.where(X[:, 0] > 0.0, 9.0, 1.0)
+        rows = StandardisedData.of(X, np.zeros((1000, 1)), weight)
+        table, share, _ = representative_rows(rows, 200)
+        heavy = table[:, 0] > -rows.inputs.offset[0] / rows.inputs.scale[0]
+        assert_allclose(
+            share[heavy].sum() / share.sum(), weight[X[:, 0] > 0.0].sum() / weight.sum(), atol=0.01
+        )
+
+    def test_a_fit_by_clusters_does_not_see_the_order_of_the_rows(self, rng, monkeypatch):
+        monkeypatch.setattr(representative_rows, "__defaults__", (200,))
+        X = rng.uniform(-1.0, 1.0, (900, 2))
+        y = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + 0.1 * rng.normal(size=900)
+        turn = rng.permutation(900)
+        partition = KMeans(3, n_init=2, random_state=0)
+        one = ANFISRegressor(partition=partition, solver=VariableProjection(tol=0.01)).fit(X, y)
+        other = ANFISRegressor(partition=partition, solver=VariableProjection(tol=0.01)).fit(
+            X[turn], y[turn]
+        )
+        assert_allclose(other.predict(X), one.predict(X), atol=1e-6)
+
+
+class TestCounts:
+    def test_inputs_are_counted_once_as_far_as_enough(self, rng):
+        X, y, times = many(rng)
+        rows = StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
+        n_distinct = len(np.unique(X, axis=0))
+        assert n_distinct_inputs(rows, 10_000) == n_distinct
+        assert n_distinct_inputs(rows, n_distinct - 5) == n_distinct - 5
+        X = np.tile(rng.normal(size=3), (40, 1))
+        X[:, 1] += 1e-9 * np.arange(40)
+        assert n_distinct_inputs(StandardisedData.of(X, np.zeros((40, 1))), 100) == 40
+
+    @pytest.mark.parametrize("unit", [1e-300, 1e-6, 0.5])
+    def test_weights_below_one_count_by_the_precision_they_leave(self, rng, unit):
+        # Kish: of equal weights every row counts; of a half with next to none, half of them.
+        X, y, times = many(rng)
+        whole = StandardisedData.of(X, y, times.astype(float))
+        assert effective_weight(whole) == times.sum()
+        even = StandardisedData.of(X, y, np.full(300, unit))
+        assert_allclose(effective_weight(even), 300.0, rtol=1e-12)
+        half = StandardisedData.of(X, y, np.where(np.arange(300) < 150, unit, 1e-9 * unit))
+        assert_allclose(effective_weight(half), 150.0, rtol=1e-6)
+
+    @pytest.mark.parametrize("most", [10_000, 100])
+    def test_a_search_sees_repeated_rows_as_weighted_ones(self, rng, most):
+        X, y, times = many(rng)
+        weighted = search_sample(StandardisedData.of(X, y, times.astype(float)), most)
+        repeated = search_sample(
+            StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0)), most
+        )
+        assert_allclose(repeated.X, weighted.X, atol=1e-12)
+        assert_allclose(repeated.y, weighted.y, atol=1e-12)
+        assert_array_equal(repeated.sample_weight, weighted.sample_weight)
+        # Already in the units of all rows: what they are is not standardised again.
+        assert_array_equal(weighted.inputs.scale, 1.0)
+        assert_array_equal(weighted.inputs.offset, 0.0)
+
+    def test_a_search_knows_the_group_of_each_of_its_rows(self, rng):
+        X, y = rng.normal(size=(500, 2)), rng.normal(size=(500, 1))
+        rows = StandardisedData.of(X, y, groups=np.arange(500))
+        sample = search_sample(rows, 60)
+        assert sample.n_rows == 60
+        assert_array_equal(np.hstack([sample.X, sample.y]), rows.table(sample.groups))
