@@ -15,6 +15,7 @@ from math import prod
 import numpy as np
 
 from ..learning.data import StandardisedData
+from ..learning.evidence import ROWS_EACH
 from ..learning.premise import Premise
 from ..membership import Membership
 from .candidates import MOST_RULES, Candidate, terms_asked_for
@@ -179,11 +180,19 @@ class StructureSearch:
         return larger if self._is_better(larger, smaller) else smaller
 
     def _is_better(self, candidate, than):
-        """Whether a larger candidate gains more than luck gives."""
-        score, to_beat = self.trials.score(candidate), self.trials.score(than)
-        if not self.trials.folds:
-            return score < to_beat and to_beat - score > _DECISIVE
-        worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(self.trials.n_sample))
+        """Whether a larger candidate gains more than luck gives.
+
+        Where there are hardly more rows than consequents, what one row's leaving out says is said
+        by few others: then the evidence has to say so too.
+        """
+        trials = self.trials
+        score, to_beat = trials.score(candidate), trials.score(than)
+        if not trials.folds:
+            tuned, before = trials.tuned(candidate), trials.tuned(than)
+            is_plenty = trials.sample.n_rows >= ROWS_EACH * tuned.problem.n_columns
+            is_likelier = is_plenty or before.score - tuned.score > _DECISIVE
+            return score < to_beat and to_beat - score > _DECISIVE and is_likelier
+        worthwhile = max(_WORTHWHILE_ERROR, _ERROR_OF_ERROR / np.sqrt(trials.n_sample))
         return score < (1.0 - worthwhile) * to_beat
 
 

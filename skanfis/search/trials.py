@@ -100,13 +100,11 @@ class Trials:
         self.scores: dict[Candidate, float] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self._found: dict[Candidate, Tuned] = {}
-        self._best: Tuned | None = None
         self._to_beat: np.ndarray | float = 0.0
 
     def beat(self, best: Candidate):
-        """Have grids begin with the terms of the best so far, and compare with it between rows."""
-        self._best = self.tuned(best)
-        self._to_beat = _error_between(self._best, self.places)[1]
+        """Have candidates compared with the best so far at places between rows."""
+        self._to_beat = _error_between(self.tuned(best), self.places)[1]
 
     def promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
@@ -194,7 +192,6 @@ class Trials:
 
     def _train(self, candidate, rows, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
         """A short training on some rows."""
-        displacement = None
         if begun is None:
             problem = SeparableProblem(
                 rows,
@@ -206,12 +203,8 @@ class Trials:
         else:
             problem, first_steps = begun.problem, first_steps - _STEPS_TO_PROMISE
         premise = Premise.of(problem.antecedent, rows.inputs.minimum, rows.inputs.maximum)
-        if begun is None and self._best is not None and problem.antecedent.grid_counts is not None:
-            displacement = _at_terms_of(self._best.evaluation.antecedent, premise)
         weight = effective_weight(rows)
-        return tune(
-            problem, premise, self.free, weight, turns, first_steps, displacement, begun=begun
-        )
+        return tune(problem, premise, self.free, weight, turns, first_steps, begun=begun)
 
     def report(self):
         """Every candidate in words and numbers, best first."""
@@ -258,21 +251,6 @@ def _folds(groups):
         return []
     n_folds = min(_MOST_FOLDS, np.unique(groups).size)
     return list(GroupKFold(n_folds).split(np.empty((groups.size, 0)), groups=groups))
-
-
-def _at_terms_of(other, premise: Premise):
-    """Where a grid has the terms of another, on inputs of as many of them; else at its start."""
-    groups = premise.antecedent.groups
-    theta = [group.theta.copy() for group in groups]
-    for group, own in zip(groups, theta, strict=True):
-        for j in np.unique(group.inputs):
-            mine = group.inputs == j
-            for its in other.groups:
-                theirs = its.inputs == j
-                if its.family is group.family and theirs.sum() == mine.sum():
-                    own[:, mine] = its.theta[:, theirs]
-    raw = np.concatenate([own.ravel() for own in theta] or [np.empty(0)])
-    return np.clip(premise.displacement(raw), premise.lower, premise.upper)
 
 
 def _is_too_many(candidate, n_rows):

@@ -128,7 +128,6 @@ def tune(
     n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
-    displacement=None,
     has_least=True,
     begun: Tuned | None = None,
 ) -> Tuned:
@@ -147,8 +146,6 @@ def tune(
         Most turns of the premises; with 0 they stay where they are.
     first_steps : int
         Steps of the weights before the premises move.
-    displacement : ndarray of shape (premise.size,), optional
-        Where the premises start; zero if not given.
     has_least : bool
         Whether weights stay above those of ``least_weights``.
     begun : Tuned, optional
@@ -164,7 +161,7 @@ def tune(
     if begun is not None:
         x, evaluation = begun.displacement, begun.evaluation
     else:
-        x = np.zeros(premise.size) if displacement is None else displacement
+        x = np.zeros(premise.size)
         evaluation = problem.evaluate(premise.parameters(x))
     posterior = _improved(
         problem, evaluation, x, problem.penalty, first_steps, free, n_rows, has_least

@@ -405,13 +405,8 @@ def test_family_is_that_of_the_truth_where_it_is_asked_for(rng):
 def test_searched_structure_is_tried_with_every_family(rng):
     X, y = piecewise_linear(rng)
     model = ANFISRegressor(partition="grid", mf="auto").fit(X, y)
-    best = ANFISRegressor(partition="grid").fit(X, y).structures_[0]
-    # The best comes last: one structure may have been trained in two ways.
-    lines = reversed(model.structures_)
-    found = {line["structure"]: line["expected_error"] for line in lines}
-    families = [f"{best['structure']}, {family.name}" for family in TRIED_FAMILIES[1:]]
-    assert set(families) <= set(found)
-    assert found[best["structure"]] == best["expected_error"]
+    tried = {line["structure"].rpartition(", ")[2] for line in model.structures_}
+    assert {family.name for family in TRIED_FAMILIES[1:]} <= tried
     # What is trained is what promised most.
     name = model.model_.antecedent.groups[0].family.name
     assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"

@@ -1,4 +1,4 @@
-"""Where training starts: rules that are given, their weights, and when their terms are unbounded."""
+"""Where training starts: rules that are given, their weights, and when terms are unbounded."""
 
 from types import SimpleNamespace
 

@@ -91,9 +91,9 @@ def test_training_goes_on_from_what_told_the_promise(rng, monkeypatch):
     found, candidate = search_of(X, np.sin(3.0 * X[:, 0])), Candidate((3,))
     steps, tune = [], trials.tune
 
-    def noting(problem, premise, free, n_rows, turns, first_steps, **more):
+    def noting(problem, premise, free, n_rows, turns, first_steps, *args, **more):
         steps.append((turns, first_steps, problem.penalty))
-        return tune(problem, premise, free, n_rows, turns, first_steps, **more)
+        return tune(problem, premise, free, n_rows, turns, first_steps, *args, **more)
 
     monkeypatch.setattr(trials, "tune", noting)
     assert found.promising([candidate]) == [candidate]
