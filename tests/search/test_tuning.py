@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE, PRIOR_DISPLACEMENT
@@ -30,8 +30,6 @@ def test_premises_begin_as_stiff_as_their_prior_expects(monkeypatch, two_rules):
     tuning.tune_unbounded(*two_rules, FREE, 100.0)
     assert_allclose(begun[0].stiffness, noise / (100.0 * PRIOR_DISPLACEMENT**2))
     assert begun[1] == Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-12)
-
-
 
 
 def test_large_models_take_few_turns_of_one_step(monkeypatch, two_rules):

