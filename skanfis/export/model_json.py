@@ -75,9 +75,8 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
     Raises
     ------
     ValueError
-        If a step in front cannot be folded, if a membership is not one of skanfis' own, if
-        :func:`read_json` would refuse a number, such as a spread beyond 1e50, or if the posterior
-        is asked for and the model knows of none.
+        If a step in front cannot be folded, a membership is not one of skanfis' own,
+        :func:`read_json` would refuse a number, or there is no posterior to write.
     TypeError
         If ``estimator`` is no such estimator.
 
@@ -154,10 +153,6 @@ def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = F
     posterior : bool, default=False
         Whether to write what ``predict(X, return_std=True)`` needs.
 
-    Returns
-    -------
-    None
-
     Raises
     ------
     ValueError, TypeError
@@ -171,10 +166,14 @@ def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = F
     >>> from pathlib import Path
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import write_json
+    >>> from skanfis.export import read_json, write_json
     >>> X, y = make_jang_sinc()
+    >>> estimator = ANFISRegressor(n_mfs=2).fit(X, y)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.json")
+    ...     write_json(estimator, Path(folder) / "sinc.json")
+    ...     model = read_json(Path(folder) / "sinc.json")
+    >>> bool((model.predict(X)[:, 0] == estimator.predict(X)).all())
+    True
     """
     text = export_json(estimator, posterior=posterior)
     Path(path).write_text(text, encoding="utf-8", newline="\n")
@@ -203,19 +202,17 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
 
     Examples
     --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import read_json, write_json
-    >>> X, y = make_jang_sinc()
-    >>> estimator = ANFISRegressor(n_mfs=2).fit(X, y)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(estimator, Path(folder) / "sinc.json")
-    ...     model = read_json(Path(folder) / "sinc.json")
-    >>> bool((model.predict(X)[:, 0] == estimator.predict(X)).all())
-    True
+    See :func:`write_json`.
+
+    >>> from skanfis.export import read_json
+    >>> read_json('{"format": "skanfis-model"}')
+    Traceback (most recent call last):
+    ValueError: path is the text of a model, not the path of a file: write it to a file first.
     """
+    if isinstance(path, str) and path.lstrip().startswith("{"):
+        raise ValueError(
+            "path is the text of a model, not the path of a file: write it to a file first."
+        )
     data = read_bytes(path, _MOST_BYTES)
     try:
         return parse_json(data.decode("utf-8"))

@@ -7,7 +7,7 @@ import numpy as np
 
 from .._validation import check_choice, check_count, warn_user
 from ..exceptions import ReadabilityWarning
-from ..export.unwrapping import last_step
+from ..export import last_step
 from ..model import TSKModel
 
 __all__ = [

@@ -62,11 +62,6 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     OSError
         If the file cannot be opened.
 
-    Notes
-    -----
-    Membership functions that no rule uses are left out. Where no rule fires, programs give zero,
-    NaN, or the middle of the output's Range; here the nearest rule speaks.
-
     Examples
     --------
     >>> import tempfile

@@ -18,20 +18,8 @@ __all__ = ["export_fis", "write_fis"]
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MINUS = re.compile(r"(?<!\S)-(?=[0-9.])")
 # What fuzzylite takes for words of a rule.
-_WORDS = {
-    "if",
-    "is",
-    "then",
-    "with",
-    "and",
-    "or",
-    "not",
-    "any",
-    "very",
-    "seldom",
-    "somewhat",
-    "extremely",
-}
+_WORDS = {"if", "is", "then", "with", "and", "or", "not"}
+_WORDS |= {"any", "very", "seldom", "somewhat", "extremely"}
 # Points of the box at which the rules of the file are tried.
 _N_POINTS = 1000
 
@@ -70,10 +58,8 @@ def export_fis(estimator: Any) -> str:
 
     Notes
     -----
-    The file holds the model within the box of the training data, which is the Range of its inputs.
-    What lies outside, the format cannot say: MATLAB and fuzzylite compute on, Octave refuses. Clamp
-    the inputs to the Range to have ``out_of_bounds="clip"``; a tangent
-    (``max_extrapolation``) has no counterpart there, nor has coverage.
+    Outside the Range of the inputs, the box of the training data, the format says nothing: MATLAB
+    and fuzzylite compute on, Octave refuses. Clamp the inputs to have ``out_of_bounds="clip"``.
 
     Examples
     --------
@@ -139,21 +125,12 @@ def write_fis(estimator: Any, path: str | PathLike[str]) -> None:
     path : str or path-like
         Of the file, which is replaced where it exists; Octave wants it to end in ".fis".
 
-    Returns
-    -------
-    None
-
     Raises
     ------
     ValueError, TypeError
         As :func:`export_fis`.
     OSError
         If the file cannot be written.
-
-    Warns
-    -----
-    UserWarning
-        As :func:`export_fis`.
 
     Examples
     --------
