@@ -217,7 +217,6 @@ def _write(calibration, options, paths, folder, axis=""):
             path,
             std=options.c,
             min_coverage=coverage,
-            deviation=options.deviation,
             saturate=certain_of(calibration).found if options.saturate else None,
         )
 
