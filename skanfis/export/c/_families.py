@@ -122,8 +122,8 @@ def _two_feet(profile, multiplications, slope=None):
     return right < 1.0R ? -p[3] * $name_@_slope(right) : 0.0R;
 """
     )
-    bodies = (body.replace("@", profile) for body in (value, slope))
-    return FamilyInC(*bodies, 1, 1, multiplications)
+    value, slope = value.replace("@", profile), slope.replace("@", profile)
+    return FamilyInC(value, slope, 1, 1, multiplications)
 
 
 # An input that is held at the edge of the box may lie on a corner, where the slope is zero: by the

@@ -10,7 +10,8 @@ from ._cost import CCost
 from ._dialect import Dialect, comment, index_type, literals
 from ._header import cost_lines, header_of, input_lines, policy_line
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
-from ._source import FINITE_INPUT, Source, rejection
+from ._source import Source
+from ._templates import FINITE_INPUT, rejection
 from .status import STATUS
 
 __all__ = [
