@@ -8,7 +8,7 @@ import numpy as np
 
 from ..membership import MEMBERSHIPS
 
-__all__ = ["CONSTANTS_OF", "FLOOR", "SMALLEST_LOG_SQUARE"]
+__all__ = ["CONSTANTS_OF", "FLOOR", "KINKS_OF", "SMALLEST_LOG_SQUARE"]
 
 # As in ``membership.profiles`` and ``membership.bell``.
 FLOOR = 1e-10
@@ -77,3 +77,6 @@ _BY_NAME = {
 
 # By the class, since another class may go by the same name.
 CONSTANTS_OF = {MEMBERSHIPS[name]: constants for name, constants in _BY_NAME.items()}
+
+# Which constants are places where the slope jumps.
+KINKS_OF = {MEMBERSHIPS["triangular"]: (0, 1, 4), MEMBERSHIPS["trapezoidal"]: (0, 1)}

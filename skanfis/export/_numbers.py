@@ -13,7 +13,7 @@ import numpy as np
 from ..antecedent import RuleTableAntecedent
 from ..membership import Membership
 from ..model import TSKModel
-from ._constants import CONSTANTS_OF
+from ._constants import CONSTANTS_OF, KINKS_OF
 
 __all__ = ["Numbers", "TermTable", "rounded_within"]
 
@@ -181,30 +181,30 @@ def _in_rounded_box(model, low, high):
 def _term_tables(model, low, high, reference):
     start = 0
     for group in model.antecedent.groups:
-        name = group.family.name
-        if group.family not in CONSTANTS_OF:
+        family, inputs = group.family, group.inputs
+        if family not in CONSTANTS_OF:
             raise ValueError(
-                f"Memberships {name!r} cannot be exported; "
-                f"{', '.join(family.name for family in CONSTANTS_OF)} can."
+                f"Memberships {family.name!r} cannot be exported; "
+                f"{', '.join(one.name for one in CONSTANTS_OF)} can."
             )
-        theta = group.theta.copy()
-        theta[0] = _about(reference, theta[0], group.inputs, (low, high))
-        exact = np.column_stack(CONSTANTS_OF[group.family](theta))
-        constants = _rounded(exact, low.dtype, f"a constant of a {name} membership")
-        yield TermTable(group.family, start, constants)
+        exact = _constants_about(reference, group)
+        constants = _rounded(exact, low.dtype, f"a constant of a {family.name} membership")
+        # An input that is held at an edge of the box is on the same side of a kink as in the model.
+        for edge in (low, high):
+            sides = np.sign(_constants_about(edge, group)).astype(low.dtype)
+            held = (edge - reference)[inputs]
+            for k in KINKS_OF.get(family, ()):
+                moved = np.where(sides[:, k], np.nextafter(held, held + sides[:, k]), held)
+                is_right = np.sign(constants[:, k] - held) == sides[:, k]
+                constants[:, k] = np.where(is_right, constants[:, k], moved)
+        yield TermTable(family, start, constants)
         start += group.n_terms
 
 
-def _about(reference, locations, inputs, edges):
-    """Locations about the reference; on the same side of an edge when they are rounded, too."""
-    shifted, inf = locations - reference[inputs], np.inf
-    for edge in edges:
-        side = np.sign(locations - edge[inputs].astype(float)).astype(edge.dtype)
-        rounded = (edge - reference)[inputs]
-        is_lost = (shifted.astype(edge.dtype) == rounded) & (side != 0.0)
-        beside = np.nextafter(rounded, np.copysign(edge.dtype.type(inf), side))
-        shifted = np.where(is_lost, beside, shifted)
-    return shifted
+def _constants_about(place, group):
+    theta = group.theta.copy()
+    theta[0] -= place[group.inputs]
+    return np.column_stack(CONSTANTS_OF[group.family](theta))
 
 
 def _consequents(model, reference):
