@@ -31,33 +31,15 @@ class TermTable:
 class Numbers:
     """What is written: floating-point arrays of one type, and integers.
 
-    Attributes
-    ----------
-    model : TSKModel
-        The model with its box as it is rounded. What is left between it and a function on the
-        numbers is the function's own rounding.
-    low, high, reference, inverse_spread : ndarray of shape (n_inputs,)
-        The box, the point that inputs are about, one over their standard deviations.
-    terms : tuple of TermTable
-    term_inputs : ndarray of int of shape (n_terms,)
-    counts : tuple of int or None
-        Terms per input of a grid; None for other rule bases.
-    rule_terms : ndarray of int of shape (n_rules, n_terms_per_rule)
-        Positions of terms, ``n_terms`` for none.
-    offset : ndarray of shape (n_outputs,)
-        What all consequents are about.
-    coefficients : ndarray of shape (n_rules, n_outputs, 1 + n_slopes)
-    slope_inputs : ndarray of int of shape (n_slopes,)
-        The inputs that take part in the consequents.
-    reach : ndarray of shape (n_inputs,)
-        How far the tangent is followed; finite, so that the sum over inputs of what is followed,
-        in standard deviations, is finite too.
-    output_limits : ndarray of shape (2, n_outputs) or None
-        What outputs are held within; a tangent ends at the largest number of the type, if nowhere
-        else. None where they are not held.
-    support : ndarray of shape (n_rules, 2 + n_inputs + n_inputs (n_inputs + 1) / 2) or None
-        Of each rule in coverage: its share, its radius, its centre, and its factor row by row up to
-        the diagonal. None where the model knows of no data.
+    ``model`` is the model with its box as it is rounded: what is left between it and a function on
+    the numbers is the function's own rounding. ``counts`` has the terms per input of a grid, and is
+    None for other rule bases. ``rule_terms`` (n_rules, n_terms_per_rule) has positions of terms,
+    ``n_terms`` for none. ``coefficients`` (n_rules, n_outputs, 1 + n_slopes) are about ``offset``,
+    with slopes on the inputs ``slope_inputs``. ``reach`` is how far the tangent is followed in each
+    input, so that the sum of it in standard deviations is finite. ``output_limits``
+    (2, n_outputs) end a tangent at the largest number of the type if nowhere else, and are None
+    where outputs are not held. ``support`` has a row per rule for coverage, or is None: its share,
+    its radius, its centre, and its factor row by row up to the diagonal.
     """
 
     model: TSKModel

@@ -226,9 +226,9 @@ class _Formula:
             logs.append(value())
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
-        log_mu = self._joined(logs)
+        log_mu = self.graph.node("Concat", *logs, axis=1)
         if way_out is not None:
-            change = self._joined(slopes)
+            change = self.graph.node("Concat", *slopes, axis=1)
         if numbers.counts is not None:
             return self._products(log_mu, change)
         rule_of_term = np.zeros((numbers.n_terms + 1, numbers.n_rules))
@@ -236,13 +236,9 @@ class _Formula:
         shares = (log_mu @ rule_of_term[:-1]).softmax()
         return shares, None if change is None else _centred(change @ rule_of_term[:-1], shares)
 
-    def _joined(self, parts):
-        return parts[0] if len(parts) == 1 else self.graph.node("Concat", *parts, axis=1)
-
     def _products(self, log_mu, change):
         """Of a grid: every input normalised alone, then all products of shares."""
-        edges = zip(self.numbers.block_starts, self.numbers.counts, strict=True)
-        blocks = [np.arange(start, start + count) for start, count in edges]
+        blocks = np.split(np.arange(self.numbers.n_terms), self.numbers.block_starts[1:])
         shares = [log_mu.columns(block).softmax() for block in blocks]
         strengths = self._combined(shares, operator.mul)
         if change is None:

@@ -70,10 +70,7 @@ def expected_outputs(model, X, status, std):
     [
         pytest.param("double", "c99", slice(None), [], id="double"),
         pytest.param("float", "c99", slice(None), [], id="float", marks=pytest.mark.theory),
-        # C89 differs by its exp and log alone: three of four models are met by the sanitizers.
-        pytest.param(
-            "double", "c99", slice(0, None, 4), SANITIZE, id="double sane", marks=pytest.mark.theory
-        ),
+        # C89 differs by its exp and log alone: half of the models are met by the sanitizers.
         pytest.param(
             "double", "c89", slice(1, None, 4), SANITIZE, id="double c89", marks=pytest.mark.theory
         ),
@@ -625,32 +622,6 @@ def test_limit_of_zero_is_clip_and_the_header_says_the_limit():
         code = export_c(model.with_out_of_bounds("linear", limit), name="m")
         assert words in " ".join(code.header.replace("*", "").split())
         assert ("m_tangent" in code.source) is (limit > 0.0)
-
-
-@pytest.mark.theory
-@needs_compiler
-@pytest.mark.parametrize("dtype", ["double", "float"])
-def test_rows_on_a_thin_diagonal_are_covered_and_its_corners_are_not(dtype, tmp_path):
-    g = np.random.default_rng(0)
-    along = g.uniform(-1.0, 1.0, 600)
-    X = np.column_stack([along, along + 0.02 * g.normal(size=600)]) * [1e3, 1e-3] + [5e5, 0.0]
-    estimator = quick(n_mfs=[3, 1]).fit(X, np.sin(3.0 * along))
-    Z = around(X, dtype)
-    Z = np.vstack([Z, X.astype(Z.dtype)])
-    limits = [0.05, 0.5, 0.95]
-    codes = [
-        export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=limit)
-        for place, limit in enumerate(limits)
-    ]
-    coverage = estimator.coverage(Z.astype(float))
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [1, 1, 1], flags=[])
-    for min_coverage, (_, status) in zip(limits, answers, strict=True):
-        sure = np.abs(coverage - min_coverage) > 1e-3
-        uncovered = (status & STATUS["UNCOVERED"]) > 0
-        np.testing.assert_array_equal(uncovered[sure], (coverage < min_coverage)[sure])
-        # Where rules share a row, one with little say may have it beyond its own.
-        assert uncovered[-600:].mean() < (0.2 if min_coverage > 0.9 else 1e-9)
-        assert uncovered[:-600].mean() > 0.3
 
 
 def test_rules_that_have_seen_no_data_are_not_called_uncovered():
