@@ -97,10 +97,16 @@ def known_answers(numbers, min_coverage, limits=None):
     """Rows, outputs, status and the tolerance of every output, of the model of the numbers.
 
     Half of the rows lie in the box, the others up to half its width beyond; the first two are its
-    corners. Rows so near to the coverage asked for that rounding decides are left out. Outputs are
-    held between ``limits``, if there are any.
+    corners. Outputs are held between ``limits``, if there are any. Rows are left out where rounding
+    decides: on the coverage, or, in a gap between all terms, on the strongest rule.
     """
     model = numbers.model
+    policy = "linear" if model.out_of_bounds == "linear" else "clip"
+    held = (-np.inf, np.inf) if limits is None else limits.T.astype(float)
+
+    def outputs(rows):
+        return np.clip(model.with_out_of_bounds(policy).predict(rows), *held)
+
     points = qmc.Halton(model.n_inputs, scramble=False).random(4 * ROWS)
     width = model.maximum - model.minimum
     reach = np.where(np.arange(len(points)) % 2, 1.0, 2.0)[:, None]
@@ -115,16 +121,19 @@ def known_answers(numbers, min_coverage, limits=None):
         coverage = model.coverage(Z)
         status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
         sure = np.abs(coverage - min_coverage) > 1e-3 * min_coverage
-    chosen = np.flatnonzero(sure)[:ROWS]
-    X, Z, status, silent = X[chosen], Z[chosen], status[chosen], silent[chosen]
-    policy = "linear" if model.out_of_bounds == "linear" else "clip"
-    y = model.with_out_of_bounds(policy).predict(Z)
-    if limits is not None:
-        y = np.clip(y, *limits.T.astype(float))
-    y[silent] = 0.0
+    y = outputs(Z)
     tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z, y)
     tolerance *= max(_largest_logarithm(model, Z) / _USUAL, 1.0)
-    return X, y.astype(numbers.dtype), status, tolerance.astype(numbers.dtype)
+    step = 4.0 * np.finfo(numbers.dtype).eps * (np.abs(Z - numbers.reference) + model.spread)
+    steady = (np.abs(outputs(Z + step) - y) <= 0.25 * tolerance).all(axis=1)
+    chosen = np.flatnonzero(sure & steady if (sure & steady).any() else sure)[:ROWS]
+    y[silent] = 0.0
+    return (
+        X[chosen],
+        y[chosen].astype(numbers.dtype),
+        status[chosen],
+        tolerance.astype(numbers.dtype),
+    )
 
 
 def _largest_logarithm(model, X):
