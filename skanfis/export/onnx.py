@@ -1,12 +1,10 @@
 """ONNX: a converter that skl2onnx takes up for estimators and the pipelines they end.
 
 The graph does what the model does, in the same order: inputs held in the box, log memberships,
-strengths by a softmax (of a grid: one per input, then their products), consequents weighed by the
-strengths. The continuation "linear" carries the derivative along the way out of the box through the
-same operations.
+strengths by a softmax over the rules, consequents weighed by the strengths. The continuation
+"linear" carries the derivative along the way out of the box through the same operations.
 """
 
-import operator
 from functools import partialmethod
 
 import numpy as np
@@ -216,46 +214,23 @@ class _Formula:
 
     def _strengths(self, z, way_out):
         """Strengths (n_rows, n_rules) and the change of their logarithms along the way out."""
-        numbers, change = self.numbers, None
+        numbers, logs, slopes = self.numbers, [], []
         if not numbers.n_terms:
             return None, None
-        logs, slopes = [], []
         for terms in numbers.terms:
             positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
             value, slope = _FORMULAS[terms.family](z.columns(positions), terms.constants.T)
             logs.append(value())
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
-        log_mu = self.graph.node("Concat", *logs, axis=1)
-        if way_out is not None:
-            change = self.graph.node("Concat", *slopes, axis=1)
-        if numbers.counts is not None:
-            return self._products(log_mu, change)
-        rule_of_term = np.zeros((numbers.n_terms + 1, numbers.n_rules))
-        rule_of_term[numbers.rule_terms.T, np.arange(numbers.n_rules)] = 1.0
-        shares = (log_mu @ rule_of_term[:-1]).softmax()
-        return shares, None if change is None else _centred(change @ rule_of_term[:-1], shares)
-
-    def _products(self, log_mu, change):
-        """Of a grid: every input normalised alone, then all products of shares."""
-        blocks = np.split(np.arange(self.numbers.n_terms), self.numbers.block_starts[1:])
-        shares = [log_mu.columns(block).softmax() for block in blocks]
-        strengths = self._combined(shares, operator.mul)
-        if change is None:
-            return strengths, None
-        pairs = zip(blocks, shares, strict=True)
-        changes = [_centred(change.columns(block), share) for block, share in pairs]
-        return strengths, self._combined(changes, operator.add)
-
-    def _combined(self, by_input, operation):
-        """One value per rule from one per term of each input."""
-        first, *others = by_input
-        n_rules = self.numbers.counts[0]
-        for count, other in zip(self.numbers.counts[1:], others, strict=True):
-            pairs = operation(first.reshape(n_rules, 1), other.reshape(1, count))
-            n_rules *= count
-            first = pairs.reshape(n_rules)
-        return first
+        # 1 where rule r has term t.
+        has_term = np.zeros((numbers.n_terms + 1, numbers.n_rules))
+        has_term[numbers.rule_terms.T, np.arange(numbers.n_rules)] = 1.0
+        shares = (self.graph.node("Concat", *logs, axis=1) @ has_term[:-1]).softmax()
+        if way_out is None:
+            return shares, None
+        change = self.graph.node("Concat", *slopes, axis=1) @ has_term[:-1]
+        return shares, change - (shares * change).sum()
 
     def _slopes(self, z):
         """What slopes make of z, (n_rows, n_rules, n_outputs); None where there are none."""
@@ -274,10 +249,6 @@ class _Formula:
         if isinstance(by_rule, np.ndarray):
             return self.graph.node("Identity", by_rule[:, 0])
         return by_rule.sum(keep=False)
-
-
-def _centred(changes, shares):
-    return changes - (shares * changes).sum()
 
 
 # Families: of inputs x about the reference and the constants p of ``_constants``, functions that
