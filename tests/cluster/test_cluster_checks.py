@@ -43,7 +43,7 @@ def test_every_clusterer_is_checked():
 def test_docstring_describes_every_parameter_and_attribute(name, rng):
     clusterer = getattr(cluster, name)
     heads = [line.strip() for line in clusterer.__doc__.splitlines() if " : " in line]
-    described = [head.partition(" : ")[0] for head in heads]
+    described = [name for head in heads for name in head.partition(" : ")[0].split(", ")]
     parameters = list(inspect.signature(clusterer).parameters)
     assert described[: len(parameters)] == parameters
     fitted = clusterer().fit(rng.normal(size=(20, 2)))
