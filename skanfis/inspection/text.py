@@ -1,7 +1,6 @@
 """Rules as text, and as HTML for notebooks."""
 
 from collections.abc import Sequence
-from html import escape
 from math import floor, log10
 from typing import Any
 
@@ -26,10 +25,6 @@ __all__ = ["export_text", "range_text", "rows_text", "rules_html"]
 
 # More than these give back no other double.
 _MOST_DIGITS = 17
-# Hues of terms from the lowest to the highest, from blue to red; they show on white and on black.
-_HUES = (220, 10)
-# Dots of a picture of an input's terms, and corners of its curves.
-_WIDTH, _HEIGHT, _POINTS = 130, 34, 61
 
 
 def export_text(
@@ -135,7 +130,8 @@ def export_text(
             rows = rows_text(model.rule_rows[r])
             share = f"{100.0 * model.rule_weights[r]:.3g} %"
             heading += f", {share} of the weight, strongest on {rows}"
-        then = "\n   AND ".join(consequents[r])
+        pairs = zip(model.output_names, consequents[r], strict=True)
+        then = "\n   AND ".join(f"{name} = {formula}" for name, formula in pairs)
         parts.append(f"{heading}:\n  IF {premise}\n  THEN {then}")
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
@@ -145,7 +141,7 @@ def export_text(
 
 
 def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> str:
-    """Write the rules as HTML, the weightiest first, with pictures of the terms.
+    """Write the rules as HTML, the weightiest first.
 
     Parameters
     ----------
@@ -180,7 +176,7 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     >>> page = rules_html(ANFISRegressor(n_mfs=3).fit(X, y))
     >>> HTML(page)  # doctest: +SKIP
     >>> page.count("</tr>")
-    10
+    11
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     model = writable(fold(estimator))
@@ -188,22 +184,19 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     frame = rules_frame(model, reference)
     chosen = choose_rules(frame, "weight", max_rules, 0.0)
     consequents = _consequent_texts(model, frame, reference, precision)
-    cells: dict = {"rule": chosen.index}
+    cells: dict = {}
     if has_training_data(model):
         notes = np.where(chosen["data", "rows"] < 0.5, " (no row)", "")
         shares = zip(chosen["data", "weight"], notes, strict=True)
-        cells["weight"] = [f"{100.0 * share:.3g} %{note}" for share, note in shares]
-    hues = _term_hues(model)
+        cells["data", "weight"] = [f"{100.0 * share:.3g} %{note}" for share, note in shares]
     for name in chosen.get("if", ()):
-        heading = _terms_picture(model, name, hues, precision)
-        terms = [term if isinstance(term, str) else "any" for term in chosen["if", name]]
-        cells[heading] = [_term_html(term, hues.get((name, term))) for term in terms]
-    cells["then"] = [
-        f'<span style="font-family:monospace">{"<br>".join(map(escape, consequents[r]))}</span>'
-        for r in chosen.index
-    ]
+        low, high = range_text(model, model.input_names.index(name), precision)
+        cells["if", f"{name}, {low} to {high}"] = chosen["if", name].fillna("any")
+    for k, name in enumerate(model.output_names):
+        cells["then", name] = [consequents[r][k] for r in chosen.index]
     with pd.option_context("display.max_colwidth", None):
-        table = pd.DataFrame(cells).to_html(escape=False, index=False, border=0, justify="left")
+        table = pd.DataFrame(cells, index=list(chosen.index))
+        table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
     if len(chosen) < model.n_rules:
@@ -215,7 +208,7 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
 
 
 def _consequent_texts(model, frame, reference, precision):
-    """Of each rule and output "y = a + b * (x - x0) + ...", a list of lists."""
+    """Of each rule and output "a + b * (x - x0) + ...", a list of lists."""
     texts: list[list[str]] = [[] for _ in range(model.n_rules)]
     for output in model.output_names:
         values = frame[f"then {output}"].to_numpy(copy=True)
@@ -224,8 +217,7 @@ def _consequent_texts(model, frame, reference, precision):
         scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
         values[:, 1:][change < 10.0 ** -(precision + 2) * scale] = 0.0
         for of_rule, coefficients in zip(texts, values, strict=True):
-            formula = _formula(coefficients, model.input_names, reference, precision)
-            of_rule.append(f"{output} = {formula}")
+            of_rule.append(_formula(coefficients, model.input_names, reference, precision))
     return texts
 
 
@@ -316,49 +308,3 @@ def rows_text(count):
 
 def _count(number_of, what):
     return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")
-
-
-def _term_hues(model):
-    """A hue by (input, term): the rank of its place among those of its input, from blue to red."""
-    inputs, places = model.antecedent.term_inputs, model.antecedent.term_places
-    hues = {}
-    for j in np.unique(inputs):
-        own = np.flatnonzero(inputs == j)
-        own = own[np.argsort(places[own], kind="stable")]
-        for t, hue in zip(own, np.linspace(*_HUES, own.size), strict=True):
-            hues[model.input_names[j], model.term_names[t]] = hue
-    return hues
-
-
-def _term_html(term, hue):
-    if hue is None:
-        return escape(term)
-    return (
-        f'<span style="background:hsla({hue:.0f},70%,55%,0.25);white-space:nowrap;'
-        f'border-left:3px solid hsl({hue:.0f},70%,50%);padding:0 4px">{escape(term)}</span>'
-    )
-
-
-def _terms_picture(model, name, hues, precision):
-    """The membership functions of an input, its name and its range."""
-    j = model.input_names.index(name)
-    own = np.flatnonzero(model.antecedent.term_inputs == j)
-    Z = np.zeros((model.n_inputs, _POINTS))
-    Z[j] = np.linspace(model.minimum[j], model.maximum[j], _POINTS)
-    heights = 1.0 + _HEIGHT * (1.0 - np.exp(model.antecedent.log_memberships(Z)[own]))
-    memberships = model.memberships()
-    curves = ""
-    for t, y in zip(own, heights, strict=True):
-        points = zip(np.linspace(0.0, _WIDTH, _POINTS), y, strict=True)
-        title = f"{model.term_names[t]}: {_term_text(memberships[t], precision)}"
-        curves += (
-            f'<polyline points="{" ".join(f"{a:.1f},{b:.1f}" for a, b in points)}" fill="none" '
-            f'stroke="hsl({hues[name, model.term_names[t]]:.0f},70%,50%)" stroke-width="1.5">'
-            f"<title>{escape(title)}</title></polyline>"
-        )
-    low, high = range_text(model, j, precision)
-    return (
-        f'<svg width="{_WIDTH}" height="{_HEIGHT + 2}" style="border-bottom:1px solid gray">'
-        f"{curves}</svg><br>{escape(name)}"
-        f'<div style="font-weight:normal;font-size:85%">{low} to {high}</div>'
-    )

@@ -201,8 +201,6 @@ def test_a_model_without_data_has_no_weights_to_tell():
 class Page(HTMLParser):
     """Collects tags and text, and checks that every tag is closed in its turn."""
 
-    VOID = ("br",)
-
     def __init__(self, page):
         super().__init__()
         self.open, self.tags, self.texts = [], [], []
@@ -212,8 +210,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
-        if tag not in self.VOID:
-            self.open.append(tag)
+        self.open.append(tag)
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
@@ -226,13 +223,13 @@ class Page(HTMLParser):
 
 
 @ALL
-def test_there_is_a_line_per_rule_and_a_curve_per_term(model):
+def test_there_is_a_line_per_rule(model):
     page = Page(rules_html(model, max_rules=100))
     assert "".join(page.texts).count("(no row)") == np.sum(model.rule_rows < 0.5)
-    assert page.count("tr") == 1 + model.n_rules
-    assert page.count("polyline") == model.antecedent.n_terms
-    for name in model.term_names:
-        assert name in "".join(page.texts)
+    assert page.count("tr") == 2 + model.n_rules
+    terms = model.antecedent.rule_terms
+    for t in np.unique(terms[terms >= 0]):
+        assert model.term_names[t] in page.texts
     assert f"{model.n_rules} rule" in "".join(page.texts)
 
 
@@ -255,7 +252,7 @@ def test_names_are_text_whatever_they_contain():
     tags = {tag for tag, _ in page.tags}
     assert not tags & {"script", "img", "link", "a"}
     assert page.count("b") == 1
-    assert bad in page.texts
+    assert any(bad in text for text in page.texts)
     for _, attributes in page.tags:
         assert not any(name.startswith("on") for name in attributes)
         assert not {"src", "href"} & set(attributes)
