@@ -109,37 +109,8 @@ class TestClusters:
         assert_allclose(found.cluster_centers_, centers, atol=1.2)
         assert adjusted_rand_score(y, found.labels_) == 1.0
 
-    def test_max_clusters_keeps_the_first(self, rng):
-        X = cloud(rng)
-        every = SubtractiveClustering(0.3).fit(X)
-        some = SubtractiveClustering(0.3, max_clusters=3).fit(X)
-        assert len(every.cluster_centers_) > 3
-        assert_array_equal(some.cluster_centers_, every.cluster_centers_[:3])
-        assert_array_equal(some.potentials_, every.potentials_[:3])
-        assert set(some.labels_) == {0, 1, 2}
-
 
 class TestInvariance:
-    def test_order_of_rows_changes_no_bit(self, rng):
-        X, weight = cloud(rng), rng.integers(1, 4, 150)
-        order = rng.permutation(150)
-        expected = SubtractiveClustering(0.3).fit(X, sample_weight=weight)
-        found = SubtractiveClustering(0.3).fit(X[order], sample_weight=weight[order])
-        assert_array_equal(found.cluster_centers_, expected.cluster_centers_)
-        assert_array_equal(found.potentials_, expected.potentials_)
-        assert_array_equal(found.labels_, expected.labels_[order])
-
-    def test_weights_are_repeated_rows_to_the_last_bit(self, rng):
-        X, weight = cloud(rng), rng.integers(0, 4, 150)
-        X[weight == 0] *= 100.0  # rows that are not there stretch no range
-        weighted = SubtractiveClustering(0.3).fit(X, sample_weight=weight)
-        repeated = SubtractiveClustering(0.3).fit(np.repeat(X, weight, axis=0))
-        assert_array_equal(weighted.cluster_centers_, repeated.cluster_centers_)
-        assert_array_equal(weighted.potentials_, repeated.potentials_)
-        assert_array_equal(weighted.widths_, repeated.widths_)
-        assert_array_equal(weighted.predict(X), repeated.predict(X))
-        assert weighted.labels_.shape == (150,)
-
     # A grid is full of equal potentials, which rounding errors must not decide between.
     @pytest.mark.parametrize("grid", [False, True])
     @pytest.mark.parametrize("units", [[1e6, 1e-6, 1.0], [0.1, 3.0, 1 / 7]])
@@ -183,18 +154,3 @@ class TestErrors:
     def test_bad_parameters(self, rng, setting, message):
         with pytest.raises(ValueError, match=message):
             SubtractiveClustering(**setting).fit(rng.normal(size=(10, 2)))
-
-    def test_not_finite_data_name_the_column(self, rng):
-        X = rng.normal(size=(10, 2))
-        fitted = SubtractiveClustering().fit(X)
-        X[3, 1] = np.nan
-        for method in (SubtractiveClustering().fit, fitted.predict):
-            with pytest.raises(ValueError, match="X contains NaN in column 'x1', first at row 3"):
-                method(X)
-
-    def test_bad_weights(self, rng):
-        X = rng.normal(size=(3, 2))
-        with pytest.raises(ValueError, match="Negative values in sample_weight: -2 at row 1"):
-            SubtractiveClustering().fit(X, sample_weight=[1, -2, 1])
-        with pytest.raises(ValueError, match=r"weight.*zero"):
-            SubtractiveClustering().fit(X, sample_weight=[0, 0, 0])

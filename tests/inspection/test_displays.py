@@ -10,7 +10,6 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.preprocessing import MinMaxScaler
 
 from skanfis import ANFISRegressor
-from skanfis.export import fold
 from skanfis.inspection import (
     LossCurveDisplay,
     MembershipDisplay,
@@ -18,7 +17,6 @@ from skanfis.inspection import (
     ResponseSurfaceDisplay,
     RuleActivationDisplay,
     RuleContributionDisplay,
-    explain,
     memberships_table,
     rules_table,
 )
@@ -143,20 +141,6 @@ class TestActivation:
         assert len(texts) == A_GRID.n_rules
         assert f"{100 * A_GRID.rule_weights[1]:.1f} %" in texts
 
-    def test_on_other_rows(self, fitted):
-        pipe, X = fitted
-        some = X[X["kelvin"] < 270]
-        display = drawn(RuleActivationDisplay.from_estimator(pipe, some))
-        strengths = fold(pipe).strengths(some.to_numpy())
-        for cell, r in np.ndenumerate(display.rules):
-            assert display.weights[cell] == pytest.approx(strengths[:, r].mean(), rel=1e-12)
-            assert display.rows[cell] == (strengths.argmax(axis=1) == r).sum()
-
-    def test_a_large_map_has_no_numbers(self):
-        X = np.random.default_rng(0).uniform(size=(500, 2))
-        model = ANFISRegressor(n_mfs=11, order=0, solver="lse").fit(X, X[:, 0])
-        assert not drawn(RuleActivationDisplay.from_estimator(model)).ax_.texts
-
 
 class TestContribution:
     @EACH
@@ -174,14 +158,6 @@ class TestContribution:
         assert display.baseline == pytest.approx(wanted)
         assert_allclose(display.ax_.get_lines()[-1].get_ydata(), total)
         assert set(display.held) == set(NAMES[:2])
-
-    def test_without_baseline_they_are_those_of_the_explanation(self):
-        display = RuleContributionDisplay.from_estimator(A_GRID, 0, baseline=0, n_points=5)
-        rows = np.tile(A_GRID.reference, (5, 1))
-        rows[:, 0] = display.grid
-        for line in explain(A_GRID, rows).itertuples():
-            found = display.contributions[line.rule, line.row]
-            assert found == pytest.approx(line.contribution, rel=1e-9)
 
     def test_rules_without_a_line_are_drawn_as_their_sum(self):
         display = RuleContributionDisplay.from_estimator(A_GRID, max_rules=4)
@@ -248,11 +224,6 @@ class TestSurface:
         corner = pd.DataFrame([X.max()])
         assert display.response[-1, -1] == pytest.approx(target.predict(corner)[0], rel=1e-9)
 
-    def test_what_is_not_held_stands_at_its_mean(self):
-        display = ResponseSurfaceDisplay.from_estimator(A_GRID, features=(0, 2), grid_resolution=3)
-        assert display.held == {"chip temperature": A_GRID.reference[1]}
-        assert "chip temperature = 18.5" in display.ax_.get_title(loc="left")
-
     def test_colours_are_set_by_where_the_data_are(self):
         rows = rows_of(A_GRID, 0.2)
         wide = ResponseSurfaceDisplay.from_estimator(A_GRID, grid_resolution=41)
@@ -301,13 +272,6 @@ class TestLoss:
         with pytest.raises(TypeError, match="TSKModel has not been trained here"):
             LossCurveDisplay.from_estimator(A_GRID)
 
-    def test_curves_share_axes(self):
-        _, ax = plt.subplots()
-        LossCurveDisplay(loss=np.array([1.0, 0.5])).plot(ax=ax)
-        LossCurveDisplay(loss=np.array([1.0, 0.0]), name="exact").plot(ax=ax, color="red")
-        assert [line.get_color() for line in ax.get_lines()][1] == "red"
-        assert [text.get_text() for text in ax.get_legend().get_texts()] == ["exact"]
-
     def test_rows_held_out_are_a_dashed_line_of_the_same_colour(self):
         X = np.random.default_rng(0).uniform(-3, 3, (80, 1))
         # With weights that are given the premises have not been moved before the run begins.
@@ -347,23 +311,6 @@ class TestReadability:
             Z[j] = np.linspace(model.minimum[j], model.maximum[j], 11)
             expected = np.exp(model.antecedent.log_memberships(Z)[t])
             assert_allclose(image.get_array()[0], expected, rtol=1e-9)
-
-    def test_of_chosen_rows_on_given_axes(self):
-        X = rows_of(TWO_OUTPUTS, 1.0)
-        weight = np.ones(40)
-        weight[::4] = 0.0
-        _, axes = plt.subplots(1, 2)
-        display = ReadabilityDisplay.from_estimator(
-            TWO_OUTPUTS, X, sample_weight=weight, output="y1", max_rows=20, ax=axes
-        )
-        assert_array_equal(display.axes_, axes)
-        # Of every second row, half have weight.
-        assert_allclose(display.predictions, TWO_OUTPUTS.predict(X[2::4])[:, 1], rtol=1e-9)
-        assert axes[1].get_ylabel() == "y1: strongest rule alone"
-        for settings in ({"max_rows": 0}, {"n_points": 1}, {"output": 2}):
-            name = next(iter(settings)).replace("output", "no output")
-            with pytest.raises(ValueError, match=name):
-                ReadabilityDisplay.from_estimator(TWO_OUTPUTS, X, **settings)
 
     def test_what_cannot_be_read_is_red(self):
         X = np.random.default_rng(0).uniform(size=(50, 1))

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.inspection import measures
 from skanfis.inspection.measures import crossings, distinct_terms, measure
-from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
+from skanfis.membership import MEMBERSHIPS, Gaussian
 
-from .. import oracles
-from ..export.rule_bases import EVERY_PAIR, MODELS, OFFSET, SCALE, build, rows_of
+from ..export.rule_bases import EVERY_PAIR, MODELS, build, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 ONE = MODELS["one rule, order 1, 1 outputs"]
@@ -74,14 +73,6 @@ def test_measures_are_what_loops_find(model):
     data = data_of(model)
     # The textbook form of the consequents, far from the origin, has lost digits: so the tolerance.
     assert_alike(found_of(model, *data), by_loops(model, *data), rtol=1e-6)
-
-
-@ALL
-def test_without_a_target_the_predictions_stand_for_it(model):
-    X, _, weight = data_of(model)
-    expected = found_of(model, X, model.with_out_of_bounds("clip").predict(X), weight)
-    for policy in ("clip", "linear", "nan", "raise"):
-        assert_alike(found_of(replace(model, out_of_bounds=policy), X, None, weight), expected)
 
 
 @ALL
@@ -206,16 +197,6 @@ def test_neighbours_of_a_start_cross_at_its_overlap(family, overlap):
     assert_allclose(found[:2], expected, rtol=1e-8)
 
 
-def test_crossings_do_not_depend_on_units_or_order():
-    antecedent = oracles.random_scattered(np.random.default_rng(0), Gaussian, 6, (0, 1, 2))
-    found = crossings(antecedent)
-    assert_allclose(crossings(antecedent.change_units(OFFSET, SCALE)), found, rtol=1e-6)
-    group = antecedent.groups[0]
-    turned = TermGroup(Gaussian, group.inputs[::-1], group.theta[:, ::-1])
-    turned = replace(antecedent, groups=(turned,))
-    assert_allclose(crossings(turned)[::-1], found, rtol=1e-12)
-
-
 def test_terms_that_are_the_very_same_are_one():
     off = 1e-13  # a rounding error
     antecedent = scattered([1.0, 3.0, 1.0 + off, 3.0], [0.5, 0.7, 0.5 * (1 + off), 0.7])
@@ -227,16 +208,3 @@ def test_terms_that_are_the_very_same_are_one():
     nothing = GridAntecedent((), counts=())
     assert distinct_terms(nothing) == {}
     assert crossings(nothing).size == 0
-
-
-def test_neighbours_of_two_families():
-    bells = np.array([[2.0], [np.log(1.0)], [np.log(2.0)]])
-    groups = (
-        TermGroup(Gaussian, np.array([0, 0]), gaussians([2.0, 0.0], [1.0, 1.0])),
-        TermGroup(Bell, np.array([0]), bells),
-    )
-    antecedent = RuleTableAntecedent(groups, np.array([[0], [1], [2]]))
-    x = np.linspace(0.0, 2.0, 200_001)
-    height = np.minimum(np.exp(-0.5 * (x - 2.0) ** 2), np.exp(-0.5 * x**2)).max()
-    assert distinct_terms(antecedent) == {0: [1, 0, 2]}
-    assert_allclose(crossings(antecedent), [1.0, height, np.nan], atol=1e-5)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+from sklearn.compose import TransformedTargetRegressor
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, StandardScaler
@@ -145,17 +145,6 @@ def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
     inner = scaled.regressor_.best_estimator_
     inside = readability(inner, X, scaled.transformer_.transform(y.to_numpy()[:, None]))
     assert_allclose(readability(scaled, X, y).summary, inside.summary, rtol=1e-6)
-
-
-def test_columns_that_do_not_reach_the_model_may_hold_anything():
-    X = np.random.default_rng(0).uniform(size=(60, 3))
-    pipe = make_pipeline(
-        ColumnTransformer([("two", "passthrough", [2, 0])]), ANFISRegressor(n_mfs=2, solver="lse")
-    )
-    pipe.fit(X, X[:, 0] ** 2)
-    expected = readability(pipe, X)
-    X[:, 1] = np.nan
-    assert_same(readability(pipe, X), expected)
 
 
 def test_tables_of_every_kind(fitted):
