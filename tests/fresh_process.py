@@ -53,7 +53,7 @@ def page_faults():
 
 def modules_for_measuring():
     from skanfis import ANFISRegressor
-    from skanfis.inspection import readability_of_rows
+    from skanfis.inspection.readability import readability_of_rows
 
     X = np.linspace(0, 1, 30)[:, None]
     before = set(sys.modules)

@@ -9,14 +9,7 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_choice
 from ..export.folding import fold, fold_with_rows
-from .rules import (
-    choose_rules,
-    conditions,
-    consequents_about,
-    premise_text,
-    premises,
-    warn_if_unreadable,
-)
+from .rules import choose_rules, premise_texts, rule_values, rules_frame, warn_of_findings
 
 __all__ = ["explain", "memberships_table", "rules_table"]
 
@@ -36,15 +29,10 @@ def rules_table(
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     about : {"origin", "mean"}, default="origin"
-        What the constants of the consequents mean. "origin": the textbook form, p0 + p1 x1 + ...;
-        "mean": the rule's value at the mean of the training inputs, which keeps more digits where
-        a column lies far from the origin. The slopes are the same.
-    sort_by : {"rule", "weight", "rows"}, default="rule"
-        Order of the rules: by number, or the most important first.
-    max_rules : int, default=None
-        Give no more rules than this; None is all.
-    min_weight : float, default=0.0
-        Give only rules with at least this part of the weight of the training data, from 0 to 1.
+        Where the constants of the consequents are the rule's value: at the origin, as in textbooks,
+        or at the mean of the training inputs, with more digits. The slopes are the same.
+    sort_by, max_rules, min_weight : {"rule", "weight", "rows"}, int or None, float
+        Which rules, and in which order, as :func:`export_text` takes them; all by their number.
 
     Returns
     -------
@@ -59,8 +47,6 @@ def rules_table(
     ------
     ValueError
         If a parameter is out of its range, or a step of a pipeline cannot be folded.
-    TypeError
-        If ``estimator`` has no rules.
 
     Warns
     -----
@@ -88,22 +74,9 @@ def rules_table(
     """
     check_choice("about", about, ("origin", "mean"))
     model = fold(estimator)
-    warn_if_unreadable(estimator, model)
-    chosen = choose_rules(model, sort_by, max_rules, min_weight)
+    warn_of_findings(estimator, model)
     reference = model.reference if about == "mean" else 0.0 * model.reference
-    consequents = consequents_about(model, reference)
-    by_rule, looked_at = premises(model)
-    columns: dict = {
-        ("if", model.input_names[j]): [model.term_names[r[j]] if j in r else None for r in by_rule]
-        for j in looked_at
-    }
-    columns["data", "weight"] = model.rule_weights
-    columns["data", "rows"] = model.rule_rows
-    for k, output in enumerate(model.output_names):
-        for i, name in enumerate(("constant", *model.input_names)):
-            columns[f"then {output}", name] = consequents[:, i, k]
-    table = pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
-    return table.iloc[chosen]
+    return choose_rules(rules_frame(model, reference), sort_by, max_rules, min_weight)
 
 
 def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
@@ -114,7 +87,7 @@ def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it.
     trained : bool, default=True
-        Whether to tell the memberships after training, or as they were before it.
+        Whether to give the memberships after training, or as they were before it.
 
     Returns
     -------
@@ -127,8 +100,6 @@ def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
     ------
     ValueError
         If a step of a pipeline cannot be folded.
-    TypeError
-        If ``estimator`` has no rules.
 
     Examples
     --------
@@ -148,7 +119,7 @@ def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
 
 
 def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
-    """Tell for each row which rules fired, by how much, and what each contributed.
+    """Tabulate which rules made each prediction, and what each contributed.
 
     Parameters
     ----------
@@ -157,37 +128,29 @@ def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     X : array-like of shape (n_samples, n_features)
         Rows to explain, as ``estimator.predict`` takes them.
     min_strength : float, default=0.0
-        Rules that fire with less than this on a row, from 0 to 1, are told in one line, "other
-        rules".
+        Rules that fire with less than this on a row, from 0 to 1, share one line, "other rules".
 
     Returns
     -------
     table : DataFrame
-        The strongest rule first, for each row and output. Columns:
+        The strongest rule first, for each row and output. Columns: "row", its position in X;
+        "output", its name; "rule", the rule's number; "if", its terms; "strength", its part in the
+        row, which sums to one over the rules; "value", what it says there; "contribution", strength
+        times value. **The sum of the contributions to a row's output is the prediction**, to
+        rounding errors.
 
-        * "row": its position in X, from 0;
-        * "output": the name of the output;
-        * "rule": the rule's number, missing for other lines;
-        * "if": its terms, "other rules", "beyond x" or "held" (see below);
-        * "strength": the part that the rule has in the row; the sum over rules is one;
-        * "value": what the rule says there;
-        * "contribution": strength times value. **The sum of the contributions to a row's output is
-          the prediction**, to rounding errors.
-
-        A row outside the training range is explained at the nearest point in it. With
-        ``out_of_bounds="linear"``, a line "beyond x" for each input that is outside has the way to
-        the row: its "value" is the slope there, its "contribution" the slope times the distance, or
-        times ``max_extrapolation`` standard deviations where that is less.
-        With "nan" the values and contributions of such rows are missing. Where an output is held at
-        the limits of its training, a line "held" has the difference to what the rules say.
+        Lines without a number: "other rules" (see ``min_strength``); "held", where the output is
+        held at the limits of its training, with the difference to what the rules say; and of a
+        row outside the training range, which is explained at the nearest point in it, "beyond x"
+        for each input that is outside, with ``out_of_bounds="linear"``: its "value" is the slope
+        there, its "contribution" the slope times the distance, or times ``max_extrapolation``
+        standard deviations where that is less. With "nan" such rows have missing values.
 
     Raises
     ------
     ValueError
         If X is not finite, or has other columns than in training; if it is outside the training
         range and ``out_of_bounds="raise"``; if a step of a pipeline cannot be folded.
-    TypeError
-        If ``estimator`` has no rules.
 
     Examples
     --------
@@ -214,82 +177,61 @@ def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     values = rule_values(model, nearest)
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
-    lines = [_rule_lines(model, strengths, values, min_strength)]
+    lines = _rule_lines(model, strengths, values, min_strength)
     said = np.einsum("nr,nro->no", strengths, values)
     if model.out_of_bounds == "linear" and not inside.all():
         way, gradient = model.way_out(rows), model.gradient(nearest)
-        lines.append(_lines_beyond(model, way, gradient))
-        said += np.einsum("nj,njo->no", way, gradient)
-    low, high = model.output_limits
-    lines.append(_lines_held(model, np.clip(said, low, high) - said))
-    table = pd.concat(lines).sort_values(["row", "output", "place"], kind="stable")
+        beyond = way[:, :, None] * gradient
+        row, j, output = np.nonzero(np.repeat(way[:, :, None] != 0.0, model.n_outputs, axis=2))
+        names = np.array([f"beyond {name}" for name in model.input_names], dtype=object)
+        cell = (row, j, output)
+        lines.append(_lines(row, output, names[j], beyond[cell], value=gradient[cell]))
+        said += beyond.sum(axis=1)
+    held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
+    row, output = np.nonzero(held)
+    lines.append(_lines(row, output, "held", held[row, output]))
+    # Sorted by row and output alone, lines stay in the order in which they were made.
+    table = pd.concat([part for part in lines if len(part)] or lines[:1], ignore_index=True)
+    table = table.sort_values(["row", "output"], kind="stable", ignore_index=True)
     table["output"] = np.array(model.output_names, dtype=object)[table["output"]]
-    table["rule"] = table["rule"].astype("Int64")
-    return table.drop(columns="place").reset_index(drop=True)
-
-
-def rule_values(model, rows):
-    """f_r at rows in the box, shape (n_rows, n_rules, n_outputs)."""
-    constant, slopes = model.coefficients[:, 0], model.coefficients[:, 1:]
-    if not model.order:
-        return np.tile(constant, (len(rows), 1, 1))
-    return constant + np.einsum("nj,rjo->nro", rows - model.reference, slopes)
+    return table
 
 
 def _rule_lines(model, strengths, values, min_strength):
     """A line for each rule that fires on a row, by falling strength, and one for all others."""
-    premises = np.array([premise_text(model, rule) for rule in conditions(model)], dtype=object)
-    _, n_rules, n_outputs = values.shape
-    order = np.argsort(-strengths, axis=1, kind="stable")
+    premises = np.array(premise_texts(rules_frame(model, model.reference)), dtype=object)
     contributions = strengths[:, :, None] * values
-    told = np.take_along_axis(strengths, order, axis=1) >= min_strength
-    row, place, output = np.nonzero(np.repeat(told[:, :, None], n_outputs, axis=2))
+    order = np.argsort(-strengths, axis=1, kind="stable")
+    fires = np.take_along_axis(strengths, order, axis=1) >= min_strength
+    row, place, output = np.nonzero(np.repeat(fires[:, :, None], model.n_outputs, axis=2))
     rule = order[row, place]
+    cell = (row, rule, output)
     fired = _lines(
         row,
         output,
         premises[rule],
-        contributions[row, rule, output],
-        place,
+        contributions[cell],
         rule=rule,
         strength=strengths[row, rule],
-        value=values[row, rule, output],
+        value=values[cell],
     )
-    silent = strengths < min_strength
-    row, output = np.nonzero(np.repeat(silent.any(axis=1)[:, None], n_outputs, axis=1))
-    said = (contributions * silent[:, :, None]).sum(axis=1)[row, output]
-    strength = (strengths * silent).sum(axis=1)[row]
-    others = _lines(row, output, "other rules", said, n_rules, strength=strength)
-    return pd.concat([fired, others]) if len(others) else fired
+    weak = strengths < min_strength
+    row, output = np.nonzero(np.repeat(weak.any(axis=1)[:, None], model.n_outputs, axis=1))
+    total = np.einsum("nr,nro->no", weak, contributions)[row, output]
+    others = _lines(row, output, "other rules", total, strength=(strengths * weak).sum(axis=1)[row])
+    return [fired, others]
 
 
-def _lines_held(model, change):
-    """A line for each output that is held at its limit."""
-    row, output = np.nonzero(np.nan_to_num(change))
-    place = model.n_rules + 1 + model.n_inputs
-    return _lines(row, output, np.full(row.size, "held", dtype=object), change[row, output], place)
-
-
-def _lines_beyond(model, distance, gradient):
-    """A line for each input that lies outside the box: the way along the tangent."""
-    row, j, output = np.nonzero(np.repeat((distance != 0.0)[:, :, None], model.n_outputs, axis=2))
-    names = np.array([f"beyond {name}" for name in model.input_names], dtype=object)
-    slope = gradient[row, j, output]
-    said, place = slope * distance[row, j], model.n_rules + 1 + j
-    return _lines(row, output, names[j], said, place, value=slope)
-
-
-def _lines(row, output, what, contribution, place, *, rule=np.nan, strength=np.nan, value=np.nan):
-    """Lines of an explanation, in the order of their places."""
+def _lines(row, output, what, contribution, *, rule=None, strength=np.nan, value=np.nan):
+    """Lines of an explanation."""
     return pd.DataFrame(
         {
             "row": row,
             "output": output,
-            "rule": rule,
-            "if": what,
+            "rule": pd.array([pd.NA] * len(row) if rule is None else rule, dtype="Int64"),
+            "if": np.full(len(row), what, dtype=object) if isinstance(what, str) else what,
             "strength": strength,
             "value": value,
             "contribution": contribution,
-            "place": place,
         }
     )

@@ -1,4 +1,4 @@
-"""What the displays have in common: axes to draw on, and which inputs to look at."""
+"""What the displays have in common: axes, colours, labels, and rows along one or two inputs."""
 
 from collections.abc import Mapping
 from numbers import Real
@@ -6,31 +6,31 @@ from numbers import Real
 import numpy as np
 
 from .._validation import position_of
-from .rules import knows_data
+from .labels import as_label
+from .rules import has_training_data
 
-__all__ = [
-    "COVERED",
-    "colors",
-    "coverage_if_known",
-    "held_row",
-    "one_axes",
-    "panels",
-    "position",
-    "terms_text",
-]
+__all__ = ["COVERED", "Display", "colors", "panels", "position", "section"]
 
 # Below this coverage the prediction counts as extrapolated.
 COVERED = 0.5
-
 # The brightest end of a colour map is hard to see on white.
 _BRIGHTEST = 0.85
 
 
-def one_axes(ax, width=5.6, height=4.2):
-    """``ax``, or the axes of a new figure of this size in inches."""
-    if ax is not None:
+class Display:
+    """A picture on one axes: ``from_estimator`` stores arrays, ``plot`` draws them."""
+
+    def _begin(self, ax, width=5.6, height=4.2):
+        """Take ``ax``, or the axes of a new figure of this size in inches."""
+        if ax is None:
+            ax = _pyplot().subplots(figsize=(width, height), layout="constrained")[1]
+        self.ax_, self.figure_ = ax, ax.figure
         return ax
-    return _pyplot().subplots(figsize=(width, height), layout="constrained")[1]
+
+    def _note(self, held, *notes):
+        """What is held, and other notes, in small letters above the picture."""
+        values = [f"{as_label(name)} = {value:.4g}" for name, value in held.items()]
+        self.ax_.set_title("; ".join([*values, *notes]), fontsize="small", loc="left")
 
 
 def panels(ax, count, width=3.2, height=2.6, columns=3):
@@ -50,7 +50,7 @@ def panels(ax, count, width=3.2, height=2.6, columns=3):
     else:
         axes = np.ravel(ax)
         if axes.size != count:
-            raise ValueError(f"ax has {axes.size} axes; {count} are needed, one per input.")
+            raise ValueError(f"ax has {axes.size} axes; {count} are needed, one per panel.")
         return axes
     return np.array([figure.add_subplot(grid[i // columns, i % columns]) for i in range(count)])
 
@@ -82,26 +82,17 @@ def position(feature, names, what="input"):
     )
 
 
-def terms_text(model, rule, inputs):
-    """Names of the rule's terms on some inputs, "any" where it does not look at one."""
-    return ", ".join(model.term_names[rule[j]] if j in rule else "any" for j in inputs)
+def section(model, inputs, values, held):
+    """Rows that have ``values`` (n_rows, n_inputs_varied) on some inputs, with the others held.
 
-
-def coverage_if_known(model, rows):
-    """How well the training data cover each row; 1 where the model knows of no data."""
-    return np.ones(len(rows)) if model.support is None else model.coverage(rows)
-
-
-def held_row(model, held):
-    """A row of the inputs' means, but for what the mapping ``held`` says by input.
-
-    Without data that a mean could be of, the middle of the ranges.
+    Others are held where ``held`` says, or at their mean in training; without training data, in the
+    middle of their range. Returns the rows, the others' values by name, and the rows' coverage, 1
+    where the model knows of no data.
     """
     middle = 0.5 * (model.minimum + model.maximum)
-    mean = model.reference if knows_data(model) else middle
+    mean = model.reference if has_training_data(model) else middle
     row = np.clip(mean, model.minimum, model.maximum)
-    if held is None:
-        return row
+    held = {} if held is None else held
     if not isinstance(held, Mapping):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
     for feature, value in held.items():
@@ -113,4 +104,8 @@ def held_row(model, held):
                 f"{low:.6g} to {high:.6g}."
             )
         row[j] = value
-    return row
+    rows = np.tile(row, (len(values), 1))
+    rows[:, inputs] = values
+    others = [j for j in range(model.n_inputs) if j not in inputs]
+    coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
+    return rows, {model.input_names[j]: float(row[j]) for j in others}, coverage
