@@ -16,7 +16,7 @@ from ._simpler import Simpler, simpler_compensations
 from ._split import Split
 from ._verdict import Verdict, judge
 from .compensator import GyroCompensator, features
-from .log import LogError
+from .errors import LogError
 from .metrics import rms, scale_factor
 
 __all__ = ["MODEL", "Calibration", "Recipe", "calibrate"]

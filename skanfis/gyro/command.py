@@ -13,17 +13,24 @@ from ._apply import apply
 from ._calibration import Recipe, calibrate
 from ._certain import certain_of
 from ._columns import SIGNALS
-from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
+from ._console import (
+    ExistsError,
+    Progress,
+    UsageError,
+    refuse_existing,
+    say,
+    say_error,
+    staged,
+)
 from ._dossier import dossier_of
-from ._files import check_different, find_logs
-from ._logs import find_tasks, read_task
 from ._options import PROGRAM, make_parser
 from ._split import choose_split
-from ._staging import Staging
 from ._summary import errors_and_verdict
+from ._tasks import find_tasks, read_task
 from .c_code import export_c_physics
 from .errors import LogError
 from .html_report import report_page, rules_text
+from .log import check_different, find_logs
 from .metrics import hysteresis
 
 __all__ = ["main"]
@@ -72,7 +79,7 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
-    with Staging(folder) as staging:
+    with staged(folder) as written:
         tell(f"reading {_named(paths)}")
         tasks = find_tasks(options, paths)
         for task in tasks[: len(tasks) if len(tasks) > 1 or tasks[0].axis else 0]:
@@ -94,31 +101,23 @@ def _calibrate(options, tell):
             tell(f"inputs: {', '.join(inputs)}")
             tell(f"check: {split.sentence}")
             calibration = calibrate(
-                reading.log,
-                split,
-                recipe,
-                tell,
-                reading.name_row,
-                made=reading.made,
-                n_rows=reading.n_rows,
+                reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
             )
             tell("drawing the report")
-            target = staging.path / task.axis
+            target = written / task.axis
             target.mkdir(exist_ok=True)
             _write(calibration, options, paths, target, task.axis)
             done.append((task, calibration, reading.notes))
         if not done:
             raise LogError(f"no axis follows the rate: {'; '.join(left_out)}")
-        staging.publish()
     _say_what_was_found(done, left_out, folder, tell)
 
 
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
-    for name in ("deviation", "saturate"):
-        if getattr(options, name) and not options.c:
-            raise UsageError(f"--{name} is of the model in C: give --c c99 or --c c89 with it.")
+    if options.saturate and not options.c:
+        raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     _refuse_twice([name for name, *_ in options.box], "--box: {} is given twice.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
@@ -160,10 +159,7 @@ def _recipe(options, inputs, unit):
         physics=options.physics,
         outside=options.outside,
         max_extrapolation=options.max_extrapolation,
-        time_constant=options.time_constant,
         min_coverage=options.min_coverage,
-        max_rules=options.max_rules,
-        fit_rows=options.fit_rows,
         n_jobs=options.jobs,
         box=tuple(options.box),
     )
@@ -217,7 +213,6 @@ def _write(calibration, options, paths, folder, axis=""):
             path,
             std=options.c,
             min_coverage=coverage,
-            deviation=options.deviation,
             saturate=certain_of(calibration).found if options.saturate else None,
         )
 

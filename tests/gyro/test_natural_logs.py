@@ -6,9 +6,8 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError
-from skanfis.gyro._files import find_logs
-from skanfis.gyro._layout import Request
-from skanfis.gyro.log import read
+from skanfis.gyro._guess import Request
+from skanfis.gyro.log import find_logs, read
 
 ASKED = {"require": ("temperature", "output"), "guess": True, "drop_missing": True}
 PARTS = ["time", "temperature", "output", "rate"]
@@ -141,17 +140,12 @@ def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth, suf
     np.testing.assert_allclose(reading.log["output"], -27_000.0 * truth["output"])
 
 
-def test_columns_without_names_are_told_by_what_they_do(tmp_path, truth):
-    warming = 20.0 + 0.1 * np.arange(len(truth)) + 3.0 * np.sin(truth.index / 40.0)
-    table = pd.DataFrame(
-        {"a": 0.5 * truth.index, "b": truth["output"], "c": warming, "d": truth["rate"]}
-    )
+def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
+    table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
     table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv", require=("temperature", "output", "rate", "time"))
-    names = {part: reading.files[0].layout.name(part) for part in PARTS}
-    assert names == {"time": "a", "temperature": "c", "output": "b", "rate": "d"}
-    assert "because one follows the other" in "; ".join(reading.notes)
-    told = found(tmp_path / "log.csv", columns={"output": "D ", "rate": "b"})
+    with pytest.raises(LogError, match=r"Say which it is .--columns temperature=NAME"):
+        found(tmp_path / "log.csv")
+    told = found(tmp_path / "log.csv", columns={"temperature": "a", "output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
     assert "'d' is taken for 'D '" in told.notes
 
@@ -232,7 +226,7 @@ def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
 
 
 def test_means_while_reading_are_those_of_the_rows(tmp_path, monkeypatch, truth):
-    monkeypatch.setattr("skanfis.gyro._table._ROWS", 37)  # no multiple of a cell
+    monkeypatch.setattr("skanfis.gyro._log_file._ROWS", 37)  # no multiple of a cell
     truth[[*PARTS, "run"]].to_csv(tmp_path / "log.csv", index=False)
     reading = found(tmp_path / "log.csv", average=50.0)
     cells = truth.groupby(["run", (truth["time"] // 50.0)])[PARTS].mean()

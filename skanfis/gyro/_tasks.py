@@ -6,15 +6,16 @@ import numpy as np
 
 from ._checks import LARGEST_AT_REST, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._console import UsageError, check_device, pairs, usage_errors
-from ._layout import Request
-from ._table import LogFile
-from ._thinned import read_thinned
+from ._console import UsageError, usage_errors
+from ._log_file import LogFile
+from ._options import pairs, request_of
 from .compensator import INPUTS
 from .errors import LogError
-from .log import checked_request, read
+from .log import read
 
-__all__ = ["Task", "find_tasks", "read_task", "request_of"]
+__all__ = ["Task", "find_tasks", "read_task"]
+
+_MOST_ROWS = 1_000_000  # that are held
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ def find_tasks(options, paths):
     if options.axes is not None and len(told) < len(options.axes):
         raise UsageError("--axes: an axis is given twice.")
     with usage_errors():
-        layout = LogFile.open(paths[0], request_of(options, ())).layout
+        layout = LogFile(paths[0], request_of(options, ())).layout
     found = layout.axes
     tasks = []
     for axis, name in (told or dict.fromkeys(found, "")).items():
@@ -53,49 +54,19 @@ def find_tasks(options, paths):
     return tasks if len(tasks) > 1 or told else [Task()]
 
 
-def request_of(options, require, columns=None):
-    request = Request(
-        columns=pairs(options.columns, "--columns") | (columns or {}),
-        units=pairs(options.units, "--units"),
-        require=tuple(require),
-        separator=options.separator,
-        decimal=options.decimal,
-        encoding=options.encoding,
-        guess=True,
-        drop_missing=options.missing == "drop",
-        average=options.average,
-    )
-    with usage_errors():  # an unknown part or unit
-        return checked_request(request)
-
-
 def read_task(options, paths, task, tell):
     """The checked log of one axis; returns its reading and the inputs.
 
-    What was found out is told. Of too many rows to be held, some are.
+    What was found out is told.
     """
     required = ["temperature", "output"]
     if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
         required.append("time")
-    with usage_errors():  # characters that do not go together
-        request = request_of(options, required, task.columns)
-        max_gap, most_rows = options.max_gap, options.check_rows
-        reading = read(paths, request, max_gap=max_gap, tell=tell, most_rows=most_rows)
-        if reading is None:
-            tell(f"more than {most_rows:,} rows: not all are held")
-            reading = read_thinned(
-                paths,
-                request,
-                max_gap=max_gap,
-                most_rows=most_rows,
-                time_constant=options.time_constant,
-                tell=tell,
-                device=options.device,
-            )
-        elif options.device is not None:
-            labels = reading.log.get("device")
-            check_device(options.device, None if labels is None else list(labels.cat.categories))
-            reading = reading.of_device(options.device)
+    request = request_of(options, required, task.columns)
+    with usage_errors():
+        reading = read(
+            paths, request, max_gap=options.max_gap, tell=tell, most_rows=_MOST_ROWS, check=True
+        )
     for note in reading.notes:
         tell(f"note: {note}")
     tell(f"{reading.n_rows:,} rows{_counts(reading.log)}")
@@ -103,12 +74,7 @@ def read_task(options, paths, task, tell):
         at_rest = _settle_rest(options, reading, tell)
         inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
         _check_options(options, inputs, reading.units["output"], at_rest)
-        check_log(
-            reading.log,
-            units=reading.units,
-            inputs=inputs,
-            min_temperature_span=options.min_temperature_span,
-        )
+        check_log(reading.log, units=reading.units, inputs=inputs)
     except LogError as error:
         raise reading.located(error) from error
     return reading, inputs
