@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import joblib
 import numpy as np
 import pandas as pd
 
@@ -25,7 +24,8 @@ def apply(options, tell):
         raise UsageError("--apply to several logs needs --output.")
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
     refuse_existing([target], options.force)
-    compensator = load(options.apply, tell)
+    with usage_errors():
+        compensator = GyroCompensator.read_json(options.apply)
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
@@ -112,70 +112,39 @@ class _Inputs:
         return X
 
 
-def load(path, tell):
-    """The compensator of a file: of JSON, or else by its name a pickle, which may run any code."""
-    try:
-        return GyroCompensator.read_json(path)
-    except ValueError as error:
-        if Path(path).suffix.lower() != ".joblib":
-            raise UsageError(str(error)) from error
-        reason = str(error)
-    tell(
-        f"{reason} It is loaded as a pickle for its name ends in .joblib: loading it runs whatever "
-        "code it holds. compensator.json runs nothing."
-    )
-    try:
-        loaded = joblib.load(path)
-    except Exception as error:
-        # A damaged pickle may raise anything.
-        raise UsageError(
-            f"{path} cannot be loaded ({type(error).__name__}: {error}): it is damaged, or no "
-            "compensator. Use compensator.json."
-        ) from error
-    if not isinstance(loaded, GyroCompensator):
-        raise UsageError(f"{path} holds a {type(loaded).__name__}, not a GyroCompensator.")
-    return loaded
-
-
 class _Summary:
-    """Counts and squares over all files."""
+    """Counts and squared errors over all rows."""
 
     def __init__(self, target):
         self._target = target
-        self.n_rows = self._n_flagged = 0
-        self._by_status = dict.fromkeys(STATUS, 0)
+        self.n_rows = 0
+        self._by_status = pd.Series(dtype=int)
         # Squares before and after, and how many, of the rows where all is well and of others.
         self._squares = {False: np.zeros(3), True: np.zeros(3)}
 
     def add(self, log, compensated):
-        """Count the rows of one file."""
-        status = compensated["status"].to_numpy()
+        status = compensated["status"]
         self.n_rows += len(log)
-        self._n_flagged += int(np.count_nonzero(status))
-        for name, bit in STATUS.items():
-            self._by_status[name] += int(np.count_nonzero(status & bit))
+        self._by_status = self._by_status.add(status.value_counts(), fill_value=0)
         if "rate" not in log:
             return
-        before, after = (
-            (compensated[name] - log["rate"]).to_numpy()
-            for name in ("rate_indicated", "rate_compensated")
-        )
-        for flagged, sums in self._squares.items():
-            rows = (status != 0) == flagged
-            answered = rows & np.isfinite(after)
-            sums += [np.sum(before[answered] ** 2), np.sum(after[answered] ** 2), answered.sum()]
+        errors = compensated[["rate_indicated", "rate_compensated"]].sub(log["rate"], axis=0)
+        errors = (errors.dropna() ** 2).assign(count=1.0)
+        for is_flagged, sums in errors.groupby(status[errors.index] != 0):
+            self._squares[is_flagged] += sums.sum().to_numpy()
 
     def lines(self):
         """The summary."""
-        yield f"written        {self._target}: {self.n_rows:,} rows, {self._n_flagged:,} flagged"
+        counts = self._by_status.astype(int)
+        n_flagged = counts[counts.index != 0].sum()
+        yield f"written        {self._target}: {self.n_rows:,} rows, {n_flagged:,} flagged"
         for name, bit in STATUS.items():
-            if self._by_status[name]:
-                count = self._by_status[name]
+            if count := counts[(counts.index & bit) != 0].sum():
                 yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
-        for flagged, (before, after, n_answered) in self._squares.items():
-            if n_answered:
+        for is_flagged, (before, after, n_rows) in self._squares.items():
+            if n_rows:
+                kind = "flagged" if is_flagged else "all is well"
                 yield (
-                    f"RMS error      {np.sqrt(before / n_answered):.4g} deg/s before, "
-                    f"{np.sqrt(after / n_answered):.4g} after "
-                    f"({'flagged' if flagged else 'all is well'})"
+                    f"RMS error      {np.sqrt(before / n_rows):.4g} deg/s before, "
+                    f"{np.sqrt(after / n_rows):.4g} after ({kind})"
                 )

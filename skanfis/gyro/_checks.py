@@ -58,10 +58,9 @@ def check_log(
         As :func:`read_log` returns it. Without a column "run" all rows are one run.
     inputs : sequence of str, default=("temperature", "output")
         What the compensator is to learn from: of "time", "temperature", "temperature_rate" and
-        "output". They must change enough. Without any, the ranges do not matter.
+        "output". They must change enough.
     units : dict of str to str, default=None
-        Units that the file was declared to be in, as for :func:`read_log`. They tell a raw signal
-        from a rate, and serve the messages.
+        Units of the file, as for :func:`read_log`, which tell a raw signal from a rate.
     min_temperature_span : float, default=10.0
         Smallest range of the temperature [degC], if it is an input.
 
@@ -73,9 +72,8 @@ def check_log(
     Raises
     ------
     LogError
-        If values are missing, infinite or implausible in their unit; if time does not increase
-        within a run; if the temperature's or the rate's range is too small; if the output does not
-        follow the rate. The message names column and row, what was found, and what would do.
+        If values are missing, infinite or implausible, time does not increase within a run, a range
+        is too small, or the output does not follow the rate. The message names column and row.
 
     Examples
     --------

@@ -90,15 +90,14 @@ class Request:
 class Layout:
     """Places of the parts in a file and their units there.
 
-    ``date`` is the place of a date beside a clock, ``axes`` the outputs of several axes by letter:
-    the names of the output and of its rate. ``reasons`` and ``others`` are those of guesses.
+    ``date`` is the place of a date beside a clock. ``reasons`` and ``others``, which would do too,
+    are those of guesses.
     """
 
     header: list
     places: dict
     units: dict
     date: int | None = None
-    axes: dict = field(default_factory=dict)
     notes: list = field(default_factory=list)
     reasons: dict = field(default_factory=dict)
     others: dict = field(default_factory=dict)
@@ -147,7 +146,6 @@ def _guess(source, request, layout, first):
         _Column(place, name, unit, sample[place], source.decimal)
         for place, (name, unit) in enumerate(zip(source.header, source.units, strict=True))
     ]
-    has_output = "output" in layout.places
     for part in _WORDS:
         if part == "output" and not any(column.is_named("output") for column in columns):
             _alone_in("output", ("signal",), columns, layout)
@@ -169,8 +167,6 @@ def _guess(source, request, layout, first):
     if "time" in layout.places and is_clock(columns[layout.places["time"]].texts):
         days = [c.place for c in columns if c.words & {"date", "datum", "day", "日期"}]
         layout.date = next((k for k in days if k != layout.places["time"]), None)
-    if "output" in layout.places and not has_output:
-        _find_axes(columns, layout)
     layout.notes += _sentences(layout, request)
 
 
@@ -259,7 +255,7 @@ def _by_name(part, columns, layout):
     # One truth in two units: that which needs no conversion.
     chosen = next((c for c in best if c.unit in CANONICAL.values()), best[0])
     layout.places[part] = chosen.place
-    layout.others[part] = [c.place for c in best if c is not chosen and c.axis == chosen.axis]
+    layout.others[part] = [c.place for c in best if c is not chosen]
 
 
 def _by_unit(columns, layout):
@@ -317,29 +313,6 @@ def _settle_units(columns, layout):
 
 def _are_counts(values):
     return np.abs(values).max() > _LARGEST_RATE and (values == values.round()).all()
-
-
-def _find_axes(columns, layout):
-    """Outputs of several axes, each with the rate of its own or the one that there is."""
-    output, rate = (
-        columns[layout.places[part]] if part in layout.places else None
-        for part in ("output", "rate")
-    )
-    alike = [
-        column
-        for column in columns
-        if column.axis
-        and (column.words, column.unit) == (output.words, output.unit)
-        and column.can_be("output")
-    ]
-    if not output.axis or len(alike) < 2:
-        return
-    for column in alike:
-        rates = [rate] if rate is not None else []
-        if rate is not None and rate.axis:
-            rates = [c for c in columns if c.axis == column.axis and c.words == rate.words]
-        name = layout.header[rates[0].place] if rates else None
-        layout.axes[column.axis] = layout.header[column.place], name
 
 
 def _sentences(layout, request):

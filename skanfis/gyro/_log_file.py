@@ -96,14 +96,14 @@ class LogFile:
             known = ", ".join(sorted(devices))
             raise ValueError(f"--device {self.request.device}: {self.path} has {known}.")
 
-    def located(self, error, rows=None):
+    def located(self, error, rows=None, where=None):
         """An error of one part and row, in terms of this file; ``rows`` are positions in it."""
-        where = self.path
+        where = where or self.path
         if error.row is not None:
             row = error.row if rows is None else int(rows.iloc[error.row])
             where = f"{self.path}, {self.source.place_of(row)}"
         if error.column is None:
-            return LogError(f"{where}: {error.reason}")
+            return error
         name = self.layout.name(error.column)
         part = "" if name == error.column else f" ({error.column})"
         return LogError(f"{where}, column {name!r}{part}: {error.reason}")
@@ -219,7 +219,7 @@ class RunFinder:
 
     @property
     def runs(self):
-        return pd.DataFrame(list(self._codes), columns=["file", "device", "run"])
+        return pd.DataFrame(list(self._codes), columns=["file", "device", "run"], dtype=object)
 
     def codes(self, piece, file):
         """Position of each row's run among ``runs``; ``file`` tells files apart."""
@@ -285,7 +285,7 @@ class RunFinder:
             owners.append("run")
         if not {"file", "run"} & set(owners):
             return None
-        runs["file"] = [file_names[file] for file in runs["file"]]
+        runs["file"] = np.array(file_names, dtype=object)[runs["file"].to_numpy(dtype=int)]
         for parts in (["run"], ["file"], ["device", "run"], ["file", "run"], owners):
             if set(parts) <= set(owners) and not runs.duplicated(parts).any():
                 break

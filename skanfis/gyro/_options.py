@@ -17,20 +17,79 @@ from .compensator import INPUTS
 from .errors import shortened
 from .log import checked_request
 
-__all__ = ["PROGRAM", "make_parser", "pairs", "request_of"]
+__all__ = ["PROGRAM", "make_parser", "request_of"]
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
 _MOST_JOBS = 1024  # more threads than any machine has cores for
-_LONGEST_AXIS = 20  # it becomes part of file names
 
-_DESCRIPTION = """\
+_UNITS_OF_PARTS = ("\n" + 28 * " ").join(
+    f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES
+)
+_HELP = f"""\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
-Written to a folder: the model (compensator.json, and compensator.joblib as a Python object), a
-report with tables and pictures for any browser (report.html), and the rules as text (rules.txt).
+Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
+(report.html), and the rules as text (rules.txt).
+
+LOG: text with a header, such as CSV, or Parquet: one log, or one file per run; a folder or a
+pattern such as 'logs/*.csv' stands for its files
+
+reading the log:
+  --columns PART=NAME ...   names of the columns; parts: {", ".join(PARTS)}.
+                            A part that is not named is guessed by names and units, and the guess is
+                            told. Needed are temperature and output; the rate (the truth) unless the
+                            gyro was at rest; time for inputs that need it
+  --units PART=UNIT ...     units, by default those in the names, or s, degC and deg/s
+                            {_UNITS_OF_PARTS}
+  --encoding NAME           of the text, such as gbk (UTF-8, UTF-16 or Windows-1252)
+  --device NAME             use the rows of this device only
+  --max-gap S               a longer step of the time begins a new run, where no column tells runs
+                            apart; inf for none (auto: a minute, and 50 usual steps)
+  --average S               average the rows over so many seconds while they are read
+  --at-rest                 the gyro did not turn: the bias is learnt, and the log needs no rate.
+                            Found out where there is no rate, or one of zero
+  --scale-factor K          of a raw signal at rest, which does not tell it: counts per deg/s
+
+the model:
+  --inputs INPUT ...        of {", ".join(INPUTS)}; by default all that the
+                            log has, and time (since power-on) only with three runs or more. Without
+                            output, the bias alone is learnt
+  --terms N,N,...           fuzzy terms per input; 'search' (default) grows them on held-out groups,
+                            'auto' leaves them to ANFISRegressor
+  --physics                 for open-loop fiber-optic gyros: fit the arcsine law first, and let the
+                            fuzzy rules learn what it leaves
+  --jobs N                  threads for a fit (1); -1 is one per core
+
+where it holds, and how it is checked:
+  --outside POLICY          for rows outside the range of the calibration, which are flagged in any
+                            case: hold the edge value (clip), go on along the tangent for a limited
+                            way (linear, default), or give no rate (nan)
+  --max-extrapolation SD    how far the rules follow the tangent beyond the range of an input, in
+                            standard deviations; inf for without end; auto for as many as the
+                            outermost rows speak for, half a one at least
+  --min-coverage SHARE      rows that the data cover less are flagged ({Recipe.min_coverage:g})
+  --box INPUT=LOW:HIGH ...  box, such as temperature=-40:85, over which the report proves how large
+                            the compensation can be (the range of the calibration), in s, degC,
+                            degC/s, and the unit of the output
+  --groups KIND             what to hold out: {", ".join(KINDS)}.
+                            By default (auto) devices where there are three or more, else runs, and
+                            rate levels where these could be memorised; of a single run legs of the
+                            temperature's cycles, or pieces of them
+
+output:
+  --apply MODEL             compensate the logs by this model (compensator.json) instead of
+                            calibrating; a column for the rate is compared with where it is there.
+  --output PATH             folder to write to (LOG-compensator); with --apply the file
+                            (LOG-compensated.csv)
+  --c STD                   also write the model as C, compensator.h and .c, by c99 or c89
+  --saturate                with --c: hold what the rules give between the limits that the report
+                            has proven for the box (--box)
+  --force                   replace files that exist
+  --quiet                   no progress on stderr
+  --version, --help         the version; this page
 """
 
 _EPILOG = """\
@@ -51,41 +110,10 @@ status of a row in what --apply writes, the same bits as in the C code of skanfi
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
-
-security: --apply reads every file as JSON first, that is as data, and runs nothing of it. Only a
-file whose name ends in .joblib is unpickled where it is no JSON: unpickling runs whatever code the
-file holds, with all your rights. Apply such a file only if you, or someone whom you trust, have
-written it.
 """
 
 
-def make_parser():
-    """The parser of the command's arguments."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        usage=f"{PROGRAM} LOG [LOG ...] [options]\n"
-        f"       {PROGRAM} --apply MODEL LOG [LOG ...] [options]",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--version", action="version", version=f"skanfis {__version__}")
-    parser.add_argument(
-        "logs",
-        nargs="+",
-        metavar="LOG",
-        help="text with a header, such as CSV, or Parquet: one log, or one file per run; a folder "
-        "or a pattern such as 'logs/*.csv' stands for its files",
-    )
-    for title, options in _GROUPS.items():
-        group = parser.add_argument_group(title)
-        for name, settings in options.items():
-            group.add_argument(name, **settings)
-    add_report_options(parser)
-    return parser
-
-
-def pairs(texts, option):
+def _pairs(texts, option):
     """Options of the form PART=NAME as a dict."""
     found = {}
     for text in texts:
@@ -98,11 +126,11 @@ def pairs(texts, option):
     return found
 
 
-def request_of(options, require, columns=None):
+def request_of(options, require):
     """What the options ask of a reading; UsageError where they name an unknown part or unit."""
     request = Request(
-        columns=pairs(options.columns, "--columns") | (columns or {}),
-        units=pairs(options.units, "--units"),
+        columns=_pairs(options.columns, "--columns"),
+        units=_pairs(options.units, "--units"),
         require=tuple(require),
         encoding=options.encoding,
         guess=True,
@@ -162,15 +190,6 @@ def _encoding(text):
     return text
 
 
-def _axis(text):
-    letter, equals, name = text.partition("=")
-    # It becomes a folder's name.
-    plain = letter.isascii() and letter.isalnum() and len(letter) <= _LONGEST_AXIS
-    if not plain or bool(equals) != bool(name):
-        raise argparse.ArgumentTypeError(f"{shortened(text)} must be such as x or x=NAME")
-    return text
-
-
 def _box(text):
     name, _, ends = text.partition("=")
     try:
@@ -184,7 +203,6 @@ def _box(text):
     return name, low, high
 
 
-_SEVERAL = {"nargs": "+", "action": "extend", "default": []}
 _SECONDS = _number(float, lambda s: 1e-9 <= s <= 1e9, "a number from 1e-9 to 1e9")
 _SHARE = _number(float, lambda s: 0 <= s <= 1, "a number from 0 to 1")
 _GAP = _number(float, lambda s: s > 0, "auto, a positive number, or inf", "auto")
@@ -198,146 +216,45 @@ _FACTOR = _number(
     float, lambda k: 1e-30 <= abs(k) <= 1e30, "a number from 1e-30 to 1e30, or such a negative one"
 )
 
-_GROUPS: dict[str, dict[str, dict]] = {
-    "reading the log": {
-        "--columns": {
-            **_SEVERAL,
-            "metavar": "PART=NAME",
-            "help": f"names of the columns; parts: {', '.join(PARTS)}. A part that is not named is "
-            "guessed by names and units, and the guess is told. Needed are temperature and output; "
-            "the rate (the truth) unless the gyro was at rest; time for inputs that need it",
-        },
-        "--units": {
-            **_SEVERAL,
-            "metavar": "PART=UNIT",
-            "help": "units of the columns, by default those in their names, or s, degC and deg/s. "
-            + "; ".join(f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES),
-        },
-        "--axes": {
-            "nargs": "+",
-            "type": _axis,
-            "metavar": "AXIS[=NAME]",
-            "help": "calibrate several axes, each by itself, into a folder of its own: letters, "
-            "and the columns of their outputs where these are not guessed; by default all found",
-        },
-        "--encoding": {
-            "type": _encoding,
-            "metavar": "NAME",
-            "help": "of the text, such as gbk; by default UTF-8, UTF-16 or Windows-1252",
-        },
-        "--device": {"metavar": "NAME", "help": "use the rows of this device only"},
-        "--max-gap": {
-            "type": _GAP,
-            "default": "auto",
-            "metavar": "S",
-            "help": "a longer step of the time begins a new run, where no column tells runs apart; "
-            "inf for none (auto: a minute, and 50 usual steps)",
-        },
-        "--average": {
-            "type": _SECONDS,
-            "metavar": "S",
-            "help": "average the rows over so many seconds while they are read",
-        },
-        "--at-rest": {
-            "action": "store_true",
-            "help": "the gyro did not turn: the log needs no column for the rate, and the bias is "
-            "learnt. Found out where there is no rate, or one of zero",
-        },
-        "--scale-factor": {
-            "type": _FACTOR,
-            "metavar": "K",
-            "help": "of a raw signal at rest, which does not tell it: counts (V, mV) per deg/s",
-        },
-    },
-    "the model": {
-        "--inputs": {
-            "nargs": "+",
-            "choices": INPUTS,
-            "metavar": "INPUT",
-            "help": f"of {', '.join(INPUTS)}; by default all that the log has, and time (since "
-            "power-on) only with three runs or more. Without output, the bias alone is learnt",
-        },
-        "--terms": {
-            "type": _terms,
-            "default": "search",
-            "metavar": "N,N,...",
-            "help": "fuzzy terms per input; 'search' (default) grows them on held-out groups, "
-            "'auto' leaves them to ANFISRegressor",
-        },
-        "--physics": {
-            "action": "store_true",
-            "help": "for open-loop fiber-optic gyros: fit the arcsine law first, and let the fuzzy "
-            "rules learn what it leaves",
-        },
-        "--jobs": {
-            "type": _JOBS,
-            "metavar": "N",
-            "help": "threads for a fit (1); -1 is one per core",
-        },
-    },
-    "where it holds, and how it is checked": {
-        "--outside": {
-            "choices": ("clip", "linear", "nan"),
-            "default": Recipe.outside,
-            "help": "policy for rows outside the range of the calibration, which are flagged in "
-            "any case: hold the edge value (clip), go on along the tangent for a limited way "
-            "(linear, default), or give no rate (nan)",
-        },
-        "--max-extrapolation": {
-            "type": _EXTENT,
-            "default": Recipe.max_extrapolation,
-            "metavar": "SD",
-            "help": "how far the rules follow the tangent beyond the range of an input, in its "
-            "standard deviations; inf for without end; auto for as many as the outermost rows "
-            f"speak for, half a one at least ({Recipe.max_extrapolation})",
-        },
-        "--min-coverage": {
-            "type": _SHARE,
-            "default": Recipe.min_coverage,
-            "metavar": "SHARE",
-            "help": f"rows that the data cover less are flagged ({Recipe.min_coverage:g})",
-        },
-        "--box": {
-            **_SEVERAL,
-            "type": _box,
-            "metavar": "INPUT=LOW:HIGH",
-            "help": "box of inputs, such as temperature=-40:85, over which the report proves how "
-            "large the compensation can be; of others the range of the calibration. Units: s, "
-            "degC, degC/s, and that of the output",
-        },
-        "--groups": {
-            "choices": KINDS,
-            "default": "auto",
-            "help": "what to hold out in the check; by default (auto) devices where there are "
-            "three or more, else runs, and rate levels where these could be memorised; of a single "
-            "run legs of the temperature's cycles, or pieces of them",
-        },
-    },
-    "output": {
-        "--apply": {
-            "metavar": "MODEL",
-            "help": "compensate the logs by this model (compensator.json) instead of calibrating; "
-            "a column for the rate is not needed, and is compared with where it is there. A "
-            ".joblib file is taken too, and can run any code: see below",
-        },
-        "--output": {
-            "type": Path,
-            "metavar": "PATH",
-            "help": "folder to write to (LOG-compensator); with --apply the file "
-            "(LOG-compensated.csv)",
-        },
-        "--c": {
-            "choices": ("c99", "c89"),
-            "metavar": "STD",
-            "help": "also write the model as C (compensator.h, compensator.c) by the standard c99 "
-            "or c89",
-        },
-        "--saturate": {
-            "action": "store_true",
-            "help": "with --c: hold what the rules give between the limits that the report has "
-            "proven for the box (--box)",
-        },
-        "--force": {"action": "store_true", "help": "replace files that exist"},
-        "--quiet": {"action": "store_true", "help": "no progress on stderr"},
-    },
-}
+
+def make_parser():
+    """The parser of the command's arguments."""
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        usage=f"{PROGRAM} LOG [LOG ...] [options]\n"
+        f"       {PROGRAM} --apply MODEL LOG [LOG ...] [options]",
+        description=_HELP,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        add_help=False,
+    )
+
+    def add(name, **settings):
+        parser.add_argument(name, help=argparse.SUPPRESS, **settings)
+
+    several = {"nargs": "+", "action": "extend", "default": []}
+    parser.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)
+    add("--version", action="version", version=f"skanfis {__version__}")
+    add("logs", nargs="+", metavar="LOG")
+    add("--columns", **several)
+    add("--units", **several)
+    add("--encoding", type=_encoding)
+    add("--device")
+    add("--max-gap", type=_GAP, default="auto")
+    add("--average", type=_SECONDS)
+    add("--scale-factor", type=_FACTOR)
+    add("--inputs", nargs="+", choices=INPUTS)
+    add("--terms", type=_terms, default="search")
+    add("--jobs", type=_JOBS)
+    add("--outside", choices=("clip", "linear", "nan"), default=Recipe.outside)
+    add("--max-extrapolation", type=_EXTENT, default=Recipe.max_extrapolation)
+    add("--min-coverage", type=_SHARE, default=Recipe.min_coverage)
+    add("--box", type=_box, **several)
+    add("--groups", choices=KINDS, default="auto")
+    add("--apply")
+    add("--output", type=Path)
+    add("--c", choices=("c99", "c89"))
+    for flag in ("--at-rest", "--physics", "--saturate", "--force", "--quiet"):
+        add(flag, action="store_true")
+    add_report_options(parser)
+    return parser

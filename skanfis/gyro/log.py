@@ -8,7 +8,7 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 import glob
 import hashlib
 import os
-import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -57,14 +57,12 @@ def read_log(
     paths : str, path, or sequence of these
         Text files with a header line, or Parquet files (with pyarrow).
     columns : dict of str to str, default=None
-        Names in the file by part: keys "time", "temperature", "output", "rate", "run", "device".
-        A part that is not named here has its own name in the file. Blanks around names, and
-        capitals, do not matter where one column alone fits.
+        Names in the file by part ("time", "temperature", "output", "rate", "run", "device"), where
+        they differ from it; blanks around names, and capitals, do not matter.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
-        and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be a raw signal, in
-        counts, V or mV. By default s, degC and deg/s. Times that are no numbers (ISO 8601, dates,
-        clocks) come in seconds by themselves.
+        and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be in counts, V or mV.
+        By default s, degC and deg/s. Dates and clocks come in seconds by themselves.
     require : sequence of str, default=None
         Parts without which the log is refused; None stands for temperature, output and rate.
     separator, decimal, encoding : str, default=None
@@ -79,11 +77,10 @@ def read_log(
     Raises
     ------
     LogError
-        If a file is empty, no such table, or there twice; if a column that is required is not
-        there; if a value is missing or no number. The message names the file, its column and line.
+        If a file is no such table, or there twice; if a column that is required is not there; if a
+        value is missing or no number. The message names the file, its column and line.
     ValueError
-        If ``columns``, ``units`` or ``require`` name an unknown part or unit, or if ``separator``
-        or ``decimal`` is no single sign.
+        If an argument names an unknown part or unit, or is no single sign.
     OSError
         If a file cannot be read.
 
@@ -136,9 +133,8 @@ class Reading:
         if error.row is not None:
             file = self.files[self.file[error.row]]
             return file.located(error, pd.Series(self.row))
-        if len(self.files) == 1 and error.column is not None:
-            return self.files[0].located(error)
-        return LogError(str(error))
+        where = None if len(self.files) == 1 else "the log"
+        return self.files[0].located(error, where=where)
 
 
 def read(paths, request, *, max_gap=None, tell=None, most_rows=None, check=False):
@@ -240,18 +236,15 @@ def short_names(paths):
 
 
 def notes_of(files):
-    """What was found out about the files; what holds for several is said once."""
-    by_note: dict = {}
-    for file in files:
-        for note in file.notes:
-            by_note.setdefault(note, []).append(file.path)
-    found = []
-    for note, paths in by_note.items():
-        where = "" if len(files) in (1, len(paths)) else f"{paths[0]}"
-        if where and len(paths) > 1:
-            where += f" and {len(paths) - 1} more"
-        found.append(f"{where}: {note}" if where and not note.startswith(where) else note)
-    return found
+    """What was found out about the files; what holds for all is said once."""
+    counts = Counter(note for file in files for note in file.notes)
+    return list(
+        dict.fromkeys(
+            note if counts[note] == len(files) else f"{file.path}: {note}"
+            for file in files
+            for note in file.notes
+        )
+    )
 
 
 def checked_request(request):
@@ -279,7 +272,7 @@ def checked_request(request):
 
 
 def find_logs(arguments):
-    """The files that are named, folders and patterns filled in; those of each in natural order.
+    """The files that are named, folders and patterns filled in; those of each in order.
 
     A name that is no pattern stays as it is, whether there is such a file or not.
     """
@@ -288,10 +281,9 @@ def find_logs(arguments):
         if os.path.isdir(argument):
             found += _logs_in(argument)
         elif glob.has_magic(argument) and not os.path.lexists(argument):
-            matches = [path for path in glob.glob(argument, recursive=True) if os.path.isfile(path)]
-            if not matches:
+            found += sorted(glob.glob(argument, recursive=True))
+            if not found:
                 raise LogError(f"{argument}: no file matches this pattern.")
-            found += sorted(matches, key=_natural)
         else:
             found.append(argument)
     return found
@@ -302,17 +294,9 @@ def _logs_in(folder):
     for suffixes in _SUFFIXES:
         logs = [path for path in paths if path.lower().endswith(suffixes) and os.path.isfile(path)]
         if logs:
-            return sorted(logs, key=_natural)
+            return sorted(logs)
     known = ", ".join(suffix for suffixes in _SUFFIXES for suffix in suffixes)
     raise LogError(f"{folder}: is a folder without logs ({known}).")
-
-
-def _natural(path):
-    """A key by which run2 comes before run10."""
-    return [
-        (0, int(part), "") if part.isdecimal() else (1, 0, part)
-        for part in re.split(r"([0-9]{1,15})", path)
-    ]
 
 
 def check_different(paths):
