@@ -204,7 +204,8 @@ class _Column:
         axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
         self.axis = axes[-1] if axes else ""
         self.words = set(words) - {self.axis}
-        self.quantity, self.unit = meant or (None, None)
+        self.quantity = meant[0] if meant else None
+        self.unit = meant[1] if meant else None
         self.texts = texts.dropna()
         numbers = pd.to_numeric(self.texts.str.replace(decimal, "."), errors="coerce")
         self.numbers = numbers[np.isfinite(numbers)].to_numpy()

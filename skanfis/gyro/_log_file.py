@@ -219,7 +219,7 @@ class RunFinder:
 
     @property
     def runs(self):
-        return pd.DataFrame(list(self._codes), columns=["file", "device", "run"], dtype=object)
+        return pd.DataFrame(list(self._codes), columns=["file", "device", "run"])
 
     def codes(self, piece, file):
         """Position of each row's run among ``runs``; ``file`` tells files apart."""
@@ -275,21 +275,21 @@ class RunFinder:
 
     def names(self, file_names, has_labels):
         """The shortest label of each run that tells it from all others; None of a single run."""
-        runs = self.runs
-        owners = []
-        if len(file_names) > 1:
-            owners.append("file")
-        if (runs["device"] != "").any():
-            owners.append("device")
-        if has_labels or self.note:
-            owners.append("run")
-        if not {"file", "run"} & set(owners):
+        keys: dict = dict(
+            zip(("file", "device", "run"), zip(*self._codes, strict=True), strict=False)
+        )
+        owners = ["file"] if len(file_names) > 1 else []
+        owners += ["device"] if any(keys.get("device", ())) else []
+        owners += ["run"] if has_labels or self.note else []
+        if not keys or not {"file", "run"} & set(owners):
             return None
-        runs["file"] = np.array(file_names, dtype=object)[runs["file"].to_numpy(dtype=int)]
+        keys["file"] = [file_names[file] for file in keys["file"]]
         for parts in (["run"], ["file"], ["device", "run"], ["file", "run"], owners):
-            if set(parts) <= set(owners) and not runs.duplicated(parts).any():
-                break
-        return runs[parts].agg(" / ".join, axis=1)
+            if set(parts) <= set(owners):
+                names = [" / ".join(row) for row in zip(*map(keys.get, parts), strict=True)]
+                if len(set(names)) == len(names):
+                    break
+        return names
 
 
 def _longest_step(time, device):
