@@ -7,7 +7,7 @@ from ._checks import LABELS, QUANTITIES, check_values
 from ._clock import Clock
 from ._columns import SIGNALS, convert
 from ._guess import settle
-from ._source import open_source
+from ._source import NO_VALUE, open_source
 from .errors import LogError, shortened
 
 __all__ = ["LogFile", "RunFinder"]
@@ -157,13 +157,18 @@ class LogFile:
 
     def _no_number(self, kinds, error):
         """The error for the first value in the file that should be a number and is none."""
-        parts = {self.layout.places[p]: p for p in QUANTITIES if p in self.layout.places}
-        places = [place for place in parts if kinds[place] is float]
-        found = self.source.find_text(places)
-        if found is None:
-            return error
-        row, place, value = found
-        return self.located(LogError(f"{value} is not a number.", parts[place], row))
+        for part, place in self.layout.places.items():
+            start = 0
+            for table in self.source.pieces({place: str}, _ROWS) if kinds[place] is float else ():
+                texts = table[place].mask(table[place].isin(NO_VALUE))
+                plain = texts.str.replace(self.source.decimal, ".")
+                bad = (pd.to_numeric(plain, errors="coerce").isna() & texts.notna()).to_numpy()
+                if bad.any():
+                    row = int(bad.argmax())
+                    reason = f"{shortened(texts.iloc[row])} is not a number."
+                    return self.located(LogError(reason, part, start + row))
+                start += len(table)
+        return error
 
     def _report_missing(self, n_rows, lacking, first):
         if n_rows == 0:

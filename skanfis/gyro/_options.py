@@ -1,7 +1,6 @@
 """The options of the command, and its help."""
 
 import argparse
-import codecs
 import math
 from pathlib import Path
 
@@ -39,9 +38,8 @@ pattern such as 'logs/*.csv' stands for its files
 
 reading the log:
   --columns PART=NAME ...   names of the columns; parts: {", ".join(PARTS)}.
-                            A part that is not named is guessed by names and units, and the guess is
-                            told. Needed are temperature and output; the rate (the truth) unless the
-                            gyro was at rest; time for inputs that need it
+                            Parts that are not named are guessed by names and units. Needed are
+                            temperature and output, and the rate (the truth) unless at rest
   --units PART=UNIT ...     units, by default those in the names, or s, degC and deg/s
                             {_UNITS_OF_PARTS}
   --encoding NAME           of the text, such as gbk (UTF-8, UTF-16 or Windows-1252)
@@ -49,17 +47,15 @@ reading the log:
   --max-gap S               a longer step of the time begins a new run, where no column tells runs
                             apart; inf for none (auto: a minute, and 50 usual steps)
   --average S               average the rows over so many seconds while they are read
-  --at-rest                 the gyro did not turn: the bias is learnt, and the log needs no rate.
-                            Found out where there is no rate, or one of zero
+  --at-rest                 the gyro did not turn: learn the bias; no rate is needed
   --scale-factor K          of a raw signal at rest, which does not tell it: counts per deg/s
 
 the model:
-  --inputs INPUT ...        of {", ".join(INPUTS)}; by default all that the
-                            log has, and time (since power-on) only with three runs or more. Without
-                            output, the bias alone is learnt
+  --inputs INPUT ...        of {", ".join(INPUTS)} (all that the log
+                            has; time, since power-on, with three runs or more)
   --terms N,N,...           fuzzy terms per input; 'search' (default) grows them on held-out groups,
                             'auto' leaves them to ANFISRegressor
-  --physics                 for open-loop fiber-optic gyros: fit the arcsine law first, and let the
+  --physics                 fit the arcsine law of open-loop fiber-optic gyros first, and let the
                             fuzzy rules learn what it leaves
   --jobs N                  threads for a fit (1); -1 is one per core
 
@@ -68,20 +64,15 @@ where it holds, and how it is checked:
                             case: hold the edge value (clip), go on along the tangent for a limited
                             way (linear, default), or give no rate (nan)
   --max-extrapolation SD    how far the rules follow the tangent beyond the range of an input, in
-                            standard deviations; inf for without end; auto for as many as the
-                            outermost rows speak for, half a one at least
+                            standard deviations; inf for without end (auto)
   --min-coverage SHARE      rows that the data cover less are flagged ({Recipe.min_coverage:g})
   --box INPUT=LOW:HIGH ...  box, such as temperature=-40:85, over which the report proves how large
-                            the compensation can be (the range of the calibration), in s, degC,
-                            degC/s, and the unit of the output
-  --groups KIND             what to hold out: {", ".join(KINDS)}.
-                            By default (auto) devices where there are three or more, else runs, and
-                            rate levels where these could be memorised; of a single run legs of the
-                            temperature's cycles, or pieces of them
+                            the compensation can be, in s, degC, degC/s, and the output's unit
+  --groups KIND             what to hold out in the check:
+                            {", ".join(KINDS)}
 
 output:
-  --apply MODEL             compensate the logs by this model (compensator.json) instead of
-                            calibrating; a column for the rate is compared with where it is there.
+  --apply MODEL             compensate the logs by this compensator.json instead of calibrating
   --output PATH             folder to write to (LOG-compensator); with --apply the file
                             (LOG-compensated.csv)
   --c STD                   also write the model as C, compensator.h and .c, by c99 or c89
@@ -180,16 +171,6 @@ def _terms(text):
     return numbers
 
 
-def _encoding(text):
-    try:
-        is_text = isinstance(codecs.lookup(text).incrementaldecoder().decode(b""), str)
-    except (LookupError, ValueError, TypeError):
-        is_text = False
-    if not is_text:
-        raise argparse.ArgumentTypeError(f"{shortened(text)} is no encoding of text that is known")
-    return text
-
-
 def _box(text):
     name, _, ends = text.partition("=")
     try:
@@ -238,7 +219,7 @@ def make_parser():
     add("logs", nargs="+", metavar="LOG")
     add("--columns", **several)
     add("--units", **several)
-    add("--encoding", type=_encoding)
+    add("--encoding")
     add("--device")
     add("--max-gap", type=_GAP, default="auto")
     add("--average", type=_SECONDS)

@@ -6,13 +6,12 @@ import re
 from functools import partial
 from itertools import islice
 
-import numpy as np
 import pandas as pd
 
 from ._columns import unit_in
-from .errors import LogError, shortened
+from .errors import LogError
 
-__all__ = ["ParquetSource", "TextSource", "open_source"]
+__all__ = ["NO_VALUE", "ParquetSource", "TextSource", "open_source"]
 
 _LONGEST_FIELD = 2**31 - 1  # the largest limit that the module csv takes on every system
 _HEAD_BYTES = 2**16
@@ -30,7 +29,7 @@ _MARKS = {
 _KINDS = {b"\x1f\x8b": "compressed", b"PK\x03\x04": "an archive or a workbook", b"PAR1": "Parquet"}
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f\x81\x8d\x8f\x90\x9d\ufffd]")
 # What loggers write where there is no value, beside what pandas knows.
-_NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
+NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?$")
 _MOMENT = re.compile(r"[0-9]{1,4}([:./-])[0-9]{1,2}(\1[0-9]|[T ,:]|$)")
 
@@ -164,7 +163,7 @@ class TextSource:
                     names=range(len(self.header)),
                     usecols=list(kinds),
                     dtype=kinds,
-                    na_values={k: _NO_VALUE for k, kind in kinds.items() if kind is float},
+                    na_values={k: NO_VALUE for k, kind in kinds.items() if kind is float},
                     chunksize=n_rows,
                 )
         except pd.errors.EmptyDataError:
@@ -190,17 +189,6 @@ class TextSource:
                     f"{self.path}, line {line}: has {len(values)} values, more than the "
                     f"{n_columns} columns of the header."
                 )
-
-    def find_text(self, places):
-        """Row, place and value of the first cell in these columns that is no number, or None."""
-        start = 0
-        for table in self.pieces(dict.fromkeys(places, str), _HEAD_BYTES):
-            texts = table.replace(_NO_VALUE, np.nan)
-            found = _first_text(texts, self.decimal)
-            if found is not None:
-                return start + found[0], found[1], shortened(found[2])
-            start += len(table)
-        return None
 
 
 class ParquetSource:
@@ -260,8 +248,6 @@ class ParquetSource:
         except self._errors as error:
             raise self._damaged(error) from error
 
-    find_text = TextSource.find_text
-
 
 def _plain(column):
     """Moments and durations in seconds; all else as it is."""
@@ -270,19 +256,6 @@ def _plain(column):
     if column.dtype.kind == "M":
         return (column - pd.Timestamp(0)) / pd.Timedelta(seconds=1)
     return column / pd.Timedelta(seconds=1) if column.dtype.kind == "m" else column
-
-
-def _first_text(texts, decimal):
-    """Position, column and value of the first cell, row by row, that is no number, or None."""
-    numbers = texts.apply(
-        lambda column: pd.to_numeric(column.str.replace(decimal, "."), errors="coerce")
-    )
-    bad = (numbers.isna() & texts.notna()).to_numpy()
-    if not bad.any():
-        return None
-    row = int(bad.any(axis=1).argmax())
-    column = int(bad[row].argmax())
-    return row, texts.columns[column], texts.iloc[row, column]
 
 
 def _find_encoding(path):

@@ -5,6 +5,7 @@ The columns of a log play parts: ``time``, ``temperature``, ``output`` (the gyro
 A log that has been read has its columns by these names, in s, degC and deg/s.
 """
 
+import codecs
 import glob
 import hashlib
 import os
@@ -21,7 +22,7 @@ from ._checks import PARTS, RowChecks
 from ._columns import declared_units
 from ._guess import Request
 from ._log_file import LogFile, RunFinder
-from .errors import LogError
+from .errors import LogError, shortened
 
 __all__ = [
     "Reading",
@@ -265,9 +266,12 @@ def checked_request(request):
             raise ValueError(f"{name}={sign!r} must be one character, such as a comma.")
     if request.encoding is not None:
         try:
-            "".encode(request.encoding)
-        except (LookupError, ValueError) as error:
-            raise ValueError(f"encoding={request.encoding!r} is not known.") from error
+            decoder = codecs.lookup(request.encoding).incrementaldecoder()
+            is_text = isinstance(decoder.decode(b""), str)
+        except (LookupError, ValueError, TypeError):
+            is_text = False
+        if not is_text:
+            raise ValueError(f"{shortened(request.encoding)} is no encoding of text that is known.")
     return replace(request, units=declared_units(request.units))
 
 
