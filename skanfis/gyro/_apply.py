@@ -12,7 +12,7 @@ from ._console import UsageError, refuse_existing, say, staged, usage_errors
 from ._log_file import LogFile, RunFinder
 from ._options import request_of
 from .compensator import GyroCompensator, features
-from .log import check_different, find_logs, pieces_of
+from .log import check_device, check_different, find_logs, pieces_of
 
 __all__ = ["apply"]
 
@@ -33,12 +33,12 @@ def apply(options, tell):
         needed.add("time")
     request = request_of(options, sorted(needed))
     check_different(paths)
-    summary = _Summary(target)
+    summary, files = _Summary(target), []
     with staged(target.parent) as folder, usage_errors():
         with open(folder / target.name, "w", encoding="utf-8", newline="") as written:
             for number, path in enumerate(paths, start=1):
                 tell(f"compensating {path} ({number} of {len(paths)})")
-                file = LogFile(path, request)
+                files.append(file := LogFile(path, request))
                 stem = Path(path).stem if len(paths) > 1 else ""
                 for log, compensated in _compensated(
                     file, compensator, options.max_gap, stem, tell
@@ -49,6 +49,7 @@ def apply(options, tell):
                     is_first = summary.n_rows == 0
                     table.to_csv(written, index=False, header=is_first, float_format="%.12g")
                     summary.add(log, compensated)
+        check_device(files, request)
         tell(f"writing {target}")
     say(summary.lines())
     tell("done")

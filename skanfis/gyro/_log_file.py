@@ -33,7 +33,7 @@ class LogFile:
         self.source = open_source(path, request.separator, request.decimal, request.encoding)
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
-        self.n_rows = 0
+        self.n_rows, self.devices = 0, set()
         if first is not None:
             self._check_like(first)
         if request.device is not None and "device" not in self.layout.places:
@@ -69,7 +69,7 @@ class LogFile:
         if clock is not None and self.layout.date is not None:
             kinds[self.layout.date] = str
         lacking = pd.Series(0, index=list(places))
-        n_left_out, first, devices = 0, None, set()
+        n_left_out, first = 0, None
         try:
             for number, table in enumerate(self.source.pieces(kinds, _ROWS), start=1):
                 piece, missing = self._converted(table, clock)
@@ -81,7 +81,7 @@ class LogFile:
                     first = piece["row"][bad.idxmax()] if first is None else first
                     piece = piece[~bad]
                 if self.request.device is not None:
-                    devices |= set(piece["device"])
+                    self.devices |= set(piece["device"])
                     piece = piece[piece["device"] == self.request.device]
                 if len(piece):
                     yield piece.reset_index(drop=True)
@@ -92,9 +92,6 @@ class LogFile:
         except ValueError as error:
             raise self._no_number(kinds, error) from error
         self._report_missing(n_left_out, lacking[lacking > 0], first)
-        if devices and self.request.device not in devices:
-            known = ", ".join(sorted(devices))
-            raise ValueError(f"--device {self.request.device}: {self.path} has {known}.")
 
     def located(self, error, rows=None, where=None):
         """An error of one part and row, in terms of this file; ``rows`` are positions in it."""

@@ -160,6 +160,7 @@ def read(paths, request, *, max_gap=None, tell=None, most_rows=None, check=False
             thinned.add(piece.drop(columns="device", errors="ignore"))
         if tell is not None and len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
+    check_device(files, request)
     notes = notes_of(files)
     notes += [finder.note] if finder.note else []
     notes += [thinned.note] if thinned.note else []
@@ -246,6 +247,13 @@ def notes_of(files):
             for note in file.notes
         )
     )
+
+
+def check_device(files, request):
+    """ValueError where the device that is asked for is none of those of the files."""
+    devices = {device for file in files for device in file.devices}
+    if devices and request.device not in devices:
+        raise ValueError(f"--device {request.device}: the log has {', '.join(sorted(devices))}.")
 
 
 def checked_request(request):

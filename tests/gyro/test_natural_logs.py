@@ -164,15 +164,6 @@ def test_a_raw_signal_is_no_rate(tmp_path, truth, name, scale):
     assert reading.units["output"] == "mV"
 
 
-def test_an_output_alone_is_told_by_its_unit(tmp_path, truth):
-    table = truth[["time", "temperature"]].assign(**{"G7 [mV]": truth["output"], "note": "a"})
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
-    np.testing.assert_allclose(reading.log["output"], truth["output"])
-    assert reading.units["output"] == "mV"
-    assert "output = 'G7 [mV]' in mV (by its unit)" in "; ".join(reading.notes)
-
-
 def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
     table = pd.DataFrame(
         {
