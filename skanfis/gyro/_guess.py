@@ -90,8 +90,7 @@ class Request:
 class Layout:
     """Places of the parts in a file and their units there.
 
-    ``date`` is the place of a date beside a clock. ``reasons`` and ``others``, which would do too,
-    are those of guesses.
+    ``date`` is the place of a date beside a clock. ``reasons`` are those of guesses.
     """
 
     header: list
@@ -100,7 +99,6 @@ class Layout:
     date: int | None = None
     notes: list = field(default_factory=list)
     reasons: dict = field(default_factory=dict)
-    others: dict = field(default_factory=dict)
 
     def name(self, part):
         """The part's name in the file."""
@@ -109,7 +107,10 @@ class Layout:
 
 def settle(source, request, first=None):
     """The layout of a file; ``first`` is that of the first file, whose names hold for all."""
-    names = {part: part for part in PARTS} | request.columns
+    names = {part: part for part in PARTS}
+    if first is not None:
+        names |= {part: first.name(part) for part in first.places}
+    names |= request.columns
     layout = Layout(source.header, {}, {})
     # Names that were told go first: what they have taken is not there for the others.
     for part in sorted(names, key=lambda part: part not in request.columns):
@@ -119,11 +120,10 @@ def settle(source, request, first=None):
             layout.places[part] = place
         elif part in request.columns:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
-    for part, name in request.columns.items():
-        if layout.name(part) != name:
-            layout.notes.append(f"{layout.name(part)!r} is taken for {name!r}")
+        if place is not None and names[part] not in (part, layout.name(part)):
+            layout.notes.append(f"{layout.name(part)!r} is taken for {names[part]!r}")
     if request.guess:
-        _guess(source, request, layout, first)
+        _guess(source, request, layout, is_first=first is None)
     for part in request.require:
         if part not in layout.places:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
@@ -134,11 +134,11 @@ def settle(source, request, first=None):
     return layout
 
 
-def _guess(source, request, layout, first):
+def _guess(source, request, layout, is_first):
     """Add the parts that names and units tell, and the units."""
-    own_rate = None if "rate" in request.columns else layout.places.pop("rate", None)
-    if first is not None:
-        _take_names(source, request, layout, first)
+    # Of the first file, a column that is called rate may be the gyro's own.
+    is_told = "rate" in request.columns or not is_first
+    own_rate = None if is_told else layout.places.pop("rate", None)
     sample = next(source.pieces(dict.fromkeys(range(len(source.header)), str), _SAMPLE_ROWS), None)
     if sample is None:
         sample = pd.DataFrame({place: pd.Series(dtype=str) for place in range(len(source.header))})
@@ -163,24 +163,11 @@ def _guess(source, request, layout, first):
     _by_unit(columns, layout)
     if own_rate is not None and own_rate not in layout.places.values():
         layout.places.setdefault("rate", own_rate)
-    _settle_units(columns, layout)
+    _settle_units(columns, layout, request)
     if "time" in layout.places and is_clock(columns[layout.places["time"]].texts):
         days = [c.place for c in columns if c.words & {"date", "datum", "day", "日期"}]
         layout.date = next((k for k in days if k != layout.places["time"]), None)
     layout.notes += _sentences(layout, request)
-
-
-def _take_names(source, request, layout, first):
-    for part in set(first.places) - set(request.columns):
-        place = _place(source, first.name(part), ())
-        if place is None:
-            continue
-        layout.places[part] = place
-        if source.header[place] != first.name(part):
-            layout.notes.append(
-                f"{source.path}: {source.header[place]!r} is taken for {first.name(part)!r} of the "
-                "first file"
-            )
 
 
 class _Column:
@@ -256,7 +243,8 @@ def _by_name(part, columns, layout):
     # One truth in two units: that which needs no conversion.
     chosen = next((c for c in best if c.unit in CANONICAL.values()), best[0])
     layout.places[part] = chosen.place
-    layout.others[part] = [c.place for c in best if c is not chosen]
+    others = ", ".join(repr(layout.header[c.place]) for c in best if c is not chosen)
+    layout.reasons[part] = [f"{others} would do too"] if others else []
 
 
 def _by_unit(columns, layout):
@@ -267,13 +255,13 @@ def _by_unit(columns, layout):
     moments = [c.place for c in columns if c.numbers.size == 0 and c.can_be("time")]
     if "time" not in layout.places and len(moments) == 1:
         layout.places["time"] = moments[0]
-        layout.reasons["time"] = "because it holds times"
+        layout.reasons["time"] = ["because it holds times"]
     rate = layout.places.get("rate")
-    is_lone = "output" not in layout.places and "rate" in layout.others
+    is_lone = "output" not in layout.places and "rate" in layout.reasons
     if is_lone and not columns[rate].is_named("rate"):
         # A rate that is said to be none's, in a log without an output, is the gyro's own.
         layout.places["output"] = layout.places.pop("rate")
-        layout.reasons["output"] = "by its name, and because there is no other rate"
+        layout.reasons["output"] = ["by its name, and because there is no other rate"]
     _alone_in("output", ("rate",), columns, layout)
 
 
@@ -289,15 +277,17 @@ def _alone_in(part, quantities, columns, layout):
     ]
     if part not in layout.places and len(found) == 1:
         layout.places[part] = found[0]
-        layout.reasons[part] = "by its unit"
+        layout.reasons[part] = ["by its unit"]
 
 
-def _settle_units(columns, layout):
+def _settle_units(columns, layout, request):
     """Units that the names say, or else the values."""
     for part in _QUANTITIES.keys() & layout.places.keys():
         column = columns[layout.places[part]]
         values, reason = column.numbers, ""
-        if column.quantity in _QUANTITIES[part]:
+        if part in request.units:
+            layout.units[part] = request.units[part]
+        elif column.quantity in _QUANTITIES[part]:
             layout.units[part] = column.unit
         elif values.size == 0:
             continue
@@ -309,7 +299,7 @@ def _settle_units(columns, layout):
         elif part == "output" and _are_counts(values):
             layout.units[part], reason = "counts", "because they are whole numbers"
         if reason:
-            layout.reasons[part, "unit"] = f"{layout.units[part]} {reason}"
+            layout.reasons.setdefault(part, []).append(f"{layout.units[part]} {reason}")
 
 
 def _are_counts(values):
@@ -320,17 +310,11 @@ def _sentences(layout, request):
     """What was guessed, in words; what is named as it should be is not worth a word."""
     told = []
     for part in (part for part in PARTS if part in layout.places):
-        unit = request.units.get(part, layout.units.get(part, ""))
-        why_unit = "" if part in request.units else layout.reasons.get((part, "unit"), "")
-        name = layout.name(part)
-        if (part in request.columns or name.strip().casefold() == part) and not why_unit:
+        name, reasons = layout.name(part), layout.reasons.get(part, [])
+        if (part in request.columns or name.strip().casefold() == part) and not reasons:
             continue
-        others = ", ".join(repr(layout.header[place]) for place in layout.others.get(part, []))
-        notes = [layout.reasons.get(part), why_unit, others and f"{others} would do too"]
-        why = "; ".join(note for note in notes if note)
-        told.append(
-            f"{part} = {name!r}" + (f" in {unit}" if unit else "") + (f" ({why})" if why else "")
-        )
+        unit = f" in {layout.units[part]}" if part in layout.units else ""
+        told.append(f"{part} = {name!r}{unit}" + (f" ({'; '.join(reasons)})" if reasons else ""))
     if layout.date is not None:
         told.append(f"the date of the time = {layout.header[layout.date]!r}")
     if not told:

@@ -196,7 +196,7 @@ def test_many_files_folders_patterns_and_headers_that_nearly_agree(tmp_path, tru
     reading = found(paths)
     same(reading, truth[truth["run"].astype(int) < 3])
     assert list(reading.log["run"].cat.categories) == ["r1", "r2", "r3"]
-    assert sum("is taken for 'Temp' of the first file" in note for note in reading.notes) == 2
+    assert sum("is taken for 'Temp'" in note for note in reading.notes) == 2
     assert reading.name_row(60).endswith("r2.csv, line 2")
     for empty in ([f"{folder}/x*.csv"], [str(tmp_path)]):
         with pytest.raises(LogError, match=r"no file matches|folder without logs"):
