@@ -208,7 +208,7 @@ class Thinned:
             return ""
         n_held = sum(map(len, self._pieces))
         return (
-            f"of {self.n_rows:,} rows {n_held:,} are held, every {self._every}th of each run; "
+            f"of {self.n_rows:,} rows {n_held:,} are held, one in {self._every} of each run; "
             "--average makes means of all"
         )
 

@@ -239,7 +239,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     same(some, expected, PARTS)
     assert some.log["run"].astype(int).tolist() == expected["run"].astype(int).tolist()
     assert some.notes == [
-        "of 300 rows 75 are held, every 4th of each run; --average makes means of all"
+        "of 300 rows 75 are held, one in 4 of each run; --average makes means of all"
     ]
     assert some.name_row(7).endswith(f"line {expected.index[7] + 2}")
     # A row that would not be held is checked all the same.
