@@ -16,7 +16,7 @@ from .compensator import INPUTS
 from .errors import shortened
 from .log import checked_request
 
-__all__ = ["PROGRAM", "make_parser", "request_of"]
+__all__ = ["PROGRAM", "make_parser", "parse_box", "request_of"]
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
@@ -171,7 +171,7 @@ def _terms(text):
     return numbers
 
 
-def _box(text):
+def parse_box(text):
     name, _, ends = text.partition("=")
     try:
         low, high = map(float, ends.split(":"))
@@ -230,7 +230,7 @@ def make_parser():
     add("--outside", choices=("clip", "linear", "nan"), default=Recipe.outside)
     add("--max-extrapolation", type=_EXTENT, default=Recipe.max_extrapolation)
     add("--min-coverage", type=_SHARE, default=Recipe.min_coverage)
-    add("--box", type=_box, **several)
+    add("--box", type=parse_box, **several)
     add("--groups", choices=KINDS, default="auto")
     add("--apply")
     add("--output", type=Path)
