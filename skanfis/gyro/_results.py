@@ -8,10 +8,9 @@ import pandas as pd
 
 from ._budget import budget_of
 from ._certain import certain_of
-from ._columns import label_texts
+from ._columns import RATE_UNITS, in_rate_unit, label_texts
 from ._dossier import Dossier
 from ._figures_of_merit import FIGURES_OF_ALLAN
-from ._rate_units import RATE_UNITS, in_rate_unit
 from ._reading import readability_of
 from ._specification import check_limits
 from .allan import ROWS_PER_TIME, allan_coefficients, allan_deviation
@@ -171,7 +170,7 @@ class Results:
         if self.time is None:
             return "the log has no time"
         if self.calibration.is_thinned:
-            return "only some of the rows are held: see --check-rows and --average"
+            return "only some of the rows are held: see --average"
         steps = self.steps
         if not steps.size or np.ptp(steps) > _UNEVEN * np.median(steps):
             return "the rows are not evenly spaced in time"

@@ -9,7 +9,7 @@ import pytest
 from skanfis.gyro._budget import budget_of, noise_within, scatter_between
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._certain import certain_of
-from skanfis.gyro._option_types import box
+from skanfis.gyro._options import parse_box
 from skanfis.gyro._split import Split, choose_split
 from skanfis.gyro.command import main
 
@@ -118,7 +118,7 @@ def test_one_group_in_range_leaves_the_scatter_open():
 @pytest.mark.parametrize("text", ["temperature", "temperature=85", "t=85:-40", "t=a:b", "t=0:inf"])
 def test_box_that_is_none_is_refused(text):
     with pytest.raises(argparse.ArgumentTypeError, match="must be INPUT=LOW:HIGH"):
-        box(text)
+        parse_box(text)
 
 
 def test_command_takes_a_box_and_names_an_input_that_is_none(tmp_path, capsys):

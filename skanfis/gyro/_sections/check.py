@@ -19,10 +19,9 @@ def check(page, results):
     if calibration.is_thinned:
         page.paragraph(
             f"The log has {calibration.n_rows:,} rows. All were read and looked at for errors; "
-            f"what is said here is of {len(calibration.log):,} of them, drawn at random in equal "
-            "parts from every stretch of every run, with those at the ends of the ranges. Figures "
-            "that need every row, of bias stability and Allan's deviation, are left out: see "
-            "--check-rows and --average."
+            f"what is said here is of {len(calibration.log):,} of them, every k-th of each run. "
+            "Figures that need every row, of bias stability and Allan's deviation, are left out: "
+            "see --average."
         )
     page.paragraph(
         f"Every row was compensated by a model that had not seen its group: "

@@ -1,6 +1,6 @@
 """The log: its size, ranges and scale factor; and the options of the command."""
 
-from .._units import SIGNALS
+from .._columns import SIGNALS
 from .words import unit_of
 
 __all__ = ["log"]
@@ -13,7 +13,7 @@ def log(page, results):
     page.section("The log and the options")
     lines = [("rows", f"{calibration.n_rows:,}", "")]
     if calibration.is_thinned:
-        lines.append(("rows kept, drawn at random", f"{len(rows):,}", ""))
+        lines.append(("rows held, every k-th of each run", f"{len(rows):,}", ""))
     for name in ("run", "device"):
         if name in rows:
             lines.append((f"{name}s", f"{rows[name].nunique():,}", ""))
