@@ -30,17 +30,24 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
-from .leaving import sorted_by_face
 from .naming import default_output_names, default_term_names
-from .policies import FARTHEST, MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
+from .policies import (
+    FARTHEST,
+    MAX_EXTRAPOLATION,
+    TargetRange,
+    check_policy,
+    describe_out_of_bounds,
+)
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
-from .target import TargetRange
 
 __all__ = ["TSKModel"]
 
 # Bytes that the intermediate results of one block of rows may take.
 _BLOCK_BYTES = 2**22
+# Further than so many standard deviations a row counts as so far: results saturate, and overflow
+# nowhere on the way.
+_FARTHEST_ROW = 1e100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,54 +200,40 @@ class TSKModel:
         return outputs
 
     def standard_deviation(self, X) -> np.ndarray:
-        """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``.
+        """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``."""
+        return self.predict_with_deviation(X)[1]
+
+    def predict_with_deviation(self, X, inside=None) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
-        return self.predict_with_deviation(X, exact=True)[1]
-
-    def predict_with_deviation(self, X, inside=None, exact=False) -> tuple[np.ndarray, np.ndarray]:
-        """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
-
-        Deviations are right to a thousandth, or, if ``exact``, in double precision.
-        """
-        posterior = self.posterior
+        posterior, n_values = self.posterior, 2 * self.n_outputs
         if posterior is None:
             raise ValueError(self._why_no_posterior())
         inside = self.in_bounds(X) if inside is None else inside
-        n_outputs = self.n_outputs
+        if self.out_of_bounds == "raise" and not inside.all():
+            raise ValueError(self.describe_out_of_bounds(X))
 
         def within(Z):
-            outputs, deviations = posterior.inside(self, Z, exact)
-            if posterior.inputs.size < self.coefficients.shape[1] - 1:
-                outputs = self._outputs(Z)
-            return np.vstack([self._hold(outputs), deviations])
+            return np.vstack([self._outputs(Z), posterior.inside(self, Z)])
 
         def beyond(Z):
             nearest = self._clip(Z)
-            way = Z - nearest
-            values, slopes, parts = self._linearised(nearest)
-            followed = self._held(way) if self.out_of_bounds == "linear" else np.zeros_like(way)
+            way = self._way(Z, nearest)
+            values, slopes = self._linearised(nearest)
+            followed = self._followed(way) if self.out_of_bounds == "linear" else 0.0 * way
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
-            unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
-            row = posterior.row_of(self, nearest, values, parts)
-            return np.vstack(
-                [outputs, posterior.beyond(self, row, nearest, way, unfollowed, exact)]
-            )
+            # How far the tangent may be from the prediction: what that leaves of it adds in full.
+            left = np.einsum("ji,joi->oi", way - followed, slopes)
+            return np.vstack([outputs, np.hypot(posterior.tangent(self, nearest, way), left)])
 
-        if inside.all():
-            found = self._by_block(X, within, 2 * n_outputs)
-            return found[:, :n_outputs], found[:, n_outputs:]
-        if self.out_of_bounds == "raise":
-            raise ValueError(self.describe_out_of_bounds(X))
-        found = np.full((X.shape[0], 2 * n_outputs), np.nan)
-        if inside.any():
-            found[inside] = self._by_block(X[inside], within, 2 * n_outputs)
-        if self.out_of_bounds != "nan":
-            rows = np.flatnonzero(~inside)
-            rows = rows[sorted_by_face(X[rows], self.antecedent, self.minimum, self.maximum)]
-            found[rows] = self._by_block(X[rows], beyond, 2 * n_outputs, self._n_slopes)
-        return found[:, :n_outputs], found[:, n_outputs:]
+        found = np.full((X.shape[0], n_values), np.nan)
+        n_more = posterior.n_values + self._n_slopes
+        for rows, of_block in ((inside, within), (~inside, beyond)):
+            if rows.any() and (of_block is within or self.out_of_bounds != "nan"):
+                found[rows] = self._by_block(X[rows], of_block, n_values, n_more)
+        return found[:, : self.n_outputs], found[:, self.n_outputs :]
 
     def gradient(self, X) -> np.ndarray:
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
@@ -274,11 +267,10 @@ class TSKModel:
             return np.zeros(X.shape[0])
 
         def of_block(Z):
-            inside = self._clip(Z)
-            outside = (Z - inside) / self.spread[:, None]
-            near = np.exp(-0.5 * np.sum(outside**2, axis=0))
-            by_rule = self.antecedent.strengths(inside)
-            by_rule *= support.by_rule(inside)
+            nearest = self._clip(Z)
+            distance = self._way(Z, nearest) / self.spread[:, None]
+            near = np.exp(-0.5 * np.sum(distance**2, axis=0))
+            by_rule = self.antecedent.strengths(nearest) * support.by_rule(nearest)
             return (by_rule.sum(axis=0) * near)[None]
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
@@ -302,7 +294,7 @@ class TSKModel:
 
         The way from the nearest point in the box, held at ``max_extrapolation``.
         """
-        return self._held(X.T - self._clip(X.T)).T
+        return self._followed(self._way(X.T, self._clip(X.T))).T
 
     def describe_out_of_bounds(self, X) -> str:
         """Say which inputs leave the box of the training data, in how many rows, and how far."""
@@ -368,7 +360,13 @@ class TSKModel:
     def _clip(self, Z):
         return np.clip(Z, self.minimum[:, None], self.maximum[:, None])
 
-    def _held(self, way):
+    def _way(self, Z, nearest):
+        """The way from the nearest point in the box, no further than ``_FARTHEST_ROW``."""
+        reach = (_FARTHEST_ROW * self.spread)[:, None]
+        with np.errstate(over="ignore"):
+            return np.clip(Z - nearest, -reach, reach)
+
+    def _followed(self, way):
         """The way out of the box, as far as the tangent is followed."""
         reach = (self.max_extrapolation * self.spread)[:, None]
         return np.clip(way, -reach, reach)
@@ -386,28 +384,28 @@ class TSKModel:
         return self.output_limits[:, :, None]
 
     def _outputs(self, Z):
-        strengths, basis_rows = self.antecedent.strengths(Z), self._basis(Z)
+        strengths, basis_rows = self.antecedent.strengths(Z), self.basis(Z)
         by_rule = self.coefficients.transpose(2, 0, 1)
         outputs = [rule_outputs(one, strengths, basis_rows)[1] for one in by_rule]
         return self._hold(np.stack(outputs))
 
     def _outputs_linear(self, Z):
         """Value and slope of the nearest point in the box."""
-        inside = self._clip(Z)
-        values, slopes, _ = self._linearised(inside)
-        return self._hold(values + np.einsum("ji,joi->oi", self._held(Z - inside), slopes))
+        nearest = self._clip(Z)
+        values, slopes = self._linearised(nearest)
+        followed = self._followed(self._way(Z, nearest))
+        return self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
 
     def _linearised(self, Z):
-        """y (n_outputs, n_rows), dy/dx (n_inputs, n_outputs, n_rows), and what they are made of.
+        """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).
 
-        These are strengths, shares, basis and derivatives by terms.
         Memberships depend on x and their location through the difference alone: the derivative of
         log mu by x is minus that by the location.
         """
         log_mu, gradients = self.antecedent.log_memberships_and_gradient(Z)
         strengths, shares = self.antecedent.normalise(log_mu)
-        basis_rows = self._basis(Z)
-        values, slopes, by_terms = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1])), []
+        basis_rows = self.basis(Z)
+        values, slopes = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1]))
         for k, one in enumerate(self.coefficients.transpose(2, 0, 1)):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
             by_term = self.antecedent.term_sensitivity(by_rule, output, shares)
@@ -418,10 +416,10 @@ class TSKModel:
                 start += group.n_terms
             slopes[: one.shape[1] - 1, k] += one[:, 1:].T @ strengths
             values.append(output)
-            by_terms.append(by_term)
-        return np.stack(values), slopes, (strengths, shares, basis_rows, by_terms, gradients)
+        return np.stack(values), slopes
 
-    def _basis(self, Z):
+    def basis(self, Z):
+        """1 and the inputs about the reference, (n_basis, n_rows)."""
         basis_rows = np.ones((self.coefficients.shape[1], Z.shape[1]))
         if self.order == 1:
             np.subtract(Z, self.reference[:, None], out=basis_rows[1:])

@@ -15,9 +15,8 @@ from skanfis.antecedent import GridAntecedent
 from skanfis.learning import VariableProjection
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
-from skanfis.policies import OUT_OF_BOUNDS
+from skanfis.policies import OUT_OF_BOUNDS, TargetRange
 from skanfis.support import RuleSupport
-from skanfis.target import TargetRange
 
 from . import oracles
 

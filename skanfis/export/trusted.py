@@ -52,5 +52,5 @@ TRUSTED_TYPES = [
     "skanfis.training.moments.Moments",
     "skanfis.training.stream.Stream",
     "skanfis.support.RuleSupport",
-    "skanfis.target.TargetRange",
+    "skanfis.policies.TargetRange",
 ]

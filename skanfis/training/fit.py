@@ -23,13 +23,13 @@ from .._validation import warn_user
 from ..antecedent import Antecedent
 from ..bounds.exchange import constrained
 from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
+from ..learning.covariance import effective_premises, posterior_of
 from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
-from ..posterior import Posterior, effective_premises
 from ..search import (
     SampleSize,
     Start,
@@ -372,7 +372,7 @@ class _Fit:
         """What standard deviations need; ``robust`` are the weights of rows and Huber's epsilon."""
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = effective_weight(run.problem.rows)
-        return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
+        return posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
 
     @property
     def n_units(self):

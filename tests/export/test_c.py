@@ -24,8 +24,7 @@ from skanfis.export.c.status import STATUS
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
-from skanfis.policies import OUT_OF_BOUNDS
-from skanfis.target import TargetRange
+from skanfis.policies import OUT_OF_BOUNDS, TargetRange
 
 from ..oracles import random_grid
 from ..quick import quick
