@@ -4,22 +4,14 @@ A first-order Takagi-Sugeno-Kang model (Jang 1993),
 
     y(x) = sum_r w_r(x) f_r(x) ,    f_r(x) = a_r + sum_j b_rj (x_j - x0_j) ,
 
-with normalised firing strengths w and consequents about a reference point x0, the mean of the
-training data: a column that lies far from the origin (a time stamp, a raw count) so loses no
-digits. :attr:`TSKModel.consequents` gives the textbook form p0 + p1 x1 + ... + pd xd.
-
-Outside the box of the training data the model follows a declared policy, by the nearest point c of
-the box: hold its value (clip), or go on along its tangent (linear) and hold what is reached at a
-distance of L standard deviations h_j of each input in training,
+with normalised firing strengths w and consequents about x0, the mean of the training data: a column
+far from the origin (a time stamp, a raw count) so loses no digits. Outside the box of the training
+data it goes by the nearest point c of the box: it holds the value there (clip), or follows the
+tangent as far as L standard deviations h_j of each input (linear),
 
     y(c) + sum_j dy/dx_j(c) clip(x_j - c_j, -L h_j, L h_j) .
 
-Strengths are those of the nearest point; they sum to one everywhere, so that no policy ever gives a
-silent zero.
-
-Outputs are held too, inside the box and out of it: within L standard deviations of the training
-target, or half a one where L is less, of its range, and of several rules within a quarter of that.
-Whatever the inputs, no answer is further off.
+Outputs are held within limits as well, see :class:`~skanfis.policies.TargetRange`.
 """
 
 from dataclasses import dataclass, replace
@@ -75,22 +67,14 @@ class TSKModel:
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float
-        L of "linear": how far the tangent is followed, in standard deviations (``spread``) of each
-        input beyond its range; zero or positive, or infinite. Where it is infinite, outputs are not
-        held either, but by limits that were asked for.
-    support : RuleSupport or None
-        Where the training data of every rule lie; None where the model knows of none.
-    posterior : Posterior or None
-        What the standard deviation of a prediction needs; None where the model knows of none.
+        L of "linear", zero or positive. Where it is infinite, outputs are not held either, but by
+        limits that were asked for.
+    support, posterior, target : RuleSupport, Posterior, TargetRange or None
+        What coverage, deviations and the limits of outputs are made of, as far as there are data.
+    term_names, output_names : tuple of str
+        Where not given, see ``naming``.
     told_extrapolation : float or None
-        L for which the outermost training rows speak, see ``training.outermost``; None where the
-        model knows of no rows, as one that was read from a file.
-    term_names : tuple of str
-        One per term, unique on its input; where not given, see ``naming``.
-    target : TargetRange or None
-        What outputs are held by; None where the model knows of no data, and they are not held.
-    output_names : tuple of str
-        Where not given "y", or "y0", "y1", ... of several outputs.
+        L for which the outermost training rows speak, see ``training.outermost``.
     """
 
     antecedent: Antecedent
@@ -183,10 +167,7 @@ class TSKModel:
         return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
 
     def predict(self, X, inside=None) -> np.ndarray:
-        """Outputs, shape (n_rows, n_outputs), by the policy for rows out of bounds.
-
-        ``inside`` is what :meth:`in_bounds` gives, for a caller that has it already.
-        """
+        """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""
         inside = self.in_bounds(X) if inside is None else inside
         if inside.all():
             return self._by_block(X, self._outputs, self.n_outputs)
@@ -240,11 +221,11 @@ class TSKModel:
 
         Rows out of the box are taken at its nearest point, and outputs before they are held.
         """
-        n_values = self.n_inputs * self.n_outputs
 
         def of_block(Z):
-            return self._linearised(self._clip(Z))[1].reshape(n_values, -1)
+            return self._linearised(self._clip(Z))[1].reshape(-1, Z.shape[1])
 
+        n_values = self.n_inputs * self.n_outputs
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
@@ -253,14 +234,9 @@ class TSKModel:
 
         With c the nearest point of the box and delta its distance in standard deviations,
 
-            exp(-|delta|^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2) :
+            exp(-|delta|^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2) ,
 
-        N_r is the number of distinct training inputs on which rule r is the strongest, P the number
-        of its coefficients, d_r the Mahalanobis distance from the centre of its data, D_r that of
-        the farthest row on which it fires; see :class:`skanfis.support.RuleSupport`. Near one on
-        the training rows of rules that have enough of them; falling to zero away from the box,
-        where only rules without data speak, and off the rows, in empty corners of the box too. Zero
-        everywhere where the model knows of no data.
+        see :class:`~skanfis.support.RuleSupport`. Zero everywhere where the model knows of no data.
         """
         support = self.support
         if support is None:
@@ -280,9 +256,8 @@ class TSKModel:
         n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
         if n_parameters > MOST_PARAMETERS:
             return (
-                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} no posterior "
-                "is kept, and there is no standard deviation. Use fewer rules, or intervals from "
-                "residuals: ConformalRegressor(..., scaled=False)."
+                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} there is no "
+                "standard deviation. Use fewer rules, or ConformalRegressor(..., scaled=False)."
             )
         return (
             "The model knows of no posterior: it was taken as it was given, not fitted. Fit it to "
@@ -290,10 +265,7 @@ class TSKModel:
         )
 
     def way_out(self, X) -> np.ndarray:
-        """How far "linear" goes from the box towards each row, (n_rows, n_inputs).
-
-        The way from the nearest point in the box, held at ``max_extrapolation``.
-        """
+        """How far "linear" goes from the box towards each row, (n_rows, n_inputs)."""
         return self._followed(self._way(X.T, self._clip(X.T))).T
 
     def describe_out_of_bounds(self, X) -> str:
@@ -309,10 +281,7 @@ class TSKModel:
         return text
 
     def with_out_of_bounds(self, policy, max_extrapolation=None) -> Self:
-        """Return the same model with another policy; the limit stays where None is given.
-
-        "auto" is how far the data speak for the tangent.
-        """
+        """Return the same model with another policy, and another limit where one is given."""
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
         check_policy(policy, limit)
         if limit == "auto":
@@ -323,10 +292,9 @@ class TSKModel:
 
     @cached_property
     def _supported_extrapolation(self):
-        """How far the data speak for the tangent; as it is set where the model knows of none.
+        """How far the outermost rows speak for the tangent; as it is set where there are none.
 
-        So far as the outermost rows do. A line, of which these say that it goes on, bends beyond
-        them by no more than it leaves of the target, for all that is known.
+        A line that goes on bends beyond them by no more than it leaves of the target.
         """
         told, target, posterior = self.told_extrapolation, self.target, self.posterior
         if told is None:
@@ -339,7 +307,7 @@ class TSKModel:
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).
 
-        ``n_more`` is the number of values that it takes per row besides strengths and outputs.
+        It takes ``n_more`` values per row besides strengths and outputs.
         """
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
@@ -380,7 +348,7 @@ class TSKModel:
 
     @cached_property
     def _limits_of_columns(self):
-        """The limits as columns; for a single row they are a sixth of what the rest takes."""
+        """The limits as columns, kept: for a single row they are a sixth of the work."""
         return self.output_limits[:, :, None]
 
     def _outputs(self, Z):

@@ -20,7 +20,6 @@ TRUSTED_TYPES = [
     "skanfis.gyro.features.ThermalRate",
     "skanfis.gyro.features.TimeSincePowerOn",
     "skanfis.gyro.physics.OpenLoopArcsineRegressor",
-    "skanfis.intervals._scores.Scorer",
     "skanfis.intervals.conformal.ConformalRegressor",
     "skanfis.membership.bell.Bell",
     "skanfis.membership.flanked.PiShaped",
