@@ -25,6 +25,7 @@ from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
     FARTHEST,
+    FARTHEST_ROW,
     MAX_EXTRAPOLATION,
     TargetRange,
     check_policy,
@@ -37,9 +38,6 @@ __all__ = ["TSKModel"]
 
 # Bytes that the intermediate results of one block of rows may take.
 _BLOCK_BYTES = 2**22
-# Further than so many standard deviations a row counts as so far: results saturate, and overflow
-# nowhere on the way.
-_FARTHEST_ROW = 1e100
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -329,8 +327,8 @@ class TSKModel:
         return np.clip(Z, self.minimum[:, None], self.maximum[:, None])
 
     def _way(self, Z, nearest):
-        """The way from the nearest point in the box, no further than ``_FARTHEST_ROW``."""
-        reach = (_FARTHEST_ROW * self.spread)[:, None]
+        """The way from the nearest point in the box, no further than ``FARTHEST_ROW``."""
+        reach = (FARTHEST_ROW * self.spread)[:, None]
         with np.errstate(over="ignore"):
             return np.clip(Z - nearest, -reach, reach)
 

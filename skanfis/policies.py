@@ -8,6 +8,7 @@ import numpy as np
 
 __all__ = [
     "FARTHEST",
+    "FARTHEST_ROW",
     "MAX_EXTRAPOLATION",
     "OUT_OF_BOUNDS",
     "SILENT",
@@ -24,6 +25,8 @@ SILENT = ("nan", "raise")
 # a line that leaves nothing of the target: no more than a row in 10,000 is that far from its mean
 # (Chebyshev).
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
+# A row further off than so many of them counts as so far: results saturate, and overflow nowhere.
+FARTHEST_ROW = 1e100
 # What a prediction may have beyond the range of the target: half a standard deviation at least,
 # whatever the limit of inputs, for peaks between rows; of rules that bend a quarter of the range at
 # most. A line has no peaks between rows.

@@ -22,7 +22,7 @@ from math import prod
 import numpy as np
 
 from .._validation import collected_warnings, warn_user
-from ..bounds.wishes import Wishes
+from ..bounds.constraints import Constraints
 from ..exceptions import InfeasibleConstraintsError
 from .result import Fitted
 
@@ -40,12 +40,12 @@ _NEARLY_EXACT = 0.01
 _LEAST = np.finfo(float).eps
 
 
-def grown(wishes: Wishes, inputs, fit: Callable[..., Fitted]) -> Fitted:
+def grown(wishes: Constraints, inputs, fit: Callable[..., Fitted]) -> Fitted:
     """The fit of the structure found, or of that with more terms if what is known asks for them.
 
     Parameters
     ----------
-    wishes : Wishes
+    wishes : Constraints
         What is known.
     inputs : ndarray of int
         Those that may have terms.

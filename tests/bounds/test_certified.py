@@ -145,6 +145,11 @@ def test_the_box_is_held_where_the_policy_holds(rng):
     estimator.set_params(out_of_bounds=LinearExtrapolation(np.inf))
     with pytest.raises(ValueError, match=r"'x0', and the model goes on along its tangent without"):
         bounds(estimator, without_end)
+    # As far as floats go results saturate, and are enclosed.
+    far = bounds(estimator, [(-1.7e308, 1.7e308)] * 2, max_boxes=2000)
+    ends = estimator.predict([[s * 1e308, t * 1e308] for s in (-1, 1) for t in (-1, 1)])
+    assert far.lower[0] <= ends.min() < -1e90
+    assert 1e90 < ends.max() <= far.upper[0] < np.inf
 
 
 @pytest.mark.theory

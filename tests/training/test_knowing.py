@@ -11,7 +11,7 @@ from skanfis import ANFISRegressor
 from skanfis._validation import warn_user
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.bounds import gradient_bounds, monotonicity
-from skanfis.bounds.wishes import Wishes
+from skanfis.bounds.constraints import Constraints
 from skanfis.exceptions import InfeasibleConstraintsError
 from skanfis.membership import Gaussian
 from skanfis.search import Start
@@ -58,7 +58,7 @@ def grow(errors, found, n_units=N_ROWS, candidates=(), varies=1.0):
         # Rows left out tell more than the rows of training do: of the same order here.
         return replace(fitted, proven=proven, expected_error=lambda: 1.1 * known["loss_after"])
 
-    wishes = Wishes(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
+    wishes = Constraints(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
     with pytest.warns(UserWarning, match="told|proven") as told:
         best = grown(wishes, np.arange(2), fit)
     assert best.start.candidates == list(candidates)
@@ -158,6 +158,6 @@ def test_what_fails_for_another_reason_is_not_passed_over():
         )
 
     shared = warnings.filters, warnings.showwarning
-    wishes = Wishes(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
+    wishes = Constraints(np.array([[1, 0]]), *np.full((2, 1), np.nan), np.empty((0, 2)), None)
     with pytest.raises(ValueError, match="of another kind"):
         grown(wishes, np.arange(2), fit)

@@ -1,4 +1,4 @@
-"""What is asked of a model: read from what a user gives."""
+"""Constraints on the outputs, read from what a user gives."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["FixedPoint", "OutputLimits", "Wishes"]
+__all__ = ["Constraints", "FixedPoint", "OutputLimits"]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class FixedPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Wishes:
+class Constraints:
     """Constraints of every output, in the user's units.
 
     Attributes

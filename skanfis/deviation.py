@@ -1,3 +1,0 @@
-"""Local shim until C deviations are removed."""
-
-DerivativeRows = DeviationTables = rulers = None
