@@ -310,7 +310,7 @@ class TSKModel:
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
         step = max(_BLOCK_BYTES // (8 * values_per_row), 64)
-        if n_rows <= step:
+        if 0 < n_rows <= step:
             return of_block(np.array(X.T, dtype=float, order="C")).T
         result = np.empty((n_rows, n_columns))
         for start in range(0, n_rows, step):

@@ -74,15 +74,7 @@ class _Parts:
 
 
 class Enclosure:
-    """Upper bounds of one output, or of its negative, over batches of boxes.
-
-    Parameters
-    ----------
-    model : TSKModel
-    output : int
-    sign : {-1.0, 1.0}
-        1 bounds from above, -1 from below: all of it is of sign times the output.
-    """
+    """Upper bounds of one output, or of its negative with sign -1, over batches of boxes."""
 
     def __init__(self, model: TSKModel, output: int, sign: float):
         self.model, self.output, self.sign = model, output, sign
@@ -113,18 +105,10 @@ class Enclosure:
         return np.clip(values, self.lowest, self.highest)
 
     def values(self, low, high):
-        """Bounds of the output on boxes (n_inputs, n_boxes).
+        """Bounds of the output on boxes (n_inputs, n_boxes) that nothing in them is above.
 
-        Returns
-        -------
-        bound : ndarray of shape (n_boxes,)
-            Nothing in the box is above.
-        points : ndarray of shape (n_inputs, n_boxes)
-            One in each box.
-        attained : ndarray of shape (n_boxes,)
-            The output there.
-        gain : ndarray of shape (n_inputs, n_boxes)
-            What splitting along each input promises.
+        Then a point in each, (n_inputs, n_boxes), the output there, and what splitting the box
+        along each input promises, (n_inputs, n_boxes).
         """
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)

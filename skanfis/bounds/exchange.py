@@ -33,8 +33,7 @@ __all__ = ["constrained"]
 
 # Margins, in standard deviations of the target (and of the input): the first, and the last tried.
 _FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.03, 3.0
-# A bound on time, where constraints nearly contradict one another: what is not proven by then is
-# said not to be. Of one proof, about a second's worth.
+# A bound on time: what is not proven by then is said not to be. One proof takes a second.
 _MOST_ROUNDS, _MOST_BOXES = 40, 30_000
 # A sample is looked at in milliseconds; each point of a round is a row of the quadratic program
 # from there on, so that half of them are the worst, and half are spread over the others.

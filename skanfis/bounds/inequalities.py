@@ -54,10 +54,10 @@ class Solved:
     """Consequents that keep what is held, at some premises.
 
     ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
-    how much of it each output pays for what is held. ``known`` has for every output what is met
-    with equality: points in the user's units, and those that a slope begins at, or None. ``active``
-    is how many points of each inequality are, ``rows`` what is met of every output as rows (n_met,
-    n_columns) of constraints on its local coefficients.
+    how much of it each output pays. ``known`` has for every output what is met with equality:
+    points in the user's units, and those that a slope begins at, or None; ``rows`` the same as
+    constraints (n_met, n_columns) on its local coefficients. ``active`` is how many points of each
+    inequality are met so.
     """
 
     local: np.ndarray
@@ -68,10 +68,7 @@ class Solved:
     rows: tuple
 
     def held(self, factor: NormalFactor):
-        """Of every output an orthonormal basis (n_columns, n_held) of what is met, in L'u.
-
-        ``factor`` is L. At these constraints, met with equality, u moves across it alone.
-        """
+        """Of every output an orthonormal basis (n_columns, n_held) of what is met, in L'u."""
         return tuple(orthonormal_rows(factor.half_solve(rows.T)).T for rows in self.rows)
 
 
@@ -140,10 +137,12 @@ class HeldPoints:
 
     def solve(self, evaluation, chosen=None) -> Solved:
         """The nearest consequents; ``chosen`` inequalities alone, if given."""
-        columns = self._columns(evaluation.antecedent)
+        columns, model = self._columns(evaluation.antecedent), self.model
         normal, problem = evaluation.normal, self.problem
         local, targets = normal.coefficients.copy(), problem.rows.targets
-        equal = self._in_local(self._at_points(columns))
+        # By the policy where they lie beyond the range.
+        at_points = columns.with_out_of_bounds(model.out_of_bounds, model.max_extrapolation)
+        equal = self._in_local(at_points.predict(self.standardised(self.constraints.points)))
         values = (self.constraints.values - targets.offset) / targets.scale
         places = range(len(self.inequalities)) if chosen is None else chosen
         known, met, active = [], [], np.zeros(len(self.inequalities), dtype=int)
@@ -190,11 +189,11 @@ class HeldPoints:
         rows, least = [np.empty((0, n_columns))], [np.empty(0)]
         for p in places:
             one = self.inequalities[p]
-            found, size, limit = self._at(columns, self.after[p]), 1.0, 0.0
+            found, size, limit = columns.predict(self.after[p]), 1.0, 0.0
             if one.input is None:
                 limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
             else:
-                found = (found - self._at(columns, self.before[p])) / _STEP
+                found = (found - columns.predict(self.before[p])) / _STEP
                 # Where no consequents have much of a slope, none is asked for.
                 size = np.minimum(np.abs(found).sum(axis=1), 1.0)
             rows.append(self._in_local(one.sign * found))
@@ -225,17 +224,6 @@ class HeldPoints:
             out_of_bounds="clip",
             output_names=tuple(map(str, range(problem.n_columns))),
         )
-
-    def _at_points(self, columns):
-        """The same at fixed points, by the policy where they lie beyond the range."""
-        if not len(self.constraints.points):
-            return np.empty((0, self.problem.n_columns))
-        own = columns.with_out_of_bounds(self.model.out_of_bounds, self.model.max_extrapolation)
-        return own.predict(self.standardised(self.constraints.points))
-
-    def _at(self, columns, Z):
-        """Columns of the design at points, (n_points, n_columns)."""
-        return columns.predict(Z) if len(Z) else np.empty((0, self.problem.n_columns))
 
     def _in_local(self, rows):
         """Rows (n, n_columns) by local coefficients from those by global ones."""
