@@ -1,8 +1,5 @@
 """Where the data of every rule lie, against the definitions, and what coverage makes of it."""
 
-from contextlib import nullcontext
-from dataclasses import fields
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -10,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor, blocks
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.firing import rule_support
-from skanfis.support import RuleSupport
 
 from . import oracles
 
@@ -78,17 +74,6 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
         assert_allclose(found.radius[r], radius, rtol=1e-9)
 
 
-def test_whole_weights_are_repeated_rows(rng):
-    X, weight = table(rng), rng.integers(1, 5, 400)
-    antecedent = ANTECEDENTS["grid"](rng)
-    weighted = rule_support(StandardisedData.of(X, X[:, :1], weight.astype(float)), antecedent, 30)
-    again = np.repeat(X, weight, axis=0)
-    repeated = rule_support(StandardisedData.of(again, again[:, :1]), antecedent, 30)
-    for part in fields(RuleSupport):
-        one, other = getattr(weighted, part.name), getattr(repeated, part.name)
-        assert_allclose(one, other, rtol=1e-8, atol=1e-8)
-
-
 def test_units_change_as_inputs_do(rng):
     found = oracles.random_support(rng, 4, 3)
     offset, scale = np.array([1e6, 0.0, -3.0]), np.array([1e3, 1e-6, 2.0])
@@ -154,15 +139,6 @@ def test_a_corner_that_no_row_is_near_is_not_covered(n_mfs, rng):
         assert_array_equal(model.coverage(X), 1.0)
 
 
-def test_beside_a_thin_manifold_there_is_some_thickness(rng):
-    # No noise at all: without thickness the rounding of a coordinate would be beyond any distance.
-    along = rng.uniform(-1.0, 1.0, 300)
-    X = np.column_stack([along, along])
-    model = ANFISRegressor(n_mfs=1).fit(X, along)
-    beside = np.array([[0.0, 0.01], [0.0, 0.03]])
-    assert model.coverage(beside).min() > 0.95
-
-
 def test_inputs_that_repeat_are_counted_once(rng):
     # Three places, a hundred rows each, and three coefficients; then two places.
     places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -176,21 +152,6 @@ def test_inputs_that_repeat_are_counted_once(rng):
     with pytest.warns():
         one = ANFISRegressor(n_mfs=1).fit(np.array([[0.0, 0.0], [1.0, 1e-3]]), y[:2])
     assert_allclose(one.model_.support.share, 2.0 / 3.0)
-
-
-def test_slopes_that_rules_may_not_have_are_not_counted(rng):
-    X = rng.normal(size=(3, 5))
-    X = np.vstack([X, X[:1]])
-    y = X[:, 0]
-    shares = {}
-    for name, settings in {
-        "all": {},
-        "two": {"consequent_features": [0, 1]},
-        "none": {"order": 0},
-    }.items():
-        with pytest.warns() if name == "all" else nullcontext():
-            shares[name] = ANFISRegressor(n_mfs=1, **settings).fit(X, y).model_.support.share[0]
-    assert shares == {"all": pytest.approx(0.5), "two": 1.0, "none": 1.0}
 
 
 def test_coverage_does_not_depend_on_units_or_the_order_of_inputs(rng):

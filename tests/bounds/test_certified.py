@@ -73,25 +73,6 @@ def test_two_rules_of_order_zero_are_a_sigmoid():
     assert monotonicity(replace(model, coefficients=-model.coefficients), "time") == -1
 
 
-@pytest.mark.theory
-@pytest.mark.parametrize("number", [3, 26, 78, 130, 152])
-def test_bounds_are_tight(number):
-    model = CASES[number].model.with_out_of_bounds("linear", 0.4)
-    box = whole_box(model)
-    found = bounds(model, box, max_boxes=5000)
-    rng = np.random.default_rng(number)
-    y = model.predict(rng.uniform(box[:, 0], box[:, 1], (5000, 3)))
-    assert (found.lower <= y.min(axis=0)).all()
-    assert (y.max(axis=0) <= found.upper).all()
-    width = found.upper - found.lower
-    assert found.converged
-    assert (found.tightness <= 0.01 + 1e-9).all()
-    assert (width <= 1.021 * (found.highest - found.lowest)).all()
-    for rows, taken in ((found.at_lowest, found.lowest), (found.at_highest, found.highest)):
-        assert ((box[:, 0] <= rows) & (rows <= box[:, 1])).all()
-        assert_allclose(np.diagonal(model.predict(rows)), taken, rtol=1e-12)
-
-
 def test_an_optimiser_finds_nothing_beyond():
     model = CASES[1].model.with_out_of_bounds("linear", 0.4)
     box = whole_box(model)
@@ -179,22 +160,6 @@ def test_scalers_are_folded_in(rng):
     assert predicted.max() <= found.upper[0]
     assert_allclose([found.lower[0], found.upper[0]], [predicted.min(), predicted.max()], rtol=3e-3)
     assert repr(found).startswith("Bounds(y in [")
-
-
-def test_the_limit_on_boxes_leaves_bounds_that_hold():
-    model = CASES[40].model.with_out_of_bounds("clip")
-    rough, fine = bounds(model, max_boxes=1), bounds(model, tol=1e-4)
-    assert not rough.converged
-    assert rough.tightness[0] > 0.01
-    assert rough.lower < fine.lower
-    assert fine.upper < rough.upper
-
-
-def test_a_constant_is_bounded_by_itself():
-    model = replace(ONE_RULE, coefficients=np.full((1, 1, 1), 3.0), output_names=("y",))
-    found = bounds(model)
-    assert_allclose([found.lower[0], found.upper[0]], 3.0, rtol=1e-12)
-    assert monotonicity(model, "rate") == 1
 
 
 @pytest.mark.parametrize(

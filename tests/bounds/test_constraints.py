@@ -109,15 +109,6 @@ def test_what_holds_already_is_left_alone(rng):
     assert_allclose(held.consequents_, free.consequents_, rtol=1e-12)
 
 
-def test_a_constant_target_is_proven_at_once(rng):
-    """Slopes of nothing but rounding."""
-    X = planted(rng)[0]
-    model = ANFISRegressor(**QUICK, monotonic_cst=[1, -1]).fit(X, np.full(len(X), 0.1))
-    assert model.constraints_["certified"]
-    assert model.constraints_["boxes"] == 0
-    assert_allclose(model.predict(X), 0.1, rtol=1e-14)
-
-
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 def test_one_rule_is_bounded_least_squares(rng):
     """Without terms: a ridge of nearly nothing with the sign of each slope given."""

@@ -9,7 +9,7 @@ from sklearn.base import clone
 from sklearn.dummy import DummyRegressor
 from sklearn.frozen import FrozenEstimator
 from sklearn.linear_model import BayesianRidge, LinearRegression
-from sklearn.model_selection import GridSearchCV, GroupKFold, KFold, ShuffleSplit
+from sklearn.model_selection import GroupKFold, KFold, ShuffleSplit
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import estimator_checks_generator
@@ -238,20 +238,6 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert abs(covered(model.predict_interval(new, 0.8), truth) - 0.8) < 0.06
     lower, upper = model.predict_interval([[0.0], [1.5], [3.0]])
     assert (np.diff(upper - lower) > 0.0).all()
-
-
-def test_what_a_search_finds_says_how_sure_it_is():
-    """By the best of its candidates, whose own intervals they are, within a Pipeline too."""
-    rng = np.random.default_rng(12)
-    X, y = bent(rng, 60)
-    scaled = make_pipeline(StandardScaler(), ANFISRegressor(**QUICK))
-    search = GridSearchCV(scaled, {"anfisregressor__n_mfs": [1, 2]}, cv=2)
-    best = search.fit(X, y).best_estimator_
-    found, expected = (
-        ConformalRegressor(one, method="loo").fit(X, y).predict_interval(X, 0.8)
-        for one in (search, best)
-    )
-    assert_allclose(found, expected, rtol=1e-9)
 
 
 def test_several_outputs_are_each_covered():
