@@ -161,10 +161,13 @@ def gradient_bounds(
 
     Parameters
     ----------
-    model, box, tol, max_boxes
-        As in :func:`bounds`.
+    model : fitted estimator or TSKModel
     feature : str or int
         The input, by name or position.
+    box : array-like of shape (n_inputs, 2) or dict, default=None
+    tol : float, default=0.01
+    max_boxes : int, default=200_000
+        As in :func:`bounds`.
 
     Returns
     -------
@@ -211,10 +214,12 @@ def monotonicity(
 
     Parameters
     ----------
-    model, box, max_boxes
-        As in :func:`bounds`.
+    model : fitted estimator or TSKModel
     feature : str or int
         The input, by name or position.
+    box : array-like of shape (n_inputs, 2) or dict, default=None
+    max_boxes : int, default=200_000
+        As in :func:`bounds`.
 
     Returns
     -------

@@ -244,7 +244,9 @@ class _Exchange:
                 worst.append(self.sample[:0])
                 continue
             enclosure = Enclosure(model, one.output, -one.sign)
-            until, places, values = -one.sign * one.limit, [], []
+            until = -one.sign * one.limit
+            places: list[np.ndarray] = []
+            values: list[np.ndarray] = []
 
             def evaluate(low, high, one=one, enclosure=enclosure, places=places, values=values):
                 if one.input is None:

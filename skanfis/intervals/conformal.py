@@ -220,7 +220,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         masses, n_units = row_masses(held_out.size, own_weight, own_groups)
         # All at once: a fit that is interrupted leaves what was there.
         for name in ("n_features_in_", "feature_names_in_"):
-            vars(self).pop(name, None)
+            self.__dict__.pop(name, None)
             if hasattr(estimator, name):
                 setattr(self, name, getattr(estimator, name))
         self.estimator_, self.estimators_ = estimator, estimators
