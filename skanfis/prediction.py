@@ -4,14 +4,11 @@ from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._callers import is_silent, pipelines_above
-from ._dispatch import in_bounds, namespace_of, to_numpy
-from ._validation import check_finite, warn_user
+from ._validation import warn_user
 from .exceptions import OutOfBoundsWarning
 from .export import fold_with_rows, last_step
-from .export.arrays import predict_in
 from .model import TSKModel
 from .options import policy_of
 
@@ -74,9 +71,6 @@ class PredictsMixin:
         OutOfBoundsWarning
             With ``out_of_bounds="linear"``, if rows lie outside the training data.
         """
-        namespace = namespace_of(X)
-        if namespace is not None:
-            return self._predict_there(namespace, X, return_std)
         X = self._check_inputs(X)
         model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
         inside = model.in_bounds(X)
@@ -90,28 +84,6 @@ class PredictsMixin:
         if return_std:
             return (outputs[:, 0], deviations[:, 0]) if single else (outputs, deviations)
         return outputs[:, 0] if single else outputs
-
-    def _predict_there(self, xp, X, return_std):
-        """Predict by an array library's own operations; what else is asked for, on the host."""
-        check_is_fitted(self)
-        X = validate_data(
-            self, X, reset=False, dtype=(xp.float64, xp.float32), ensure_all_finite=False
-        )
-        if return_std:
-            host = self.predict(to_numpy(X, xp), return_std=True)
-            return tuple(xp.asarray(a.tolist(), dtype=X.dtype, device=X.device) for a in host)
-        if not bool(xp.all(xp.isfinite(X))):
-            check_finite(to_numpy(X, xp), "X", self.model_.input_names)
-        model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
-        if not bool(xp.all(in_bounds(xp, X, model.minimum, model.maximum))):
-            there = to_numpy(X, xp)
-            if model.out_of_bounds == "raise":
-                raise ValueError(model.describe_out_of_bounds(there))
-            self._warn_out_of_bounds(model, there)
-        # Of rows in the box it is all one.
-        held = model.with_out_of_bounds("clip") if model.out_of_bounds == "raise" else model
-        outputs = predict_in(xp, held, X)
-        return outputs[:, 0] if self._single_output else outputs
 
     def _warn_out_of_bounds(self, model, X):
         if model.out_of_bounds == "linear" and not is_silent(OutOfBoundsWarning):

@@ -21,7 +21,6 @@ PUBLIC = "__init__"
 LAYERS = {
     "_sklearn": SKLEARN,
     "_callers": SKLEARN,
-    "_dispatch": SKLEARN,
     "_threads": SKLEARN,
     "_memory": [],
     "exceptions": [],
@@ -83,7 +82,6 @@ SHARED = {
     "_validation": "checks and warnings in one voice, by parameters and columns that it knows",
     "_callers": "reads the frames of the calls above, which no user should rely on",
     "_threads": "counts the fits that hold BLAS to one thread, which works only if all do",
-    "_dispatch": "looks up what scikit-learn is set to, and reads arrays of other libraries",
     "_memory": "sets limits of the process's malloc, and counts who needs them set",
     "_notebook": "overrides private methods of scikit-learn's representation",
 }

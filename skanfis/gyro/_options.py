@@ -311,11 +311,6 @@ def _add_output(group):
         help="also write the model as C (compensator.h, compensator.c) by the standard c99 or c89",
     )
     group.add_argument(
-        "--deviation",
-        action="store_true",
-        help="with --c: write the standard deviation too, compensator_deviation(x, deviation)",
-    )
-    group.add_argument(
         "--saturate",
         action="store_true",
         help="with --c: hold what the rules give between the limits that the report has proven for "

@@ -13,7 +13,6 @@ import numpy as np
 
 from ..export.c import CCode
 from ..export.c.builder import (
-    DECLARATION,
     FINITE_INPUT,
     LONGEST_NAME,
     Dialect,
@@ -107,22 +106,6 @@ $finite_input
     return status;
 }
 """
-_DEVIATION = """
-int $name_deviation(const $real x[$NAME_N_INPUTS], $real deviation[$NAME_N_OUTPUTS])
-{
-    $real z[$n_rules_inputs], rate[1];
-    int i;
-    const int status = $name_predict(x, rate) & ~$NAME_UNCOVERED;
-    if (status & $NAME_NO_OUTPUT) {
-        return $NAME_REJECT(deviation, status);
-    }
-    for (i = 0; i < $n_rules_inputs; ++i) {
-        z[i] = x[$name_rules_input[i]];
-    }
-    (void)$rules_deviation(z, deviation);
-    return status;
-}
-"""
 _BEYOND = {
     "clip": "phase = $max_phase;",
     "linear": "phase = $max_phase + (sine - $limit) * $slope;",
@@ -140,7 +123,6 @@ def export_c_physics(
     std: str = "c99",
     min_coverage: float | None = 0.1,
     saturate: Any = None,
-    deviation: bool = False,
 ) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 
@@ -171,10 +153,6 @@ def export_c_physics(
     saturate : Bounds or array-like of shape (1, 2), default=None
         Limits between which what the rules add to the law is held: what
         :func:`skanfis.bounds.bounds` has proven of them, or others. None holds nothing.
-    deviation : bool, default=False
-        Whether to write ``int NAME_deviation(const double x[], double deviation[])`` too: the
-        standard deviation of a new rate by the rules; the law, which is fitted before them, is
-        taken for known.
 
     Returns
     -------
@@ -221,27 +199,21 @@ def export_c_physics(
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
     dialect = Dialect(name, dtype, std)
-    if not isinstance(deviation, bool | np.bool_):
-        raise ValueError(f"deviation={deviation!r} must be True or False.")
-    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, saturate, bool(deviation))
+    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, saturate)
     columns = np.union1d(law.columns_, rules.positions)
     composition = Composition(law, rules, columns, dialect.dtype)
     of_law = _law(dialect, composition, policies)
-    answers, test = known_answers(composition, part), ""
-    if deviation:
-        test = part.deviation_test(dialect, answers[0][:, composition.rules_inputs])
     source = "".join(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
             part.text(),
             "\n",
             of_law,
-            _write(dialect, _DEVIATION, composition) if deviation else "",
-            self_test(answers, dialect, test, "deviation_test"),
+            self_test(known_answers(composition, part), dialect),
         ]
     )
     price = _cost(part.cost, composition)
-    code = CCode(name, _header(composition, dialect, price, part, deviation), source, price)
+    code = CCode(name, _header(composition, dialect, price, part), source, price)
     write_files(code, path)
     return code
 
@@ -295,7 +267,7 @@ def _law(dialect, composition, policies):
     )
 
 
-def _header(composition, dialect, price, part, deviation):
+def _header(composition, dialect, price, part):
     law, model = composition.law, composition.rules.model
     lines = [
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
@@ -315,11 +287,8 @@ def _header(composition, dialect, price, part, deviation):
     if part.limits is not None:
         low, high = part.limits[0]
         lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
-    if deviation:
-        lines.append("The deviation is that of the rules: the law is taken for known.")
     title = "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
-    declarations = dialect.write(DECLARATION) if deviation else ""
-    return header_of(title, lines, dialect, composition.columns.size, 1, declarations)
+    return header_of(title, lines, dialect, composition.columns.size, 1)
 
 
 def _cost(of_rules, composition):

@@ -116,9 +116,8 @@ def _calibrate(options, tell):
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
-    for name in ("deviation", "saturate"):
-        if getattr(options, name) and not options.c:
-            raise UsageError(f"--{name} is of the model in C: give --c c99 or --c c89 with it.")
+    if options.saturate and not options.c:
+        raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     _refuse_twice([name for name, *_ in options.box], "--box: {} is given twice.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
@@ -217,7 +216,6 @@ def _write(calibration, options, paths, folder, axis=""):
             path,
             std=options.c,
             min_coverage=coverage,
-            deviation=options.deviation,
             saturate=certain_of(calibration).found if options.saturate else None,
         )
 

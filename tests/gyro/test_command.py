@@ -80,7 +80,7 @@ def calibrated(tmp_path_factory, log, given_weights, coarse_report):
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("skanfis.gyro.html_report.PICTURES", ())
-        assert main([*arguments, "--c", "c99", "--deviation", "--saturate"]) == 0
+        assert main([*arguments, "--c", "c99", "--saturate"]) == 0
     return folder
 
 
@@ -88,7 +88,6 @@ def test_writes_what_it_says(calibrated):
     found = sorted(path.name for path in (calibrated / "out").iterdir())
     assert found == sorted([*FILES, "compensator.c", "compensator.h"])
     header = (calibrated / "out" / "compensator.h").read_text()
-    assert "int compensator_deviation(const double x[" in header
     assert "saturated beyond limits" in header
 
 

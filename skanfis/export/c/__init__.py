@@ -4,22 +4,14 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-from .._numbers import Numbers, as_held
+from .._numbers import Numbers
 from ..folding import fold
+from ._arguments import check_arguments, read_limits, write_files
 from ._cost import CCost
-from ._deviation import DeviationSource
-from ._deviation_tables import deviation_of
-from ._deviation_test import deviation_test
 from ._dialect import Dialect
-from ._files import check_arguments, write_files
 from ._header import header
-from ._interval import check_deviation, read_interval
-from ._learner import learner_of
-from ._learning_source import LearningSource, learning_test
-from ._saturation import read_limits
 from ._self_test import known_answers, self_test
 from ._source import Source
-from .status import STATUS
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -62,9 +54,6 @@ def export_c(
     std: str = "c99",
     min_coverage: float | None = 0.1,
     saturate: Any = None,
-    forgetting: float | None = None,
-    deviation: bool = False,
-    coverage: float | None = None,
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
@@ -100,19 +89,6 @@ def export_c(
         :func:`skanfis.bounds.bounds` has proven for the box that is specified, or others. Within
         proven limits nothing changes, until an input beyond the box, or a fault of the hardware,
         would give more. None holds nothing.
-    forgetting : float or None, default=None
-        A number above 0 and at most 1 adds recursive least squares, by which the consequents go on
-        learning on the device, with this forgetting factor; ``estimator`` is then an ANFISRegressor
-        trained by ``partial_fit``, which knows how sure its consequents are. None leaves it out.
-    deviation : bool, default=False
-        Whether to write ``int NAME_deviation(const double x[], double deviation[])`` too: the
-        standard deviation of :meth:`~skanfis.ANFISRegressor.predict`, with ``return_std=True``. Its
-        tables grow with the square of the number of coefficients.
-    coverage : float, default=None
-        Between 0 and 1: adds ``int NAME_interval(const double x[], double lower[], double
-        upper[])``, the ends of :meth:`~skanfis.intervals.ConformalRegressor.predict_interval` at
-        this coverage, and the deviation. ``estimator`` is then a fitted ConformalRegressor with
-        ``scaled=True`` and not ``method="cross"``, whose intervals are those of several models.
 
     Returns
     -------
@@ -123,8 +99,7 @@ def export_c(
     ------
     ValueError
         If a parameter is none of the above, if ``estimator`` has a step that cannot be folded in,
-        if it cannot learn and ``forgetting`` is given, or if the model's numbers go beyond what
-        "float" holds.
+        or if the model's numbers go beyond what "float" holds.
 
     Notes
     -----
@@ -135,14 +110,6 @@ def export_c(
     leaves y as it is, so that a controller which keeps y holds its last value. "nan" writes NaN, or
     in C89, which has none, leaves y as it is. A row that is not finite gets no answer under any
     policy.
-
-    With ``forgetting``, a ``NAME_learner`` of fixed size, which is the caller's, holds what is
-    learnt: ``NAME_reset`` sets it to what training has left, ``NAME_learn(&q, x, t)`` takes in a
-    row x with its target t, ``NAME_predict_learnt(&q, x, y)`` answers, and ``NAME_freeze(&q, 1)``
-    holds it. Where the penalty is zero, that is what ``partial_fit`` would have learnt with the
-    same rows and forgetting factor; else the penalty stays as it was at the export, and fades.
-    Rows out of the range of the training data are not learnt from, and the status says so
-    (``NAME_NOT_LEARNT``, 16). See :doc:`/streaming`.
 
     With the macro ``NAME_SELF_TEST`` defined, ``int NAME_self_test(void)`` compares the function
     with what Python predicts, and returns zero if all is well; with ``NAME_SELF_TEST_MAIN`` too,
@@ -161,8 +128,6 @@ def export_c(
     (8, 88)
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
-    estimator, reach = read_interval(estimator, coverage)
-    deviation = check_deviation(deviation, forgetting) or reach is not None
     model = fold(estimator)
     if model.support is None:
         # Rules that come from elsewhere: no data to be near to or far from.
@@ -170,27 +135,13 @@ def export_c(
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
-    answers = known_answers(model, numbers, min_coverage, STATUS, limits)
-    given = (numbers, dialect, model.out_of_bounds, min_coverage)
-    test, call = "", "learner_test"
-    body: Source
-    if deviation:
-        found = deviation_of(model, numbers, reach, coverage)
-        body = DeviationSource(*given, found, limits=limits)
-        test = deviation_test(as_held(model, numbers), dialect, answers[0], body)
-        call = "deviation_test"
-    elif forgetting is None:
-        body = Source(*given, limits=limits)
-    else:
-        learner = learner_of(estimator, numbers, forgetting)
-        body = LearningSource(*given, learner, limits=limits)
-        test = learning_test(as_held(model, numbers), body)
-    price = body.cost
+    source = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits)
+    test = self_test(known_answers(numbers, min_coverage, limits), dialect)
     code = CCode(
         name,
-        header(model, numbers, dialect, price, min_coverage, limits, body.declarations()),
-        body.text(f"{stem}.h") + self_test(answers, dialect, test, call),
-        price,
+        header(model, numbers, dialect, source.cost, min_coverage, limits),
+        source.text(f"{stem}.h") + test,
+        source.cost,
     )
     write_files(code, path)
     return code

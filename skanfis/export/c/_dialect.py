@@ -1,4 +1,4 @@
-"""The dialect of C that a file is written in: its type, its standard, its functions."""
+"""The dialect of C that a file is written in, and what may stand in one."""
 
 import re
 from dataclasses import dataclass
@@ -6,13 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._constants import FLOOR, SMALLEST_LOG_SQUARE
-from ._text import literal
 
-__all__ = ["DTYPES", "STANDARDS", "Dialect"]
+__all__ = ["DTYPES", "STANDARDS", "Dialect", "comment", "index_type", "kept_lines", "literals"]
 
 DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
 STANDARDS = ("c99", "c89")
+_FUNCTIONS = ("exp", "log", "sqrt", "asin")
 _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
+# Decimal digits that give back the very same float or double.
+_DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
+# A name in a comment stays on its line.
+_LONGEST_COMMENT = 60
 
 
 @dataclass(frozen=True)
@@ -35,22 +39,20 @@ class Dialect:
 
     def number(self, value):
         """A constant of the type."""
-        return literal(self.dtype.type(value))
+        return _literal(self.dtype.type(value))
 
     def write(self, template, **words):
         """The template with everything filled in."""
+        prefix = self.name.upper()
         words = {
             "floor": self.number(FLOOR),
             "log_floor": self.number(np.log(FLOOR)),
             "smallest_log_square": self.number(SMALLEST_LOG_SQUARE),
             "name": self.name,
-            "NAME": self.name.upper(),
+            "NAME": prefix,
             "real": self.real,
-            "EXP": f"{self.name.upper()}_EXP",
-            "LOG": f"{self.name.upper()}_LOG",
-            "SQRT": f"{self.name.upper()}_SQRT",
-            "ASIN": f"{self.name.upper()}_ASIN",
             "MAX": "FLT_MAX" if self.real == "float" else "DBL_MAX",
+            **{name.upper(): f"{prefix}_{name.upper()}" for name in _FUNCTIONS},
             **words,
         }
         longest_first = "|".join(sorted(words, key=len, reverse=True))
@@ -58,14 +60,64 @@ class Dialect:
         return re.sub(rf"\$({longest_first})", lambda found: str(words[found[1]]), text)
 
     def functions(self):
-        """Macros for the functions of <math.h>; C89 has them for double alone."""
-        lines = []
-        for function in ("exp", "log", "sqrt", "asin"):
-            macro = f"#define {self.name.upper()}_{function.upper()}(u)"
-            if self.real == "double":
-                lines.append(f"{macro} {function}(u)")
-            elif self.std == "c99":
-                lines.append(f"{macro} {function}f(u)")
-            else:
-                lines.append(f"{macro} ((float){function}((double)(u)))")
-        return "\n".join(lines)
+        """Macros for the functions of <math.h>, one a line; C89 has them for double alone."""
+        calls = {"double": "{}(u)", "float": "{}f(u)" if self.std == "c99" else "((float){}(u))"}
+        return "\n".join(
+            f"#define {self.name.upper()}_{name.upper()}(u) {calls[self.real].format(name)}"
+            for name in _FUNCTIONS
+        )
+
+    def table(self, name, values, kind=None):
+        """A constant array, of the type where no other kind is given."""
+        shape = "".join(f"[{n}]" for n in values.shape)
+        head = self.write(f"static const {kind or self.real} $name_{name}{shape} =\n")
+        return f"{head}{literals(values)};\n"
+
+
+def kept_lines(template, facts):
+    """The lines of a template whose words before the first "|" are all among ``facts``."""
+    lines = [line.split("|", 1) for line in template.strip("\n").splitlines()]
+    return "\n".join(text for words, text in lines if facts.issuperset(words.split()))
+
+
+def index_type(values):
+    """The smallest unsigned type that holds these positions whatever the width of a char is."""
+    largest = max(map(int, np.ravel(values)), default=0)
+    limits = [(255, "unsigned char"), (65535, "unsigned short")]
+    return next((kind for limit, kind in limits if largest <= limit), "unsigned long")
+
+
+def _literal(value):
+    """A NumPy floating-point number as a C constant that reads back as the same number."""
+    if not np.isfinite(value):
+        raise ValueError(f"The model holds {value}, which has no C constant.")
+    text = f"{value:.{_DIGITS[value.dtype]}g}"
+    if not set(text) & set(".e"):
+        text += ".0"
+    return text + ("f" if value.dtype == np.float32 else "")
+
+
+def literals(values, indent=""):
+    """Nested braces for an array of numbers of any kind and dimension."""
+    if values.ndim == 2 and len(values) == 1:
+        return f"{indent}{{ {literals(values[0])} }}"
+    if values.ndim > 1:
+        inner = ",\n".join(literals(part, indent + "    ") for part in values)
+        return f"{indent}{{\n{inner}\n{indent}}}"
+    write = _literal if values.dtype.kind == "f" else str
+    lines, line = [], ""
+    for text in map(write, values):
+        if line and len(indent) + len(line) + len(text) > 90:
+            lines.append(line)
+            line = ""
+        line += f"{text}, " if line else f" {text}, "
+    lines.append(line)
+    return f"{indent}{{{f'{chr(10)}{indent} '.join(x.rstrip() for x in lines).rstrip(',')} }}"
+
+
+def comment(text):
+    """Any text as something that cannot end a comment, continue a line or make a trigraph."""
+    text = str(text)
+    shown = text[:_LONGEST_COMMENT]
+    safe = re.sub(r"[^ -~]|[*?\\]", lambda found: f"<U+{ord(found[0]):04X}>", shown)
+    return safe + ("..." if len(text) > len(shown) else "")

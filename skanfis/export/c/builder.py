@@ -4,24 +4,17 @@ What surrounds the rules is written in the same :class:`Dialect`, under the same
 the same header and self-test; :func:`skanfis.export.export_c` is made of the same parts.
 """
 
-from .._numbers import Numbers, as_held
+from .._numbers import Numbers
+from ._arguments import LONGEST_NAME, check_arguments, read_limits, write_files
 from ._cost import CCost
-from ._deviation import DeviationSource
-from ._deviation_code import DECLARATION
-from ._deviation_tables import deviation_of
-from ._deviation_test import deviation_test
-from ._dialect import Dialect
-from ._files import check_arguments, write_files
-from ._fragments import FINITE_INPUT, rejection
+from ._dialect import Dialect, comment, index_type, literals
 from ._header import cost_lines, header_of, input_lines, policy_line
-from ._saturation import read_limits
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ._source import Source
-from ._text import LONGEST_NAME, comment, index_type, literals
+from ._templates import FINITE_INPUT, rejection
 from .status import STATUS
 
 __all__ = [
-    "DECLARATION",
     "FINITE_INPUT",
     "LONGEST_NAME",
     "ROWS",
@@ -63,8 +56,6 @@ class RulesPart:
         out too where the rules have never seen data.
     saturate : Bounds or array-like of shape (n_outputs, 2), default=None
         Limits between which the outputs of the rules are held.
-    deviation : bool, default=False
-        Whether there is ``int NAME_deviation(const REAL x[], REAL deviation[])`` too.
 
     Attributes
     ----------
@@ -97,35 +88,17 @@ class RulesPart:
     True
     """
 
-    def __init__(
-        self,
-        model,
-        dialect: Dialect,
-        suffix: str,
-        min_coverage: float | None,
-        saturate=None,
-        deviation: bool = False,
-    ) -> None:
+    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage, saturate=None) -> None:
+        numbers = Numbers.of(model, dialect.dtype)
         self.name = dialect.name + suffix
         self.min_coverage = None if model.support is None else min_coverage
-        numbers = Numbers.of(model, dialect.dtype)
-        own = Dialect(self.name, dialect.real, dialect.std)
         self.limits = read_limits(saturate, numbers)
-        given = (numbers, own, model.out_of_bounds, self.min_coverage)
-        self._source: Source
-        self.model = as_held(model, numbers)
-        self.low, self.high = numbers.low, numbers.high
-        if deviation:
-            found = deviation_of(model, numbers)
-            self._source = DeviationSource(*given, found, is_part=True, limits=self.limits)
-        else:
-            self._source = Source(*given, is_part=True, limits=self.limits)
-        self.cost = self._source.cost
+        self.model, self.low, self.high = numbers.model, numbers.low, numbers.high
+        own = Dialect(self.name, dialect.real, dialect.std)
+        given = (numbers, own, model.out_of_bounds, self.min_coverage, self.limits)
+        self._source = Source(*given, is_part=True)
         self._outer = dialect.name.upper()
-
-    def deviation_test(self, dialect: Dialect, rows) -> str:
-        """The self-test of deviations of a file in a dialect, at ``rows`` of the rules."""
-        return deviation_test(self.model, dialect, rows, self._source)
+        self.cost = self._source.cost
 
     def text(self) -> str:
         """The C code, for after the lines that include other files."""
