@@ -100,7 +100,7 @@ def run(options):
             [
                 Measure("median", inside, "σ", 1.1, 1.05),
                 Measure("worst", worst_inside, "σ", 1.1),
-                Measure("CPU", seconds, "s", 1.0, 0.3),
+                Measure("CPU", seconds, "s", 1.5, 0.5),
             ],
         ),
         Row(

@@ -1,13 +1,10 @@
-"""Solvers find the premises: small objects with the settings that are theirs alone.
+"""Learning as one separable least-squares problem, and the solvers that find the premises.
 
 A string such as ``ANFISRegressor(solver="hybrid")`` stands for the object with its defaults.
 """
 
-from .gradient import GradientDescent
-from .hybrid import Hybrid
-from .lse import LeastSquares
-from .solver import Solver
-from .solver_result import MESSAGES, SolverResult
+from .descent import GradientDescent, Hybrid
+from .solver import MESSAGES, LeastSquares, Solver, SolverResult
 from .varpro import VariableProjection
 
 __all__ = [

@@ -49,7 +49,7 @@ class Premise:
                 row = OrderedTerms.of(own, raw, minimum[j], maximum[j], is_free)
                 if not is_free:
                     lower[locations], upper[locations] = row.bounds()
-                    row, least, most = row.within_reach(own, raw)
+                    least, most = row.width_bounds(own, raw)
                     lower[row.widths], upper[row.widths] = least[row.terms], most[row.terms]
                     upper[np.concatenate([term.shapes for term in own])] = LOG_FLATTER
                 ordered.append(row)
@@ -94,8 +94,7 @@ class Premise:
         """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
         jacobian = np.diag(self._unit)
         for row in self._ordered:
-            by_location, by_gaps, own = row.jacobian(displacement)
+            by_location, by_gaps = row.jacobian(displacement)
             jacobian[row.locations[:, None], row.locations] = by_location
             jacobian[row.widths[:, None], row.locations] = by_gaps
-            jacobian[row.widths, row.widths] = own
         return jacobian.T @ gradient, jacobian.T @ gauss_newton @ jacobian

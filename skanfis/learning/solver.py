@@ -1,7 +1,11 @@
-"""What a solver is: an object with the settings of its own, that finds the premises."""
+"""What a solver is, an object with settings of its own that finds the premises; what it returns.
+
+The simplest is here too: least squares alone, which leaves the premises where they start.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -9,12 +13,66 @@ from sklearn.base import BaseEstimator
 
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
-from .solver_result import SolverResult
 
-__all__ = ["Solver", "Watch"]
+__all__ = ["MESSAGES", "LeastSquares", "Solver", "SolverResult", "Watch", "lse"]
 
 # Called with the number of the iteration and the evaluation there; what is true ends the run.
 Watch = Callable[[int, Evaluation], bool]
+
+MESSAGES = {
+    "gradient": "The projected gradient is below tol: the premises are stationary.",
+    "cost": "The relative decrease of the cost, expected and found, is below tol.",
+    "step": "No step decreases the cost any further at this precision.",
+    "max_iter": "max_iter was reached before the cost settled or the error met its goal.",
+    "stopped": "Early stopping or a callback asked for the end.",
+    "as_given": "Nothing was learnt: the rules are as they were given.",
+    "error_goal": "The root mean square error is as small as error_goal.",
+    "epochs": "All max_iter epochs were run: this rule stops of itself at an error_goal only.",
+    "no_premise": "There is nothing to iterate on: the consequents are found in one solve.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class SolverResult:
+    """The best point found and how the solver came to it.
+
+    Parameters
+    ----------
+    evaluation : skanfis.learning.objective.Evaluation or None
+        The problem at the best point; None where nothing was trained.
+    loss_curve : ndarray of shape (n_iter + 1,)
+        Mean squared error of the standardised target, at the start and after every iteration.
+    n_iter : int
+        Iterations run.
+    status : str
+        Why it stopped, a key of ``skanfis.learning.MESSAGES``.
+    gauss_newton : ndarray of shape (n_displacements, n_displacements) or None
+        Curvature of the cost by the premises' displacements, their pull left out, at most one
+        iteration before the end. None of solvers that never ask for it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.learning import SolverResult
+    >>> SolverResult(None, np.array([0.4, 0.1]), 1, "max_iter").converged
+    False
+    """
+
+    evaluation: Evaluation | None
+    loss_curve: np.ndarray
+    n_iter: int
+    status: str
+    gauss_newton: np.ndarray | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solver stopped of its own accord."""
+        return self.status != "max_iter"
+
+    @property
+    def message(self) -> str:
+        """The status in words."""
+        return MESSAGES[self.status]
 
 
 class Solver(BaseEstimator, ABC):
@@ -37,7 +95,7 @@ class Solver(BaseEstimator, ABC):
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.learning import LeastSquares, Solver, VariableProjection
+    >>> from skanfis.learning import Solver, VariableProjection
     >>> class Hurried(Solver):
     ...     "A tenth of the iterations."
     ...
@@ -85,3 +143,35 @@ class Solver(BaseEstimator, ABC):
         -------
         SolverResult
         """
+
+
+def lse(problem, premise, *, start=None, on_iteration=None):
+    """Solve for the consequents; the one solve counts as an iteration."""
+    x = np.zeros(premise.size) if start is None else start
+    evaluation = problem.evaluate(premise.parameters(x))
+    if on_iteration is not None:
+        on_iteration(1, evaluation)
+    loss_curve = np.full(2, evaluation.mean_squared_error)
+    return SolverResult(evaluation, loss_curve, 1, "no_premise")
+
+
+class LeastSquares(Solver):
+    """Least squares alone: the premises stay as they start, the consequents are solved for once.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.learning import LeastSquares
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=4, solver=LeastSquares()).fit(X, y)
+    >>> model.memberships_ == model.initial_memberships_
+    True
+    """
+
+    moves_premises: ClassVar[bool] = False
+
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
+        return lse(problem, premise, start=start, on_iteration=on_iteration)

@@ -30,8 +30,7 @@ from typing import ClassVar
 import numpy as np
 
 from .._sklearn import Interval, StrOptions
-from .solver import Solver
-from .solver_result import SolverResult
+from .solver import Solver, SolverResult
 
 __all__ = ["VariableProjection", "trust_region_step", "varpro"]
 

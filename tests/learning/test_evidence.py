@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import integrate, optimize, special, stats
 
-from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import (
@@ -202,31 +201,6 @@ class TestAtGivenPremises:
             assert_allclose(in_full(found), expected, atol=1e-6)
             assert_allclose(found.noise_variance, variance, rtol=1e-4)
 
-    @pytest.mark.parametrize("n_outputs", [1, 2])
-    def test_whole_weights_are_repeated_rows(self, n_outputs):
-        g = np.random.default_rng(5)
-        X, times = oracles.bumpy_rows(g, 30, 2, n_outputs), g.integers(1, 5, 30)
-        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
-        weighted = StandardisedData.of(X.X, X.y, times.astype(float))
-        repeated = StandardisedData.of(np.repeat(X.X, times, axis=0), np.repeat(X.y, times, axis=0))
-        for penalty in PENALTIES:
-            one, other = (posterior(r, antecedent, 1, penalty) for r in (weighted, repeated))
-            assert_allclose(one.minus_twice_log, other.minus_twice_log, rtol=1e-9)
-            assert_allclose(n_effective(one), n_effective(other), rtol=1e-9)
-            assert_allclose(one.noise_variance, other.noise_variance, rtol=1e-9)
-
-    def test_weights_of_the_evaluation_do_not_matter(self):
-        # The normal equations of any weights give the posterior at all others.
-        g = np.random.default_rng(2)
-        rows = oracles.bumpy_rows(g, 60, 2, 2)
-        antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 3])
-        for penalty in PENALTIES:
-            own = posterior(rows, antecedent, 1, penalty, at=penalty)
-            for at in PENALTIES:
-                found = posterior(rows, antecedent, 1, penalty, at=at)
-                assert_allclose(found.minus_twice_log, own.minus_twice_log, atol=1e-6)
-                assert_allclose(n_effective(found), n_effective(own), rtol=1e-6)
-
     @pytest.mark.parametrize("factor", [1e-6, -1e6])
     def test_units_do_not_matter(self, factor):
         g = np.random.default_rng(2)
@@ -280,33 +254,6 @@ class TestLimits:
             many = posterior(rows, self.alike(n_rules), order, penalty)
             assert_allclose(many.minus_twice_log, one.minus_twice_log, atol=1e-7)
             assert_allclose(n_effective(many), n_effective(one), rtol=1e-8)
-
-    @pytest.mark.parametrize("key", ["agreement", "alpha"])
-    def test_rules_that_must_agree_are_one_rule(self, key):
-        g = np.random.default_rng(1)
-        rows, antecedent = oracles.bumpy_rows(g, 60, 1), rules(g, 3)
-        gaps = []
-        for size in (1e2, 1e4, 1e6):
-            penalty = replace(Penalty(agreement=1e-3, alpha=1e-3, slope=0.02), **{key: size})
-            one = posterior(rows, ONE_RULE, 1, penalty)
-            gaps.append(
-                posterior(rows, antecedent, 1, penalty).minus_twice_log - one.minus_twice_log
-            )
-        # Its departure is in proportion to what there is left to disagree, until rounding.
-        assert_allclose(gaps[0], 100.0 * gaps[1], rtol=0.05)
-        assert_allclose(gaps[2], 0.0, atol=1e-4)
-
-    def test_of_a_line_and_a_constant_the_data_decide(self):
-        # Slopes that must vanish leave a constant; data on a line ask for the line.
-        g = np.random.default_rng(1)
-        x = g.normal(size=(50, 1))
-        for signal, wins in ((0.0, False), (1.0, True)):
-            rows = StandardisedData.of(x, signal * x + g.normal(size=(50, 1)))
-            constant = posterior(rows, ONE_RULE, 0, FIRST)
-            flat = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e7))
-            line = posterior(rows, ONE_RULE, 1, replace(FIRST, slope=1e-2))
-            assert_allclose(flat.minus_twice_log, constant.minus_twice_log, atol=1e-4)
-            assert bool(line.minus_twice_log < constant.minus_twice_log) is wins
 
 
 def at_fixed_premises(seed):
@@ -481,13 +428,6 @@ class TestReestimated:
             penalty = reestimated(found, ["slope"])
         return found.noise_variance * y.var(), penalty
 
-    def test_known_noise_and_slope_are_found(self):
-        noise, penalty = self.of_slopes(np.tile([0.1, -0.1], 50))
-        assert_allclose(noise, 1.0, rtol=0.05)
-        # n rho / sigma^2 is the precision of the slopes, where inputs have a deviation of one.
-        assert_allclose(noise / (2000 * penalty.rho), 0.01, rtol=0.15)
-        assert max(map(abs, np.log(list(penalty.slope_pulls.values())))) < 1.0
-
     @pytest.mark.parametrize(("n_matter", "least", "most"), [(6, 0.0, 0.6), (60, 0.9, 1.15)])
     def test_what_a_weight_for_every_slope_is_worth(self, n_matter, least, most):
         # Planes of 60 slopes and three rows each, over one weight for all slopes.
@@ -512,14 +452,6 @@ class TestReestimated:
                 errors.append(np.sum((own - slopes) ** 2))
         each, one = np.reshape(errors, (4, 2)).sum(axis=0)
         assert least < each / one < most
-
-    def test_inputs_that_matter_are_pulled_less_than_those_that_do_not(self):
-        slopes = np.zeros(40)
-        slopes[::8] = 0.5
-        noise, penalty = self.of_slopes(slopes)
-        assert_allclose(noise, 1.0, rtol=0.05)
-        pulls = np.array(list(penalty.slope_pulls.values()))
-        assert pulls[slopes != 0.0].max() < 0.1 * pulls[slopes == 0.0].min()
 
 
 # Distinct rows for every consequent, and what that asks of all weights.
@@ -689,67 +621,8 @@ class TestPremises:
         assert_allclose(slope + 100.0 * (found.prior_precision - 1.0), 0.0, atol=1e-4)
         assert 0.5 < found.prior_precision < 2.0
 
-    def test_effective_parameters_are_those_that_move(self):
-        at, penalty = at_fixed_premises(1)
-        curvature = np.array([1.0, 1e-3, 0.0])
-        penalty = replace(penalty, stiffness=1e-3)
-        there = at(penalty, displacement=np.zeros(3), curvature=curvature)
-        gain = n_effective(there) - n_effective(at(penalty))
-        assert_allclose(gain, 1.0 / 1.001 + 0.5, rtol=1e-12)
-
 
 def surface(n_rows, noise, seed=0):
     g = np.random.default_rng(seed)
     X = g.uniform(-1.0, 1.0, (n_rows, 2))
     return X, np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + noise * g.normal(size=n_rows)
-
-
-def effective_parameters(model, X, y):
-    """Trace of the hat matrix of the consequents where the fit ended."""
-    rows = StandardisedData.of(X, y[:, None])
-    antecedent = model.model_.antecedent.change_units(
-        -rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale
-    )
-    penalty = Penalty(model.agreement_, model.alpha_, model.slope_alpha_)
-    return n_effective(posterior(rows, antecedent, 1, penalty))
-
-
-class TestWholeFits:
-    @pytest.mark.theory
-    def test_the_noisier_the_fewer_parameters(self):
-        counts = []
-        for noise in (0.03, 0.3, 3.0):
-            X, y = surface(300, noise)
-            counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
-        assert (np.diff(counts) < -1.0).all()
-
-    @pytest.mark.theory
-    def test_the_more_rows_the_more_parameters(self):
-        counts = []
-        for n_rows in (50, 200, 1000):
-            X, y = surface(n_rows, 0.3)
-            counts.append(effective_parameters(ANFISRegressor(n_mfs=3).fit(X, y), X, y))
-        assert (np.diff(counts) > 0.5).all()
-
-    @pytest.mark.theory
-    @pytest.mark.parametrize("seed", range(2))
-    def test_the_noisier_the_simpler_the_structure(self, seed):
-        rules, parameters = [], []
-        for noise in (0.3, 2.0, 20.0):
-            X, y = surface(200, noise, seed)
-            model = ANFISRegressor().fit(X, y)
-            rules.append(model.n_rules_)
-            parameters.append(effective_parameters(model, X, y))
-        # In between there may be more rules, of which each then says less.
-        assert rules[2] == 1 < rules[0]
-        assert (np.diff(parameters) < 0.0).all()
-
-    @pytest.mark.theory
-    def test_repeated_rows_and_whole_weights_are_the_same_fit(self):
-        X, y = surface(80, 0.2)
-        times = np.random.default_rng(1).integers(1, 4, 80)
-        weighted = ANFISRegressor(n_mfs=2).fit(X, y, sample_weight=times)
-        repeated = ANFISRegressor(n_mfs=2).fit(np.repeat(X, times, axis=0), np.repeat(y, times))
-        for name in ("agreement_", "alpha_", "slope_alpha_", "stiffness_"):
-            assert_allclose(getattr(weighted, name), getattr(repeated, name), rtol=1e-6)
-        assert_allclose(weighted.predict(X), repeated.predict(X), rtol=0, atol=1e-9)

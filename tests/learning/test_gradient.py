@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.learning import GradientDescent
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
-from skanfis.learning.premise import Premise
 
 from .. import oracles
 from .test_objective import CASES, FULL, PLAIN, Case
@@ -73,17 +72,6 @@ class TestJointGradient:
         assert_allclose(joint.evaluation.cost, evaluation.cost, rtol=1e-10)
         assert_allclose(joint.evaluation.masses, evaluation.masses, rtol=1e-10, atol=1e-14)
 
-    def test_blocks_of_rows_add_up(self, monkeypatch):
-        whole = Case.named("grid of both")
-        coefficients = any_coefficients(whole)
-        expected = whole.problem.joint(whole.point, coefficients)
-        monkeypatch.setattr("skanfis.learning.objective._FEWEST_ROWS", 8)
-        monkeypatch.setattr("skanfis.learning.objective._BLOCK_BYTES", 1)
-        monkeypatch.setattr("skanfis.learning.data._BLOCKS_PER_CHUNK", 3)
-        found = Case.named("grid of both").problem.joint(whole.point, coefficients)
-        assert_allclose(found.premises, expected.premises, rtol=1e-10)
-        assert_allclose(found.coefficients, expected.coefficients, rtol=1e-10, atol=1e-14)
-
 
 AGREEING = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
 
@@ -141,26 +129,3 @@ def test_consequents_are_solved_for_once():
     problem.evaluate = lambda *arguments: calls.append(arguments) or evaluate(*arguments)
     gradient(problem, premise, max_iter=5, tol=0.0)
     assert len(calls) == 1
-
-
-@pytest.mark.theory
-def test_given_time_it_comes_near_the_optimum():
-    # Order 0 and one input: a small problem, on which even this gets somewhere.
-    rows = oracles.bumpy_rows(np.random.default_rng(0), n_inputs=1)
-    _, premise, *_ = planted("one input", 0)
-    premise = Premise.of(premise.antecedent, *oracles.box(rows))
-    problem = SeparableProblem(rows, premise.antecedent, 0, Penalty(alpha=1e-6))
-    result = gradient(problem, premise, max_iter=600, tol=0.0)
-    assert result.loss_curve.min() < 0.8 * result.loss_curve[0]
-    assert result.status == "epochs"
-
-
-def test_error_goal_ends_it():
-    problem, premise = problem_of("bells")
-    free = gradient(problem, premise, max_iter=40, tol=0.0, step_size=1e-3)
-    goal = np.sqrt(free.loss_curve[20])
-    result = gradient(problem, premise, max_iter=40, tol=0.0, step_size=1e-3, error_goal=goal)
-    assert result.status == "error_goal"
-    assert 0 < result.n_iter <= 20
-    missed = gradient(problem, premise, max_iter=3, tol=0.0, error_goal=1e-9)
-    assert missed.status == "max_iter"

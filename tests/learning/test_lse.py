@@ -5,10 +5,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.linear_model import LinearRegression
 
-from skanfis.learning.lse import lse
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
+from skanfis.learning.solver import lse
 
 from .. import oracles
 from .test_varpro import start_of

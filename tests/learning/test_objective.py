@@ -197,23 +197,6 @@ def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
     assert_all_close(linearisation.gradient, case.dense.gradient(point), 1e-13 / alpha)
 
 
-def test_two_rules_that_are_alike_learn_as_one_another():
-    # Exchanging the two changes nothing, so neither may the gradient tell them apart.
-    g = np.random.default_rng(3)
-    antecedent, data = duplicated_rule(g), oracles.bumpy_rows(g, 250)
-    problem = SeparableProblem(data, antecedent, 1, Penalty(alpha=1e-6))
-    linearisation = problem.linearise(problem.evaluate(antecedent.parameters))
-    by_rule = linearisation.gradient.reshape(3, 4, 2)
-    assert_all_close(by_rule[:, 1], by_rule[:, 3], 1e-8)
-
-
-@pytest.mark.parametrize("penalty", [PLAIN, FULL])
-def test_dead_rule_has_no_gradient(penalty):
-    evaluation, linearisation = Case.named("dead rule", penalty).at_point()
-    assert_array_equal(linearisation.gradient.reshape(2, 4, 2)[:, 1], 0.0)
-    assert evaluation.masses[1] == 0.0
-
-
 def test_dead_rule_lies_on_the_line_of_the_others():
     # With a center at zero and an extent of one: what is left to minimise is its own departure.
     case = Case.named("dead rule", Penalty(agreement=0.1, alpha=1e-3, slope=0.0))
@@ -330,21 +313,6 @@ def test_whole_weights_are_repeated_rows(name):
         assert_all_close(found, expected, 1e-9)
 
 
-@pytest.mark.parametrize("factor", [1e-6, 1e6])
-def test_units_and_sizes_of_weights_do_not_matter(factor):
-    g = np.random.default_rng(3)
-    antecedent, data = (
-        oracles.random_grid(g, [Gaussian] * 2, [3, 2]),
-        oracles.bumpy_rows(g, 250, 2, 2),
-    )
-    weight = g.uniform(0.5, 2.0, 250)
-    plain = StandardisedData.of(data.X, data.y, weight)
-    other = StandardisedData.of(data.X * factor, data.y / factor, weight * factor)
-    one, two = (Case(antecedent, 1, r).at_point() for r in (plain, other))
-    for found, expected in zip(arrays(*one), arrays(*two), strict=True):
-        assert_all_close(found, expected, 1e-9)
-
-
 def test_outputs_add_up(rng):
     # Cost, gradient and curvature of two outputs are the sums of those of each alone.
     data = oracles.bumpy_rows(rng, 250, 2, 2, weighted=True)
@@ -359,30 +327,6 @@ def test_outputs_add_up(rng):
     assert_allclose(both[0].cost, sum(e.cost for e, _ in singles), rtol=1e-12)
     assert_all_close(both[1].gradient, sum(s.gradient for _, s in singles), 1e-11)
     assert_all_close(both[1].gauss_newton, sum(s.gauss_newton for _, s in singles), 1e-11)
-
-
-def test_without_terms_the_cost_is_that_of_a_linear_model(rng):
-    data = oracles.bumpy_rows(rng, 200, 2, 1, weighted=True)
-    antecedent = GridAntecedent((), counts=())
-    evaluation = SeparableProblem(data, antecedent, 1, Penalty()).evaluate(np.empty(0))
-    phi = np.column_stack([np.ones(200), (data.X - data.X.mean(axis=0)) / data.X.std(axis=0)])
-    y = (data.y - data.targets.offset) / data.targets.scale
-    root = np.sqrt(data.sample_weight / data.sample_weight.sum())[:, None]
-    _, residual, *_ = np.linalg.lstsq(root * phi, root * y, rcond=None)
-    assert_allclose(evaluation.mean_squared_error, residual[0], rtol=1e-9)
-
-
-def test_constant_input_changes_nothing(rng):
-    data = oracles.bumpy_rows(rng, 200, 2)
-    antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
-    padded = StandardisedData.of(np.column_stack([data.X, np.full(200, 7.0)]), data.y)
-    one, two = (SeparableProblem(r, antecedent, 1, FULL) for r in (data, padded))
-    first, second = (p.evaluate(antecedent.parameters) for p in (one, two))
-    assert_allclose(second.cost, first.cost, rtol=1e-12)
-    coefficients = second.coefficients.reshape(4, 4)
-    assert_array_equal(coefficients[:, 3], 0.0)
-    assert_all_close(coefficients[:, :3].reshape(-1, 1), first.coefficients, 1e-10)
-    assert_all_close(two.linearise(second).gradient, one.linearise(first).gradient, 1e-10)
 
 
 def test_residuals_are_those_of_the_dense_design(case):
@@ -415,17 +359,6 @@ def test_leverage_and_mean_squares_are_those_of_the_dense_design(monkeypatch, na
     assert_allclose(found, case.dense.weight @ squares, rtol=1e-9)
 
 
-def test_outputs_share_the_error_of_all_rows_as_they_share_that_of_the_sample():
-    case = Case.named("grid of both", FULL)
-    sample = case.rows.part(np.arange(0, 250, 2))
-    alone = SeparableProblem(sample, case.problem.antecedent, 1, FULL)
-    problem = alone.on_all(case.rows)
-    evaluation = problem.evaluate(case.point)
-    found, of_sample = problem.mean_squares(evaluation), alone.mean_squares(evaluation)
-    assert_allclose(found.sum(), evaluation.mean_squared_error, rtol=1e-12)
-    assert_allclose(found / found.sum(), of_sample / of_sample.sum(), rtol=1e-12)
-
-
 @pytest.mark.parametrize("name", ["grid of both", "consequents in one input", "scattered"])
 def test_the_strongest_rule_alone_is_that_of_the_dense_design(name):
     case = Case.named(name)
@@ -439,33 +372,6 @@ def test_the_strongest_rule_alone_is_that_of_the_dense_design(name):
     squares = case.dense.weight @ (alone @ evaluation.coefficients) ** 2
     found = case.problem.strongest_alone(evaluation)
     assert_allclose(found, np.sqrt(squares.max() / case.dense.weight.sum()), rtol=1e-9)
-
-
-def test_rows_are_not_read_again_for_the_sums_at_the_start(case, monkeypatch):
-    problem = case.problem
-    start = problem.antecedent.parameters
-    expected = problem.evaluate(start, np.zeros((problem.n_columns, problem.n_outputs)))
-    monkeypatch.setattr(problem, "_sum", None)
-    for _ in range(2):
-        found = problem.evaluate(start)
-        assert_array_equal(found.coefficients, expected.coefficients)
-        assert (found.cost, found.mean_squared_error) == (
-            expected.cost,
-            expected.mean_squared_error,
-        )
-
-
-def test_reference_leaves_nothing_behind_where_only_the_shift_holds():
-    # Two rules that are the same, and no penalty: their difference changes no residual. What it is
-    # in the reference must not come back.
-    g = np.random.default_rng(3)
-    problem = SeparableProblem(oracles.bumpy_rows(g, 250), duplicated_rule(g), 1, Penalty())
-    start = problem.antecedent.parameters
-    reference = np.zeros((4, 3, 1))
-    reference[1, 0], reference[3, 0] = 1.0, -1.0
-    found = problem.evaluate(start, reference.reshape(12, 1)).coefficients.reshape(4, 3)
-    # Of the shift, which is at the level of rounding, rounding leaves the first digit.
-    assert abs(found[1, 0] - found[3, 0]) < 0.5
 
 
 @pytest.mark.parametrize("weighted", [False, True])

@@ -123,18 +123,6 @@ class TestWeightOfAgreement:
         for rule in solved:
             assert_allclose(rule, line.coef_.T, atol=1e-5)
 
-    def test_the_more_the_less_they_disagree(self, kind, order):
-        model, apart, error = Model(kind, order), [], []
-        for agreement in (1e-6, 1e-3, 1e-1, 1.0, 1e2):
-            evaluation = model.evaluate(Penalty(agreement=agreement))
-            model.beta = evaluation.coefficients.reshape(model.beta.shape)
-            model.f = np.einsum("rbo,bn->rno", model.beta, model.basis)
-            model.output = np.einsum("rn,rno->no", model.w, model.f)
-            apart.append(model.disagreement)
-            error.append(evaluation.mean_squared_error)
-        assert (np.diff(apart) < 0.0).all()
-        assert (np.diff(error) > 0.0).all()
-
 
 class TestCommonLine:
     def parts(self, model):
@@ -224,15 +212,6 @@ class TestCommonLine:
         ridge = Ridge(alpha=0.3, tol=1e-12).fit(model.Z.T, model.y[:, 0], model.share)
         assert_allclose(solved, np.tile([ridge.intercept_, *ridge.coef_], (6, 1)), atol=1e-5)
 
-    def test_order_zero_is_pulled_to_the_mean_of_the_rules(self):
-        model = Model("grid", 0)
-        line = model.problem(Penalty()).common_line
-        beta = model.beta[:, 0, 0]
-        assert_allclose(
-            beta @ line.departures.together @ beta, np.sum((beta - beta.mean()) ** 2), rtol=1e-12
-        )
-        assert line.to_slopes.shape == (0, 6)
-
     def test_extent_is_the_unit_of_a_departing_slope(self):
         # A rule that stands for rows far away may not turn by as much: what counts is where it
         # ends. One slope changed by t of two rules departs by half of it each, and so do values.
@@ -271,18 +250,6 @@ class TestOneRule:
             assert_allclose(solved[1:], ridge.coef_.T, rtol=1e-9)
             assert_allclose(solved[0], ridge.intercept_, atol=1e-12)
 
-    def test_pull_of_rules_is_nothing_to_it(self, rng):
-        rows = oracles.bumpy_rows(rng, 50, 2)
-        solved = [
-            SeparableProblem(
-                rows, GridAntecedent((), counts=()), 1, Penalty(agreement, alpha, slope=0.1)
-            )
-            .evaluate(np.empty(0))
-            .coefficients
-            for agreement, alpha in ((0.0, 0.0), (5.0, 7.0))
-        ]
-        assert_allclose(solved[0], solved[1], rtol=1e-12, atol=1e-15)
-
 
 @ON_ALL
 @ORDERS
@@ -304,35 +271,3 @@ class TestInvariance:
         one, other = (self.prediction(model, r, model.antecedent) for r in (rows, moved))
         assert_allclose(one[0], other[0], rtol=1e-8)
         assert_allclose(one[1], other[1], atol=1e-7)
-
-    def test_mirrored_inputs_and_target(self, kind, order):
-        model = Model(kind, order)
-        rows = model.rows
-        turned = StandardisedData.of(-rows.X, -rows.y, rows.sample_weight)
-        mirrored = model.antecedent
-        theta = []
-        for group in mirrored.groups:
-            one = group.theta.copy()
-            one[0] *= -1.0
-            theta.append(one.ravel())
-        mirrored = mirrored.with_parameters(np.concatenate(theta))
-        one = self.prediction(model, rows, model.antecedent)
-        other = self.prediction(model, turned, mirrored)
-        assert_allclose(one[0], other[0], rtol=1e-10)
-        assert_allclose(one[1], -other[1], atol=1e-9)
-
-    def test_whole_weights_are_repeated_rows(self, kind, order):
-        model = Model(kind, order)
-        times = np.random.default_rng(1).integers(1, 5, 200)
-        rows = model.rows
-        weighted = StandardisedData.of(rows.X, rows.y, times.astype(float))
-        repeated = StandardisedData.of(*(np.repeat(a, times, axis=0) for a in (rows.X, rows.y)))
-        one, other = (self.prediction(model, r, model.antecedent) for r in (weighted, repeated))
-        assert_allclose(one[0], other[0], rtol=1e-10)
-        assert_allclose(np.repeat(one[1], times, axis=0), other[1], atol=1e-9)
-
-
-def test_slopes_have_the_weight_of_departures_unless_given():
-    assert Penalty(alpha=0.3).rho == 0.3
-    assert Penalty(alpha=0.3, slope=0.0).rho == 0.0
-    assert Penalty(alpha=0.3, slope=2.0).rho == 2.0

@@ -12,7 +12,6 @@ from .. import oracles
 from ..premises import (
     ALL,
     FACTOR,
-    FREE_OR_NOT,
     HIGH,
     LOW,
     ON_ALONE,
@@ -24,9 +23,8 @@ from ..premises import (
 
 
 @ALL
-@FREE_OR_NOT
-def test_displacement_zero_is_the_start(antecedent, is_free):
-    premise = Premise.of(antecedent, LOW, HIGH, is_free)
+def test_displacement_zero_is_the_start(antecedent):
+    premise = Premise.of(antecedent, LOW, HIGH)
     assert premise.size == antecedent.parameters.size
     zero = np.zeros(premise.size)
     assert_allclose(premise.parameters(zero), antecedent.parameters, rtol=1e-13, atol=1e-13)
@@ -65,9 +63,8 @@ def test_term_beyond_the_data_may_stay_there():
 
 
 @ALL
-@FREE_OR_NOT
-def test_displacement_undoes_parameters(antecedent, is_free, rng):
-    premise = Premise.of(antecedent, LOW, HIGH, is_free)
+def test_displacement_undoes_parameters(antecedent, rng):
+    premise = Premise.of(antecedent, LOW, HIGH)
     for displacement in in_the_box(premise, rng, 10):
         found = premise.displacement(premise.parameters(displacement))
         assert_allclose(found, displacement, rtol=1e-9, atol=1e-9)
@@ -105,9 +102,8 @@ def test_parameters_out_of_order_have_a_displacement_too():
 
 @pytest.mark.theory
 @ALL
-@FREE_OR_NOT
-def test_pull_back_is_the_chain_rule(antecedent, is_free, rng):
-    premise = Premise.of(antecedent, LOW, HIGH, is_free)
+def test_pull_back_is_the_chain_rule(antecedent, rng):
+    premise = Premise.of(antecedent, LOW, HIGH)
     gradient = rng.normal(size=premise.size)
     root = rng.normal(size=(premise.size, premise.size))
     for displacement in in_the_box(premise, rng, 1):

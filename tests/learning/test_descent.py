@@ -10,11 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.learning import Hybrid
 from skanfis.learning.data import Scale, StandardisedData
-from skanfis.learning.hybrid import NaturalPremise, StepSize
+from skanfis.learning.descent import NaturalPremise, StepSize
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
-from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
+from skanfis.membership import MEMBERSHIPS, Bell
 
 from .. import oracles
 from .test_varpro import planted
@@ -133,16 +133,6 @@ class TestAgainstTheTranscription:
         found = np.stack([width, slope, center], axis=-1).reshape(premises.shape)
         assert_allclose(found, premises, rtol=1e-7, atol=1e-7)
 
-    @pytest.mark.theory
-    @pytest.mark.parametrize("subset", ["train", "check"])
-    def test_error_that_goes_up_and_down(self, subset):
-        X, y = make_jang_three_input(subset)
-        rows = in_raw_units(X, y)
-        result = hybrid(*two_bells(rows), max_iter=40, tol=0.0, step_size=0.3)
-        errors, _ = Jang1993(X, y).train(40, 0.3)
-        assert_allclose(np.sqrt(result.loss_curve), errors, rtol=1e-6)
-        assert 5 < np.sum(np.diff(errors) > 0.0) < 35
-
 
 class TestPublishedFigures:
     """In the data's units, as in the paper; published figures are the bars.
@@ -183,25 +173,6 @@ class TestStepSize:
     def test_grows_after_four_falls_and_again_after_four_more(self):
         sizes = self.sizes([9, 8, 7, 6, 5, 4, 3, 2, 1])
         assert_allclose(sizes, [1, 1, 1, 1.1, 1.1, 1.1, 1.1, 1.21])
-
-    def test_shrinks_after_two_rises_and_falls_and_again_after_two_more(self):
-        sizes = self.sizes([1, 2, 1, 2, 1, 2, 1, 2, 1])
-        assert_allclose(sizes, [1, 1, 1, 0.9, 0.9, 0.9, 0.9, 0.81])
-
-    @pytest.mark.parametrize(
-        "errors",
-        [
-            [5, 4, 3, 2, 2],  # the fourth does not fall
-            [5, 4, 3, 3, 2],
-            [1, 2, 3, 4, 5],
-            [2, 1, 2, 1, 2],  # falls first
-            [1, 2, 1, 1, 2, 1],
-            [1, 2, 3, 2, 1],
-            [3, 3, 3, 3, 3],
-        ],
-    )
-    def test_stays_otherwise(self, errors):
-        assert_array_equal(self.sizes(errors), 1.0)
 
     def test_a_fall_may_end_one_pattern_and_begin_the_other(self):
         sizes = self.sizes([5, 6, 5, 6, 5, 4, 3, 2])
@@ -258,22 +229,6 @@ class TestNaturalPremise:
         expected = oracles.central_difference(function, np.zeros(premise.size), 1e-3)
         assert_allclose(slope, expected, rtol=1e-8, atol=1e-10)
 
-    def test_steepest_is_of_what_the_box_lets_move(self, kind, rng):
-        premise = premise_of(kind)
-        x, by_parameters = np.zeros(premise.size), rng.normal(size=premise.size)
-        by_displacement, _ = premise.pull_back(x, by_parameters, np.eye(x.size))
-        stuck = replace(
-            premise,
-            lower=np.where(by_displacement > 0.0, 0.0, -1e3),
-            upper=np.where(by_displacement > 0.0, 1e3, 0.0),
-        )
-        assert NaturalPremise(stuck).slope(x, by_parameters, 0.0)[1] == 0.0
-        stuck.lower[1] = -1e3
-        stuck.upper[1] = 1e3
-        assert_allclose(
-            NaturalPremise(stuck).slope(x, by_parameters, 0.0)[1], abs(by_displacement[1])
-        )
-
     @pytest.mark.parametrize("direction", [-1.0, 1.0])
     def test_too_long_a_step_ends_on_the_edge(self, kind, direction):
         # A width, a distance or a slope below zero too.
@@ -306,30 +261,6 @@ class TestEnd:
         assert_array_equal(result.loss_curve, free.loss_curve[: first + 1])
         assert np.sqrt(result.evaluation.mean_squared_error) <= goal
 
-    def test_error_goal_is_of_one_output(self):
-        # Two outputs that are one: the root mean square error is that of either.
-        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
-        twice = StandardisedData.of(rows.X, np.hstack([rows.y, rows.y]))
-        one, two = (
-            SeparableProblem(some, premise.antecedent, 1, Penalty(alpha=1e-8))
-            for some in (rows, twice)
-        )
-        goal = np.sqrt(hybrid(one, premise, max_iter=10, tol=0.0).loss_curve.min()) * (1 + 1e-9)
-        results = [hybrid(p, premise, max_iter=10, tol=0.0, error_goal=goal) for p in (one, two)]
-        assert results[0].status == results[1].status == "error_goal"
-        assert results[0].n_iter == results[1].n_iter
-
-    def test_goal_met_at_the_start(self):
-        problem, premise = self.problem()
-        result = hybrid(problem, premise, max_iter=30, tol=0.0, error_goal=10.0)
-        assert (result.status, result.n_iter) == ("error_goal", 0)
-
-    def test_goal_not_met(self):
-        problem, premise = self.problem()
-        result = hybrid(problem, premise, max_iter=3, tol=0.0, error_goal=1e-9)
-        assert result.status == "max_iter"
-        assert not result.converged
-
     def test_best_epoch_and_not_the_last(self):
         # So long a step goes up and down.
         problem, premise = self.problem()
@@ -353,32 +284,3 @@ class TestEnd:
         numbers = [a.groups[0].family.natural(a.groups[0].theta) for a in at]
         for one, other in pairwise(numbers):
             assert_allclose(np.linalg.norm(other - one), 0.02, rtol=1e-9)
-
-
-def test_gaussians_have_natural_parameters_too():
-    # One step along the complex-step gradient by (c, sigma) themselves.
-    rows = oracles.bumpy_rows(np.random.default_rng(0))
-    low, high = oracles.box(rows)
-    antecedent = oracles.even_grid([Gaussian] * 2, [2, 3], low, high, 0.6)
-    penalty = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
-    problem = SeparableProblem(rows, antecedent, 1, penalty)
-    seen = []
-    hybrid(
-        problem,
-        Premise.of(antecedent, low, high),
-        max_iter=1,
-        tol=0.0,
-        on_iteration=lambda n, evaluation: seen.append(evaluation.antecedent),
-    )
-    (group,) = antecedent.groups
-    start = group.family.natural(group.theta)
-    dense = oracles.DenseProblem(rows, antecedent, 1, problem.penalty)
-
-    def cost(flat):
-        center, sigma = flat.reshape(start.shape)
-        return dense.cost(np.concatenate([center, np.log(sigma)]))
-
-    gradient = oracles.complex_step(cost, start.ravel()).reshape(start.shape)
-    expected = start - 0.01 * gradient / np.linalg.norm(gradient)
-    found = seen[0].groups[0]
-    assert_allclose(found.family.natural(found.theta), expected, rtol=1e-9)

@@ -1,0 +1,295 @@
+r"""Steepest descent, Jang's way: his hybrid rule, and plain back-propagation.
+
+**Hybrid.** An epoch (Jang 1993, section III) takes one step of the premises' natural parameters n
+(center c, width a or sigma, slope b of a membership) down the gradient of the cost at the
+consequents that least squares gives, and solves for these again. The step's length is given,
+
+    n -> n - kappa g / |g| ,    g = dF / dn ,
+
+and follows the error: kappa grows by 10 % where the error has fallen four times in a row, and
+shrinks by 10 % where it has twice risen and fallen. Neither counts a change of the error again that
+has once changed kappa in the same way. Centers and widths are in standard deviations of their
+input, so that a fit does not depend on units. His rule has no bounds: a step can make a width
+negative. Here a step that would leave the premises' box ends on its edge, displacement by
+displacement; inside the box the rule is his to the letter. By the envelope theorem the gradient at
+solved consequents is that of the joint cost, which a pass without square matrices gives
+(``SeparableProblem.joint``): an epoch is that pass and one solve.
+
+**Gradient.** Premises and consequents beta on [1, z] take one step together,
+
+    (n, beta) -> (n, beta) - kappa g / |g| ,    g = (dE / dn, dE / dbeta) ,
+
+with E the cost of ``objective`` (Liu et al. 2009). The consequents start as the solution of least
+squares and are never solved for again (the second of the four methods in Jang 1993).
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from numbers import Real
+from typing import ClassVar
+
+import numpy as np
+
+from .._sklearn import Interval, StrOptions
+from .objective import Evaluation, JointGradient
+from .solver import Solver, SolverResult, lse
+
+__all__ = ["GradientDescent", "Hybrid", "NaturalPremise", "StepSize"]
+
+_RISE, _FALL = 1.0, -1.0
+# His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
+_GROWTH, _SHRINKAGE = 1.1, 0.9
+_GROW_AFTER = [_FALL, _FALL, _FALL, _FALL]
+_SHRINK_AFTER = [_RISE, _FALL, _RISE, _FALL]
+# Gradients below this part of tol times the cost are zero, as in ``varpro``.
+_GRADIENT_FACTOR = 1e-2
+
+
+class StepSize:
+    """The length of a step, by the course of the error."""
+
+    def __init__(self, size, error):
+        self.size = size
+        self._error = error
+        self._course: deque[float] = deque(maxlen=len(_GROW_AFTER))
+        self._since_growth = self._since_shrinkage = 0
+
+    def follow(self, error):
+        """Take the next error into account."""
+        self._course.append(float(np.sign(error - self._error)))
+        self._error = error
+        self._since_growth += 1
+        self._since_shrinkage += 1
+        course = list(self._course)
+        if course == _SHRINK_AFTER and self._since_shrinkage >= len(course):
+            self.size *= _SHRINKAGE
+            self._since_shrinkage = 0
+        elif course == _GROW_AFTER and self._since_growth >= len(course):
+            self.size *= _GROWTH
+            self._since_growth = 0
+
+
+class NaturalPremise:
+    """A premise whose parameters are the numbers that a paper writes: no logarithms.
+
+    Displacements and natural parameters n are one to one: a step is taken in n.
+    """
+
+    def __init__(self, premise):
+        self.premise = premise
+        kinds = [
+            np.repeat([p.kind for p in group.family.parameters], group.n_terms)
+            for group in premise.antecedent.groups
+        ]
+        self._is_log = np.concatenate(kinds) != "location"
+
+    def _natural(self, x):
+        """n."""
+        parameters = self.premise.parameters(x)
+        return np.where(self._is_log, np.exp(parameters * self._is_log), parameters)
+
+    def _by_parameters(self, x):
+        """The derivatives of n by the antecedent's parameters, each by its own alone."""
+        return np.where(self._is_log, self._natural(x), 1.0)
+
+    def _jacobian(self, x):
+        """dn / dx."""
+        identity = np.eye(x.size)
+        transposed, _ = self.premise.pull_back(x, identity, identity)
+        return self._by_parameters(x)[:, None] * transposed.T
+
+    def slope(self, x, by_parameters, stiffness):
+        """Gradient of F + stiffness/2 |x|^2 by n, out of dF / d parameters.
+
+        Also the largest entry of the gradient by x, projected on the box.
+        """
+        jacobian = self._jacobian(x)
+        gradient = by_parameters / self._by_parameters(x)
+        by_displacement = jacobian.T @ gradient + stiffness * x
+        gradient += np.linalg.solve(jacobian.T, stiffness * x)
+        inside = np.clip(x - by_displacement, self.premise.lower, self.premise.upper)
+        return gradient, np.abs(x - inside).max()
+
+    def move(self, x, step):
+        """The displacement at n + ``step``, or on the edge where that is out of the box."""
+        # What would not be positive, a width or the distance of two terms, goes to its lower bound.
+        natural = self._natural(x) + step
+        logs = np.log(np.where(self._is_log, np.maximum(natural, np.finfo(float).tiny), 1.0))
+        moved = self.premise.displacement(np.where(self._is_log, logs, natural))
+        return np.clip(moved, self.premise.lower, self.premise.upper)
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Where a descent is: displacements, the evaluation there, its cost with the stiffness'."""
+
+    x: np.ndarray
+    evaluation: Evaluation
+    cost: float
+    joint: JointGradient | None = None  # where the pass that gives the cost gives it too
+
+
+class _Descent(Solver):
+    """A solver whose epochs are steps of steepest descent, with its settings.
+
+    There is no other end than ``max_iter``, ``error_goal`` and a projected gradient of zero;
+    without the last the error may rise and fall for ever. The result is the epoch of least cost.
+    """
+
+    _parameter_constraints: ClassVar[dict] = {
+        "step_size": [Interval(Real, 0, None, closed="neither")],
+        "error_goal": [Interval(Real, 0, None, closed="left"), None],
+        "tol": [Interval(Real, 0, None, closed="left")],
+        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+    }
+
+    def __init__(
+        self,
+        *,
+        step_size: float = 0.01,
+        error_goal: float | None = None,
+        tol: float = 1e-3,
+        stiffness: str | float = "auto",
+    ) -> None:
+        self.step_size = step_size
+        self.error_goal = error_goal
+        self.tol = tol
+        self.stiffness = stiffness
+
+    def solve(
+        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
+    ) -> SolverResult:
+        if not premise.size:
+            return lse(problem, premise, on_iteration=on_iteration)
+        natural = NaturalPremise(premise)
+        x = np.zeros(premise.size) if start is None else start
+        first = problem.evaluate(premise.parameters(x)).coefficients
+        point = best = self._at(problem, premise, stiffness, x, first)
+        length = StepSize(self.step_size, point.cost)
+        loss_curve, n_iter = [point.evaluation.mean_squared_error], 0
+        while True:
+            if self.error_goal is not None and _rms_error(point) <= self.error_goal:
+                best, status = point, "error_goal"
+                break
+            if n_iter == max_iter:
+                status = "epochs" if self.error_goal is None else "max_iter"
+                break
+            by_premises, by_coefficients = self._gradient(problem, point)
+            slope, steepest = natural.slope(point.x, by_premises, stiffness)
+            steepest = max(steepest, np.abs(by_coefficients).max(initial=0.0))
+            if steepest <= _GRADIENT_FACTOR * self.tol * point.cost:
+                status = "gradient"
+                break
+            whole = np.concatenate([slope, by_coefficients])
+            step = -length.size / np.linalg.norm(whole) * whole
+            coefficients = point.evaluation.coefficients.copy()
+            coefficients.ravel()[: by_coefficients.size] += step[point.x.size :]
+            x = natural.move(point.x, step[: point.x.size])
+            point, n_iter = self._at(problem, premise, stiffness, x, coefficients), n_iter + 1
+            length.follow(point.cost)
+            best = point if point.cost < best.cost else best
+            loss_curve.append(point.evaluation.mean_squared_error)
+            if on_iteration is not None and on_iteration(n_iter, point.evaluation):
+                status = "stopped"
+                break
+        return SolverResult(best.evaluation, np.array(loss_curve), n_iter, status)
+
+    @staticmethod
+    def _at(problem, premise, stiffness, x, coefficients):
+        """The point at some displacements, after a step of the coefficients or their solution."""
+        raise NotImplementedError
+
+    @staticmethod
+    def _gradient(problem, point):
+        """By the antecedent's parameters, and by the coefficients that take steps."""
+        raise NotImplementedError
+
+
+def _rms_error(point):
+    n_outputs = point.evaluation.coefficients.shape[1]
+    return np.sqrt(point.evaluation.mean_squared_error / n_outputs)
+
+
+class Hybrid(_Descent):
+    """Jang's hybrid rule: least squares for the consequents, steepest descent for the premises.
+
+    Parameters
+    ----------
+    step_size : float, default=0.01
+        Length of the first step, in standard deviations of the inputs and units of the slope;
+        positive.
+    error_goal : float, default=None
+        Stop at this root mean square error, in standard deviations of the target; zero or positive.
+        None: all ``max_iter`` epochs are run.
+    tol : float, default=1e-3
+        Stop where the projected gradient is zero for all that ``tol`` can tell. Zero or positive.
+    stiffness : "auto" or float, default="auto"
+        Pull of the premises to their start, zero or positive; see
+        :class:`~skanfis.learning.VariableProjection`.
+
+    References
+    ----------
+    .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
+       on Systems, Man, and Cybernetics 23 (1993) 665-685.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.learning import Hybrid
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=2, solver=Hybrid(step_size=0.1), max_iter=20).fit(X, y)
+    >>> model.n_iter_
+    20
+    """
+
+    @staticmethod
+    def _at(problem, premise, stiffness, x, coefficients):
+        evaluation = problem.evaluate(premise.parameters(x), coefficients)
+        return _Point(x, evaluation, evaluation.cost + 0.5 * stiffness * (x @ x))
+
+    @staticmethod
+    def _gradient(problem, point):
+        evaluation = point.evaluation
+        joint = problem.joint(evaluation.antecedent.parameters, evaluation.coefficients)
+        return joint.premises, np.empty(0)
+
+
+class GradientDescent(_Descent):
+    """Back-propagation: steepest descent on premises and consequents together.
+
+    Slow, for no single length of step suits all parameters. It is here for comparison with what it
+    is the ancestor of.
+
+    Parameters
+    ----------
+    step_size : float, default=0.01
+        Length of the first step, in standardised units; positive.
+    error_goal, tol, stiffness
+        As for :class:`~skanfis.learning.Hybrid`.
+
+    References
+    ----------
+    .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
+       on Systems, Man, and Cybernetics 23 (1993) 665-685.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.learning import GradientDescent
+    >>> X, y = make_jang_sinc()
+    >>> model = ANFISRegressor(n_mfs=2, solver=GradientDescent(), max_iter=20).fit(X, y)
+    >>> model.n_iter_
+    20
+    """
+
+    @staticmethod
+    def _at(problem, premise, stiffness, x, coefficients):
+        joint = problem.joint(premise.parameters(x), coefficients)
+        cost = joint.evaluation.cost + 0.5 * stiffness * (x @ x)
+        return _Point(x, joint.evaluation, cost, joint)
+
+    @staticmethod
+    def _gradient(problem, point):
+        return point.joint.premises, point.joint.coefficients.ravel()
