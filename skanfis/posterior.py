@@ -17,7 +17,7 @@ from scipy.linalg import blas
 from .antecedent import Antecedent
 from .consequent import rule_outputs
 
-__all__ = ["MOST_PARAMETERS", "Posterior", "orthonormal_rows", "parameter_units"]
+__all__ = ["MOST_PARAMETERS", "Posterior", "parameter_units"]
 
 # A model of more parameters keeps no posterior: its factor would take more than 32 MB.
 MOST_PARAMETERS = 2000
@@ -121,7 +121,7 @@ class Posterior:
                 if others is not None:
                     rows -= self._rows(model, np.array(others.T, order="C"))
                 halves.append(self._halves(rows)[k])
-            spans.append(orthonormal_rows(np.hstack(halves)))
+            spans.append(_orthonormal_rows(np.hstack(halves)))
         pinned = np.zeros((self.noise.size, max(map(len, spans)), spans[0].shape[1]))
         for own, rows in zip(pinned, spans, strict=True):
             own[: len(rows)] = rows
@@ -224,7 +224,7 @@ def _lengths(model):
     return np.maximum(lengths, _NARROWEST * model.spread)
 
 
-def orthonormal_rows(columns):
+def _orthonormal_rows(columns):
     """Orthonormal rows that span some columns, (n, n_columns); what rounding leaves is dropped."""
     lengths = np.sqrt(np.sum(columns**2, axis=0))
     columns = columns[:, lengths > 0.0] / lengths[lengths > 0.0]

@@ -147,6 +147,6 @@ model.partial_fit(frame, y, forgetting=0.99)
 stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
 labels: np.ndarray = combine_groups(log["run"], dwells)
 export_text(model, precision="many")  # type: ignore[arg-type]
-export_c(model, coverage="most")  # type: ignore[arg-type]
+export_c(model, min_coverage="most")  # type: ignore[arg-type]
 model.coverage(None)  # type: ignore[arg-type]
 check_split(3, log["rate"], groups=groups, tolerance="small")  # type: ignore[arg-type]

@@ -44,14 +44,12 @@ _CHANCE = 1e-3
 _CORNERS = 8
 
 
-def constrained(
-    model: TSKModel, evaluation, problem, constraints: Constraints, in_user_units, is_trial=False
-):
+def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, in_user_units):
     """The consequents nearest to those of an evaluation that keep all constraints.
 
     ``model`` is that of ``evaluation`` in the user's units, ``in_user_units`` makes coefficients of
-    a TSKModel from those on [1, z]. As a trial nothing is proven, nothing warned of. Gives the
-    evaluation with its new coefficients, a report (a dict), and a :class:`Solved`.
+    a TSKModel from those on [1, z]. Gives the evaluation with its new coefficients, a report (a
+    dict), and a :class:`Solved`.
 
     Raises
     ------
@@ -59,15 +57,12 @@ def constrained(
         If no consequents keep the constraints; it says which.
     """
     exchange = _Exchange(model, problem, constraints, in_user_units)
-    if is_trial:
-        solved, is_proven = exchange.on_sample(evaluation), False
-    else:
-        solved, is_proven = exchange.proven(evaluation)
-        if not is_proven:
-            # A margin that does not help is not paid for.
-            exchange.points.margin = _FIRST_MARGIN
-            solved = exchange.on_sample(evaluation)
-            exchange.warn_that_nothing_is_proven()
+    solved, is_proven = exchange.proven(evaluation)
+    if not is_proven:
+        # A margin that does not help is not paid for.
+        exchange.points.margin = _FIRST_MARGIN
+        solved = exchange.on_sample(evaluation)
+        exchange.warn_that_nothing_is_proven()
     normal, local = evaluation.normal, solved.local
     error = 2.0 * solved.cost - float(np.sum(local * (normal.penalty @ local)))
     ended = replace(
@@ -77,8 +72,7 @@ def constrained(
         mean_squared_error=max(error, 0.0),
         normal=replace(normal, coefficients=local),
     )
-    if not is_trial:
-        exchange.warn_of_contradictions(evaluation, solved, ended)
+    exchange.warn_of_contradictions(evaluation, solved, ended)
     report = {
         "certified": is_proven,
         "margin": exchange.points.margin,

@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..consequent import NormalFactor
 from ..model import TSKModel
 from ..policies import SILENT
-from ..posterior import orthonormal_rows
 from .constraints import Constraints
 from .quadratic_program import InfeasibleError, nearest
 
@@ -55,9 +53,8 @@ class Solved:
 
     ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
     how much of it each output pays. ``known`` has for every output what is met with equality:
-    points in the user's units, and those that a slope begins at, or None; ``rows`` the same as
-    constraints (n_met, n_columns) on its local coefficients. ``active`` is how many points of each
-    inequality are met so.
+    points in the user's units, and those that a slope begins at, or None. ``active`` is how many
+    points of each inequality are met so.
     """
 
     local: np.ndarray
@@ -65,11 +62,6 @@ class Solved:
     paid: np.ndarray
     known: tuple
     active: np.ndarray
-    rows: tuple
-
-    def held(self, factor: NormalFactor):
-        """Of every output an orthonormal basis (n_columns, n_held) of what is met, in L'u."""
-        return tuple(orthonormal_rows(factor.half_solve(rows.T)).T for rows in self.rows)
 
 
 class HeldPoints:
@@ -145,7 +137,7 @@ class HeldPoints:
         equal = self._in_local(at_points.predict(self.standardised(self.constraints.points)))
         values = (self.constraints.values - targets.offset) / targets.scale
         places = range(len(self.inequalities)) if chosen is None else chosen
-        known, met, active = [], [], np.zeros(len(self.inequalities), dtype=int)
+        known, active = [], np.zeros(len(self.inequalities), dtype=int)
         for k in range(problem.n_outputs):
             own = [p for p in places if self.inequalities[p].output == k]
             rows, least = self._rows(columns, own)
@@ -157,11 +149,10 @@ class HeldPoints:
                 failure.output = k
                 raise
             known.append(self._known(own, is_active, active))
-            met.append(np.vstack([equal, rows[is_active]]))
         change = local - normal.coefficients
         paid = 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
         cost = evaluation.cost + float(paid.sum())
-        return Solved(local, cost, paid, tuple(known), active, tuple(met))
+        return Solved(local, cost, paid, tuple(known), active)
 
     def _known(self, places, is_active, active):
         """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""

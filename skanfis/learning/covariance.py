@@ -24,7 +24,7 @@ from ..posterior import MOST_PARAMETERS, Posterior, parameter_units
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-__all__ = ["effective_premises", "posterior_of"]
+__all__ = ["posterior_of"]
 
 # Where rows leave no freedom, the noise is that of so many.
 _LEAST_FREEDOM = 1.0
@@ -73,11 +73,6 @@ def posterior_of(
     scale = rows.targets.scale
     cross = cross * (shared * scale)[:, None, None]
     return Posterior(noise * scale, problem.consequent_inputs, half, premises, cross)
-
-
-def effective_premises(problem: SeparableProblem, premise: Premise, evaluation: Evaluation):
-    """How many displacements of the premises the data determine, tr H (H + kappa)^-1."""
-    return _premises(problem, premise, evaluation)[2] if premise.size else 0.0
 
 
 def _mean_squares(problem, evaluation, robust):

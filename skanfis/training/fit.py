@@ -170,9 +170,7 @@ class _Fit:
         # The first rows of a sample are a sample.
         return [sample.part(slice(few)), sample]
 
-    def run(
-        self, rows: StandardisedData, start: Start, is_watched=True
-    ) -> SolverRun:
+    def run(self, rows: StandardisedData, start: Start, is_watched=True) -> SolverRun:
         """One run of the solver from a start; its iterations are told where it is watched."""
         estimator, displacement = self.estimator, start.displacement
         problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)

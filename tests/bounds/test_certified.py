@@ -135,7 +135,7 @@ def test_the_box_is_held_where_the_policy_holds(rng):
 
 @pytest.mark.theory
 def test_slopes_beyond_the_range_are_those_of_the_policy(rng):
-    X, y, estimator = a_fit(rng, agreement=0.01, alpha=0.01)
+    X, y, estimator = a_fit(rng, agreement=1.0, alpha=0.01)
     estimator.fit(X, y)
     top = X[:, 1].max()
     assert gradient_bounds(estimator, "x1", {"x1": (top + 1.0, top + 2.0)}).lower[0] > 0.0
