@@ -135,7 +135,7 @@ def test_the_box_is_held_where_the_policy_holds(rng):
 
 @pytest.mark.theory
 def test_slopes_beyond_the_range_are_those_of_the_policy(rng):
-    X, y, estimator = a_fit(rng, agreement=1.0, alpha=0.01)
+    X, y, estimator = a_fit(rng, monotonic_cst=[0, 1])
     estimator.fit(X, y)
     top = X[:, 1].max()
     assert gradient_bounds(estimator, "x1", {"x1": (top + 1.0, top + 2.0)}).lower[0] > 0.0
@@ -144,7 +144,8 @@ def test_slopes_beyond_the_range_are_those_of_the_policy(rng):
     # Held at the edge the output never falls with the rate, whatever comes after.
     estimator.set_params(out_of_bounds="clip")
     everywhere = {"x1": (-np.inf, np.inf)}
-    assert gradient_bounds(estimator, "x1", everywhere).lower[0] == 0.0
+    slope = gradient_bounds(estimator, "x1", everywhere)
+    assert -0.011 * slope.magnitude[0] <= slope.lower[0] <= slope.lowest[0] == 0.0
     assert monotonicity(estimator, "x1", everywhere) == 1
 
 
