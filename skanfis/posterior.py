@@ -68,6 +68,17 @@ class Posterior:
             none = np.zeros((self.noise.size, 0, sum(self.cross.shape[1:])))
             object.__setattr__(self, "pinned", none)
 
+    def __getstate__(self):
+        """What a file holds: of a triangle no zeros."""
+        lower = self.consequents[np.tril_indices(len(self.consequents))]
+        return vars(self) | {"consequents": lower}
+
+    def __setstate__(self, state):
+        n_columns = int(np.sqrt(2 * state["consequents"].size))
+        full = np.zeros((n_columns, n_columns))
+        full[np.tril_indices(n_columns)] = state["consequents"]
+        vars(self).update(state | {"consequents": full})
+
     @property
     def n_values(self):
         """Numbers per row that a deviation takes, about."""

@@ -51,7 +51,7 @@ class RuleFiring:
         (overlap, products, strongest), peak, distinct = rows.reduce(
             partial(_sums, antecedent=antecedent, enough=enough), partial(_added, enough=enough)
         )
-        second = products[:, pair_index(1 + rows.X.shape[1])]
+        second = products[:, pair_index(int(np.sqrt(2 * products.shape[1])))]
         return cls(overlap, second, strongest, peak, np.array([len(own) for own in distinct]))
 
 
