@@ -19,7 +19,7 @@ from ._validation import (
     positive_weights,
     refuse_lazy,
 )
-from .bounds.wishes import Wishes
+from .bounds.constraints import Constraints
 from .model import TSKModel
 from .naming import default_output_names
 from .training import ValidatedData
@@ -68,7 +68,7 @@ class ChecksRowsMixin:
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
             groups = None if groups is None else groups[keep]
         names = tuple(map(str, self._input_names()))
-        wishes = Wishes.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
+        wishes = Constraints.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
         return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
 
     def _check_inputs(self, X):

@@ -9,7 +9,7 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted
 
 from .._memory import keeps_freed_memory
-from ..bounds.wishes import Wishes
+from ..bounds.constraints import Constraints
 from ..inspection.measures import TargetScale, rule_sums
 from ..inspection.readability import Readability
 from ..learning.sampling import is_many
@@ -261,7 +261,7 @@ class DaskANFISRegressor(ANFISRegressor):
             )
         data = ClusterData.of(Blocks.of(X, y, sample_weight, groups))
         layout = data.blocks.layout
-        wishes = Wishes.read(
+        wishes = Constraints.read(
             self.monotonic_cst, self.constraints, layout.input_names, len(layout.output_names)
         )
         data = replace(data, wishes=wishes)

@@ -8,7 +8,7 @@ from operator import methodcaller
 import numpy as np
 
 from .._memory import keeps_freed_memory
-from ..bounds.wishes import Wishes
+from ..bounds.constraints import Constraints
 from ..learning.data import Scale, StandardisedData, check_scales
 from .blocks import Blocks, Described, describe, joined
 from .keeping import kept_blocks
@@ -115,7 +115,7 @@ class ClusterData:
 
     blocks: Blocks
     described: Described
-    wishes: Wishes | None = None
+    wishes: Constraints | None = None
 
     @classmethod
     def of(cls, blocks):

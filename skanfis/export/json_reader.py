@@ -15,9 +15,8 @@ from ..antecedent import (
 )
 from ..membership import MEMBERSHIPS
 from ..model import TSKModel
-from ..policies import OUT_OF_BOUNDS
+from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..support import RuleSupport
-from ..target import TargetRange
 from ._posterior_json import read_posterior
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, shown
 

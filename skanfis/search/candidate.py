@@ -30,7 +30,6 @@ class Candidate:
     counts: tuple[int, ...] | None
     size: float | None = None  # number of clusters, or the radius that they have
     clustering: str = ""  # "k-means", "subtractive" or "fcm"
-    is_loose: bool = False  # whether its training begins with the premises (see ``tuning``)
     family: type[Membership] | None = None  # where it is another one than that of the search
 
     def describe(self):

@@ -24,7 +24,6 @@ from .tuning import (
     MOST_TURNS,
     Tuned,
     held,
-    held_for_nothing,
     scaled,
     settled,
     tune,
@@ -81,8 +80,6 @@ def tuned_start(
         freed = _freed(best, anywhere, free, n_sample)
         if freed is not None:
             best, premise, is_free = freed, anywhere, True
-    if premises_move:
-        best = held_for_nothing(best, premise, free, n_sample, effective_weight(rows))
     penalty = scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held)
     return Start(
         antecedent,

@@ -16,13 +16,12 @@ import numpy as np
 
 from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
-from ..learning.premise import Premise
 from ..membership import Membership
 from .candidate import MOST_RULES, Candidate
 from .screening import residual_asks_for
 from .start import Start
 from .trials import Trials
-from .tuning import held_for_nothing, scaled, settled
+from .tuning import scaled, settled
 
 __all__ = ["SEARCHED", "StructureSearch"]
 
@@ -108,9 +107,6 @@ class StructureSearch:
         self.trials.beat(best)
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
-            loose = self.trials.loosely(best) if max(best.counts) > 1 else None
-            if loose is not None:
-                best = self._grow_grid(loose)
         if partition != "grid" and self.inputs.size:
             clustering = "k-means" if partition == "auto" else partition
             clusters = self._best_clusters(clustering, best)
@@ -131,7 +127,7 @@ class StructureSearch:
             small = trials.promising(filter(self._is_small, grown))
             if not small:
                 return best
-            grown_best = trials.leading(self._worth_training(small, best), best)
+            grown_best = trials.leading(small[: self._n_trained(small[0], best)], best)
             if not self._is_better(grown_best, best, of=self.inputs.size):
                 return best
             best = grown_best
@@ -151,23 +147,6 @@ class StructureSearch:
         counts = list(candidate.counts)
         counts[j] += 1
         return replace(candidate, counts=tuple(counts))
-
-    def _worth_training(self, promising, best):
-        """The most promising, one of them with one more term where the best has several.
-
-        Such a one promises less than it keeps: the terms of that input begin anew, where those of
-        one that gives another input terms are where the best has trained them.
-        """
-        chosen = promising[: self._n_trained(promising[0], best)]
-        anew = [c for c in promising if self._begins_anew(c, best)]
-        if len(chosen) > 1 and anew and anew[0] not in chosen:
-            chosen[-1] = anew[0]
-        return chosen
-
-    @staticmethod
-    def _begins_anew(candidate, best):
-        pairs = zip(candidate.counts, best.counts, strict=True)
-        return any(count > before > 1 for count, before in pairs)
 
     def _n_trained(self, candidate, best):
         """How many of the promising candidates are trained."""
@@ -241,8 +220,6 @@ class StructureSearch:
     def _start(self, best):
         trials, tuned = self.trials, self.trials.tuned(best)
         n_sample, n_all, free = trials.n_sample, trials.n_all, trials.free
-        premise = Premise.of(tuned.problem.antecedent, *trials.sample.inputs.box)
-        tuned = held_for_nothing(tuned, premise, free, n_sample, n_all)
         return Start(
             tuned.problem.antecedent,
             scaled(tuned.penalty, free, n_sample / n_all, tuned.is_held),

@@ -164,20 +164,6 @@ class Trials:
         """Whether the best so far leaves more than data next to exact do."""
         return self.expected(self.tuned(best)) > _NEARLY_EXACT
 
-    def loosely(self, best: Candidate):
-        """The loose training of a candidate where it beats the one before; else None.
-
-        It may find what that took for noise: its first turn goes far, and those that follow leave
-        no less.
-        """
-        loose, tuned = replace(best, is_loose=True), self.tuned(best)
-        begun = self.train(loose, self.sample, _FIRST_TURNS)
-        if not tuned.takes_for_noise(begun):
-            return None
-        self._begun[loose] = begun
-        is_beaten = tuned.is_beaten_loosely(self.tuned(loose)) and np.isfinite(self.score(loose))
-        return loose if is_beaten else None
-
     def score(self, candidate):
         """N log of the expected error, or the error on groups left out."""
         if candidate not in self.scores:
@@ -279,7 +265,6 @@ class Trials:
             turns,
             first_steps,
             self._inherited(antecedent, premise) if begun is None else None,
-            is_loose=candidate.is_loose,
             begun=begun,
             is_last=is_last,
         )

@@ -45,7 +45,6 @@ __all__ = [
     "WORTHWHILE",
     "Tuned",
     "held",
-    "held_for_nothing",
     "is_affordable",
     "more_agreement",
     "scaled",
@@ -97,9 +96,6 @@ _MARGIN = 0.9
 # Rules that hold one by one are worth a tenth of the error, a fifth of its square. Where they would
 # cost more, as they do where the data are next to exact, the model goes before its rules.
 HOLDING = 1.2
-# What is had for next to nothing of the mean square: the strongest rule no farther than this from
-# the model, of which a tenth of the target's variance is then not said by it.
-_HOLDS_WELL, _NEXT_TO_NOTHING = 0.3, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,28 +336,6 @@ def _together(tuned: Tuned, weights: _Weights, premise: Premise, free) -> Tuned:
         if not is_affordable(found.evaluation, tuned.evaluation):
             found = None
     return replace(tuned, is_apart=True)
-
-
-def held_for_nothing(tuned: Tuned, premise: Premise, free, n_rows: float, n_all: float) -> Tuned:
-    """The same with as much more agreement as costs nothing, until the rules hold well.
-
-    The evidence has found how far rules agree; where more of it changes next to nothing of the
-    error to be expected, it is had for the reading: half of what it costs anyway to find the
-    parameters on the ``n_all`` rows that are trained on, k / n of the noise's variance, at most.
-    """
-    if "agreement" not in free or tuned.is_apart or not tuned.displacement.size:
-        return tuned
-    weights = _Weights(tuned.problem, n_rows)
-    others = [key for key in free if key != "agreement"]
-    price = min(0.5 * tuned.posterior.n_effective / n_all, _NEXT_TO_NOTHING)
-    best = tuned
-    while (penalty := more_agreement(best.problem, best.evaluation, _HOLDS_WELL)) is not None:
-        x, evaluation = best.displacement, best.evaluation
-        found = _turned(weights, premise, penalty, x, evaluation, others, _ITERATIONS, 0)
-        if not found.expected_error <= (1.0 + price) * tuned.expected_error:
-            break
-        best = found
-    return best if best is tuned else replace(best, is_held=True)
 
 
 def more_agreement(

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..antecedent import Antecedent
 from ..learning.data import StandardisedData
-from ..support import FIRES, RuleSupport, inverse_factor
+from ..learning.firing import FIRES, inverse_factor
+from ..support import RuleSupport
 from .scales import Change
 
 __all__ = ["Distinct", "RuleFiring"]

@@ -11,7 +11,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,31 +19,24 @@ from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
-from ..antecedent import Antecedent
 from ..bounds.exchange import constrained
 from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
+from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
-from ..posterior import Posterior, effective_premises
 from ..search import (
     SampleSize,
     Start,
     StructureRequest,
     effective_weight,
-    has_idle_term,
-    is_affordable,
-    more_agreement,
     report_constant,
-    with_premises,
 )
 from .data import ValidatedData
 from .freezing import ModelBuilder, as_given
-from .knowing import grown
-from .left_out import leave_group_out_error
 from .outermost import told_by_outermost
 from .progress import Callbacks, Printer, watch_all
 from .pruning import redundant_rules, rule_statistics
@@ -60,8 +52,6 @@ _THOROUGH = 0.1
 # The way there begins on a part of the sample, an iteration of which costs as much less; but no
 # fewer rows than so many per consequent.
 _PART_OF_SAMPLE, _ROWS_EACH = 4, 20
-# Tenfold stiffer premises, while a term is hardly true on any row.
-_MOST_STIFFER = 6
 # Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
 # them, and what has not after these goes to and fro.
 _MOST_TURNS = 20
@@ -91,34 +81,17 @@ def fit_rules(
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
 
-    may_grow = request.is_searched and request.partition in ("auto", "grid")
-    if data.wishes is None or not may_grow:
-        return _fitted(estimator, data, request, callbacks)
-
-    def fit(counts=None, is_noisy=False):
-        if counts is None:
-            return _fitted(estimator, data, request, callbacks, is_trial=True)
-        grid = replace(request, n_mfs=counts, partition="grid", is_noisy=is_noisy)
-        return _fitted(estimator, data, grid, None, is_trial=True)
-
-    return grown(data.wishes, request.premise_inputs, fit)
-
-
-def _fitted(estimator, data, request, callbacks, is_trial=False) -> Fitted:
     fit = _Fit(estimator, data, request, callbacks)
     report_constant(fit.rows, data.input_names)
     weights = None
     if fit.huber is None:
-        run = fit.readable_run(fit.rows, fit.start(fit.rows))
+        run = fit.run_from(fit.rows, fit.start(fit.rows))
     else:
         run, row_weights = fit.robust_run(fit.huber.epsilon)
         weights = data.spread_over_rows(row_weights, fit.trained_on)
     fit.warn_unless_converged(run)
     robust = None if fit.huber is None else (row_weights, fit.huber.epsilon)
     fitted = fit.frozen(run, weights)
-    if is_trial:
-        trial = fit.constrained(fitted, run, is_trial)
-        return replace(trial, proven=partial(fit.sure, fitted, run, robust))
     return fit.sure(fitted, run, robust)
 
 
@@ -166,17 +139,17 @@ class _Fit:
             self.printer.tell_start(start)
         return start
 
-    def readable_run(self, rows: StandardisedData, start: Start) -> SolverRun:
-        """The run from a start, to rules that can be read one by one.
+    def run_from(self, rows: StandardisedData, start: Start) -> SolverRun:
+        """The run from a start.
 
         Of many rows a sample decides on how much premises are held and rules agree, and where the
         premises are: what is left to do on all rows is a step or two.
         """
         if rows.sample is None:
-            return self.run_until_readable(rows, start)
+            return self.run(rows, start)
         for part in self.parts_of_sample(rows.sample, start):
             # Iterations on a sample are not told.
-            found = self.run_until_readable(part, start, is_watched=False)
+            found = self.run(part, start, is_watched=False)
             start = found.start
             if self.is_projecting:
                 start = replace(start, displacement=found.displacement)
@@ -197,55 +170,7 @@ class _Fit:
         # The first rows of a sample are a sample.
         return [sample.part(slice(few)), sample]
 
-    def run_until_readable(self, rows, start: Start, is_watched=True) -> SolverRun:
-        """The run from a start, repeated until its rules can be read; unwatched then.
-
-        Rows that the search has not seen may draw a term into a gap between them, out of which no
-        gradient leads. The premises are then held ten times as much, from the start again, unless
-        it was asked for how much they are held, or terms were freed beyond all reading because that
-        is worth it (``structure.given``). Likewise agreement rises, unless it was asked for, until
-        the strongest rule holds alone, if that is cheap.
-        """
-        run = self.run(rows, start, is_watched)
-        if self.was_stopped(run):
-            return run
-        given = self.request.weights
-        first = _as_tuned(rows, start) if start.is_free else start.antecedent
-        if "stiffness" not in given and not has_idle_term(rows, first):
-            run = self.without_idle_terms(rows, run)
-        if "agreement" not in given and not start.is_apart:
-            run = self.with_rules_that_hold(rows, run)
-        return run
-
-    def was_stopped(self, run: SolverRun) -> bool:
-        """Whether a callback has asked for the end."""
-        return self.callbacks is not None and run.result.status == "stopped"
-
-    def without_idle_terms(self, rows, run: SolverRun) -> SolverRun:
-        """The run with premises as stiff as leaves every term true somewhere."""
-        for _ in range(_MOST_STIFFER):
-            if not has_idle_term(rows, run.evaluation.antecedent):
-                break
-            penalty = run.start.penalty
-            penalty = replace(penalty, stiffness=10.0 * penalty.stiffness)
-            run = self.run(rows, replace(run.start, penalty=penalty), is_watched=False)
-        return run
-
-    def with_rules_that_hold(self, rows, apart: SolverRun) -> SolverRun:
-        """The run with so much agreement that the strongest rule holds alone, if that is cheap."""
-        run = apart
-        while (penalty := more_agreement(run.problem, run.evaluation)) is not None:
-            start = replace(run.start, penalty=penalty)
-            if self.solver.goes_on_from_tuning:
-                start = replace(start, displacement=run.displacement)
-            run = self.run(rows, start, is_watched=False, is_settled=True)
-            if not is_affordable(run.evaluation, apart.evaluation):
-                return apart
-        return run
-
-    def run(
-        self, rows: StandardisedData, start: Start, is_watched=True, is_settled=False
-    ) -> SolverRun:
+    def run(self, rows: StandardisedData, start: Start, is_watched=True) -> SolverRun:
         """One run of the solver from a start; its iterations are told where it is watched."""
         estimator, displacement = self.estimator, start.displacement
         problem, premise = self.problem(rows.sample or rows, start), _premise(rows, start)
@@ -265,7 +190,7 @@ class _Fit:
         solver = self.solver
         if rows.sample is not None:
             problem = problem.on_all(rows)
-        elif self.rows.sample is not None and not is_settled and self.is_projecting:
+        elif self.rows.sample is not None and self.is_projecting:
             solver = clone(solver).set_params(tol=_THOROUGH * solver.tol)
         result = solver.solve(
             problem,
@@ -322,7 +247,7 @@ class _Fit:
                 break
             # What the first start makes of outliers need not be read.
             is_kept = turn > 0 or n_starts == 1
-            first_run = self.readable_run if is_kept else self.run
+            first_run = self.run_from if is_kept else self.run
             run = first_run(reweighted(rows, weights), start)
             run, weights = self.settled(rows, run, weights, epsilon)
         assert run is not None
@@ -372,13 +297,7 @@ class _Fit:
         """What standard deviations need; ``robust`` are the weights of rows and Huber's epsilon."""
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = effective_weight(run.problem.rows)
-        return Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
-
-    @property
-    def n_units(self):
-        """How many rows there are by weight, or, where they are given, groups."""
-        groups = (self.rows.sample or self.rows).groups
-        return effective_weight(self.rows) if groups is None else np.unique(groups).size
+        return posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
 
     def frozen(self, run, weights) -> Fitted:
         """What the run leaves, of which no deviations are known yet."""
@@ -390,7 +309,6 @@ class _Fit:
             redundant_rules(rule_statistics(self.rows, firing)),
             weights,
             run.validation_losses,
-            n_units=self.n_units,
         )
 
     def sure(self, fitted, run, robust) -> Fitted:
@@ -401,7 +319,7 @@ class _Fit:
         fitted = replace(fitted, model=model)
         return fitted if self.data.wishes is None else self.constrained(fitted, run)
 
-    def constrained(self, fitted, run, is_trial=False) -> Fitted:
+    def constrained(self, fitted, run) -> Fitted:
         """The nearest model that keeps what is known, its result, and a report."""
         evaluation, model, wishes = run.evaluation, fitted.model, self.data.wishes
         if evaluation.normal is None:
@@ -409,7 +327,7 @@ class _Fit:
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         in_user_units = self.builder.in_user_units
         evaluation, report, solved = constrained(
-            model, evaluation, run.problem, wishes, in_user_units, is_trial
+            model, evaluation, run.problem, wishes, in_user_units
         )
         model = replace(model, coefficients=in_user_units(evaluation.coefficients))
         target = model.target.within(wishes.lower, wishes.upper, wishes.values)
@@ -421,25 +339,7 @@ class _Fit:
             model=model,
             result=replace(run.result, evaluation=evaluation),
             constraints=report,
-            expected_error=partial(self.expected_error, run, evaluation, solved),
         )
-
-    def expected_error(self, run, evaluation, solved):
-        """Mean squared error on new rows of consequents that keep what is known.
-
-        That of rows left out one by one, or of groups, with what holds the consequents back held.
-        """
-        rows, problem = run.problem.rows, run.problem.on_sample or run.problem
-        n_rows = effective_weight(rows)
-        held = solved.held(evaluation.normal.factor)
-        if problem.rows.groups is None or self.n_units == 1:
-            left_out = problem.leave_one_out_error(evaluation, n_rows, held)
-        else:
-            left_out = leave_group_out_error(problem, evaluation, held)
-        n_premises = 0.0
-        if self.solver.moves_premises:
-            n_premises = effective_premises(run.problem, run.premise, evaluation)
-        return with_premises(left_out, n_premises / n_rows)
 
 
 def _object_for(given, by_word):
@@ -454,13 +354,6 @@ def _premise(rows: StandardisedData, start: Start) -> Premise:
     """What moves at a start, within the box of the data."""
     low, high = rows.inputs.box
     return Premise.of(start.antecedent, low, high, start.is_free)
-
-
-def _as_tuned(rows: StandardisedData, start: Start) -> Antecedent:
-    """The rule base with its premises where tuning has found them."""
-    premise = _premise(rows, start)
-    x = np.zeros(premise.size) if start.displacement is None else start.displacement
-    return start.antecedent.with_parameters(premise.parameters(x))
 
 
 def _is_of_one_size(one: Start, other: Start) -> bool:

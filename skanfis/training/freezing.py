@@ -7,13 +7,13 @@ import numpy as np
 
 from ..learning import SolverResult
 from ..learning.data import StandardisedData
+from ..learning.firing import RuleFiring, rule_support
 from ..learning.objective import Evaluation
 from ..learning.penalty import Penalty
 from ..model import TSKModel
 from ..options import policy_of
+from ..policies import TargetRange
 from ..search import Start, StructureRequest, imported_antecedent
-from ..support import RuleFiring, RuleSupport
-from ..target import TargetRange
 from .data import ValidatedData
 from .pruning import redundant_rules, rule_statistics
 from .result import Fitted
@@ -46,7 +46,7 @@ class ModelBuilder:
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
-        support = RuleSupport.of(rows, trained, self.n_coefficients, firing)
+        support = rule_support(rows, trained, self.n_coefficients, firing)
         model = TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),

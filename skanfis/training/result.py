@@ -1,6 +1,5 @@
 """What a run of the solver, and a fit, leave behind."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +46,3 @@ class Fitted:
     robust_weights: np.ndarray | None = None
     validation_losses: tuple[float, ...] | None = None
     constraints: dict | None = None
-    n_units: float = 0.0  # rows by weight, or groups where they are given
-    # Under constraints: the error to be expected on new rows, and of a trial the same with a proof.
-    expected_error: Callable[[], float] | None = None
-    proven: "Callable[[], Fitted] | None" = None

@@ -9,15 +9,15 @@ from typing import cast
 
 import numpy as np
 
+from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData, check_scales
 from ..learning.evidence import laplace, least_weights
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..model import TSKModel
-from ..posterior import Posterior
+from ..policies import TargetRange
 from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
-from ..target import TargetRange
 from .farthest import Farthest
 from .firing import Distinct, RuleFiring, row_keys
 from .held_chunks import HeldProblem
@@ -256,7 +256,7 @@ class Stream:
             support=self.firing.support(inputs, n_coefficients),
             target=TargetRange(targets.minimum, targets.maximum, targets.scale),
             # Premises stay: what is not known of them is not counted.
-            posterior=Posterior.of(problem, None, evaluation, moments.effective_weight),
+            posterior=posterior_of(problem, None, evaluation, moments.effective_weight),
         )
 
 

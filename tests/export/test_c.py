@@ -28,8 +28,7 @@ from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian, Triangular
 from skanfis.model import TSKModel
 from skanfis.options import LinearExtrapolation
-from skanfis.policies import OUT_OF_BOUNDS
-from skanfis.target import TargetRange
+from skanfis.policies import OUT_OF_BOUNDS, TargetRange
 
 from ..oracles import random_grid
 from ..quick import quick

@@ -40,22 +40,8 @@ class InfeasibleError(Exception):
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     """The local coefficients nearest to ``start`` with E u = e and G u >= h.
 
-    Parameters
-    ----------
-    factor : NormalFactor
-        Of M.
-    start : ndarray of shape (n_columns,)
-        u0.
-    equal, at_least : ndarray of shape (n, n_columns)
-        E and G.
-    equal_to, least : ndarray of shape (n,)
-        e and h.
-
-    Returns
-    -------
-    coefficients : ndarray of shape (n_columns,)
-    is_active : ndarray of bool of shape (n,)
-        Which of G u >= h are met with equality, and hold the coefficients back.
+    ``factor`` is of M. Gives too which of G u >= h are met with equality, and hold the coefficients
+    back, a bool each.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is asked of a model: read from what a user gives."""
+"""Constraints on the outputs, read from what a user gives."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["FixedPoint", "OutputLimits", "Wishes"]
+__all__ = ["Constraints", "FixedPoint", "OutputLimits"]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class FixedPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Wishes:
+class Constraints:
     """Constraints of every output, in the user's units.
 
     Attributes
@@ -171,17 +171,16 @@ def _signs(given, input_names, n_outputs):
 
 
 def _listed(constraints):
-    if constraints is None:
-        return []
     if isinstance(constraints, OutputLimits | FixedPoint):
         return [constraints]
-    for one in constraints if isinstance(constraints, Sequence) else [constraints]:
+    found = constraints if isinstance(constraints, Sequence) else [constraints]
+    for one in found if constraints is not None else ():
         if not isinstance(one, OutputLimits | FixedPoint):
             raise ValueError(
                 f"constraints holds {one!r}: it must be OutputLimits and FixedPoints of "
                 "skanfis.bounds, in a list."
             )
-    return list(constraints)
+    return [] if constraints is None else list(found)
 
 
 def _as_numbers(given, what):
@@ -193,9 +192,7 @@ def _as_numbers(given, what):
 
 
 def _per_output(given, nothing, what, n_outputs):
-    if given is None:
-        given = nothing
-    values = _as_numbers(given, f"{what} in constraints")
+    values = _as_numbers(nothing if given is None else given, f"{what} in constraints")
     if values.ndim > 1 or values.size not in (1, n_outputs) or np.isnan(values).any():
         raise ValueError(
             f"{what}={given!r} in constraints must be a number, or one for each of the "

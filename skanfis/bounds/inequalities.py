@@ -1,26 +1,27 @@
-"""Demands on the outputs, held at points: rows of linear constraints on the consequents."""
+"""Inequalities that outputs must keep, held at points: linear constraints on the consequents.
+
+Slopes are held as mean slopes over a small step, [y(x + d) - y(x)] / d, which a monotone output has
+of the right sign too: what is constrained is the prediction itself.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..consequent import NormalFactor
 from ..model import TSKModel
 from ..policies import SILENT
-from .program import InfeasibleError, nearest
-from .wishes import Wishes
+from .constraints import Constraints
+from .quadratic_program import InfeasibleError, nearest
 
-__all__ = ["Demand", "Held", "Solved", "demands"]
+__all__ = ["HeldPoints", "Inequality", "Solved", "inequalities_of"]
 
 # The step of a slope, in standard deviations of the input.
 _STEP = 1e-5
-# Of what is met with equality, what follows from the rest.
-_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True)
-class Demand:
-    """An inequality on one output: of its slope by ``input``, or, where that is None, its value.
+class Inequality:
+    """An inequality on one output: on its slope by ``input``, or, where that is None, its value.
 
     sign times it must be at least sign times ``limit``.
     """
@@ -32,17 +33,17 @@ class Demand:
     name: str
 
 
-def demands(wishes: Wishes, model: TSKModel):
-    """The inequalities among the wishes, output by output."""
+def inequalities_of(constraints: Constraints, model: TSKModel):
+    """The inequalities among the constraints, output by output."""
     found = []
     for k, name in enumerate(model.output_names):
-        for j, sign in enumerate(wishes.signs[k]):
+        for j, sign in enumerate(constraints.signs[k]):
             if sign and model.minimum[j] < model.maximum[j]:
                 what = f"monotonic_cst={sign} of {name!r} by {model.input_names[j]!r}"
-                found.append(Demand(k, float(sign), j, 0.0, what))
-        for sign, limit in ((1.0, wishes.lower[k]), (-1.0, wishes.upper[k])):
+                found.append(Inequality(k, float(sign), j, 0.0, what))
+        for sign, limit in ((1.0, constraints.lower[k]), (-1.0, constraints.upper[k])):
             if np.isfinite(limit):
-                found.append(Demand(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
+                found.append(Inequality(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
     return found
 
 
@@ -51,10 +52,9 @@ class Solved:
     """Consequents that keep what is held, at some premises.
 
     ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
-    how much of it each output pays for what is held. ``known`` has for every output what is met
-    with equality: points in the user's units, and those that a slope begins at, or None. ``active``
-    is how many points of each demand are, ``rows`` what is met of every output as rows (n_met,
-    n_columns) of constraints on its local coefficients.
+    how much of it each output pays. ``known`` has for every output what is met with equality:
+    points in the user's units, and those that a slope begins at, or None. ``active`` is how many
+    points of each inequality are met so.
     """
 
     local: np.ndarray
@@ -62,41 +62,27 @@ class Solved:
     paid: np.ndarray
     known: tuple
     active: np.ndarray
-    rows: tuple
-
-    def held(self, factor: NormalFactor):
-        """Of every output an orthonormal basis (n_columns, n_held) of what is met, in L'u.
-
-        ``factor`` is L. At these constraints, met with equality, u moves across it alone.
-        """
-        return tuple(_orthonormal(factor.half_solve(rows.T)) for rows in self.rows)
 
 
-class Held:
-    """Points at which demands are held, and the consequents that do so at any premises.
+class HeldPoints:
+    """Points at which inequalities are held, and the consequents that do so at any premises.
 
-    Parameters
-    ----------
-    model : TSKModel
-        In the user's units; its range is where demands are held, and its policy says what it
-        predicts at fixed points beyond.
-    problem : SeparableProblem
-    wishes : Wishes
-    margin : float
-        By which demands are held, in standard deviations of target and input.
+    ``model`` is in the user's units: its range is where inequalities are held, its policy says what
+    it predicts at fixed points beyond. They are held by ``margin``, in standard deviations of the
+    target (and of the input).
     """
 
-    def __init__(self, model: TSKModel, problem, wishes: Wishes, margin: float):
-        self.model, self.problem, self.wishes = model, problem, wishes
+    def __init__(self, model: TSKModel, problem, constraints: Constraints, margin: float):
+        self.model, self.problem, self.constraints = model, problem, constraints
         self._check_points()
-        self.demands, self.margin = demands(wishes, model), margin
-        # Of each demand, points in standardised inputs: where a slope ends, and where it begins.
+        self.inequalities, self.margin = inequalities_of(constraints, model), margin
+        # Of each, points in standardised inputs: where a slope ends, and where it begins.
         nothing = np.empty((0, model.n_inputs))
-        self.after, self.before = ([nothing] * len(self.demands) for _ in range(2))
+        self.after, self.before = ([nothing] * len(self.inequalities) for _ in range(2))
 
     def _check_points(self):
         """Raise ValueError where a value is asked for and nothing is predicted."""
-        model, points = self.model, self.wishes.points
+        model, points = self.model, self.constraints.points
         beyond = points[~model.in_bounds(points)]
         if len(beyond) and model.out_of_bounds in SILENT:
             raise ValueError(
@@ -131,10 +117,10 @@ class Held:
         return before, after, step
 
     def hold(self, place, X):
-        """Hold a demand at these points too."""
+        """Hold an inequality at these points too."""
         if not len(X):
             return
-        j = self.demands[place].input
+        j = self.inequalities[place].input
         before, after = X[:0], X
         if j is not None:
             before, after, _ = self.steps(X, j)
@@ -142,16 +128,18 @@ class Held:
         self.before[place] = np.vstack([self.before[place], self.standardised(before)])
 
     def solve(self, evaluation, chosen=None) -> Solved:
-        """The nearest consequents; ``chosen`` demands alone, if given."""
-        columns = self._columns(evaluation.antecedent)
+        """The nearest consequents; ``chosen`` inequalities alone, if given."""
+        columns, model = self._columns(evaluation.antecedent), self.model
         normal, problem = evaluation.normal, self.problem
         local, targets = normal.coefficients.copy(), problem.rows.targets
-        equal = self._in_local(self._at_points(columns))
-        values = (self.wishes.values - targets.offset) / targets.scale
-        places = range(len(self.demands)) if chosen is None else chosen
-        known, met, active = [], [], np.zeros(len(self.demands), dtype=int)
+        # By the policy where they lie beyond the range.
+        at_points = columns.with_out_of_bounds(model.out_of_bounds, model.max_extrapolation)
+        equal = self._in_local(at_points.predict(self.standardised(self.constraints.points)))
+        values = (self.constraints.values - targets.offset) / targets.scale
+        places = range(len(self.inequalities)) if chosen is None else chosen
+        known, active = [], np.zeros(len(self.inequalities), dtype=int)
         for k in range(problem.n_outputs):
-            own = [p for p in places if self.demands[p].output == k]
+            own = [p for p in places if self.inequalities[p].output == k]
             rows, least = self._rows(columns, own)
             try:
                 local[:, k], is_active = nearest(
@@ -161,16 +149,15 @@ class Held:
                 failure.output = k
                 raise
             known.append(self._known(own, is_active, active))
-            met.append(np.vstack([equal, rows[is_active]]))
         change = local - normal.coefficients
         paid = 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
         cost = evaluation.cost + float(paid.sum())
-        return Solved(local, cost, paid, tuple(known), active, tuple(met))
+        return Solved(local, cost, paid, tuple(known), active)
 
     def _known(self, places, is_active, active):
         """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
         inputs, found, start = self.problem.rows.inputs, [], 0
-        model, points = self.model, self.wishes.points
+        model, points = self.model, self.constraints.points
         if model.out_of_bounds == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[model.in_bounds(points)]
@@ -182,28 +169,26 @@ class Held:
             if not chosen.any():
                 continue
             after, before = inputs.offset + inputs.scale * self.after[p][chosen], None
-            if self.demands[p].input is not None:
+            if self.inequalities[p].input is not None:
                 before = inputs.offset + inputs.scale * self.before[p][chosen]
             found.append((after, before))
         return found
 
     def _rows(self, columns, places):
-        """Local rows of the demands of one output, and what they must be at least."""
+        """Local rows of the inequalities of one output, and what they must be at least."""
         targets, n_columns = self.problem.rows.targets, self.problem.n_columns
         rows, least = [np.empty((0, n_columns))], [np.empty(0)]
         for p in places:
-            demand = self.demands[p]
-            found, size, limit = self._at(columns, self.after[p]), 1.0, 0.0
-            if demand.input is None:
-                limit = (demand.limit - targets.offset[demand.output]) / targets.scale[
-                    demand.output
-                ]
+            one = self.inequalities[p]
+            found, size, limit = columns.predict(self.after[p]), 1.0, 0.0
+            if one.input is None:
+                limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
             else:
-                found = (found - self._at(columns, self.before[p])) / _STEP
+                found = (found - columns.predict(self.before[p])) / _STEP
                 # Where no consequents have much of a slope, none is asked for.
                 size = np.minimum(np.abs(found).sum(axis=1), 1.0)
-            rows.append(self._in_local(demand.sign * found))
-            least.append(np.full(len(found), demand.sign * limit) + self.margin * size)
+            rows.append(self._in_local(one.sign * found))
+            least.append(np.full(len(found), one.sign * limit) + self.margin * size)
         return np.vstack(rows), np.concatenate(least)
 
     def _columns(self, antecedent):
@@ -231,28 +216,9 @@ class Held:
             output_names=tuple(map(str, range(problem.n_columns))),
         )
 
-    def _at_points(self, columns):
-        """The same at fixed points, by the policy where they lie beyond the range."""
-        if not len(self.wishes.points):
-            return np.empty((0, self.problem.n_columns))
-        own = columns.with_out_of_bounds(self.model.out_of_bounds, self.model.max_extrapolation)
-        return own.predict(self.standardised(self.wishes.points))
-
-    def _at(self, columns, Z):
-        """Columns of the design at points, (n_points, n_columns)."""
-        return columns.predict(Z) if len(Z) else np.empty((0, self.problem.n_columns))
-
     def _in_local(self, rows):
         """Rows (n, n_columns) by local coefficients from those by global ones."""
         if not len(rows):
             return rows
         # In place, on a copy.
         return self.problem.local.transform_rows(np.array(rows.T, order="C")).T
-
-
-def _orthonormal(columns):
-    """Orthonormal columns that span some others."""
-    lengths = np.sqrt(np.sum(columns**2, axis=0))
-    columns = columns[:, lengths > 0.0] / lengths[lengths > 0.0]
-    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return left[:, sizes > _DEPENDENT * sizes.max(initial=0.0)]

@@ -1,8 +1,13 @@
-"""Arithmetic on intervals, each a pair of arrays (low, high)."""
+"""Arithmetic on intervals, each a pair of arrays (low, high), and what rounding may add to them."""
 
 import numpy as np
 
-__all__ = ["product", "size", "square"]
+__all__ = ["EPS", "ROUNDINGS", "product", "size", "square", "widened"]
+
+EPS = float(np.finfo(float).eps)
+# Roundings of a membership, a share, a rule's output or its slope, in EPS, with room to spare: of
+# a dozen operations one after another, beside those of sums, which are counted.
+ROUNDINGS = 32.0
 
 
 def product(one, other):
@@ -22,3 +27,9 @@ def square(ends):
 def size(ends):
     """The largest absolute value in an interval."""
     return np.maximum(np.abs(ends[0]), np.abs(ends[1]))
+
+
+def widened(low, high):
+    """The interval, wider by rounding errors of its ends."""
+    slack = ROUNDINGS * EPS * size((low, high))
+    return low - slack, high + slack
