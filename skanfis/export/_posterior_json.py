@@ -21,7 +21,7 @@ per displacement. ``posterior`` says what they are.
 import numpy as np
 
 from ..posterior import MOST_PARAMETERS, Posterior
-from .limits import number, shown
+from .limits import numbers, shown
 
 __all__ = ["posterior_item", "read_posterior"]
 
@@ -66,27 +66,17 @@ def read_posterior(item, antecedent, n_inputs, n_outputs, order):
         raise ValueError(f"posterior.consequents is not a triangle of {n_columns} rows.")
     consequents = np.zeros((n_columns, n_columns))
     for i, row in enumerate(triangle):
-        consequents[i, : i + 1] = _table(row, (i + 1,), f"posterior.consequents[{i}]")
+        consequents[i, : i + 1] = numbers(row, (i + 1,), f"posterior.consequents[{i}]")
     pinned = item.get("pinned", [[]] * n_outputs)
     first = pinned[0] if isinstance(pinned, list) and pinned else []
     n_pinned = len(first) if isinstance(first, list) else 0
     if n_pinned > n_columns + n_rows:
         raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
     return Posterior(
-        np.abs(_table(item["noise"], (n_outputs,), "posterior.noise")),
+        np.abs(numbers(item["noise"], (n_outputs,), "posterior.noise")),
         np.array(inputs, dtype=int),
         consequents,
-        _table(rows, (n_rows, n_parameters), "posterior.premises"),
-        _table(item["cross"], (n_outputs, n_rows, n_columns), "posterior.cross"),
-        _table(pinned, (n_outputs, n_pinned, n_columns + n_rows), "posterior.pinned"),
+        numbers(rows, (n_rows, n_parameters), "posterior.premises"),
+        numbers(item["cross"], (n_outputs, n_rows, n_columns), "posterior.cross"),
+        numbers(pinned, (n_outputs, n_pinned, n_columns + n_rows), "posterior.pinned"),
     )
-
-
-def _table(values, shape, where):
-    """Nested lists of numbers as an array of this shape."""
-    if not shape:
-        return number(values, where)
-    if not isinstance(values, list) or len(values) != shape[0]:
-        raise ValueError(f"{where}: {shown(values)} is not a list of {shape[0]}.")
-    found = [_table(value, shape[1:], where) for value in values]
-    return np.array(found, dtype=float).reshape(shape)

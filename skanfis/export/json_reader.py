@@ -18,7 +18,7 @@ from ..model import TSKModel
 from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..support import RuleSupport
 from ._posterior_json import read_posterior
-from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, shown
+from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 __all__ = ["FORMAT", "KINDS", "LIMITS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
 
@@ -229,24 +229,16 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
         table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
         weights.append(number(weight, f"{where}.weight", 0.0, 1.0 + _ROUNDING))
         rows.append(number(n_rows, f"{where}.rows", 0.0))
-        by_output = [
-            [
-                number(value, f"{where}.consequents[{k}][{j}]")
-                for j, value in enumerate(_list(one, f"{where}.consequents[{k}]"))
-            ]
-            for k, one in enumerate(_list(by_output, f"{where}.consequents"))
-        ]
-        n_basis = len(by_output[0])
-        if len(by_output) != n_outputs or n_basis not in (1, 1 + n_inputs):
+        sizes = [len(_list(one, f"{where}.consequents")) for one in _list(by_output, where)]
+        if len(sizes) != n_outputs or sizes[0] not in (1, 1 + n_inputs):
             raise ValueError(
                 f'"consequents" of {where} must be one list per output, of 1 or {1 + n_inputs} '
                 "numbers."
             )
-        consequents.append(by_output)
-        if [len(one) for one in by_output] != [len(consequents[0][0])] * n_outputs or len(
-            table[-1]
-        ) != len(table[0]):
+        n_basis = consequents[0].shape[1] if consequents else sizes[0]
+        if sizes != [n_basis] * n_outputs or len(table[-1]) != len(table[0]):
             raise ValueError(f"{where} has other numbers of terms or coefficients than rules[0].")
+        consequents.append(numbers(by_output, (n_outputs, n_basis), f"{where}.consequents"))
     terms = np.array(table, dtype=int).reshape(len(rules), len(table[0]))
     coefficients = np.array(consequents).transpose(0, 2, 1).copy()
     return terms, np.array(weights), np.array(rows), coefficients
@@ -255,27 +247,32 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
 def _support(items, n_rules, n_inputs):
     """The support of the rules, out of an entry for each."""
     n_factor = n_inputs * (n_inputs + 1) // 2
-    shares, radii, centers, factors = [], [], [], []
     if len(_list(items, "support")) != n_rules:
         raise ValueError(f"support has {len(items)} entries; the model has {n_rules} rules.")
+    found = []
     for r, item in enumerate(items):
         where = f"support[{r}]"
-        *numbers, middle, triangle = _members(item, ["share", "radius", "center", "factor"], where)
-        share = number(numbers[0], f"{where}.share", 0.0, 1.0)
-        radius = number(numbers[1], f"{where}.radius", 0.0)
-        if len(_list(middle, where)) != n_inputs or len(_list(triangle, where)) != n_factor:
+        share, radius, center, factor = _members(
+            item, ["share", "radius", "center", "factor"], where
+        )
+        if len(_list(center, where)) != n_inputs or len(_list(factor, where)) != n_factor:
             raise ValueError(
                 f'"center" and "factor" of {where} must be lists of {n_inputs} and {n_factor} '
                 "numbers."
             )
-        shares.append(share)
-        radii.append(radius)
-        centers.append([number(value, f"{where}.center") for value in middle])
-        factors.append([number(value, f"{where}.factor") for value in triangle])
+        found.append(
+            (
+                number(share, f"{where}.share", 0.0, 1.0),
+                numbers(center, (n_inputs,), f"{where}.center"),
+                numbers(factor, (n_factor,), f"{where}.factor"),
+                number(radius, f"{where}.radius", 0.0),
+            )
+        )
+    shares, centers, factors, radii = map(np.array, zip(*found, strict=True))
     # Asked for now that the file has shown to be as large.
     factor = np.zeros((n_rules, n_inputs, n_inputs))
     factor[:, *np.tril_indices(n_inputs)] = factors
-    return RuleSupport(np.array(shares), np.array(centers), factor, np.array(radii))
+    return RuleSupport(shares, centers, factor, radii)
 
 
 def _rule_base(kind, groups, table):
