@@ -1,7 +1,7 @@
 """Scores: how many standard deviations rows that a model has not seen lie from its predictions."""
 
 import inspect
-from contextlib import nullcontext
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,6 @@ from sklearn.frozen import FrozenEstimator
 from sklearn.pipeline import Pipeline
 
 from .._sklearn import safe_indexing
-from .._validation import untold
 from ..exceptions import OutOfBoundsWarning
 
 __all__ = ["Scorer", "final_step"]
@@ -43,7 +42,9 @@ class Scorer:
     def predicted(self, estimator, X, warn=True):
         """Predictions and deviations, (n_rows, n_outputs)."""
         # That a row held out lies beyond the others is what is to be measured.
-        with nullcontext() if warn else untold(OutOfBoundsWarning):
+        with warnings.catch_warnings():
+            if not warn:
+                warnings.simplefilter("ignore", OutOfBoundsWarning)
             if not self.scaled:
                 centers = np.asarray(estimator.predict(X), dtype=float)
                 centers = centers.reshape(len(centers), -1)

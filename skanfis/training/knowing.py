@@ -15,13 +15,14 @@ where the search without constraints asks for ten: few candidates are compared h
 known speaks for them too.
 """
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
 
-from .._validation import collected_warnings, warn_user
+from .._validation import warn_user
 from ..bounds.wishes import Wishes
 from ..exceptions import InfeasibleConstraintsError
 from .result import Fitted
@@ -84,8 +85,10 @@ class _Trial:
 
 def _heard(fit, *args):
     """A fit, and what it would have warned of."""
-    with collected_warnings() as told:
-        return fit(*args), told
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        found = fit(*args)
+    return found, [(str(one.message), one.category) for one in told]
 
 
 def _counts(fitted):
