@@ -41,7 +41,6 @@ def named_refusals(**tables):
     refuse_lazy(**tables)
     for what, table in tables.items():
         _check_kind(table, what)
-        _check_columns(table, what)
     try:
         yield
     except (TypeError, ValueError) as error:
@@ -65,11 +64,17 @@ def refuse_lazy(**tables):
 
 
 def _check_kind(table, what):
-    if issparse(table):
+    """Raise where a table is sparse or masked, or a column shares its name or holds times."""
+    is_frame = hasattr(table, "columns") and hasattr(table, "dtypes")
+    names = list(table.columns) if is_frame else [getattr(table, "name", None)]
+    dtypes = list(table.dtypes) if is_frame else [getattr(table, "dtype", None)]
+    is_sparse_frame = is_frame and dtypes and all(hasattr(one, "fill_value") for one in dtypes)
+    if issparse(table) or is_sparse_frame:
+        dense = f"{what}.sparse.to_dense()" if is_frame else f"{what}.toarray()"
         raise TypeError(
-            f"Sparse data was passed for {what}, but dense data is required: give "
-            f"{what}.toarray(). In a Pipeline, OneHotEncoder(sparse_output=False) and "
-            "ColumnTransformer(..., sparse_threshold=0) hand on dense data."
+            f"Sparse data was passed for {what}, but dense data is required: give {dense}. In a "
+            "Pipeline, OneHotEncoder(sparse_output=False) and ColumnTransformer(..., "
+            "sparse_threshold=0) hand on dense data."
         )
     if np.ma.is_masked(table):
         masked = np.ma.getmaskarray(table).reshape(len(table), -1).any(axis=1)
@@ -78,25 +83,11 @@ def _check_kind(table, what):
             f"{masked.size} rows, first at row {masked.argmax()}: drop these rows"
             + (", or impute X.filled(numpy.nan) in a Pipeline." if what == "X" else ".")
         )
-
-
-def _check_columns(table, what):
-    """Raise where a column has no name of its own, or holds times."""
-    if hasattr(table, "columns") and hasattr(table, "dtypes"):
-        names, dtypes = list(table.columns), list(table.dtypes)
-        twice = [name for name, count in Counter(names).items() if count > 1]
-        if twice:
-            raise ValueError(
-                f"{what} has {names.count(twice[0])} columns of the name {twice[0]!r}: rename or "
-                "drop all but one."
-            )
-        if dtypes and all(hasattr(dtype, "fill_value") for dtype in dtypes):
-            raise TypeError(
-                f"Sparse data was passed for {what}, in columns of a pandas frame; dense data is "
-                f"required. Give {what}.sparse.to_dense()."
-            )
-    else:
-        names, dtypes = [getattr(table, "name", None)], [getattr(table, "dtype", None)]
+    name, count = Counter(names).most_common(1)[0] if names else ("", 0)
+    if count > 1:
+        raise ValueError(
+            f"{what} has {count} columns of the name {name!r}: rename or drop all but one."
+        )
     for name, dtype in zip(names, dtypes, strict=True):
         # Of polars, of NumPy and pandas, a period of pandas.
         is_temporal = getattr(dtype, "is_temporal", bool)()
@@ -110,17 +101,13 @@ def _check_columns(table, what):
 
 def _name_what_is_no_number(table, what, error):
     """Raise ``error`` again by the first column and row of the table that float() refuses."""
-    refused = [
-        (name, *place)
-        for name, column in _columns(table)
-        if (place := _first_refused(column)) is not None
-    ]
-    if not refused:
+    found = [(name, *place) for name, column in _columns(table) for place in _refused(column)]
+    if not found:
         return
-    name, row, value, refusal = refused[0]
+    name, row, value, refusal = found[0]
     kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
     where = "" if name is None else f" in column {name!r}"
-    more = ", ".join(repr(other) for other, *_ in refused[1:])
+    more = ", ".join(repr(other) for other, *_ in found[1:])
     also = f" So do the columns {more}." if more else ""
     advice = "A target must be a number."
     if what == "X":
@@ -133,23 +120,23 @@ def _name_what_is_no_number(table, what, error):
     ) from error
 
 
-def _first_refused(column):
-    """Row and value of the first entry that is no number, and why; None where all are."""
+def _refused(column):
+    """Row and value of the first entry that is no number, and why, if there is one."""
     if getattr(getattr(column, "dtype", None), "kind", "O") in "biufc":
-        return None
+        return
     for row, value in enumerate(column):
         try:
             # Complex numbers are scikit-learn's to refuse.
             float(np.nan if value is None or isinstance(value, complex) else value)
         except (TypeError, ValueError) as refusal:
-            return row, value, refusal
-    return None
+            yield row, value, refusal
+            return
 
 
 def _columns(table):
     """Names and columns of a frame or array that may hold anything; of one dimension no name."""
     if hasattr(table, "columns"):
-        return [(str(name), table[name]) for name in table.columns]
+        return [(name, table[name]) for name in table.columns]
     try:
         array = np.asarray(table, dtype=object)
     except ValueError:
@@ -230,9 +217,20 @@ def feature_indices(given, names, parameter):
             raise ValueError(
                 f"{parameter} is a mask of {len(entries)} entries, but X has {len(names)} columns."
             )
-        found = list(np.flatnonzero(entries))
-    else:
-        found = [_feature_index(entry, names, parameter) for entry in entries]
+        entries = np.flatnonzero(entries).tolist()
+    found = [position_of(entry, names) for entry in entries]
+    if None in found:
+        advice = ""
+        if list(names) == [f"x{j}" for j in range(len(names))]:
+            advice = (
+                " X came without names: give a frame; a step in front hands names on with "
+                "set_output(transform='pandas')."
+            )
+        raise ValueError(
+            f"{parameter} names {entries[found.index(None)]!r}, which is no column of X; its "
+            f"columns are {', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}."
+            + advice
+        )
     if not found:
         raise ValueError(
             f"{parameter}={given!r} names no column: leave it at None for all of them."
@@ -249,22 +247,6 @@ def position_of(entry, names):
     if isinstance(entry, Integral) and -len(names) <= int(entry) < len(names):
         return int(entry) % len(names)
     return None
-
-
-def _feature_index(entry, names, parameter):
-    index = position_of(entry, names)
-    if index is not None:
-        return index
-    advice = ""
-    if isinstance(entry, str) and list(names) == [f"x{j}" for j in range(len(names))]:
-        advice = (
-            " X came without names: give a frame; a step in front hands names on with "
-            "set_output(transform='pandas')."
-        )
-    raise ValueError(
-        f"{parameter} names {entry!r}, which is no column of X; its columns are "
-        f"{', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}.{advice}"
-    )
 
 
 def check_not_negative(sample_weight):

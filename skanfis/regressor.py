@@ -800,7 +800,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
         """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
-        refuse_lazy(sample_weight=sample_weight, groups=groups)
+        refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
         numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
         is_first = not (is_chunk and hasattr(self, "model_"))
         output_names = _target_names(y)
