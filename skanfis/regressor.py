@@ -130,11 +130,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     verbose : bool, default=False
         Whether to write a line per iteration.
     random_state : int, RandomState instance or None, default=None
-        Seed of the clusterings of "auto" and "fcm", and of the rows held out. None stands for one
-        fixed seed: the same data always give the same model.
+        Seed of all that is random; None is one fixed seed: the same data give the same model.
     n_jobs : int, default=None
-        Worker threads for the passes over the data; None is one, -1 is one per core. The result is
-        the same to the last bit for any number. It pays from some 100,000 rows on.
+        Worker threads, -1 is one per core; the result is the same to the last bit for any number.
 
     Attributes
     ----------
@@ -168,8 +166,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Rules that do nothing: "rule", its number; "reason", "never fires" or "repeats rule ...";
         "weight", its part of the data's weight. ``without_rules`` drops them.
     constraints_ : dict or None
-        With constraints: "certified", whether it is proven that they hold; "loss_before",
-        "loss_after"; "margin", "rows" and "boxes" of the proof.
+        With constraints: "certified", whether they are proven to hold; "loss_before", and more.
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
         With ``early_stopping``: as ``loss_curve_``, of the rows held out.
     robust_weights_ : ndarray of shape (n_samples,) or None
@@ -287,11 +284,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         self : ANFISRegressor
-
-        Raises
-        ------
-        ValueError
-            If there is no such parameter, or a setting is given of a word and no object.
         """
         for key in params:
             name, _, setting = key.partition("__")
@@ -335,9 +327,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the data are empty, a single row, or not finite; if weights are negative or leave
-            fewer than two rows; if parameters contradict each other or the data; if the grid has
-            more rules than ``sklearn.get_config()["working_memory"]`` can hold.
+            If the data are a single row or not finite; if weights are negative; if parameters
+            contradict each other or the data; if the grid has more rules than
+            ``sklearn.get_config()["working_memory"]`` can hold.
 
         Warns
         -----
@@ -532,9 +524,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the data are empty or not finite, or have other columns than those before; if
-            ``forgetting`` or ``window`` is out of its range; if the first call has a single row but
-            must find the structure; if what that depends on has been changed since the first call.
+            If the data are not finite, or other columns than those before; if the first call has a
+            single row but must find the structure; if what that depends on has been changed since.
         AttributeError
             If ``loss``, ``early_stopping`` or constraints need all rows again.
 
@@ -644,8 +635,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         merged : ANFISRegressor
-            With the parameters of this one, as after ``partial_fit`` with all rows. The models stay
-            as they are. ``readability_`` it has after its next ``partial_fit``: it is of rows.
+            With the parameters of this one, as after ``partial_fit`` with all rows, but without
+            ``readability_``, which is of rows. The models stay as they are.
 
         Raises
         ------
@@ -693,11 +684,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         self : ANFISRegressor
-
-        Raises
-        ------
-        ValueError
-            If there are more or fewer names than an input has terms, or one twice.
         """
         model = self._fitted_model()
         renamed = given_term_names(model.antecedent, model.input_names, names)
@@ -718,11 +704,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         model : skanfis.model.TSKModel
-
-        Raises
-        ------
-        ValueError
-            If there is no such rule, or none would be left.
         """
         model = self._fitted_model()
         if rules is None:

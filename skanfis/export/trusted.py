@@ -45,12 +45,7 @@ TRUSTED_TYPES = [
     "skanfis.learning.hybrid.Hybrid",
     "skanfis.learning.lse.LeastSquares",
     "skanfis.learning.varpro.VariableProjection",
-    "skanfis.training.farthest.Farthest",
-    "skanfis.training.farthest._Corners",
-    "skanfis.training.firing.Distinct",
-    "skanfis.training.firing.RuleFiring",
-    "skanfis.training.moments.Moments",
-    "skanfis.training.stream.Stream",
+    "skanfis.training.chunks.RowSums",
     "skanfis.support.RuleSupport",
     "skanfis.target.TargetRange",
 ]

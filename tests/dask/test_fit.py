@@ -148,18 +148,13 @@ def test_what_is_lazy_is_what_is_eager(method, n_outputs):
     assert lazy.shape == eager.shape
     assert lazy.dtype == eager.dtype
     assert_array_equal(lazy.compute(), eager)
+    weight = np.linspace(0.0, 1.0, 600)
+    score = model.score(*cut(170, X, y, weight))
+    assert_allclose(score, r2_score(y, model.predict(X), sample_weight=weight), rtol=1e-12)
     table = dd.from_pandas(pd.DataFrame(X), npartitions=3)
     in_frame = getattr(model, method)(table)
     assert_array_equal(in_frame.compute().to_numpy(), eager)
     assert in_frame.compute().dtypes.tolist() if lazy.ndim == 2 else in_frame.dtype == eager.dtype
-
-
-def test_score_is_a_reduction_of_the_same_value():
-    X, y = data(600)
-    Y, weight = np.column_stack([y, X[:, 0] ** 2]), np.random.default_rng(2).uniform(size=600)
-    model = DaskANFISRegressor(n_mfs=2).fit(X, Y)
-    expected = r2_score(Y, model.predict(X), sample_weight=weight)
-    assert_allclose(model.score(*cut(170, X, Y, weight)), expected, rtol=1e-12)
 
 
 def test_fitted_model_is_small_and_travels():
@@ -275,12 +270,6 @@ def test_bad_data_are_refused_by_name(make, error, message):
         DaskANFISRegressor(n_mfs=2).fit(*make())
 
 
-def test_unknown_chunks_that_fit_together_are_fine():
-    X, y = data(300)
-    model = DaskANFISRegressor(n_mfs=2).fit(*with_unknown_chunks(-np.inf))
-    assert_array_equal(model.consequents_, ANFISRegressor(n_mfs=2).fit(X, y).consequents_)
-
-
 @pytest.mark.parametrize("settings", [{"loss": "huber"}, {"early_stopping": True}], ids=str)
 def test_what_needs_every_residual_is_refused(few_are_many, settings):
     with pytest.raises(ValueError, match="needs every row's own residual"):
@@ -305,11 +294,6 @@ def test_arrays_without_names_are_warned_of_once_and_not_by_every_block():
         lazy = model.predict(da.from_array(X, chunks=(100, 2)))
     assert len(caught) == 1
     assert_array_equal(lazy.compute(), model.predict(table[NAMES]))  # a warning would be an error
-
-
-def test_layout_gives_names_where_there_are_none():
-    layout = rows.Partitions.of(*cut(100, *data(300))).layout
-    assert (layout.input_names, layout.output_names) == (("x0", "x1"), ("y",))
 
 
 def test_plain_estimator_names_the_one_for_dask():

@@ -154,17 +154,6 @@ def test_window_is_the_rows_of_the_last_calls(premises, kind):
     assert difference(merged, both, X[rows]) < EXACT
 
 
-@pytest.mark.parametrize("window", [0, -5, 10.0, True, "10"])
-def test_window_out_of_range(premises, window):
-    with pytest.raises(ValueError, match=r"window=.* must be a whole number of 1 or more"):
-        chunk(premises).partial_fit(*surface(), window=window)
-
-
-def test_window_beside_forgetting_is_refused(premises):
-    with pytest.raises(ValueError, match="two ways to let old rows go"):
-        chunk(premises).partial_fit(*surface(), window=50, forgetting=0.9)
-
-
 def test_drift_of_inputs_costs_no_digits(premises):
     """The first chunk lies a million of its own deviations from the rest."""
     X, y = surface()
@@ -307,10 +296,18 @@ def chunk(premises, **settings):
     return ANFISRegressor(partition=premises, solver="lse", **settings)
 
 
-@pytest.mark.parametrize("forgetting", [0.0, -0.1, 1.01, np.nan, "0.9", True, None])
-def test_forgetting_out_of_range(premises, forgetting):
-    with pytest.raises(ValueError, match=r"forgetting=.*above 0 and at most 1"):
-        chunk(premises).partial_fit(*surface(), forgetting=forgetting)
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        *(({"forgetting": f}, "forgetting=.*above 0 and at most 1") for f in (0.0, 1.01, np.nan)),
+        *(({"forgetting": f}, "forgetting=.*above 0 and at most 1") for f in ("0.9", True, None)),
+        *(({"window": w}, "window=.* a whole number of 1 or more") for w in (0, -5, 10.0, True)),
+        ({"window": 50, "forgetting": 0.9}, "two ways to let old rows go"),
+    ],
+)
+def test_forgetting_and_window_out_of_range(premises, given, said):
+    with pytest.raises(ValueError, match=said):
+        chunk(premises).partial_fit(*surface(), **given)
 
 
 BAD_CHUNKS = {
