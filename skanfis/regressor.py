@@ -44,7 +44,7 @@ from .naming import default_output_names, given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .policies import OUT_OF_BOUNDS
 from .training import Callbacks, ValidatedData, chunk_checks, fit_rules, model_without_rules
-from .training.chunks import RowSums, solve
+from .training.chunks import RowSums, fitted_weights, solve
 from .training.settings import given_weights, solver_of, structure_request
 
 __all__ = ["ANFISRegressor"]
@@ -375,7 +375,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
-        for name in ("_chunks", "_chunk_settings", "_first_penalty", "n_samples_seen_"):
+        for name in ("_chunks", "_chunk_settings", "_first_weights", "n_samples_seen_"):
             self.__dict__.pop(name, None)
         if callbacks is not None:
             callbacks.end(self.model_)
@@ -578,8 +578,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             older = [one.faded(forgetting**n_rows) for one in older]
             self._chunks = (reduce(RowSums.plus, [*older, latest]),)
         if is_fitted:
-            # What this fit has found holds for further rows too: as a prior, of so many rows.
-            self._first_penalty = self._penalty, self._chunks[0].effective_weight
+            # What this fit has found holds for further rows too, as a prior of fixed strength.
+            self._first_weights = fitted_weights(self, self._chunks[0])
         else:
             self._solve_chunks()
             self.readability_ = readability_of_rows(self.model_, *rows)
@@ -614,7 +614,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     def _solve_chunks(self):
         """The model of all chunks that count."""
-        first = getattr(self, "_first_penalty", None)
+        first = getattr(self, "_first_weights", None)
         solved = solve(reduce(RowSums.plus, self._chunks), given_weights(self), first)
         self.model_ = solved.model.with_out_of_bounds(*policy_of(self.out_of_bounds))
         self.n_iter_ = 1
@@ -742,7 +742,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     def _keep_weights(self, penalty):
         """Set the attributes that tell the weights on the consequents, and the noise."""
-        self._penalty = penalty
         self.agreement_, self.alpha_, self.slope_alpha_ = (
             penalty.agreement,
             penalty.alpha,

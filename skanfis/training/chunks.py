@@ -26,7 +26,7 @@ from ..target import TargetRange
 from .chunk_checks import check_distance
 from .pruning import RuleStatistics, redundant_rules
 
-__all__ = ["RowSums", "Solved", "joined_scales", "solve"]
+__all__ = ["RowSums", "Solved", "fitted_weights", "joined_scales", "solve"]
 
 # The weights of the penalty that are found where premises stay.
 _FREE = ("agreement", "alpha", "slope")
@@ -359,23 +359,38 @@ class Solved:
     redundant_rules: list[dict] = field(default_factory=list)
 
 
+def fitted_weights(estimator, sums: RowSums):
+    """The weights of the penalty that a fit to these rows has found, times rows, in plain types."""
+    place, n_rows = list(sums.base.input_names).index, sums.effective_weight
+    return {
+        "agreement": n_rows * estimator.agreement_,
+        "alpha": n_rows * estimator.alpha_,
+        "slope": n_rows * estimator.slope_alpha_,
+        "pulls": [
+            ([place(name) for name in one["inputs"]], one["pull"]) for one in estimator.pulls_
+        ],
+        "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
+    }
+
+
 def solve(sums: RowSums, given, first=None) -> Solved:
     """Solve for the consequents.
 
-    ``given`` are weights of the penalty, by name. The others are those that a fit has found,
-    ``first``, a Penalty and for how many rows; without a fit, the evidence finds them.
+    ``given`` are weights of the penalty, by name. The others are those of ``first``, which
+    :func:`fitted_weights` gives; without it, the evidence finds them.
     """
     antecedent, none = sums.base.antecedent, np.empty(0)
     given = {key: given[key] for key in _FREE if key in given}
-    free = [key for key in _FREE if key not in given]
-    penalty = FIRST_PENALTY
     if first is not None:
         # Relative to a mean over rows, they fall with their number.
-        penalty = scaled(first[0], _FREE, first[1] / sums.effective_weight)
-        for key, pulls in (("alpha", "pulls"), ("slope", "slope_pulls")):
-            given |= {pulls: {}} if key in given else {}
-    problem = _ProblemOfSums(sums, replace(penalty, **given, stiffness=0.0))
-    if free and first is None:
+        found = {key: first[key] / sums.effective_weight for key in _FREE}
+        if "alpha" not in given:
+            found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
+            found["slope_pulls"] = dict(first["slope_pulls"])
+        given = found | given
+    free = [key for key in _FREE if key not in given]
+    problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
+    if free:
         premise = Premise(antecedent, none, none, none, ())
         tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
