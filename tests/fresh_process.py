@@ -18,8 +18,8 @@ import numpy as np
 
 
 def in_a_fresh_process(folder):
-    """Run this file in a process whose C library is told to give freed memory back at once."""
-    environment = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536", "MPLBACKEND": "nonsense"}
+    """Run this file in a process of its own."""
+    environment = os.environ | {"MPLBACKEND": "nonsense"}
     done = subprocess.run(
         [sys.executable, __file__, str(folder)],
         env=environment,
@@ -29,26 +29,6 @@ def in_a_fresh_process(folder):
     )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
-
-
-def page_faults():
-    if not sys.platform.startswith("linux"):
-        return None
-    import resource
-
-    from skanfis._memory import keeps_freed_memory
-
-    def faults():
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-        for _ in range(200):
-            np.ones(100_000) * 2.0  # the first one in its place: 195 pages
-        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
-
-    with keeps_freed_memory():
-        with keeps_freed_memory():
-            pass
-        inside = faults()
-    return {"inside": inside, "after": faults()}
 
 
 def modules_for_measuring():
@@ -103,7 +83,6 @@ def pyplot_of_pictures():
 
 
 STEPS = [
-    page_faults,
     modules_for_measuring,
     digests,
     matplotlib_of_the_command,

@@ -20,9 +20,7 @@ PLOTTING = [*NUMERIC, "sklearn", "matplotlib", "pandas"]
 PUBLIC = "__init__"
 LAYERS = {
     "_sklearn": SKLEARN,
-    "_callers": SKLEARN,
     "_threads": SKLEARN,
-    "_memory": [],
     "exceptions": [],
     "blocks": NUMERIC,
     "_validation": SKLEARN,
@@ -41,12 +39,7 @@ LAYERS = {
     "export": [*SKLEARN, "pandas", "onnx", "skl2onnx"],
     "bounds": SKLEARN,
     "inspection": PLOTTING,
-    "parameters": SKLEARN,
     "training": SKLEARN,
-    "row_checks": SKLEARN,
-    "fitted_rules": SKLEARN,
-    "prediction": SKLEARN,
-    "_notebook": [],
     "regressor": SKLEARN,
     PUBLIC: [],
     "intervals": SKLEARN,
@@ -80,10 +73,7 @@ DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 SHARED = {
     "_sklearn": "what scikit-learn may move is taken in one place, and handed on to nobody",
     "_validation": "checks and warnings in one voice, by parameters and columns that it knows",
-    "_callers": "reads the frames of the calls above, which no user should rely on",
-    "_threads": "counts the fits that hold BLAS to one thread, which works only if all do",
-    "_memory": "sets limits of the process's malloc, and counts who needs them set",
-    "_notebook": "overrides private methods of scikit-learn's representation",
+    "_threads": "holds BLAS to one thread, which works only if all fits do",
 }
 
 

@@ -102,7 +102,6 @@ wrong_bounds: float = proven.tightness  # type: ignore[assignment]
 # Rows that keep coming, or that lie on a cluster.
 stream = ANFISRegressor(n_mfs=3).partial_fit(X[:60], y[:60]).partial_fit(X[60:], y[60:])
 whole = stream.merge(ANFISRegressor(partition=stream, solver="lse").partial_fit(X, y))
-matrix: np.ndarray | None = whole.information_ and whole.information_.matrix
 score: float = DaskANFISRegressor(n_mfs=3).fit(X, y).score(X, y)
 
 # A gyro.

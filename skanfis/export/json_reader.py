@@ -220,7 +220,8 @@ def _groups(terms):
 
 def _rules(rules, n_terms, n_inputs, n_outputs):
     """Table of terms, weights, rows and coefficients."""
-    table, weights, rows, consequents = [], [], [], []
+    table, weights, rows = [], [], []
+    consequents: list[np.ndarray] = []
     for r, item in enumerate(rules):
         where = f"rules[{r}]"
         own, weight, n_rows, by_output = _members(

@@ -44,12 +44,7 @@ TRUSTED_TYPES = [
     "skanfis.learning.descent.Hybrid",
     "skanfis.learning.solver.LeastSquares",
     "skanfis.learning.varpro.VariableProjection",
-    "skanfis.training.farthest.Farthest",
-    "skanfis.training.farthest._Corners",
-    "skanfis.training.firing.Distinct",
-    "skanfis.training.firing.RuleFiring",
-    "skanfis.training.moments.Moments",
-    "skanfis.training.stream.Stream",
+    "skanfis.training.chunks.RowSums",
     "skanfis.support.RuleSupport",
     "skanfis.policies.TargetRange",
 ]

@@ -9,7 +9,6 @@ from sklearn import get_config
 from sklearn.base import clone
 from sklearn.utils.validation import has_fit_parameter
 
-from .._callers import names_in_pipeline
 from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..learning.data import StandardisedData
@@ -260,10 +259,8 @@ def report_constant(rows, names):
     scale = rows.inputs
     if not scale.is_constant.any():
         return
-    given = names_in_pipeline(names)
-    names, where = (names, "") if given is None else (given, " after the steps in front")
     flat = [
-        f"{name!r} (always {value + 0.0:.6g}{where})"  # 0, not -0
+        f"{name!r} (always {value + 0.0:.6g})"  # 0, not -0
         for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
         if is_flat
     ]

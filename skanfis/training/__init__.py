@@ -2,7 +2,6 @@
 
 from .data import ValidatedData
 from .fit import fit_rules
-from .information import Information
 from .progress import Callbacks
 from .pruning import RuleStatistics, model_without_rules, redundant_rules
 from .result import Fitted, SolverRun
@@ -10,7 +9,6 @@ from .result import Fitted, SolverRun
 __all__ = [
     "Callbacks",
     "Fitted",
-    "Information",
     "RuleStatistics",
     "SolverRun",
     "ValidatedData",
