@@ -11,7 +11,13 @@ from sklearn.base import _fit_context
 from sklearn.utils import _safe_indexing as safe_indexing
 from sklearn.utils._array_api import _convert_to_numpy as to_numpy
 from sklearn.utils._array_api import get_namespace
-from sklearn.utils._param_validation import HasMethods, Hidden, Interval, StrOptions
+from sklearn.utils._param_validation import (
+    HasMethods,
+    Hidden,
+    Interval,
+    StrOptions,
+    validate_parameter_constraints,
+)
 from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
 try:
@@ -34,6 +40,7 @@ __all__ = [
     "get_namespace",
     "safe_indexing",
     "to_numpy",
+    "validate_parameter_constraints",
 ]
 
 
