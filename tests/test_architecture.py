@@ -261,7 +261,7 @@ def test_checker_finds(module, source):
         ("skanfis.gyro.report", "from skanfis import ANFISRegressor"),
         ("skanfis.gyro.report", "from .. import ANFISRegressor"),
         ("skanfis.gyro.report", "from .. import __version__"),
-        ("skanfis.gyro.displays.error", "from .._units import unit_of"),
+        ("skanfis.gyro.displays.error", "from .._columns import unit_of"),
         ("skanfis.intervals.conformal", "from .._validation import check_finite"),
         ("skanfis.gyro.report", "def plot():\n    from matplotlib import pyplot"),
         ("skanfis.__init__", "from .regressor import ANFISRegressor"),

@@ -7,12 +7,12 @@ import numpy as np
 
 from ..export.c.status import STATUS
 from ._carried import Carried
+from ._columns import SIGNALS
 from ._console import UsageError, refuse_existing, say, usage_errors
 from ._files import check_different, find_logs
 from ._logs import request_of
 from ._staging import Staging
 from ._stream import LogStream
-from ._units import SIGNALS
 from .compensator import GyroCompensator
 
 __all__ = ["apply"]

@@ -8,13 +8,12 @@ import numpy as np
 import pandas as pd
 
 from ..options import LinearExtrapolation
-from ._ask import ask
 from ._choice import Choice, choose, choose_in_folds, some_rows
+from ._columns import SIGNALS, ask
 from ._glitches import find_glitches
 from ._models import make_estimator
 from ._simpler import Simpler, simpler_compensations
 from ._split import Split
-from ._units import SIGNALS
 from ._verdict import Verdict, judge
 from .compensator import GyroCompensator, features
 from .log import LogError

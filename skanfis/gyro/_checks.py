@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._units import CANONICAL, SIGNALS, convert, declared_units, plausible_units, units_of
+from ._columns import CANONICAL, SIGNALS, convert, declared_units, plausible_units, units_of
 from .errors import LogError
 
 __all__ = [

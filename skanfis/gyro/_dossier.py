@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from ._columns import RATE_UNITS
 from ._limits import Limit, parse_limit
-from ._rate_units import RATE_UNITS
 
 __all__ = ["Dossier", "LogFile", "add_report_options", "dossier_of"]
 

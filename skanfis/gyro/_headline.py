@@ -1,6 +1,6 @@
 """Which compensation to use, in words that report and command share."""
 
-from ._rate_units import RATE_UNITS
+from ._columns import RATE_UNITS
 from ._simpler import LAW_AND_LINE, NOTHING
 from .displays._style import SYMBOL, figures
 

@@ -4,8 +4,8 @@ import difflib
 from dataclasses import dataclass, field
 
 from ._checks import LABELS, QUANTITIES
+from ._columns import CANONICAL
 from ._guess import guess_columns
-from ._units import CANONICAL
 from .errors import LogError
 
 __all__ = ["COLUMNS", "Layout", "Request", "settle"]

@@ -10,8 +10,8 @@ import math
 import re
 from dataclasses import dataclass, replace
 
+from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of
 from ._figures_of_merit import figures_of_merit
-from ._rate_units import RATE_UNITS, in_rate_unit, rate_unit_of
 
 __all__ = ["Limit", "parse_limit"]
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._checks import LARGEST_AT_REST, check_at_rest, check_log
+from ._columns import SIGNALS
 from ._console import UsageError, check_device, pairs, usage_errors
 from ._layout import Request
 from ._table import LogFile
 from ._thinned import read_thinned
-from ._units import SIGNALS
 from .compensator import INPUTS
 from .errors import LogError
 from .log import checked_request, read

@@ -3,55 +3,16 @@
 import re
 from dataclasses import dataclass
 
-__all__ = ["ColumnName", "unit_in"]
+from ._columns import unit_in
 
-_TIME, _TEMPERATURE, _RATE, _SIGNAL = "time", "temperature", "rate", "signal"
+__all__ = ["ColumnName"]
 
-# Spellings in lower case, without blanks, of units as ``_units`` names them.
-_UNITS = {
-    _TIME: {
-        "s": "s sec secs second seconds",
-        "ms": "ms msec millis millisecond milliseconds",
-        "us": "us µs μs usec micros microsecond microseconds",
-        "ns": "ns nsec nanos nanosecond nanoseconds",
-        "min": "min minute minutes",
-        "h": "h hr hrs hour hours",
-    },
-    _TEMPERATURE: {
-        "degC": "degc °c ℃ c celsius deg_c cel",
-        "K": "k kelvin degk °k",
-        "degF": "degf °f ℉ f fahrenheit deg_f",
-    },
-    _RATE: {
-        "deg/s": "deg/s °/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec",
-        "deg/h": "deg/h °/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg/hour",
-        "rad/s": "rad/s rad_s rads radps rad/sec rad_sec rad_per_s",
-        "mrad/s": "mrad/s mrad_s mradps",
-        "rpm": "rpm",
-    },
-    _SIGNAL: {
-        "counts": "counts count cnts cnt lsb lsbs digits raw adc codes",
-        "V": "v volt volts",
-        "mV": "mv millivolt millivolts",
-    },
-}
-_MEANT = {
-    spelling: (quantity, unit)
-    for quantity, units in _UNITS.items()
-    for unit, spellings in units.items()
-    for spelling in spellings.split()
-}
 _BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]\s*$|[,/]\s*([^,/\s][^,]*)$")
 # mV first: it is one word, for all its letters of two cases.
 _WORD = re.compile(r"mV(?![A-Za-z])|[A-Z]?[a-zµäöüß°]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_a-zA-Z]+")
 # Names that hold two words without a sign between them.
 _FUSED = re.compile(r"(gyro|gyr|omega|rate|imu|g|w|acc|accel|a|mag|m)([xyz])$")
 _FULL = {"g": "gyro", "w": "omega", "gyr": "gyro", "a": "acc", "m": "mag"}
-
-
-def unit_in(text):
-    """Quantity and unit that a text names, or None."""
-    return _MEANT.get("".join(text.split()).casefold())
 
 
 @dataclass(frozen=True)

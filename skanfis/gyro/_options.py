@@ -6,6 +6,7 @@ from pathlib import Path
 from .. import __version__
 from ._calibration import Recipe
 from ._checks import QUANTITIES
+from ._columns import units_of
 from ._dossier import add_report_options
 from ._layout import COLUMNS
 from ._option_types import (
@@ -26,7 +27,6 @@ from ._option_types import (
     terms,
 )
 from ._split import KINDS
-from ._units import units_of
 from .compensator import INPUTS
 
 __all__ = ["PROGRAM", "make_parser"]

@@ -8,10 +8,9 @@ import pandas as pd
 
 from ._budget import budget_of
 from ._certain import certain_of
-from ._columns import label_texts
+from ._columns import RATE_UNITS, in_rate_unit, label_texts
 from ._dossier import Dossier
 from ._figures_of_merit import FIGURES_OF_ALLAN
-from ._rate_units import RATE_UNITS, in_rate_unit
 from ._reading import readability_of
 from ._specification import check_limits
 from .allan import ROWS_PER_TIME, allan_coefficients, allan_deviation

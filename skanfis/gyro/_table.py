@@ -10,10 +10,10 @@ import pandas as pd
 from ._average import Averager
 from ._checks import LABELS, QUANTITIES, check_finite, check_label
 from ._clock import Clock
+from ._columns import SIGNALS, convert
 from ._layout import Layout, Request, settle
 from ._parquet import ParquetLog, is_parquet
 from ._text import TextLog
-from ._units import SIGNALS, convert
 from .errors import LogError, shortened
 
 __all__ = ["LogFile"]

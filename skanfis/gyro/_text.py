@@ -8,7 +8,7 @@ from itertools import islice
 
 import pandas as pd
 
-from ._names import unit_in
+from ._columns import unit_in
 from .errors import LogError
 
 __all__ = ["TextLog"]

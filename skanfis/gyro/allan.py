@@ -16,8 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._columns import check_column
-from ._rate_units import PER_HOUR
+from ._columns import PER_HOUR, check_column
 from .metrics import rows_by_run
 
 __all__ = ["AllanCoefficients", "allan_coefficients", "allan_deviation"]

@@ -12,6 +12,7 @@ from ..inspection.labels import printable
 from ._apply import apply
 from ._calibration import Recipe, calibrate
 from ._certain import certain_of
+from ._columns import SIGNALS
 from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
 from ._dossier import dossier_of
 from ._files import check_different, find_logs
@@ -20,7 +21,6 @@ from ._options import PROGRAM, make_parser
 from ._split import choose_split
 from ._staging import Staging
 from ._summary import errors_and_verdict
-from ._units import SIGNALS
 from .c_code import export_c_physics
 from .errors import LogError
 from .html_report import report_page, rules_text

@@ -16,7 +16,7 @@ from ..export import export_json, found_by_search
 from ..export.c.status import STATUS
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, shown
-from ._ask import ask
+from ._columns import ask
 from ._frozen import FrozenRules, joined, law_and_rules
 from ._law_json import law_document, read_law
 from .compose import ResidualRegressor

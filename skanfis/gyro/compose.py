@@ -19,7 +19,7 @@ from sklearn.utils.validation import (
 )
 
 from .. import ANFISRegressor
-from ._ask import ask
+from ._columns import ask
 from .physics import OpenLoopArcsineRegressor
 
 __all__ = ["ResidualRegressor"]

@@ -7,8 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import is_numeric_dtype
 
-from ._columns import check_column, check_labels
-from ._scalars import check_number
+from ._columns import check_column, check_labels, check_number
 
 __all__ = ["clip_dwells", "find_dwells", "resample_in_temperature"]
 

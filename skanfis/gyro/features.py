@@ -27,8 +27,8 @@ from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted
 
 from ..blocks import LARGE_BLOCK_ROWS, row_blocks
+from ._columns import check_number
 from ._run_feature import Column, RunFeature
-from ._scalars import check_number
 
 __all__ = ["ThermalLag", "ThermalRate", "TimeSincePowerOn"]
 

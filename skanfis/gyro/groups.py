@@ -17,8 +17,7 @@ from sklearn.model_selection import check_cv
 from sklearn.utils import check_scalar
 
 from ..exceptions import SplitLeakWarning
-from ._columns import check_column, check_labels
-from ._scalars import check_number
+from ._columns import check_column, check_labels, check_number
 
 __all__ = [
     "check_split",

@@ -15,11 +15,11 @@ import numpy as np
 import pandas as pd
 
 from ._checks import LABELS, check_log
+from ._columns import declared_units
 from ._files import check_different
 from ._layout import COLUMNS, Request
 from ._runs import lost_rows, name_runs, split_runs
 from ._table import LogFile
-from ._units import declared_units
 from .errors import LogError
 
 __all__ = [

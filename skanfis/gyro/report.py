@@ -9,9 +9,8 @@ from sklearn.utils import check_random_state
 
 from . import metrics
 from ._bootstrap import VALUES, Bootstrap, units_to_resample
-from ._columns import check_column, check_labels
+from ._columns import RATE_UNITS, check_column, check_labels, in_rate_unit
 from ._figures_of_merit import figures_of_merit
-from ._rate_units import RATE_UNITS, in_rate_unit
 
 __all__ = ["gyro_report"]
 

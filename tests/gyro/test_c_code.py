@@ -15,7 +15,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
-from skanfis.gyro._ask import ask
+from skanfis.gyro._columns import ask
 
 from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from ..quick import quick

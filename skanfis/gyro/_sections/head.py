@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from .._columns import RATE_UNITS
 from .._headline import ARTICLES, headline
-from .._rate_units import RATE_UNITS
 from .._simpler import NOTHING
 from ..displays._style import figures
 from ..metrics import rms

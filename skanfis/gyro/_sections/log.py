@@ -1,6 +1,6 @@
 """The log: its size, ranges and scale factor; and the options of the command."""
 
-from .._units import SIGNALS
+from .._columns import SIGNALS
 from .words import unit_of
 
 __all__ = ["log"]

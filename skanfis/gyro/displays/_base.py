@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from .._rate_units import RATE_UNITS
+from .._columns import RATE_UNITS
 from ._style import SYMBOL
 
 __all__ = [

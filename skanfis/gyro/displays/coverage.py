@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from ...inspection.labels import as_label
-from .._ask import ask
-from .._columns import evenly_chosen
+from .._columns import ask, evenly_chosen
 from ._base import binned, cells_table
 from ._style import NO_DATA, dress, make_axes
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from .._rate_units import PER_HOUR
+from .._columns import PER_HOUR
 from ._base import DisplayInUnit, binned, check_rows, mean_by_cell
 from ._style import COOLING, WARMING, dress, figures, make_axes
 

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._columns import check_column
-from .._rate_units import PER_HOUR
+from .._columns import PER_HOUR, check_column
 from ._lines import centred, least_squares, line, rate_and_output
 from ._runs import rows_by_run
 
