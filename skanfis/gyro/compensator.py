@@ -18,7 +18,7 @@ from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, shown
 from ._columns import ask
 from ._frozen import FrozenRules, joined, law_and_rules
-from ._law_json import law_document, read_law
+from ._law_text import law_document, read_law
 from .compose import ResidualRegressor
 from .features import ThermalRate, TimeSincePowerOn
 

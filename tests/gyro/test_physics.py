@@ -7,7 +7,6 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
-from skanfis.gyro import _law_fit
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
 
 REFERENCE = 20.0
@@ -63,37 +62,6 @@ def test_phase_is_that_of_the_planted_law(rng):
     # The planted amplitude is negative; the law's factor is positive by convention.
     expected = factor * np.deg2rad(rate + bias)
     np.testing.assert_allclose(arcsine().fit(X, rate).phase(X), expected, atol=1e-9)
-
-
-@pytest.mark.parametrize("has_offset", [False, True])
-@pytest.mark.parametrize("has_lag", [False, True])
-def test_jacobian_is_that_of_the_misfit(rng, has_lag, has_offset):
-    X, rate = calibration(rng, n_rows=40)
-    thermal_rate = rng.normal(size=(40, int(has_lag)))
-    log = _law_fit.standardise(np.hstack([X, thermal_rate]), rate, rng.uniform(0.5, 2.0, 40))
-    shape = _law_fit.Shape((2, 1, 3), has_lag, has_offset)
-    # Far from the optimum, where no term of the derivative is hidden by a small residual.
-    point = rng.uniform(0.2, 0.8, shape.n_coefficients)
-    exact = _law_fit.jacobian(point, log, shape)
-    for j, column in enumerate(exact.T):
-        step = np.zeros(point.size, dtype=complex)
-        step[j] = 1e-30j
-        # Complex step: no difference is taken, so that the derivative is exact to rounding.
-        by_step = complex_misfit(point + step, log, shape).imag / 1e-30
-        np.testing.assert_allclose(column, by_step, rtol=1e-12, atol=1e-13)
-
-
-def complex_misfit(parameters, log, shape):
-    """The misfit from its definition, for complex parameters."""
-    s, k, b, rest = np.split(parameters, np.cumsum([degree + 1 for degree in shape.degrees]))
-    tau = log.tau + (rest[0] if shape.has_lag else 0.0) * log.rho
-    value = np.polynomial.polynomial.polyval
-    phase = value(tau, k) * (log.rate + value(tau, b))
-    output = value(tau, s) / k[0] * np.sin(phase) + (rest[-1] if shape.has_offset else 0.0)
-    misfit = log.root_weights * (output - log.output)
-    found = _law_fit.misfit(parameters.real, log, shape)
-    np.testing.assert_allclose(found, misfit.real, atol=1e-13)
-    return misfit
 
 
 def test_lag_of_the_thermometer_comes_back(rng):
