@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from ..exceptions import OutOfBoundsWarning
 from ..export.c.builder import ROWS, STATUS, TOLERANCE, size_of_sum
 from ..policies import SILENT
-from ._frozen import FrozenRules
+from .compose import FrozenRules
 from .physics import OpenLoopArcsineRegressor
 
 __all__ = ["Composition", "known_answers"]

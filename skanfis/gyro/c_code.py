@@ -31,8 +31,8 @@ from ..export.c.builder import (
 )
 from ..policies import SILENT
 from ._c_composition import Composition, known_answers
-from ._frozen import law_and_rules
 from ._law_text import past_phase
+from .compose import law_and_rules
 
 __all__ = ["export_c_physics"]
 
