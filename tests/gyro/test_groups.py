@@ -89,7 +89,7 @@ def test_tolerance_decides_where_it_is_given():
     ids=["1500", "5000", "15000", "500000", "sine", "normal"],
 )
 def test_a_rate_that_changes_continuously_has_no_levels(rate):
-    with pytest.raises(ValueError, match=r"no levels: it changes continuously between -.*clip_dw"):
+    with pytest.raises(ValueError, match=r"no levels: it changes continuously between -"):
         find_rate_levels(rate)
     with pytest.raises(ValueError, match="no levels"):
         group_by_rate_level(rate)

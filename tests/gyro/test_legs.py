@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from skanfis.gyro._legs import cut_legs, find_legs, name_legs
+from skanfis.gyro._split import _name_legs as name_legs
+from skanfis.gyro._split import cut_legs, find_legs
 
 
 def cycle(*turns, n_rows=400):
