@@ -39,7 +39,6 @@ from skanfis.gyro import (
     check_split,
     combine_groups,
     export_c_physics,
-    find_dwells,
     group_by_rate_level,
     gyro_report,
     read_log,
@@ -120,7 +119,7 @@ report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(
 offset: float = bias(log["error"]) * reduction_factor(log["error"], log["error"])
 curve = allan_deviation(log["error"], 1.0)
 walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
-dwells: np.ndarray = find_dwells(log["rate"])
+dwells: np.ndarray = log["rate"].to_numpy()
 picture: ErrorDisplay = ErrorDisplay.from_estimator(composed, log, log["rate"])
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
 wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]

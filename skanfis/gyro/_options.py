@@ -10,7 +10,6 @@ from ._columns import units_of
 from ._dossier import add_report_options
 from ._layout import COLUMNS
 from ._option_types import (
-    MOST_RULES,
     axis,
     box,
     count,
@@ -20,7 +19,6 @@ from ._option_types import (
     gap,
     jobs,
     positive,
-    rules,
     seconds,
     share,
     sign,
@@ -217,13 +215,6 @@ def _add_model(group):
         help=f"of the low-pass of the temperature's rate ({Recipe.time_constant:g})",
     )
     group.add_argument(
-        "--max-rules",
-        type=rules,
-        default=Recipe.max_rules,
-        metavar="N",
-        help=f"most rules of a search ({Recipe.max_rules}); {MOST_RULES} at most",
-    )
-    group.add_argument(
         "--fit-rows",
         type=count,
         default=Recipe.fit_rows,
@@ -309,11 +300,6 @@ def _add_output(group):
         choices=("c99", "c89"),
         metavar="STD",
         help="also write the model as C (compensator.h, compensator.c) by the standard c99 or c89",
-    )
-    group.add_argument(
-        "--deviation",
-        action="store_true",
-        help="with --c: write the standard deviation too, compensator_deviation(x, deviation)",
     )
     group.add_argument(
         "--saturate",

@@ -10,8 +10,8 @@ import numpy as np
 from ..export import export_c
 from ..inspection.labels import printable
 from ._apply import apply
+from ._budget import proven_bounds
 from ._calibration import Recipe, calibrate
-from ._certain import certain_of
 from ._columns import SIGNALS
 from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
 from ._dossier import dossier_of
@@ -116,9 +116,8 @@ def _calibrate(options, tell):
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
-    for name in ("deviation", "saturate"):
-        if getattr(options, name) and not options.c:
-            raise UsageError(f"--{name} is of the model in C: give --c c99 or --c c89 with it.")
+    if options.saturate and not options.c:
+        raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     _refuse_twice([name for name, *_ in options.box], "--box: {} is given twice.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
@@ -162,7 +161,6 @@ def _recipe(options, inputs, unit):
         max_extrapolation=options.max_extrapolation,
         time_constant=options.time_constant,
         min_coverage=options.min_coverage,
-        max_rules=options.max_rules,
         fit_rows=options.fit_rows,
         n_jobs=options.jobs,
         box=tuple(options.box),
@@ -217,8 +215,7 @@ def _write(calibration, options, paths, folder, axis=""):
             path,
             std=options.c,
             min_coverage=coverage,
-            deviation=options.deviation,
-            saturate=certain_of(calibration).found if options.saturate else None,
+            saturate=proven_bounds(calibration).found if options.saturate else None,
         )
 
 

@@ -159,8 +159,7 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
     label, model, X = case
     # The text is the same but for the names of types, and for what policies do.
     flags = SANITIZE if dtype == "double" and label in ("everything", "rules_raise") else []
-    # Its deviation is held against Python's by the self-test.
-    options = {"dtype": dtype, "std": std, "min_coverage": MIN_COVERAGE, "deviation": True}
+    options = {"dtype": dtype, "std": std, "min_coverage": MIN_COVERAGE}
     code = export_c_physics(model, name="gyro", **options)
     rows = around(X).astype(real)
     used = [j for j, name in enumerate(X) if name != "unused"]

@@ -174,7 +174,7 @@ def test_never_replaces_without_force(calibrated, capsys):
 def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = write_log(tmp_path / "log.csv", log[log["run"] < 3])
-    assert main([path, "--max-rules", "2", "--inputs", "temperature", "output"]) == 0
+    assert main([path, "--inputs", "temperature", "output"]) == 0
     out, err = capsys.readouterr()
     assert (tmp_path / "log-compensator" / "report.html").exists()
     for text in ("reading", "270 rows, 3 runs", "choosing the terms", "fold 3 of 3", "done"):
@@ -219,11 +219,11 @@ def test_physics_and_policy(tmp_path, log, capsys):
 def test_at_rest(tmp_path, capsys):
     log = simulated(n_runs=3, rates=[0.0], profile="ramps")
     path = write_log(tmp_path / "log.csv", log, ["time", "temperature", "output", "run"])
-    arguments = [path, "--at-rest", "--max-rules", "2", "--output", str(tmp_path / "out")]
+    arguments = [path, "--at-rest", "--output", str(tmp_path / "out")]
     assert main([*arguments, "--quiet"]) == 0
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     assert compensator.inputs == ("time", "temperature", "temperature_rate")
-    assert main([path, "--output", str(tmp_path / "two"), "--max-rules", "2", "--quiet"]) == 0
+    assert main([path, "--output", str(tmp_path / "two"), "--quiet"]) == 0
     assert "note           there is no column for the rate" in capsys.readouterr().out
 
 
@@ -326,7 +326,6 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--axes", "q"], "--axes q: no column for the output of this axis is found"),
         (["--scale-factor", "131"], "is for a raw signal at rest"),
         (["--terms", "9,9,9,9"], "9,9,9,9 makes 6,561 rules; at most 500"),
-        (["--max-rules", "1000"], "must be a whole number from 1 to 500"),
         (["--inputs", "output", "output"], "--inputs: output is given twice"),
         (["--separator", "(("], "must be one character"),
         (["--separator", ""], "must be one character"),
