@@ -99,8 +99,8 @@ def budget_of(calibration):
         # Of the difference of two squares rounding may leave less than nothing.
         beyond = np.maximum(deviation**2 - rules.noise_std_**2, 0.0)
         model = float(np.sqrt(np.mean(beyond)))
-    scatter = scatter_between(errors, groups[in_range])
-    return Budget(noise, *scatter, model, np.unique(groups[in_range]).size)
+    scatter, low, high = scatter_between(errors, groups[in_range])
+    return Budget(noise, scatter, low, high, model, np.unique(groups[in_range]).size)
 
 
 def noise_within(residual, groups, noise_of_fit=None):

@@ -3,8 +3,8 @@
 All are judged on the same held-out rows. How many times smaller the elaborate one's error is, is
 the geometric mean over the groups held out of the ratio of RMS errors, with the interval of
 Student's t at 95 %: a mean of squares alone would be decided by a group ten times larger than the
-others. "Decisively" means that the interval lies above 1.02, and that the RMS over all rows falls by
-more than this, where one bad group shows. The models of different folds share training rows: the
+others. "Decisively" means that the interval lies above 1.02, and that the RMS over all rows falls
+by more than this, where one bad group shows. The models of different folds share training rows: the
 interval is a little too narrow.
 """
 

@@ -268,7 +268,7 @@ def check_split(
         labels["runs"] = combine_groups(check_labels(run, "run", len(rate)))
     rows = []
     for train, test in check_cv(cv, y).split(np.zeros((len(rate), 1)), y, groups):
-        row = {"n_train": len(train), "n_test": len(test)}
+        row: dict[str, float] = {"n_train": len(train), "n_test": len(test)}
         for what, of_rows in labels.items():
             share = f"{'on' if what == 'levels' else 'in'}_shared_{what}"
             # A rate that changes continuously has no levels to share.

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from sklearn.base import clone
-from sklearn.model_selection import GridSearchCV
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
@@ -120,14 +118,6 @@ def test_columns_by_name_and_place(rng):
     np.testing.assert_array_equal(placed.predict(frame.to_numpy()), plain.predict(X))
 
 
-def test_without_temperature(rng):
-    rate = rng.uniform(-100, 100, 50)
-    counts = planted_output(rate, np.full(50, REFERENCE))[:, None]
-    law = OpenLoopArcsineRegressor(temperature=None).fit(counts, rate)
-    np.testing.assert_allclose(law.predict(counts), rate, atol=1e-7)
-    assert law.amplitude_.shape == law.sagnac_factor_.shape == law.bias_.shape == (1,)
-
-
 def test_constant_temperature_is_said_and_survived(rng):
     X, rate = calibration(rng)
     X[:, 1] = REFERENCE
@@ -230,19 +220,6 @@ def test_bad_logs_are_refused(rng):
         OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
     with pytest.raises(ValueError, match="sample_weight must be zero or positive"):
         OpenLoopArcsineRegressor().fit(X, rate, sample_weight=-np.ones(20))
-
-
-def test_degrees_are_found_by_grid_search(rng):
-    X, rate = calibration(rng, n_rows=300, bias=[0.0, 1e-3, 1e-4])
-    X[:, 0] += 300.0 * rng.standard_normal(300)
-    search = GridSearchCV(
-        arcsine(),
-        {"bias_degree": [0, 1, 2]},
-        cv=3,
-        scoring="neg_root_mean_squared_error",
-    ).fit(X, rate)
-    assert search.best_params_ == {"bias_degree": 2}
-    assert clone(search.best_estimator_).bias_degree == 2
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
