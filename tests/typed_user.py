@@ -37,9 +37,9 @@ from skanfis.gyro import (
     bias,
     bias_stability,
     check_split,
-    combine_groups,
     export_c_physics,
     group_by_rate_level,
+    group_by_run,
     gyro_report,
     read_log,
     reduction_factor,
@@ -144,7 +144,7 @@ sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
 half: float | np.ndarray = sure.half_width(coverage=0.95)
 model.partial_fit(frame, y, forgetting=0.99)
 stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
-labels: np.ndarray = combine_groups(log["run"], dwells)
+labels: np.ndarray = group_by_run(log["time"])
 export_text(model, precision="many")  # type: ignore[arg-type]
 export_c(model, coverage="most")  # type: ignore[arg-type]
 model.coverage(None)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from .displays import (
 )
 from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
-from .groups import check_split, combine_groups, find_rate_levels, group_by_rate_level, group_by_run
+from .groups import check_split, find_rate_levels, group_by_rate_level, group_by_run
 from .log import read_log
 from .metrics import (
     bias,
@@ -65,7 +65,6 @@ __all__ = [
     "bias_temperature_sensitivity",
     "check_log",
     "check_split",
-    "combine_groups",
     "export_c_physics",
     "find_rate_levels",
     "group_by_rate_level",

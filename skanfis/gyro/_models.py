@@ -74,12 +74,12 @@ def _make_rules(recipe, terms):
     outside = recipe.outside
     if outside == "linear":
         outside = LinearExtrapolation(recipe.max_extrapolation)
-    anfis = ANFISRegressor(
-        "auto" if terms is None else list(terms),
-        partition="grid" if recipe.terms == "search" else "auto",
-        out_of_bounds=outside,
-        n_jobs=recipe.n_jobs,
-    )
+    options = {"out_of_bounds": outside, "n_jobs": recipe.n_jobs}
+    if terms is not None:
+        anfis = ANFISRegressor(list(terms), **options)
+    else:
+        partition = "grid" if recipe.terms == "search" else "auto"
+        anfis = ANFISRegressor(partition=partition, **options)
     return make_pipeline(StandardScaler(), anfis)
 
 

@@ -18,7 +18,6 @@ from ._columns import check_column, check_labels, check_number
 
 __all__ = [
     "check_split",
-    "combine_groups",
     "find_rate_levels",
     "group_by_rate_level",
     "group_by_run",
@@ -163,44 +162,6 @@ def group_by_run(time: ArrayLike, *, max_gap: float | None = None) -> np.ndarray
     return np.concatenate([[0], np.cumsum(begins)])
 
 
-def combine_groups(*labels: ArrayLike) -> np.ndarray:
-    """Groups of the rows that agree in several labels, such as device and run.
-
-    Parameters
-    ----------
-    *labels : array-like of shape (n_samples,)
-        Labels of any type.
-
-    Returns
-    -------
-    groups : ndarray of int of shape (n_samples,)
-        Number of the combination of each row, from 0, in the order of the labels.
-
-    Raises
-    ------
-    ValueError
-        If there are no labels, their lengths differ, or one is missing.
-
-    Examples
-    --------
-    >>> from skanfis.gyro import combine_groups
-    >>> device, run = ["a", "a", "a", "b", "b"], [1, 1, 2, 1, 2]
-    >>> combine_groups(device, run).tolist()
-    [0, 0, 1, 2, 3]
-    """
-    if not labels:
-        raise ValueError("combine_groups needs one column of labels or more.")
-    n_rows = len(np.asarray(labels[0]))
-    table = pd.DataFrame(
-        {place: check_labels(each, f"labels[{place}]", n_rows) for place, each in enumerate(labels)}
-    )
-    for place in table:
-        if table[place].isna().any():
-            row = int(table[place].isna().to_numpy().argmax())
-            raise ValueError(f"labels[{place}] has missing values, the first at row {row}.")
-    return table.groupby(list(table), observed=True).ngroup().to_numpy()
-
-
 def check_split(
     cv: Any,
     rate: ArrayLike,
@@ -265,7 +226,10 @@ def check_split(
     rate = check_column(rate, "rate")
     labels = {"levels": _level_numbers(rate, tolerance)}
     if run is not None:
-        labels["runs"] = combine_groups(check_labels(run, "run", len(rate)))
+        labels["runs"] = pd.factorize(check_labels(run, "run", len(rate)))[0]
+        if labels["runs"].min() < 0:
+            row = labels["runs"].argmin()
+            raise ValueError(f"run has missing values, the first at row {row}.")
     rows = []
     for train, test in check_cv(cv, y).split(np.zeros((len(rate), 1)), y, groups):
         row: dict[str, float] = {"n_train": len(train), "n_test": len(test)}

@@ -18,7 +18,6 @@ from skanfis.datasets import make_ofog
 from skanfis.exceptions import SplitLeakWarning
 from skanfis.gyro import (
     check_split,
-    combine_groups,
     find_rate_levels,
     group_by_rate_level,
     group_by_run,
@@ -119,21 +118,6 @@ def test_runs_begin_where_the_clock_goes_back_or_stands_long():
         group_by_run([0.0, np.nan])
 
 
-def test_combined_groups_agree_in_all_labels(rng):
-    device, run = rng.choice(["b", "a"], 60), rng.integers(4, size=60)
-    groups = combine_groups(device, run)
-    pairs = pd.DataFrame({"device": device, "run": run, "group": groups})
-    assert (pairs.groupby("group").nunique() == 1).all(axis=None)
-    assert pairs.groupby(["device", "run"])["group"].nunique().eq(1).all()
-    assert set(groups) == set(range(8))
-    with pytest.raises(ValueError, match=r"labels\[1\] has 3 rows where the other columns have 2"):
-        combine_groups([1, 2], [1, 2, 3])
-    with pytest.raises(ValueError, match=r"labels\[0\] has missing values, the first at row 1"):
-        combine_groups(["a", None])
-    with pytest.raises(ValueError, match="needs one column"):
-        combine_groups()
-
-
 @pytest.fixture(scope="module")
 def table_data():
     """One gyro on a table that turns at 21 levels in every run."""
@@ -182,6 +166,8 @@ def test_splits_may_be_given_as_scikit_learn_takes_them(table_data):
         assert len(check_split(5, rate)) == 5
     with pytest.raises(ValueError, match="run has 2 rows where the other columns have"):
         check_split(5, rate, run=[1, 2])
+    with pytest.raises(ValueError, match="run has missing values, the first at row 0"):
+        check_split(5, rate, run=[None] * len(rate))
 
 
 @pytest.mark.theory
