@@ -228,8 +228,8 @@ def check_split(
     if run is not None:
         labels["runs"] = pd.factorize(check_labels(run, "run", len(rate)))[0]
         if labels["runs"].min() < 0:
-            row = labels["runs"].argmin()
-            raise ValueError(f"run has missing values, the first at row {row}.")
+            missing = labels["runs"].argmin()
+            raise ValueError(f"run has missing values, the first at row {missing}.")
     rows = []
     for train, test in check_cv(cv, y).split(np.zeros((len(rate), 1)), y, groups):
         row: dict[str, float] = {"n_train": len(train), "n_test": len(test)}
