@@ -158,7 +158,7 @@ def make_ofog(
     table steps through rates of both signs. The table has the error that a compensation must learn,
     and every part of it. A compensator on board knows the columns time, temperature and output (or
     counts), and no others. Hold out whole runs (``run``) or devices (``device``), never single
-    rows: neighbours are nearly equal. Formulas, coefficients and presets: :doc:`gyro_simulator`.
+    rows: neighbours are nearly equal. Formulas, coefficients and presets: :doc:`/gyro_simulator`.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def make_ofog(
     device_spread : float, default=1.0
         Factor in [0, 1] on the tolerances of the population.
     coefficients : dict of str to float, default=None
-        Nominal values in place of the preset's, by their names in :doc:`gyro_simulator`. Zero
+        Nominal values in place of the preset's, by their names in :doc:`/gyro_simulator`. Zero
         turns an effect off.
     random_state : int, RandomState instance or None, default=None
         Seed. Changing ``noise``, ``coefficients`` or ``device_spread`` leaves all that is drawn as

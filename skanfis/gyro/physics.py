@@ -28,7 +28,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     The law :math:`V = A(T) \sin[K(T) (\Omega + b(T))] + V_0` is fitted to a calibration log by
     least squares on the output V, and inverted for the rate,
     :math:`\hat\Omega = \arcsin[(V - V_0) / A(T)] / K(T) - b(T)`. The target is the true *rate*, not
-    the error of the indicated one. See :doc:`gyro_physics`.
+    the error of the indicated one. See :doc:`/gyro_physics`.
 
     Parameters
     ----------
