@@ -9,7 +9,13 @@ from typing import TypeVar
 
 from sklearn.base import _fit_context
 from sklearn.utils import _safe_indexing as safe_indexing
-from sklearn.utils._param_validation import HasMethods, Hidden, Interval, StrOptions
+from sklearn.utils._param_validation import (
+    HasMethods,
+    Hidden,
+    Interval,
+    StrOptions,
+    validate_parameter_constraints,
+)
 from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
 try:
@@ -30,6 +36,7 @@ __all__ = [
     "check_sample_weight",
     "fit_context",
     "safe_indexing",
+    "validate_parameter_constraints",
 ]
 
 

@@ -37,10 +37,9 @@ from skanfis.gyro import (
     bias,
     bias_stability,
     check_split,
-    combine_groups,
     export_c_physics,
-    find_dwells,
     group_by_rate_level,
+    group_by_run,
     gyro_report,
     read_log,
     reduction_factor,
@@ -119,7 +118,7 @@ report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(
 offset: float = bias(log["error"]) * reduction_factor(log["error"], log["error"])
 curve = allan_deviation(log["error"], 1.0)
 walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
-dwells: np.ndarray = find_dwells(log["rate"])
+dwells: np.ndarray = log["rate"].to_numpy()
 picture: ErrorDisplay = ErrorDisplay.from_estimator(composed, log, log["rate"])
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
 wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]
@@ -144,7 +143,7 @@ sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
 half: float | np.ndarray = sure.half_width(coverage=0.95)
 model.partial_fit(frame, y, forgetting=0.99)
 stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
-labels: np.ndarray = combine_groups(log["run"], dwells)
+labels: np.ndarray = group_by_run(log["time"])
 export_text(model, precision="many")  # type: ignore[arg-type]
 export_c(model, min_coverage="most")  # type: ignore[arg-type]
 model.coverage(None)  # type: ignore[arg-type]

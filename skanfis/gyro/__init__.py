@@ -14,10 +14,9 @@ from .displays import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
-from .dwells import clip_dwells, find_dwells, resample_in_temperature
 from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
-from .groups import check_split, combine_groups, find_rate_levels, group_by_rate_level, group_by_run
+from .groups import check_split, find_rate_levels, group_by_rate_level, group_by_run
 from .log import read_log
 from .metrics import (
     bias,
@@ -66,10 +65,7 @@ __all__ = [
     "bias_temperature_sensitivity",
     "check_log",
     "check_split",
-    "clip_dwells",
-    "combine_groups",
     "export_c_physics",
-    "find_dwells",
     "find_rate_levels",
     "group_by_rate_level",
     "group_by_run",
@@ -78,7 +74,6 @@ __all__ = [
     "input_error",
     "read_log",
     "reduction_factor",
-    "resample_in_temperature",
     "residual_peak",
     "residual_peak_to_peak",
     "residual_rms",

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._budget import budget_of
-from ._certain import certain_of
+from ._budget import budget_of, proven_bounds
 from ._columns import RATE_UNITS, in_rate_unit, label_texts
 from ._dossier import Dossier
 from ._figures_of_merit import FIGURES_OF_ALLAN
@@ -158,7 +157,7 @@ class Results:
     @cached_property
     def certain(self):
         """What is proven over the box that was asked for."""
-        return certain_of(self.calibration)
+        return proven_bounds(self.calibration)
 
     @cached_property
     def why_no_allan(self):

@@ -9,8 +9,8 @@ import numpy as np
 from ..export import export_c
 from ..inspection.labels import printable
 from ._apply import apply
+from ._budget import proven_bounds
 from ._calibration import Recipe, calibrate
-from ._certain import certain_of
 from ._checks import LARGEST_AT_REST, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._console import (
@@ -258,7 +258,7 @@ def _write(calibration, options, paths, folder):
             path,
             std=options.c,
             min_coverage=coverage,
-            saturate=certain_of(calibration).found if options.saturate else None,
+            saturate=proven_bounds(calibration).found if options.saturate else None,
         )
 
 
