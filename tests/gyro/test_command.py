@@ -4,7 +4,7 @@ import io
 import os
 import shutil
 import sys
-from functools import lru_cache, partial
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -150,7 +150,6 @@ def test_never_replaces_without_force(calibrated, capsys):
 @pytest.mark.usefixtures("no_report")
 def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(command, "Recipe", partial(command.Recipe, max_rules=2))
     path = write_log(tmp_path / "log.csv", log[log["run"] < 3])
     assert main([path, "--inputs", "temperature", "output"]) == 0
     out, err = capsys.readouterr()
