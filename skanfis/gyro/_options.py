@@ -6,7 +6,6 @@ from pathlib import Path
 from .. import __version__
 from ._calibration import Recipe
 from ._checks import QUANTITIES
-from ._dossier import add_report_options
 from ._layout import COLUMNS
 from ._option_types import (
     MOST_RULES,
@@ -25,6 +24,7 @@ from ._option_types import (
     sign,
     terms,
 )
+from ._report_options import add_report_options
 from ._split import KINDS
 from ._units import units_of
 from .compensator import INPUTS

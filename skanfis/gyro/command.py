@@ -13,17 +13,17 @@ from ._apply import apply
 from ._calibration import Recipe, calibrate
 from ._certain import certain_of
 from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
-from ._dossier import dossier_of
 from ._files import check_different, find_logs
+from ._headline import errors_and_verdict
 from ._logs import find_tasks, read_task
 from ._options import PROGRAM, make_parser
+from ._report_options import report_options
 from ._split import choose_split
 from ._staging import Staging
-from ._summary import errors_and_verdict
 from ._units import SIGNALS
 from .c_code import export_c_physics
 from .errors import LogError
-from .html_report import report_page, rules_text
+from .html_report import check_installed, report_page, rules_text
 from .metrics import hysteresis
 
 __all__ = ["main"]
@@ -125,7 +125,7 @@ def _where_from_and_to(options):
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
     _refuse_overwriting(folder, options)
-    _require_matplotlib()
+    check_installed()
     check_different(paths)
     return folder, paths
 
@@ -187,22 +187,9 @@ def _refuse_twice(names, sentence):
             raise UsageError(sentence.format(name))
 
 
-def _require_matplotlib():
-    """A report without its pictures would be found out at the end only."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        message = "the report needs matplotlib: pip install matplotlib"
-        raise ImportError(message) from error
-    except ValueError as error:
-        # Of its settings; MPLBACKEND is one.
-        reason = printable(str(error).partition(";")[0])
-        raise ImportError(f"matplotlib cannot be imported: {reason}.") from error
-
-
 def _write(calibration, options, paths, folder, axis=""):
     title = _title(options.logs) + (f", axis {axis}" if axis else "")
-    page = report_page(calibration, title, dossier_of(options, paths))
+    page = report_page(calibration, title, report_options(options, paths))
     compensator = calibration.compensator
     (folder / _FILES["report"]).write_text(page, encoding="utf-8")
     joblib.dump(compensator, folder / _FILES["model"])

@@ -1,21 +1,111 @@
 """One table of all figures of merit, per group, before and after, with bootstrap intervals."""
 
-from typing import Any
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.utils import check_random_state
+from scipy.stats import binned_statistic
+from sklearn.utils import check_random_state, resample
 
 from . import metrics
-from ._bootstrap import VALUES, Bootstrap, units_to_resample
 from ._columns import check_column, check_labels
-from ._figures_of_merit import figures_of_merit
 from ._rate_units import RATE_UNITS, in_rate_unit
+from .allan import ALLAN_FIGURES, allan_coefficients, allan_deviation, rows_for_allan
 
-__all__ = ["gyro_report"]
+__all__ = ["figures_of_merit", "gyro_report", "table_of"]
 
-_NAN = float("nan")
+_VALUES = ["before", "before_low", "before_high", "after", "after_low", "after_high"]
+# A nonlinearity is looked for in means over such parts of the range of rates.
+_RATE_BINS = 101
+# With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
+_FEWEST_RUNS = 5
+_N_BLOCKS = 30
+# The spread comes from the runs or blocks: evenly thinned rows show it as well.
+_MOST_ROWS = 2_000
+_FEWEST_DEFINED = 0.9  # part of the resamples that must have the figure
+
+
+class Figure(NamedTuple):
+    """A figure of merit of some columns; those in ``also`` are given by name where there are such.
+
+    With ``combine``, the function is of one run, and ``combine`` of the values of all runs.
+    """
+
+    name: str
+    unit: str
+    function: Callable
+    needs: tuple[str, ...]
+    also: tuple[str, ...] = ()
+    combine: Callable | None = None
+    fewest_runs: int = 1
+    has_interval: bool = True
+
+    def of(self, rows):
+        also = {name: rows[name] for name in self.also if name in rows}
+        return self.function(*(rows[name] for name in self.needs), **also)
+
+    def by_run(self, rows):
+        runs = metrics.rows_by_run(rows.get("run"), rows["rate"].size, self.fewest_runs)
+        return np.array([self.of(_taken(rows, run)) for run in runs])
+
+    def value(self, rows):
+        return self.of(rows) if self.combine is None else self.combine(self.by_run(rows))
+
+
+def figures_of_merit(full_scale=1.0, nominal=1.0, averaging_times=(10.0, 100.0)):
+    """All figures but those of Allan, in the order of the table."""
+    rates, thermal = ("rate", "output"), ("temperature", "temperature_rate")
+    nonlinearity = partial(_nonlinearity, full_scale=full_scale)
+    full, factor = "ppm of full scale", metrics.scale_factor
+    return [
+        Figure("residual_rms", "deg/s", metrics.rms, ("residual",)),
+        Figure("residual_peak", "deg/s", _peak, ("residual",), has_interval=False),
+        Figure("residual_peak_to_peak", "deg/s", np.ptp, ("residual",), has_interval=False),
+        Figure("reduction_factor", "", _reduction, ("rate", "before", "after")),
+        Figure("scale_factor_error", "ppm", partial(_off_nominal, nominal=nominal), rates),
+        Figure("scale_factor_nonlinearity", full, partial(nonlinearity, statistic="max"), rates),
+        Figure(
+            "scale_factor_nonlinearity_rms", full, partial(nonlinearity, statistic="rms"), rates
+        ),
+        Figure("scale_factor_asymmetry", "ppm", metrics.scale_factor_asymmetry, rates),
+        Figure("scale_factor_repeatability", "ppm", factor, rates, (), metrics.relative_spread, 2),
+        Figure(
+            "scale_factor_temperature_sensitivity",
+            "ppm/degC",
+            metrics.scale_factor_temperature_sensitivity,
+            (*rates, "temperature"),
+        ),
+        Figure("bias", "deg/h", metrics.bias, ("error",)),
+        Figure("bias_repeatability", "deg/h", np.mean, ("error",), (), metrics.spread_of_bias, 2),
+        Figure(
+            "bias_temperature_sensitivity",
+            "deg/h/degC",
+            metrics.bias_temperature_sensitivity,
+            ("error", "temperature"),
+            ("temperature_rate",),
+        ),
+        Figure(
+            "bias_ramp_sensitivity",
+            "deg/h/(degC/min)",
+            metrics.bias_ramp_sensitivity,
+            ("error", "temperature_rate"),
+            ("temperature",),
+        ),
+        Figure("hysteresis", "deg/h", metrics.hysteresis, ("error", *thermal)),
+        *(
+            Figure(
+                f"bias_stability_{seconds:g}s",
+                "deg/h",
+                partial(metrics.squares_of_means, averaging_time=seconds),
+                ("error", "time"),
+                combine=metrics.pooled_deviation,
+            )
+            for seconds in averaging_times
+        ),
+    ]
 
 
 def gyro_report(
@@ -41,14 +131,15 @@ def gyro_report(
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
 
     Give held-out predictions: the figures of rows that a compensator was fitted to say nothing.
+    The intervals are percentiles of a bootstrap over whole runs where a group has five or more, and
+    otherwise over some thirty blocks of consecutive rows.
 
     Parameters
     ----------
     rate : array-like of shape (n_rows,)
         True rate, the earth's rate about the input axis included [deg/s].
     before : array-like of shape (n_rows,)
-        Rate indicated without compensation [deg/s]; raw counts over their scale factor
-        (:func:`scale_factor`).
+        Rate indicated without compensation [deg/s]; raw counts over their scale factor.
     after : array-like of shape (n_rows,), default=None
         Compensated rate [deg/s]. Rows of NaN, which the compensator refused, are left out of all
         figures and counted.
@@ -61,11 +152,9 @@ def gyro_report(
     run : array-like of shape (n_rows,), default=None
         Labels of the runs; None is one run.
     groups : array-like of shape (n_rows,), default=None
-        Labels of the groups that get a table of their own beside the whole: runs, devices, rate
-        levels, folds.
+        Labels of the groups that get a table of their own beside the whole.
     inside : array-like of bool of shape (n_rows,), default=None
-        Rows in the bounds of the calibration, as ``in_bounds`` of a compensator tells; the others
-        are counted and stay in.
+        Rows in the bounds of the calibration; the others are counted and stay in.
     full_scale : float, default=None
         Rate to which the nonlinearity is related, positive [deg/s]; None is the largest true rate.
     nominal_scale_factor : float, default=1.0
@@ -73,7 +162,8 @@ def gyro_report(
     averaging_times : tuple of float, default=(10.0, 100.0)
         Lengths of the means of the bias stability, positive [s].
     allan : bool, default=False
-        Whether to read N, B and K off the Allan deviation; needs ``time``, and allantools.
+        Whether to read N, B and K off the Allan deviation of the runs without a refused row; needs
+        ``time``, and allantools.
     confidence_level : float, default=0.95
         Of the intervals, in (0, 1).
     n_resamples : int, default=200
@@ -100,18 +190,6 @@ def gyro_report(
         If a column is not one of finite numbers as long as the others, or a parameter is out of its
         range.
 
-    Notes
-    -----
-    The intervals are percentiles of a bootstrap over whole runs where a group has five or more, and
-    otherwise over some thirty blocks of consecutive rows, because neighbouring rows are alike: an
-    interval over single rows would be far too narrow. Blocks within one run tell nothing of the
-    next run. Figures of rows are resampled on at most 2,000 evenly chosen rows. Peaks have no
-    interval: the largest of a resample says nothing of the largest to come.
-
-    The nonlinearity is that of means over 101 bins of the rate's range, so that noise is not taken
-    for it. Bias figures are of the output over its scale factor (:func:`input_error`); where the
-    rate changes within the runs, what the scale factor's errors leave is in them.
-
     Examples
     --------
     >>> from skanfis.datasets import make_ofog
@@ -120,88 +198,85 @@ def gyro_report(
     >>> train, test = log[log["run"] < 4], log[log["run"] >= 4]
     >>> law = OpenLoopArcsineRegressor("output", "temperature")
     >>> law = law.fit(train[["output", "temperature"]], train["rate"])
-    >>> report = gyro_report(
-    ...     test["rate"],
-    ...     test["output"],
-    ...     law.predict(test[["output", "temperature"]]),
-    ...     run=test["run"],
-    ...     random_state=0,
-    ... )
+    >>> compensated = law.predict(test[["output", "temperature"]])
+    >>> report = gyro_report(test["rate"], test["output"], compensated, random_state=0)
     >>> nonlinearity = report.set_index("figure").loc["scale_factor_nonlinearity"]
     >>> bool(nonlinearity["before"] > 10_000 > nonlinearity["after_high"])
     True
     """
-    columns, refused = _columns(
-        rate=rate,
-        before=before,
-        after=after,
-        temperature=temperature,
-        temperature_rate=temperature_rate,
-        time=time,
+    if inside is not None and np.asarray(inside).dtype != bool:
+        raise ValueError(f"inside must be bool; its dtype is {np.asarray(inside).dtype}.")
+    table = table_of(
+        {
+            "rate": rate,
+            "before": before,
+            "after": after,
+            "temperature": temperature,
+            "temperature_rate": temperature_rate,
+            "time": time,
+            "run": run,
+            "groups": groups,
+            "inside": inside,
+        },
+        labels=("run", "groups", "inside"),
+        gaps=("after",),
     )
-    labels = _labels(columns["rate"].size, run=run, groups=groups, inside=inside)
-    full_scale = np.abs(columns["rate"]).max() if full_scale is None else full_scale
+    full_scale = table["rate"].abs().max() if full_scale is None else full_scale
     _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples)
     if rate_unit not in (None, *RATE_UNITS):
         raise ValueError(
             f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
         )
-    given = set(columns) | {name for name in ("run",) if labels[name] is not None}
+    given = {*table, "output", "residual", "error"}
     figures = [
         figure
-        for figure in figures_of_merit(full_scale, nominal_scale_factor, averaging_times, allan)
-        if given.issuperset(figure.needs)
+        for figure in figures_of_merit(full_scale, nominal_scale_factor, averaging_times)
+        if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
     ]
     generator = check_random_state(random_state)
+    parts = {"all": table}
+    if groups is not None:
+        parts |= dict(iter(table.groupby("groups", sort=False)))
     lines, resampled = [], {}
-    for group, rows in _parts(labels["groups"], refused.size):
-        part = _part(rows, columns, labels)
-        counts, part = _without_refused(part, refused[rows])
-        units, resampled[group] = units_to_resample(part)
-        draws = generator.randint(2**31 - 1)
-        bootstrap = Bootstrap(part, units, resampled[group], n_resamples, confidence_level, draws)
-        lines += [[group, *line] for line in counts + bootstrap.lines(figures)]
-    report = pd.DataFrame(lines, columns=["group", "figure", "unit", *VALUES, "note"])
+    for group, part in parts.items():
+        seed = generator.randint(2**31 - 1)
+        found, resampled[group] = _lines(part, figures, allan, confidence_level, n_resamples, seed)
+        lines += [{"group": group} | line for line in found]
+    report = pd.DataFrame(lines, columns=["group", "figure", "unit", *_VALUES, "note"])
     if after is None:
-        report = report.drop(columns=VALUES[3:])
+        report = report.drop(columns=_VALUES[3:])
     if rate_unit is not None:
-        report = _in_unit(report, rate_unit)
+        units, factors = zip(*(in_rate_unit(u, rate_unit) for u in report["unit"]), strict=True)
+        values = report.columns.intersection(_VALUES)
+        report = report.assign(unit=units, **report[values].mul(np.array(factors), axis=0))
+    # Before compensation nothing is reduced.
+    report.loc[report["figure"] == "reduction_factor", report.columns.intersection(_VALUES[:3])] = (
+        np.nan
+    )
     report.attrs["resampled"] = resampled
     return report
 
 
-def _in_unit(report, rate_unit):
-    """The report with every rate in one unit."""
-    values = [name for name in VALUES if name in report]
-    units, factors = zip(*(in_rate_unit(unit, rate_unit) for unit in report["unit"]), strict=True)
-    return report.assign(unit=units, **report[values].mul(np.array(factors), axis=0))
+def table_of(columns, labels=(), gaps=()):
+    """Columns of equal length as a table, those that are None left out.
 
-
-def _columns(**columns):
-    """The columns given, as arrays of one length, and which rows were refused."""
-    rate = check_column(columns.pop("rate"), "rate")
-    after = columns.pop("after")
-    found = {"rate": rate}
+    All but ``labels`` must be numbers, and finite; those in ``gaps`` may be NaN.
+    """
+    found: dict[str, np.ndarray] = {}
+    n_rows = None
     for name, values in columns.items():
-        if values is not None:
-            found[name] = check_column(values, name, rate.size)
-    refused = np.zeros(rate.size, dtype=bool)
-    if after is not None:
-        after = np.array(after, dtype=float)
-        refused = np.isnan(after)
-        after[refused] = 0.0
-        found["after"] = check_column(after, "after", rate.size)
-    return found, refused
-
-
-def _labels(n_rows, run, groups, inside):
-    labels = {"run": run, "groups": groups, "inside": inside}
-    if inside is not None and np.asarray(inside).dtype != bool:
-        raise ValueError(f"inside must be bool; its dtype is {np.asarray(inside).dtype}.")
-    return {
-        name: None if values is None else check_labels(values, name, n_rows)
-        for name, values in labels.items()
-    }
+        if values is None:
+            continue
+        if name in labels:
+            found[name] = check_labels(values, name, n_rows)
+        elif name in gaps:
+            is_gap = np.asarray(pd.isna(values))
+            filled = check_column(np.where(is_gap, 0.0, values), name, n_rows)
+            found[name] = np.where(is_gap, np.nan, filled)
+        else:
+            found[name] = check_column(values, name, n_rows)
+        n_rows = found[name].size
+    return pd.DataFrame(found)
 
 
 def _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples):
@@ -217,35 +292,157 @@ def _check_options(full_scale, averaging_times, allan, time, confidence_level, n
         raise ValueError(f"n_resamples={n_resamples} must be zero or positive.")
 
 
-def _parts(groups, n_rows):
-    """Name and rows of the whole and of each group, in order of appearance."""
-    yield "all", np.arange(n_rows)
-    if groups is not None:
-        for rows in metrics.rows_by_run(groups, n_rows, at_least=1):
-            yield groups[rows[0]], rows
+def _lines(part, figures, allan, confidence_level, n_resamples, seed):
+    """Lines of one group, and what was resampled."""
+    is_answered = part["after"].notna() if "after" in part else pd.Series(True, part.index)
+    answered = part[is_answered]
+    units, kind = _units(answered)
+    random_state = np.random.RandomState(seed)
+    n_resamples = n_resamples if units else 0
+    places = np.arange(len(units))
+    draws = [resample(places, random_state=random_state) for _ in range(n_resamples)]
+    cells = {}
+    for side in ("before", "after"):
+        if side in part:
+            cells[side] = _cells(answered, side, figures, units, kind, draws, confidence_level)
+            cells[side] += _allan_cells(part, side, is_answered.to_numpy()) if allan else []
+    names = [(figure.name, figure.unit) for figure in figures]
+    names += ALLAN_FIGURES.items() if allan else []
+    lines = _counts(part, is_answered)
+    for place, (name, unit) in enumerate(names):
+        line = {"figure": name, "unit": unit}
+        for side, found in cells.items():
+            line[side], line[f"{side}_low"], line[f"{side}_high"], _ = found[place]
+        notes = {side: found[place][-1] for side, found in cells.items()}
+        told = [f"{side}: {note}" for side, note in notes.items() if note]
+        line["note"] = notes["before"] if len({*notes.values()}) == 1 else "; ".join(told)
+        lines.append(line)
+    return lines, kind
 
 
-def _part(rows, columns, labels):
-    """The columns of some rows, and the labels that figures need."""
-    part = {name: column[rows] for name, column in columns.items()}
-    needed = {name: labels[name] for name in ("run", "inside")}
-    return part | {name: label[rows] for name, label in needed.items() if label is not None}
+def _units(rows):
+    """The rows of each run, or of blocks of rows within the runs; and which of both."""
+    runs = metrics.rows_by_run(rows.get("run"), len(rows)) if len(rows) else []
+    if len(runs) >= _FEWEST_RUNS:
+        return runs, "runs"
+    length = max(1, -(-len(rows) // _N_BLOCKS))
+    blocks = [run[i : i + length] for run in runs for i in range(0, run.size, length)]
+    return blocks, "blocks of rows"
 
 
-def _without_refused(part, refused):
-    """Lines that count rows, and the part without those that were refused."""
-    n_rows, n_outside = refused.size, 0
-    if "inside" in part:
-        n_outside = int((~part["inside"]).sum())
-    counts = [_count("rows", n_rows, "before" in part)]
+def _counts(part, is_answered):
+    """Lines that count rows: all of them, those refused and those out of bounds."""
+    n_rows, last = float(len(part)), "after" if "after" in part else "before"
+    lines = [{"figure": "rows", "before": n_rows, "after": n_rows}]
     if "after" in part:
-        counts.append(_count("rows_refused", int(refused.sum()), False))
+        lines.append({"figure": "rows_refused", "after": float((~is_answered).sum())})
     if "inside" in part:
-        counts.append(_count("rows_outside", n_outside, "after" not in part))
-    kept = {name: column[~refused] for name, column in part.items() if name != "inside"}
-    return counts, kept
+        lines.append({"figure": "rows_outside", last: float((~part["inside"]).sum())})
+    return [line | {"unit": "", "note": ""} for line in lines]
 
 
-def _count(name, number, in_before):
-    before = float(number) if in_before else _NAN
-    return [name, "", before, _NAN, _NAN, float(number), _NAN, _NAN, ""]
+def _cells(table, side, figures, units, kind, draws, confidence_level):
+    """Value, ends of the interval, and a note, of each figure."""
+    if table.empty:
+        return [(np.nan, np.nan, np.nan, "no row is left in this group")] * len(figures)
+    columns = {name: table[name].to_numpy() for name in table}
+    rows = _with_errors(columns, side)
+    step = max(1, -(-len(table) // _MOST_ROWS))
+    thinned = [unit[::step] for unit in units]
+    samples = [
+        _with_errors(_taken(columns, np.concatenate([thinned[i] for i in draw])), side)
+        for draw in draws
+    ]
+    tails = [50.0 * (1.0 - confidence_level), 50.0 * (1.0 + confidence_level)]
+    cells = []
+    for figure in figures:
+        ends = (np.nan, np.nan)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value, note = _or_nan(figure.value, rows)
+            if draws and not note:
+                note = _why_no_interval(figure, kind)
+            if draws and not note:
+                spread = _spread(figure, rows, samples, draws)
+                if np.isfinite(spread).mean() < _FEWEST_DEFINED:
+                    note = "no interval: too many resamples do not have this figure"
+                else:
+                    ends = np.percentile(spread[np.isfinite(spread)], tails)
+        cells.append((value, *ends, note))
+    return cells
+
+
+def _why_no_interval(figure, kind):
+    if not figure.has_interval:
+        return "largest value: no interval"
+    if figure.combine is not None and kind != "runs":
+        return f"no interval: fewer than {_FEWEST_RUNS} runs"
+    return ""
+
+
+def _spread(figure, rows, samples, draws):
+    """Values of a figure over the resamples."""
+    if figure.combine is None:
+        return np.array([_or_nan(figure.of, sample)[0] for sample in samples])
+    by_run = figure.by_run(rows)
+    return np.array([_or_nan(figure.combine, by_run[draw])[0] for draw in draws])
+
+
+def _taken(columns, rows):
+    return {name: column[rows] for name, column in columns.items()}
+
+
+def _with_errors(rows, side):
+    """The columns with the output of one side, its residual, and its error at the input."""
+    output = rows[side]
+    error = metrics.input_error(rows["rate"], output)
+    return rows | {"output": output, "residual": output - rows["rate"], "error": error}
+
+
+def _allan_cells(part, side, is_answered):
+    """Coefficients read off the Allan deviation, of the runs that were answered whole."""
+    time = part["time"].to_numpy()
+    run = part["run"].to_numpy() if "run" in part else np.zeros(len(part))
+    try:
+        rows, interval = rows_for_allan(time, run, is_answered)
+        error = (part[side] - part["rate"]).to_numpy()[rows]
+        curve = allan_deviation(error, interval, run=run[rows])
+        read = allan_coefficients(curve["averaging_time"], curve["deviation"])
+    except ValueError as reason:
+        return [(np.nan, np.nan, np.nan, str(reason))] * len(ALLAN_FIGURES)
+    notes = dict.fromkeys(ALLAN_FIGURES, "no interval: see the standard errors of allan_deviation")
+    notes |= read.notes
+    return [(getattr(read, n) or np.nan, np.nan, np.nan, note) for n, note in notes.items()]
+
+
+def _or_nan(function, *arguments):
+    """What the function gives and "", or NaN and what its ValueError says."""
+    try:
+        return function(*arguments), ""
+    except ValueError as error:
+        return np.nan, str(error)
+
+
+def _peak(residual):
+    return np.abs(residual).max()
+
+
+def _reduction(rate, before, after):
+    if not np.any(after - rate):
+        raise ValueError("after is zero everywhere: a factor without bound.")
+    return metrics.rms(before - rate) / metrics.rms(after - rate)
+
+
+def _off_nominal(rate, output, nominal):
+    if nominal == 0 or not np.isfinite(nominal):
+        raise ValueError(f"nominal={nominal} must be finite and not zero.")
+    return 1e6 * (metrics.scale_factor(rate, output) / nominal - 1.0)
+
+
+def _nonlinearity(rate, output, full_scale, statistic):
+    """Of the means over bins of the rate's range: that of single rows would be their noise."""
+    if np.ptp(rate) > 0:
+        means = binned_statistic(rate, [rate, output], "mean", bins=_RATE_BINS).statistic
+        rate, output = means[:, np.isfinite(means[0])]
+    return metrics.scale_factor_nonlinearity(
+        rate, output, statistic=statistic, full_scale=full_scale
+    )

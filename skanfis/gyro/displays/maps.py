@@ -1,0 +1,270 @@
+"""Maps over two columns: where error is left, where data are, what the calibration covers."""
+
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pandas as pd
+
+from ...inspection.labels import as_label
+from .._ask import ask
+from .._columns import evenly_chosen
+from ._base import GyroDisplay, bins_of, dress, figures, mark_decades, signs
+
+__all__ = ["CoverageDisplay", "ResidualSurfaceDisplay"]
+
+_NO_DATA = "#e9e9e6"
+# Rows beyond cover one another.
+_N_POINTS = 2_000
+_COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some, full
+_UNITS = {"temperature": "degC", "output": "deg/s", "time": "s", "temperature_rate": "degC/min"}
+# Of the sizes that a colour scale covers, so that one outlier does not flatten it.
+_NEARLY_ALL = 0.995
+
+
+class ResidualSurfaceDisplay(GyroDisplay):
+    """Mean error after compensation over temperature and rate, beside the number of rows.
+
+    What has a colour of its own on the left is not noise: averages over many rows are left. Where
+    the right-hand panel is empty, nothing is known of the compensation.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them: "cells", the empty ones too.
+
+    Other Parameters
+    ----------------
+    temperature : array-like of shape (n_rows,)
+        Temperature [degC].
+    n_bins : tuple of two ints, default=(24, 24)
+        Number of cells in temperature and in rate.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import ResidualSurfaceDisplay
+    >>> rate, temperature = np.array([-50.0, 50.0, 50.0]), np.array([10.0, 10.0, 30.0])
+    >>> display = ResidualSurfaceDisplay.from_predictions(
+    ...     rate, rate + 1.0, rate + [0.0, 0.25, 0.5], temperature=temperature, n_bins=(2, 2)
+    ... )
+    >>> display.tables()["cells"]["mean error after [deg/s]"].to_numpy()
+    array([0.  ,  nan, 0.25, 0.5 ])
+    """
+
+    _PER_ROW = ("temperature",)
+    _SIZE = (7.0, 3.3)
+    _PANELS: ClassVar = {"ncols": 2, "sharey": True}
+
+    @classmethod
+    def _computed(cls, rows, unit, n_bins=(24, 24)):
+        labels = ("temperature [degC]", "true rate [deg/s]")
+        ends, cells = _cells(rows["temperature"], rows["rate"], n_bins, labels)
+        found = rows["after"].groupby(cells).agg(["count", "mean"]).reindex(ends.index)
+        ends["rows"] = found["count"].fillna(0).astype(int)
+        ends[f"mean error after [{unit}]"] = found["mean"]
+        return {"cells": ends}
+
+    def _draw(self, axes, tables):
+        from matplotlib.colors import LogNorm
+
+        cells = tables["cells"]
+        residual, counts = cells.iloc[:, -1], cells["rows"]
+        limit = residual.abs().quantile(_NEARLY_ALL) or 1.0
+        mesh = _draw_cells(axes[0], cells, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
+        bar = self.figure_.colorbar(mesh, ax=axes[0], extend="both")
+        bar.set_label(signs(cells.columns[-1]))
+        # A scale needs two ends, even where all cells have as many rows.
+        norm = LogNorm(vmin=1, vmax=max(counts.max(), 2))
+        mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
+        bar = self.figure_.colorbar(mesh, ax=axes[1])
+        bar.set_label("rows in the cell")
+        mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
+        title = f"residual: largest {figures(residual.abs().max())} {self._unit}"
+        dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
+        empty = np.mean(counts == 0)
+        dress(axes[1], "temperature [degC]", title=f"data: {empty:.0%} of the cells empty")
+
+
+class CoverageDisplay(GyroDisplay):
+    """Where the calibration data cover what a compensator may be asked: a map over two inputs.
+
+    Cells that hold no row are hatched, whatever the model says of them. In the others the colour is
+    :meth:`skanfis.ANFISRegressor.coverage`, from 0 (no data speak here) to 1. Outside the dashed
+    line rows are flagged as out of bounds; beyond the dotted line, inside it, the coverage is below
+    ``min_coverage``, and rows are flagged too. For colour and lines all other inputs are
+    held at one value; a row of any value fills a cell.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them: "points" with their coverage, some of the "rows", and "cells"
+        with their number of rows, the empty ones too.
+    min_coverage : float, default=0.1
+        Rows that are covered less are flagged.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_ofog
+    >>> from skanfis.gyro import CoverageDisplay
+    >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
+    >>> X = log[["temperature", "output"]]
+    >>> model = ANFISRegressor(2).fit(X, log["error"])
+    >>> display = CoverageDisplay.from_estimator(model, X)
+    >>> len(display.tables()["points"])
+    9216
+    """
+
+    _SIZE = (6.2, 4.0)
+
+    def __init__(self, tables: dict[str, pd.DataFrame], *, min_coverage: float = 0.1):
+        super().__init__(tables)
+        self.min_coverage = min_coverage
+
+    @classmethod
+    def from_estimator(  # type: ignore[override]
+        cls,
+        estimator: Any,
+        X: Any,
+        *,
+        x: str = "temperature",
+        y: str = "output",
+        others: dict[str, Any] | None = None,
+        units: dict[str, Any] | None = None,
+        n_points: int = 96,
+        n_cells: int = 24,
+        min_coverage: float = 0.1,
+        margin: float = 0.15,
+        ax: Any = None,
+    ) -> Self:
+        """Compute from a fitted estimator, and draw.
+
+        Parameters
+        ----------
+        estimator : estimator
+            Fitted, with methods ``coverage`` and ``in_bounds``, or a Pipeline that ends in such.
+        X : DataFrame of shape (n_rows, n_inputs)
+            Rows to draw, and from which the values of other inputs are taken.
+        x, y : str, default="temperature", "output"
+            Columns of X that the axes stand for.
+        others : dict of str to float, default=None
+            Values to hold other inputs at; the median of X where they are not named.
+        units : dict of str to str, default=None
+            Units of the columns, for the labels, beside those of temperature, output, time and
+            temperature_rate: degC, deg/s, s and degC/min.
+        n_points : int, default=96
+            Number of values on each axis.
+        n_cells : int, default=24
+            Number of cells on each axis, over the range of X.
+        min_coverage : float, default=0.1
+            Rows that are covered less are flagged.
+        margin : float, default=0.15
+            How far the picture goes beyond the data, as a part of their range.
+        ax : matplotlib axes, default=None
+            Where to draw; None makes a figure.
+
+        Returns
+        -------
+        display : CoverageDisplay
+        """
+        others = {} if others is None else others
+        for name in (x, y, *others):
+            if name not in X:
+                raise ValueError(f"{name!r} is no column of X, which has {', '.join(X)}.")
+        units = _UNITS | (units or {})
+        labels = [_words(name, units.get(name)) for name in (x, y)]
+        grid = X.median().to_frame().T.assign(**others)
+        grid = grid.loc[grid.index.repeat(n_points**2)].reset_index(drop=True)
+        values = [_beyond(X[name], n_points, margin) for name in (x, y)]
+        grid[x], grid[y] = (each.ravel() for each in np.meshgrid(*values))
+        ends, cells = _cells(X[x], X[y], (n_cells, n_cells), labels)
+        ends["rows"] = np.bincount(cells, minlength=n_cells**2)
+        points = grid[[x, y]].set_axis(labels, axis=1)
+        points["coverage"] = ask(estimator, "coverage", grid)
+        points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
+        held = _cell_numbers(grid[x], grid[y], *_edges(ends)).map(ends["rows"] > 0)
+        points["in a cell with data"] = held.eq(True).astype(int)
+        some = evenly_chosen(len(X), _N_POINTS)
+        rows = X[[x, y]].iloc[some].set_axis(labels, axis=1).reset_index(drop=True)
+        tables = {"points": points, "rows": rows, "cells": ends}
+        return cls(tables, min_coverage=min_coverage).plot(ax)
+
+    def _draw(self, axes, tables):
+        from matplotlib.colors import LinearSegmentedColormap
+
+        (panel,), points = axes, tables["points"]
+        labels = points.columns[:2]
+        x, y = (points[label].unique() for label in labels)
+        shape = (y.size, x.size)
+        coverage, inside, held = (
+            points[name].to_numpy().reshape(shape)
+            for name in ("coverage", "in range", "in a cell with data")
+        )
+        panel.set_facecolor(_NO_DATA)
+        panel.patch.set(hatch="////", edgecolor="0.75", linewidth=0)
+        mesh = panel.pcolormesh(
+            x,
+            y,
+            np.where(held, coverage, np.nan),
+            cmap=LinearSegmentedColormap.from_list("coverage", _COLORS),
+            vmin=0,
+            vmax=1,
+            rasterized=True,
+        )
+        self.figure_.colorbar(mesh, ax=panel).set_label("coverage where there are data")
+        panel.plot(*tables["rows"].to_numpy().T, ".", color="0.15", ms=1.5, alpha=0.35, mew=0)
+        left, bottom = x[inside.any(axis=0)], y[inside.any(axis=1)]
+        if left.size and bottom.size:
+            corners = left[[0, -1, -1, 0, 0]], bottom[[0, 0, -1, -1, 0]]
+            panel.plot(*corners, "--", color="0.15", linewidth=1.2)
+        flagged = np.where(inside, coverage, np.nan)
+        if np.nanmin(flagged, initial=np.inf) < self.min_coverage:
+            style = {"colors": "0.15", "linestyles": ":", "linewidths": 1.2}
+            panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
+        empty = np.mean(tables["cells"]["rows"] == 0)
+        title = f"{empty:.0%} of the cells in range are empty (hatched)"
+        dress(panel, *map(as_label, labels), title)
+        panel.grid(False)
+
+
+def _cells(x, y, n_bins, labels):
+    """Ends of all cells, a line for each, and the number of the cell of every row."""
+    edges = [bins_of(values, n)[1] for values, n in zip((x, y), n_bins, strict=True)]
+    lines = np.arange(n_bins[0] * n_bins[1])
+    ends = {}
+    for place, label, each in zip(
+        (lines % n_bins[0], lines // n_bins[0]), labels, edges, strict=True
+    ):
+        ends |= {f"{label}, from": each[place], f"{label}, to": each[place + 1]}
+    return pd.DataFrame(ends), _cell_numbers(x, y, *edges).astype(int)
+
+
+def _cell_numbers(x, y, x_edges, y_edges):
+    """Number of the cell of every point; NaN beyond all."""
+    columns, lines = (
+        pd.Series(pd.cut(values, edges, labels=False, include_lowest=True))
+        for values, edges in ((x, x_edges), (y, y_edges))
+    )
+    return lines * (x_edges.size - 1) + columns
+
+
+def _edges(cells):
+    """Edges of the cells in both directions."""
+    return [np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2)]
+
+
+def _draw_cells(axes, cells, values, **options):
+    x, y = _edges(cells)
+    axes.set_facecolor(_NO_DATA)
+    shape = (y.size - 1, x.size - 1)
+    return axes.pcolormesh(x, y, values.to_numpy().reshape(shape), rasterized=True, **options)
+
+
+def _beyond(values, n_points, margin):
+    """Equal steps over the values and a part of their range on both sides."""
+    beyond = margin * np.ptp(values)
+    return np.linspace(values.min() - beyond, values.max() + beyond, n_points)
+
+
+def _words(name, unit):
+    return f"{name.replace('_', ' ')} [{unit}]" if unit else name
