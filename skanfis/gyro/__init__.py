@@ -1,7 +1,7 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
 from ._checks import check_log
-from .allan import AllanCoefficients, allan_coefficients, allan_deviation
+from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
 from .compose import ResidualRegressor
@@ -25,14 +25,11 @@ from .metrics import (
     hysteresis,
     input_error,
     scale_factor,
-    scale_factor_asymmetry,
-    scale_factor_nonlinearity,
 )
 from .physics import OpenLoopArcsineRegressor
 from .report import gyro_report
 
 __all__ = [
-    "AllanCoefficients",
     "AllanDisplay",
     "CoverageDisplay",
     "ErrorDisplay",
@@ -66,6 +63,4 @@ __all__ = [
     "read_log",
     "resample_in_temperature",
     "scale_factor",
-    "scale_factor_asymmetry",
-    "scale_factor_nonlinearity",
 ]

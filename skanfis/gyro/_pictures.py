@@ -7,7 +7,7 @@ import base64
 import io
 import re
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -47,12 +47,14 @@ class Picture(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A display, and what makes its arguments of results; these give None where it has no sense."""
+    """A display, and what makes its arguments of results; these give None where it has no sense.
+
+    The first sentence of the caption is read to those who cannot see the picture.
+    """
 
     subject: str
-    display: Callable
+    display: Any
     arguments: Callable
-    alt: str
     caption: str
 
 
@@ -100,50 +102,43 @@ PICTURES = (
         "error-by-time",
         ErrorDisplay,
         _by_time,
-        "Error against time, before and after",
-        "Error against time. Bands reach from the smallest to the largest error.",
+        "Error against time, before and after. Bands reach from the smallest to the largest error.",
     ),
     Plan(
         "error-by-temperature",
         ErrorDisplay,
         _by_temperature,
-        "Error against temperature, before and after",
-        "Error against temperature.",
+        "Error against temperature, before and after.",
     ),
     Plan(
         "scale-factor-error",
         ScaleFactorErrorDisplay,
         _over_rates,
-        "Scale-factor error against rate at three temperatures, before and after",
         "Scale-factor error against rate, in three bands of temperature.",
     ),
     Plan(
         "hysteresis",
         HysteresisDisplay,
         _loop,
-        "Bias against temperature, warming and cooling apart, before and after",
-        "Bias while warming and while cooling; what depends on the rate is taken off, other than "
-        "in the table. Temperature alone cannot close a loop.",
+        "Bias against temperature, while warming and while cooling. What depends on the rate is "
+        "taken off, other than in the table. Temperature alone cannot close a loop.",
     ),
     Plan(
         "residual-surface",
         ResidualSurfaceDisplay,
         _surface,
-        "Mean residual and number of rows over temperature and rate",
-        "What is left over temperature and rate (left), and where there are data (right).",
+        "Mean residual and number of rows over temperature and rate.",
     ),
     Plan(
         "held-out-groups",
         GroupResidualDisplay,
         _groups,
-        "RMS error of every held-out group, before and after",
-        "Every held-out group, the worst at the top.",
+        "RMS error of every held-out group, the worst at the top.",
     ),
     Plan(
         "allan-deviation",
         AllanDisplay,
         _allan,
-        "Allan deviation before and after",
         "Allan deviation of the error, over the runs that are in range from end to end.",
     ),
 )
@@ -160,7 +155,7 @@ def draw(plan, results):
     rates = (each[rows] for each in (results.rate, results.before, results.after))
     display = plan.display.computed(*rates, **arguments)
     display.plot(display.panels(Figure))
-    return _picture(plan.subject, display.figure_, display.tables(), plan.alt, plan.caption)
+    return _picture(plan.subject, display.figure_, display.tables(), plan.caption)
 
 
 def draw_coverage(calibration):
@@ -176,13 +171,12 @@ def draw_coverage(calibration):
         units={"output": calibration.recipe.output_unit, "temperature_rate": "degC/s"},
         ax=Figure(figsize=(6.2, 4.0), layout="constrained").subplots(),
     )
-    alt = "Coverage over temperature and output, with the range of the calibration"
     caption = (
-        "Coverage by the calibration data; other inputs at their medians. Hatched cells hold no "
-        "row: what is said there is a guess from their neighbours. Rows outside the dashed line "
+        "Coverage over temperature and output; other inputs at their medians. Hatched cells hold "
+        "no row: what is said there is a guess from their neighbours. Rows outside the dashed line "
         "are flagged, and within it those beyond the dotted line, where there is one."
     )
-    return _picture("coverage", display.figure_, display.tables(), alt, caption)
+    return _picture("coverage", display.figure_, display.tables(), caption)
 
 
 def draw_memberships(calibration):
@@ -201,12 +195,11 @@ def draw_memberships(calibration):
         for term, before, after in zip(each.term_names, each.before, each.after, strict=True):
             truths = {"value": each.grid, "truth before": before, "truth after": after}
             parts.append(pd.DataFrame({"input": each.input_name, "term": term} | truths))
-    alt = "Membership functions before and after training, over histograms of the data"
-    caption = "Fuzzy terms before training (dashed) and after, over the data."
-    return _picture("fuzzy-terms", figure, {"terms": pd.concat(parts)}, alt, caption)
+    caption = "Membership functions before training (dashed) and after, over the data."
+    return _picture("fuzzy-terms", figure, {"terms": pd.concat(parts)}, caption)
 
 
-def _picture(subject, figure, tables, alt, caption):
+def _picture(subject, figure, tables, caption):
     """The figure painted, and its tables as files."""
     file = io.BytesIO()
     # Software and date would make two reports on the same log differ.
@@ -222,6 +215,7 @@ def _picture(subject, figure, tables, alt, caption):
         ending = f"-{name}" if len(tables) > 1 else ""
         files[f"{subject}{ending}.csv"] = _base64(text.encode("utf-8"))
     width, height = figure.get_size_inches()
+    alt = caption.partition(".")[0]
     return Picture(_base64(file.getvalue()), alt, caption, files, height > width)
 
 

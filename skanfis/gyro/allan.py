@@ -22,7 +22,6 @@ from .metrics import rows_by_run
 
 __all__ = [
     "ALLAN_FIGURES",
-    "AllanCoefficients",
     "allan_coefficients",
     "allan_deviation",
     "rows_for_allan",
@@ -120,19 +119,8 @@ def allan_deviation(
 class AllanCoefficients:
     """What an Allan curve says of the noise; None where it says nothing, with the reason.
 
-    Parameters
-    ----------
-    angle_random_walk, allan_minimum, bias_instability, rate_random_walk : float or None
-        N [deg/sqrt(h)], the curve's minimum [deg/h], B = minimum / 0.664 [deg/h] and K
-        [deg/h/sqrt(h)].
-    notes : dict of str to str
-        Why a coefficient is None, by its name.
-
-    Examples
-    --------
-    >>> from skanfis.gyro import AllanCoefficients
-    >>> AllanCoefficients(0.05, None, None, None, {"rate_random_walk": "no slope of +1/2"}).notes
-    {'rate_random_walk': 'no slope of +1/2'}
+    N [deg/sqrt(h)], the curve's minimum [deg/h], B = minimum / 0.664 [deg/h] and K [deg/h/sqrt(h)];
+    ``notes`` has the reasons by name.
     """
 
     angle_random_walk: float | None

@@ -14,6 +14,7 @@ from ._calibration import Recipe, calibrate
 from ._certain import certain_of
 from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
 from ._files import check_different, find_logs
+from ._formulas import rules_text
 from ._headline import errors_and_verdict
 from ._logs import find_tasks, read_task
 from ._options import PROGRAM, make_parser
@@ -23,7 +24,7 @@ from ._staging import Staging
 from ._units import SIGNALS
 from .c_code import export_c_physics
 from .errors import LogError
-from .html_report import check_installed, report_page, rules_text
+from .html_report import check_installed, report_page
 from .metrics import hysteresis
 
 __all__ = ["main"]

@@ -11,21 +11,19 @@ import scipy
 import sklearn
 
 from .. import __version__
-from ..export import fold
-from ..inspection import export_text
 from ..inspection.labels import printable
 from ..policies import policy_in_words
-from ._headline import ARTICLES, headline, held_out_groups, readability_of
-from ._law_text import law_text
+from ._formulas import formula_of, law_table, on_board, rules_text
+from ._headline import ARTICLES, headline, held_out_groups
 from ._pictures import PICTURES, draw, draw_coverage, draw_memberships
 from ._rate_units import RATE_UNITS
 from ._results import Results
-from ._simpler import LAW_AND_LINE, NOTHING, options_for
+from ._simpler import NOTHING, options_for
 from ._units import SIGNALS
 from .displays._base import figures, signs
 from .metrics import rms
 
-__all__ = ["check_installed", "formula_of", "report_page", "rules_text"]
+__all__ = ["check_installed", "report_page"]
 
 _COUNTS = ("rows", "rows_refused", "rows_outside")
 _UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
@@ -189,43 +187,35 @@ def _identity(results):
 def _check(results):
     """How it was checked, and what is simpler on the same rows."""
     calibration, verdict = results.calibration, results.calibration.verdict
-    blocks = [
-        Block(
-            "text",
-            "Every row was compensated by a model that had not seen its group: "
-            f"{calibration.split.sentence}. {_CHECKED}",
-        )
-    ]
+    text = (
+        "Every row was compensated by a model that had not seen its group: "
+        f"{calibration.split.sentence}. {_CHECKED}"
+    )
+    blocks = [Block("text", text)]
     if calibration.is_thinned:
         text = (
-            f"The log has {calibration.n_rows:,} rows. All were read and looked at for errors; "
-            f"what is said here is of {len(calibration.log):,} of them, drawn at random in equal "
-            "parts from every stretch of every run, with those at the ends of the ranges. Figures "
-            "that need every row, of bias stability and Allan's deviation, are left out: see "
-            "--check-rows and --average."
+            f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, drawn "
+            "at random from every stretch of every run, with those at the ends of the ranges. "
+            "Figures that need every row, of bias stability and Allan's deviation, are left out."
         )
-        blocks.insert(0, Block("text", text))
+        blocks.append(Block("text", text))
     if calibration.fold_choices is not None:
         found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
         several = ", ".join(f"{text} in {count}" for text, count in found.most_common())
         text = (
-            "Within each fold the structure was chosen anew from the fold's training rows alone: "
-            f"{several} of {len(calibration.fold_choices)} folds. The final model, fitted to all "
-            f"rows, has {_terms_text(calibration.choice.terms)}."
+            "Within each fold the structure was chosen from the fold's training rows alone: "
+            f"{several} of {len(calibration.fold_choices)} folds. The final model has "
+            f"{_terms_text(calibration.choice.terms)}."
         )
         blocks.append(Block("text", text))
     blocks += [Block("warn", message) for message in calibration.warnings]
-    blocks += [
-        Block("heading", "Beside simpler compensations"),
-        Block(
-            "soft",
-            "On the same folds, the same held-out rows in range and the same inputs. What this "
-            "model is better by is the ratio of RMS errors, as the geometric mean over "
-            f"{held_out_groups(calibration)}, with its 95 % interval by Student's t. Recommended "
-            "is the simplest that no more elaborate one beats decisively: with an interval above "
-            "1.02.",
-        ),
-    ]
+    text = (
+        "On the same folds, held-out rows in range and inputs. What this model is better by is the "
+        f"ratio of RMS errors, as the geometric mean over {held_out_groups(calibration)}, with its "
+        "95 % interval by Student's t. Recommended is the simplest that no more elaborate one "
+        "beats decisively: with an interval above 1.02."
+    )
+    blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []
     for name, error in verdict.rms.items():
         gain, better, interval = verdict.gains.get(name), "–", ""
@@ -404,18 +394,14 @@ def _rules(results):
     """The rules in pictures and as text."""
     calibration, blocks = results.calibration, []
     if calibration.recipe.physics:
-        law = _law_table(calibration.compensator.estimator.base_, calibration.recipe)
+        law = law_table(calibration.compensator.estimator.base_, calibration.recipe)
         text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
     if (picture := draw_memberships(calibration)) is not None:
         blocks.append(Block("pictures", [picture]))
-    text = rules_text(calibration, results.readability)
-    on_board = _on_board(calibration.compensator)
-    blocks += [
-        Block("details", text, "All rules as text"),
-        Block("details", on_board, "What to compute on board"),
-    ]
-    return "The rules", blocks
+    text, steps = rules_text(calibration, results.readability), on_board(calibration.compensator)
+    blocks.append(Block("details", text, "All rules as text"))
+    return "The rules", [*blocks, Block("details", steps, "What to compute on board")]
 
 
 def _reading(results):
@@ -459,93 +445,6 @@ def _log(results):
         text = "\n".join(f"{name}: {value}" for name, value in results.options.options)
         blocks.append(Block("details", text, "Options of the command"))
     return "The log and the options", blocks
-
-
-def rules_text(calibration, found=None):
-    """The rules as sentences, after the formula of the law where there is one.
-
-    In front of them stands what speaks against reading them one by one; ``found`` is their
-    readability where it has been measured already.
-    """
-    found = readability_of(calibration) if found is None else found
-    caution = ""
-    if found.findings:
-        head = "The rules are not fit to be read one by one:"
-        caution = "\n".join([head, *found.findings, "", ""])
-    estimator = calibration.compensator.estimator
-    # Folded, a model knows of no readability in training, and the text has the caution once.
-    if calibration.recipe.physics:
-        rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
-        law = law_text(estimator.base_, calibration.recipe.inputs, calibration.recipe.output_unit)
-        return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
-    return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
-
-
-def formula_of(calibration, name):
-    """The formula of a simpler compensation, as lines of text."""
-    simple = next(each for each in calibration.simpler if each.name == name)
-    recipe = calibration.recipe
-    if name == LAW_AND_LINE:
-        line = _polynomial("line", simple.model.residual_, recipe.inputs)
-        return (
-            f"{_law_table(simple.model.base_, recipe)}\n\nTo this rate is added the line:\n{line}"
-        )
-    if simple.predicts == "rate":
-        return _law_table(simple.model, recipe)
-    rate = f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n"
-    if name == "constant":
-        return f"{rate}error = {float(simple.model.constant_.item()):.9g}"
-    return rate + _polynomial("error", simple.model, recipe.inputs)
-
-
-def _polynomial(what, pipeline, inputs):
-    """In standardised inputs, which keep the digits that count in a cubic."""
-    scaler, powers, line = (step for _, step in pipeline.steps)
-    names = [f"z{j + 1}" for j in range(len(inputs))]
-    lines = [
-        f"{name} = ({column} - {mean:.9g}) / {scale:.9g}"
-        for name, column, mean, scale in zip(
-            names, inputs, scaler.mean_, scaler.scale_, strict=True
-        )
-    ]
-    lines.append(f"{what} = {float(line.intercept_):.9g}")
-    for value, row in zip(line.coef_, powers.powers_, strict=True):
-        factors = [
-            f"{name}^{k}" if k > 1 else name for name, k in zip(names, row, strict=True) if k
-        ]
-        lines.append(f"    {value:+.9g} * {' * '.join(factors)}")
-    return "\n".join(lines)
-
-
-def _law_table(law, recipe):
-    """The arcsine law as a formula and by its coefficients."""
-    lines = [
-        law_text(law, recipe.inputs, recipe.output_unit),
-        f"at {law.reference_temperature_:.6g} °C; powers of the difference, lowest first",
-    ]
-    for name in ("amplitude_", "sagnac_factor_", "bias_"):
-        values = ", ".join(f"{value:.8g}" for value in getattr(law, name))
-        lines.append(f"{_words(name.rstrip('_'))}: {values}")
-    if law.temperature_rate is not None:
-        lines.append(f"lag of the thermometer: {law.thermometer_lag_:.6g} s")
-    return "\n".join(lines)
-
-
-def _on_board(compensator):
-    """The steps around the model, as they run on the gyro's processor."""
-    arguments, lines = ", ".join(compensator.inputs), []
-    if "temperature_rate" in compensator.inputs:
-        lines += [
-            "/* at power-on temperature_rate = 0, previous = temperature; then every h seconds */",
-            f"temperature_rate += (1 - exp(-h / {compensator.time_constant:g}))",
-            "    * ((temperature - previous) / h - temperature_rate);",
-            "previous = temperature;",
-        ]
-    if compensator.predicts == "error":
-        lines.append(f"rate = output / {compensator.scale_factor:.9g} - error({arguments});")
-    else:
-        lines.append(f"rate = law({arguments}) + rules({arguments});")
-    return "\n".join(lines)
 
 
 def _box(calibration, names, ends):

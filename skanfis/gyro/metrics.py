@@ -63,29 +63,10 @@ def scale_factor(rate: ArrayLike, output: ArrayLike) -> float:
 def scale_factor_nonlinearity(
     rate: ArrayLike, output: ArrayLike, *, statistic: str = "max", full_scale: float | None = None
 ) -> float:
-    """Scale factor nonlinearity: deviation of the output from its least-squares line.
+    """Largest, or RMS, deviation of the output from its least-squares line [ppm of full scale].
 
-    The output's noise is in it: give means over dwells where the rows are noisy.
-
-    Parameters
-    ----------
-    rate, output : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones; output in any unit.
-    statistic : {"max", "rms"}, default="max"
-        The largest deviation, as the standards have it, or the root mean square.
-    full_scale : float, default=None
-        Rate that the deviation is related to, positive [deg/s]; None is the largest rate given.
-
-    Returns
-    -------
-    nonlinearity : float
-        [ppm of full scale]
-
-    Examples
-    --------
-    >>> from skanfis.gyro import scale_factor_nonlinearity
-    >>> scale_factor_nonlinearity([-10, -5, 0, 5, 10], [-9.99, -5.02, 0.0, 5.02, 9.99])
-    2000.0
+    The output's noise is in it: give means over dwells where the rows are noisy. Without
+    ``full_scale`` [deg/s] it is related to the largest rate given.
     """
     if statistic not in ("max", "rms"):
         raise ValueError(f"statistic={statistic!r} must be 'max' or 'rms'.")
@@ -100,24 +81,7 @@ def scale_factor_nonlinearity(
 
 
 def scale_factor_asymmetry(rate: ArrayLike, output: ArrayLike) -> float:
-    """Scale factor asymmetry: slope of positive less that of negative rates, over their mean.
-
-    Parameters
-    ----------
-    rate, output : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones on each side; rows at rest are of both.
-
-    Returns
-    -------
-    asymmetry : float
-        [ppm]
-
-    Examples
-    --------
-    >>> from skanfis.gyro import scale_factor_asymmetry
-    >>> scale_factor_asymmetry([-10.0, 0.0, 10.0], [-9.999, 0.0, 10.001])
-    200.0
-    """
+    """Slope of positive less that of negative rates, over their mean [ppm]."""
     rate, output = _rate_and_output(rate, output)
     slopes = []
     for sign, side in (("positive", rate >= 0), ("negative", rate <= 0)):
@@ -369,7 +333,7 @@ def pooled_deviation(squares):
     return float(PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
 
 
-def _rate_and_output(rate, output):
+def _rate_and_output(rate, output) -> tuple[np.ndarray, np.ndarray]:
     rate = check_column(rate, "rate")
     return rate, check_column(output, "output", rate.size)
 

@@ -41,7 +41,6 @@ class Figure(NamedTuple):
     also: tuple[str, ...] = ()
     combine: Callable | None = None
     fewest_runs: int = 1
-    has_interval: bool = True
 
     def of(self, rows):
         also = {name: rows[name] for name in self.also if name in rows}
@@ -57,55 +56,35 @@ class Figure(NamedTuple):
 
 def figures_of_merit(full_scale=1.0, nominal=1.0, averaging_times=(10.0, 100.0)):
     """All figures but those of Allan, in the order of the table."""
-    rates, thermal = ("rate", "output"), ("temperature", "temperature_rate")
-    nonlinearity = partial(_nonlinearity, full_scale=full_scale)
-    full, factor = "ppm of full scale", metrics.scale_factor
-    return [
-        Figure("residual_rms", "deg/s", metrics.rms, ("residual",)),
-        Figure("residual_peak", "deg/s", _peak, ("residual",), has_interval=False),
-        Figure("residual_peak_to_peak", "deg/s", np.ptp, ("residual",), has_interval=False),
-        Figure("reduction_factor", "", _reduction, ("rate", "before", "after")),
-        Figure("scale_factor_error", "ppm", partial(_off_nominal, nominal=nominal), rates),
-        Figure("scale_factor_nonlinearity", full, partial(nonlinearity, statistic="max"), rates),
-        Figure(
-            "scale_factor_nonlinearity_rms", full, partial(nonlinearity, statistic="rms"), rates
-        ),
-        Figure("scale_factor_asymmetry", "ppm", metrics.scale_factor_asymmetry, rates),
-        Figure("scale_factor_repeatability", "ppm", factor, rates, (), metrics.relative_spread, 2),
-        Figure(
-            "scale_factor_temperature_sensitivity",
-            "ppm/degC",
-            metrics.scale_factor_temperature_sensitivity,
-            (*rates, "temperature"),
-        ),
-        Figure("bias", "deg/h", metrics.bias, ("error",)),
-        Figure("bias_repeatability", "deg/h", np.mean, ("error",), (), metrics.spread_of_bias, 2),
-        Figure(
-            "bias_temperature_sensitivity",
-            "deg/h/degC",
-            metrics.bias_temperature_sensitivity,
-            ("error", "temperature"),
-            ("temperature_rate",),
-        ),
-        Figure(
-            "bias_ramp_sensitivity",
-            "deg/h/(degC/min)",
-            metrics.bias_ramp_sensitivity,
-            ("error", "temperature_rate"),
-            ("temperature",),
-        ),
-        Figure("hysteresis", "deg/h", metrics.hysteresis, ("error", *thermal)),
-        *(
-            Figure(
-                f"bias_stability_{seconds:g}s",
-                "deg/h",
-                partial(metrics.squares_of_means, averaging_time=seconds),
-                ("error", "time"),
-                combine=metrics.pooled_deviation,
-            )
-            for seconds in averaging_times
-        ),
+    rates, error, thermal = ("rate", "output"), ("error",), ("temperature", "temperature_rate")
+    curve = {"full_scale": full_scale}
+    off, ppm = partial(_off_nominal, nominal=nominal), "ppm of full scale"
+    largest, root = (partial(_nonlinearity, statistic=name, **curve) for name in ("max", "rms"))
+    by_run, spread = metrics.scale_factor, metrics.relative_spread
+    in_temperature = metrics.scale_factor_temperature_sensitivity
+    slope, ramp = metrics.bias_temperature_sensitivity, metrics.bias_ramp_sensitivity
+    table: list[tuple[Any, ...]] = [
+        ("residual_rms", "deg/s", metrics.rms, ("residual",)),
+        ("residual_peak", "deg/s", _peak, ("residual",)),
+        ("residual_peak_to_peak", "deg/s", np.ptp, ("residual",)),
+        ("reduction_factor", "", _reduction, ("rate", "before", "after")),
+        ("scale_factor_error", "ppm", off, rates),
+        ("scale_factor_nonlinearity", ppm, largest, rates),
+        ("scale_factor_nonlinearity_rms", ppm, root, rates),
+        ("scale_factor_asymmetry", "ppm", metrics.scale_factor_asymmetry, rates),
+        ("scale_factor_repeatability", "ppm", by_run, rates, (), spread, 2),
+        ("scale_factor_temperature_sensitivity", "ppm/degC", in_temperature, (*rates, thermal[0])),
+        ("bias", "deg/h", metrics.bias, error),
+        ("bias_repeatability", "deg/h", np.mean, error, (), metrics.spread_of_bias, 2),
+        ("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", thermal[0]), thermal[1:]),
+        ("bias_ramp_sensitivity", "deg/h/(degC/min)", ramp, ("error", thermal[1]), thermal[:1]),
+        ("hysteresis", "deg/h", metrics.hysteresis, ("error", *thermal)),
     ]
+    for seconds in averaging_times:
+        squares = partial(metrics.squares_of_means, averaging_time=seconds)
+        name, pooled = f"bias_stability_{seconds:g}s", metrics.pooled_deviation
+        table.append((name, "deg/h", squares, ("error", "time"), (), pooled))
+    return [Figure(*line) for line in table]
 
 
 def gyro_report(
@@ -138,17 +117,12 @@ def gyro_report(
     ----------
     rate : array-like of shape (n_rows,)
         True rate, the earth's rate about the input axis included [deg/s].
-    before : array-like of shape (n_rows,)
-        Rate indicated without compensation [deg/s]; raw counts over their scale factor.
-    after : array-like of shape (n_rows,), default=None
-        Compensated rate [deg/s]. Rows of NaN, which the compensator refused, are left out of all
-        figures and counted.
-    temperature : array-like of shape (n_rows,), default=None
-        [degC], for the temperature sensitivities and the hysteresis.
-    temperature_rate : array-like of shape (n_rows,), default=None
-        [degC/min], for the ramp sensitivity and, as direction, the hysteresis.
-    time : array-like of shape (n_rows,), default=None
-        [s], increasing within each run, for the bias stability and the Allan deviation.
+    before, after : array-like of shape (n_rows,)
+        Rate indicated without compensation (raw counts over their scale factor) and compensated
+        rate [deg/s]. Rows where ``after`` is NaN, which the compensator refused, are left out of
+        all figures and counted. ``after=None`` tabulates ``before`` alone.
+    temperature, temperature_rate, time : array-like of shape (n_rows,), default=None
+        [degC], [degC/min], and [s], increasing within each run, for the figures that need them.
     run : array-like of shape (n_rows,), default=None
         Labels of the runs; None is one run.
     groups : array-like of shape (n_rows,), default=None
@@ -162,12 +136,10 @@ def gyro_report(
     averaging_times : tuple of float, default=(10.0, 100.0)
         Lengths of the means of the bias stability, positive [s].
     allan : bool, default=False
-        Whether to read N, B and K off the Allan deviation of the runs without a refused row; needs
-        ``time``, and allantools.
-    confidence_level : float, default=0.95
-        Of the intervals, in (0, 1).
-    n_resamples : int, default=200
-        Number of resamples of the bootstrap, zero (no intervals) or more.
+        Whether to read N, B and K off the Allan deviation of indicated less true rate, over the
+        runs without a refused row; needs ``time``, and allantools.
+    confidence_level, n_resamples : float, int, default=0.95, 200
+        Of the intervals; zero resamples make none.
     rate_unit : {"deg/s", "deg/h"}, default=None
         Unit of every figure that is a rate, or a rate per something; None leaves to each the unit
         that is usual: deg/s for residuals, deg/h for biases.
@@ -177,10 +149,9 @@ def gyro_report(
     Returns
     -------
     report : DataFrame
-        One row per group and figure; "all" comes first, then the groups as they appear. Columns:
-        group, figure, unit; before, before_low, before_high; after, after_low, after_high (only
-        where ``after`` was given); note, which says why a figure or an interval is missing.
-        ``report.attrs["resampled"]`` says by group what was resampled: "runs" or "blocks of rows".
+        One row per group, "all" first, and figure. Columns: group, figure, unit; before,
+        before_low, before_high; the same of after; note, which says why a figure or an interval is
+        missing. ``report.attrs["resampled"]`` has "runs" or "blocks of rows" by group.
 
     Raises
     ------
@@ -206,23 +177,21 @@ def gyro_report(
     """
     if inside is not None and np.asarray(inside).dtype != bool:
         raise ValueError(f"inside must be bool; its dtype is {np.asarray(inside).dtype}.")
-    table = table_of(
-        {
-            "rate": rate,
-            "before": before,
-            "after": after,
-            "temperature": temperature,
-            "temperature_rate": temperature_rate,
-            "time": time,
-            "run": run,
-            "groups": groups,
-            "inside": inside,
-        },
-        labels=("run", "groups", "inside"),
-        gaps=("after",),
-    )
+    columns = {"rate": rate, "before": before, "after": after, "temperature": temperature}
+    columns |= {"temperature_rate": temperature_rate, "time": time}
+    columns |= {"run": run, "groups": groups, "inside": inside}
+    table = table_of(columns, labels=("run", "groups", "inside"), gaps=("after",))
     full_scale = table["rate"].abs().max() if full_scale is None else full_scale
-    _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples)
+    if not full_scale > 0:
+        raise ValueError(f"full_scale={full_scale} must be positive; give it for a log at rest.")
+    if not all(seconds > 0 for seconds in averaging_times):
+        raise ValueError(f"averaging_times={averaging_times} must be positive.")
+    if allan and time is None:
+        raise ValueError("allan=True needs the column time.")
+    if not 0 < confidence_level < 1:
+        raise ValueError(f"confidence_level={confidence_level} must lie between 0 and 1.")
+    if n_resamples < 0:
+        raise ValueError(f"n_resamples={n_resamples} must be zero or positive.")
     if rate_unit not in (None, *RATE_UNITS):
         raise ValueError(
             f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
@@ -277,19 +246,6 @@ def table_of(columns, labels=(), gaps=()):
             found[name] = check_column(values, name, n_rows)
         n_rows = found[name].size
     return pd.DataFrame(found)
-
-
-def _check_options(full_scale, averaging_times, allan, time, confidence_level, n_resamples):
-    if not full_scale > 0:
-        raise ValueError(f"full_scale={full_scale} must be positive; give it for a log at rest.")
-    if not all(seconds > 0 for seconds in averaging_times):
-        raise ValueError(f"averaging_times={averaging_times} must be positive.")
-    if allan and time is None:
-        raise ValueError("allan=True needs the column time.")
-    if not 0 < confidence_level < 1:
-        raise ValueError(f"confidence_level={confidence_level} must lie between 0 and 1.")
-    if n_resamples < 0:
-        raise ValueError(f"n_resamples={n_resamples} must be zero or positive.")
 
 
 def _lines(part, figures, allan, confidence_level, n_resamples, seed):
@@ -372,7 +328,7 @@ def _cells(table, side, figures, units, kind, draws, confidence_level):
 
 
 def _why_no_interval(figure, kind):
-    if not figure.has_interval:
+    if figure.function in (_peak, np.ptp):
         return "largest value: no interval"
     if figure.combine is not None and kind != "runs":
         return f"no interval: fewer than {_FEWEST_RUNS} runs"

@@ -53,7 +53,7 @@ def log():
 def no_report(monkeypatch, few_rivals):
     """Leave out the report and what it compares with, which take longer than all else together."""
     monkeypatch.setattr(
-        "skanfis.gyro.command.report_page", lambda calibration, title, dossier: title
+        "skanfis.gyro.command.report_page", lambda calibration, title, options: title
     )
 
 
@@ -418,7 +418,7 @@ def test_a_damaged_joblib_is_refused(calibrated, tmp_path, content, capsys):
 
 @pytest.mark.usefixtures("few_rivals")
 def test_labels_of_all_kinds_are_drawn_and_told(tmp_path, log, capsys, monkeypatch):
-    monkeypatch.setattr("skanfis.gyro.html_report.PICTURES", (_pictures.draw_groups,))
+    monkeypatch.setattr("skanfis.gyro.html_report.PICTURES", _pictures.PICTURES[5:6])
     labels = dict(enumerate([r"$\frac{0$", "$$", "\x1b[31mred", "a\nb", "\u202ecba"]))
     labelled = log.assign(run=log["run"].map(labels))
     path, out = write_log(tmp_path / "log.csv", labelled), tmp_path / "out"

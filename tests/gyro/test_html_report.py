@@ -3,6 +3,7 @@
 import base64
 import io
 import re
+import sys
 from functools import cache
 from html.parser import HTMLParser
 
@@ -11,20 +12,17 @@ import pandas as pd
 import pytest
 
 pytest.importorskip("matplotlib")
+pytest.importorskip("jinja2")
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import _html
+from skanfis.gyro import _pictures
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._dossier import Dossier, LogFile
-from skanfis.gyro._html import Page
-from skanfis.gyro._limits import parse_limit
-from skanfis.gyro._models import make_estimator
-from skanfis.gyro._pictures import PICTURES, Picture
+from skanfis.gyro._formulas import formula_of, rules_text
+from skanfis.gyro._report_options import ReportOptions, parse_limit
 from skanfis.gyro._results import Results
-from skanfis.gyro._sections.instead import formula_of
 from skanfis.gyro._split import choose_split
-from skanfis.gyro.displays._style import figures
-from skanfis.gyro.html_report import report_page, rules_text
+from skanfis.gyro.displays._base import figures
+from skanfis.gyro.html_report import check_installed, report_page
 from skanfis.inspection import readability
 
 PNG = re.compile('data:image/png;base64,([^"]*)')
@@ -67,39 +65,46 @@ def calibration(given_weights):
     return calibration_of(log, terms=(1, 1, 1, 3))
 
 
-SCRIPT = "<script>alert('1')</script>"
+SCRIPT = "<script>alert('1')</script>\x00\u202e"
 TITLE = "<gyro> & co.csv"
 
 
 @pytest.fixture(scope="module")
-def dossier(calibration):
+def options(calibration):
     """All in it is text from outside; the limits lie on both sides of what was found."""
     merit = Results(calibration).merit.query("group == 'all'").set_index("figure")
     value = merit.loc["residual_rms", "after"]
     typed = [f"residual_rms={factor * value:.9f}deg/s" for factor in (1.001, 0.999)]
-    return Dossier(
+    return ReportOptions(
         serial=SCRIPT,
         operator=SCRIPT,
-        files=(LogFile(SCRIPT, 12, "0" * 64),),
+        files=((SCRIPT, 12, "0" * 64),),
         options=(("logs", SCRIPT),),
         limits=tuple(map(parse_limit, [*typed, "bias_instability=1deg/h"])),
     )
 
 
 @pytest.fixture(scope="module")
-def page(calibration, dossier, coarse_report):
-    return report_page(calibration, TITLE, dossier)
+def page(calibration, options, coarse_report):
+    return report_page(calibration, TITLE, options)
 
 
 @pytest.fixture
 def no_drawing(monkeypatch):
     """Pictures are made but not painted, which takes longer than all else."""
-    monkeypatch.setattr("skanfis.gyro._html._png", lambda figure: b"")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
 
 
 def test_is_well_formed_and_escaped(page):
     outline = Outline(page)
-    assert "Gyro compensation: <gyro> & co.csv" in "".join(outline.text)
+    text = "".join(outline.text)
+    assert "Gyro compensation: <gyro> & co.csv" in text
+    # What was typed is data; control signs are shown as such.
+    assert "script" not in outline.tags
+    assert text.count(r"<script>alert('1')</script>\x00\u202e") == 4
+    assert not {"\x00", "\u202e"} & set(text)
+    # On a phone no table may push the page wider than the screen.
+    assert page.count('<div class="scroll') == page.count("<table>")
 
 
 def test_needs_nothing_from_elsewhere(page):
@@ -124,24 +129,6 @@ def test_says_how_sure(calibration, page):
     assert "never against it proven" in told
 
 
-def test_every_picture_says_what_it_shows(page):
-    outline = Outline(page)
-    n_pictures = outline.tags.count("img")
-    alternatives = [
-        value for tag, name, value in outline.attributes if (tag, name) == ("img", "alt")
-    ]
-    assert len(set(alternatives)) == n_pictures
-    for subject in ("time", "temperature", "scale-factor", "warming", "rows over", "held-out",
-                    "Coverage", "Membership"):  # fmt: skip
-        assert any(subject.lower() in text.lower() for text in alternatives), subject
-
-
-def test_fits_a_phone(page):
-    assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in page
-    # No table may push the page wider than the screen.
-    assert page.count('<div class="scroll') == page.count("<table>")
-
-
 def test_figures_are_those_of_held_out_rows_in_range(page, calibration):
     rows = calibration.inside
     after = np.sqrt(np.mean((calibration.after - calibration.rate)[rows] ** 2))
@@ -150,34 +137,6 @@ def test_figures_are_those_of_held_out_rows_in_range(page, calibration):
     for value in (f"{before:#.3g} °/s", f"{after:#.3g} °/s", f"{before / after:#.3g} ×"):
         assert value in text.replace(",", "")
     assert "whole runs held out (5 runs" in text
-
-
-def test_every_fold_was_new_to_its_model(calibration):
-    # The last fold by hand.
-    train, test = calibration.split.folds[-1]
-    error = calibration.before - calibration.rate
-    model = make_estimator(calibration.recipe, (1, (1, 1, 1, 3)))
-    model.fit(calibration.X.iloc[train], error[train])
-    expected = calibration.before[test] - model.predict(calibration.X.iloc[test])
-    np.testing.assert_allclose(calibration.after[test], expected, rtol=1e-9)
-
-
-@pytest.mark.theory
-def test_the_same_log_gives_the_same_report(page, calibration, dossier, monkeypatch):
-    # To paint takes longer than all else: the first two pictures are painted again.
-    painted, (first, second, *others) = iter(PNG.findall(page)), PNG.findall(page)
-    paint, again = _html._png, []
-
-    def png(figure):
-        told = base64.b64decode(next(painted))
-        if len(again) < 2:
-            again.append(base64.b64encode(paint(figure)).decode())
-        return told
-
-    monkeypatch.setattr(_html, "_png", png)
-    assert report_page(calibration, TITLE, dossier) == page
-    assert again == [first, second]
-    assert others
 
 
 def test_rules_and_what_to_compute_on_board(page, calibration):
@@ -250,30 +209,6 @@ def test_physics_shows_its_law(has_time, few_rivals, no_drawing):
         assert "the log has no time" in text or "allantools is not installed" in text
 
 
-def test_page_refuses_no_text():
-    page = Page("a < b", "c & d")
-    page.banner(SCRIPT, [SCRIPT], "bad")
-    page.cards([("what", "1", "<i>")])
-    page.section("s")
-    page.heading("h")
-    page.table(("x", "unit"), [(("1", "[0, 2]"), "°/s"), ("2", SCRIPT)], "caption")
-    page.preformatted("a\n<b>", "more")
-    page.download('"><b>.csv', SCRIPT)
-    page.footer("end\x00\u202e")
-    outline = Outline(page.render())
-    text = "".join(outline.text)
-    for part in ("a < b", "c & d", "<i>", "[0, 2]", "a\n<b>", "caption", SCRIPT):
-        assert part in text
-    assert not {"script", "b", "i"} & set(outline.tags)
-    assert not {"\x00", "\u202e"} & set(text)
-
-
-def test_names_from_outside_are_data(page):
-    outline = Outline(page)
-    assert "script" not in outline.tags
-    assert "".join(outline.text).count(SCRIPT) == 4
-
-
 def test_the_verdict_comes_first(page, calibration):
     text = "".join(Outline(page).text)
     verdict = calibration.verdict
@@ -301,7 +236,7 @@ def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
 
 def test_one_unit_throughout(page, calibration, no_drawing):
     """Of errors; rates, and the formula of what to use instead, are in deg/s."""
-    hourly = report_page(calibration, TITLE, Dossier(unit="deg/h"))
+    hourly = report_page(calibration, TITLE, ReportOptions(unit="deg/h"))
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
         text = " ".join(Outline(text).text)
@@ -319,58 +254,55 @@ def test_one_unit_throughout(page, calibration, no_drawing):
         assert f"{figures(factor * rms)} {unit}" in text
 
 
+def test_every_picture_says_what_it_shows_and_has_its_data(page, calibration):
+    outline = Outline(page)
+    alternatives = [value for *which, value in outline.attributes if which == ["img", "alt"]]
+    assert len(set(alternatives)) == outline.tags.count("img") >= 8
+    for subject in ("time", "temperature", "scale-factor", "warming", "rows over", "held-out",
+                    "Coverage", "Membership"):  # fmt: skip
+        assert any(subject.lower() in text.lower() for text in alternatives), subject
+    pictures = re.findall("<figure.*?</figure>", page, re.DOTALL)
+    assert all("download=" in picture for picture in pictures)
+    links = re.findall(r'download="([^"]*)" href="data:text/csv;charset=utf-8;base64,(.*?)"', page)
+    files = {name: pd.read_csv(io.BytesIO(base64.b64decode(content))) for name, content in links}
+    points = files["error-by-temperature-points.csv"]
+    error = np.where(calibration.in_range, calibration.after - calibration.rate, np.nan)
+    np.testing.assert_allclose(points["error after [deg/s]"], error, rtol=1e-8)
+    temperature = calibration.log["temperature"]
+    np.testing.assert_allclose(points["temperature [degC]"], temperature, rtol=1e-8)
+    assert files["coverage-cells.csv"]["rows"].sum() == len(calibration.log)
+    groups = files["held-out-groups.csv"].set_index("group")["RMS error after [deg/s]"]
+    expected = pd.Series(error**2).groupby(calibration.log["run"].to_numpy()).mean() ** 0.5
+    np.testing.assert_allclose(groups.sort_index(), expected, rtol=1e-8)
+
+
+def test_a_file_runs_nothing_in_a_spreadsheet():
+    from matplotlib.figure import Figure
+
+    tables = {"groups": pd.DataFrame({"group": ["=HYPERLINK(1)", "-5"], "error": [1.0, 2.0]})}
+    picture = _pictures._picture("subject", Figure(), tables, "Caption.")
+    lines = base64.b64decode(picture.files["subject.csv"]).decode().splitlines()
+    assert lines == ["group,error", "'=HYPERLINK(1),1", "-5,2"]
+
+
+def test_the_same_log_gives_the_same_pictures(calibration):
+    results = Results(calibration)
+    one, two = (_pictures.draw(_pictures.PICTURES[0], results) for _ in range(2))
+    assert one == two
+
+
+def test_without_jinja2_the_way_to_get_it_is_said(calibration, monkeypatch, no_drawing):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    for make in (check_installed, lambda: report_page(calibration, "log.csv")):
+        with pytest.raises(ImportError, match="pip install jinja2"):
+            make()
+
+
 def test_limits_on_both_sides_of_the_figure(page):
     text = " ".join(Outline(page).text)
     section = text[text.index("Limits of the specification") : text.index("By held-out run")]
     assert re.findall(r"pass|fail|not measured", section) == ["pass", "fail", "not measured"]
     assert "1 of 3 limits are kept; not kept: residual rms; could not be measured" in text
-
-
-def files_in(page):
-    """Tables of the files that a page holds, by name."""
-    links = re.findall(r'download="([^"]*)" href="data:text/csv;charset=utf-8;base64,(.*?)"', page)
-    return {name: pd.read_csv(io.BytesIO(base64.b64decode(content))) for name, content in links}
-
-
-def test_the_data_behind_every_picture(page, calibration):
-    pictures = re.findall("<figure.*?</figure>", page, re.DOTALL)
-    assert len(pictures) >= 8
-    assert all("download=" in picture for picture in pictures)
-    files = files_in(page)
-    rows = calibration.in_range
-    points = files["error-by-temperature-points.csv"]
-    error = np.where(rows, calibration.after - calibration.rate, np.nan)
-    np.testing.assert_allclose(points["error after [deg/s]"], error, rtol=1e-8)
-    np.testing.assert_allclose(
-        points["temperature [degC]"], calibration.log["temperature"], rtol=1e-8
-    )
-    cells = files["coverage-cells.csv"]
-    assert cells["rows"].sum() == len(calibration.log)
-    groups = files["held-out-groups.csv"].set_index("group")["RMS error after [deg/s]"]
-    for run in calibration.log["run"].unique():
-        these = rows & (calibration.log["run"] == run).to_numpy()
-        expected = np.sqrt(np.mean((calibration.after - calibration.rate)[these] ** 2))
-        assert groups[run] == pytest.approx(expected, rel=1e-8)
-
-
-def test_a_file_runs_nothing_in_a_spreadsheet(calibration):
-    results = Results(calibration)
-    labels = np.where(calibration.log["run"] == 0, "=HYPERLINK(1)", "-5")
-    split = calibration.split
-    object.__setattr__(calibration, "split", type(split)(split.kind, split.folds, labels, ""))
-    try:
-        (picture,) = [draw(results) for draw in PICTURES if draw.__name__ == "draw_groups"]
-    finally:
-        object.__setattr__(calibration, "split", split)
-    assert isinstance(picture, Picture)
-    (text,) = picture.files.values()
-    assert sorted(line.split(",")[0] for line in text.splitlines()[1:]) == ["'=HYPERLINK(1)", "-5"]
-
-
-def test_paper_shows_what_a_click_opens(page):
-    style = page[page.index("@media print") : page.index("</style>")]
-    assert "details::details-content" in style
-    assert re.search(r"figure[^{}]*\{ break-inside: avoid", style)
 
 
 def test_no_screen_is_asked_for(fresh_process):

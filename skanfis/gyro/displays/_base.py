@@ -1,5 +1,6 @@
 """What the pictures of a compensation have in common: tables, units, colours, axes."""
 
+from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -44,6 +45,9 @@ class GyroDisplay:
     _UNITS: ClassVar[tuple[str, ...]] = ("deg/s", "deg/h")
     _SIZE: ClassVar[tuple[float, float]] = (6.2, 4.4)
     _PANELS: ClassVar[dict[str, Any]] = {}
+
+    # Tables of what is drawn, from the errors of all rows in the unit, and options.
+    _computed: ClassVar[Callable[..., dict[str, pd.DataFrame]]]
 
     def __init__(self, tables: dict[str, pd.DataFrame]):
         self._tables = tables
@@ -191,11 +195,6 @@ class GyroDisplay:
 
     def _size(self):
         return self._SIZE
-
-    @classmethod
-    def _computed(cls, rows, unit, **options):
-        """Tables of what is drawn, from the errors of all rows in the unit."""
-        raise NotImplementedError
 
     def _draw(self, axes, tables):
         raise NotImplementedError

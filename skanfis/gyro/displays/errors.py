@@ -277,7 +277,8 @@ class ScaleFactorErrorDisplay(GyroDisplay):
         for panel, (side, _) in zip(axes, _SIDES, strict=True):
             column = f"scale-factor error {side} [ppm]"
             for (ends, band), color in zip(bands, colors, strict=True):
-                rate, ppm = band["true rate [deg/s]"], band[column]
+                known = band.dropna(subset=column)
+                rate, ppm = known["true rate [deg/s]"], known[column]
                 # The line is broken at rest.
                 for half, label in ((rate < 0, f"{np.mean(ends):.0f} °C"), (rate > 0, None)):
                     panel.plot(rate[half], ppm[half], ".-", color=color, label=label, lw=1.2, ms=4)
@@ -337,7 +338,7 @@ class HysteresisDisplay(GyroDisplay):
         for side in ("before", "after"):
             biases = _bias_of_branches(moving.dropna(subset=side), side)
             for name, is_warming in (("warming", True), ("cooling", False)):
-                table[f"bias {side}, {name} [{unit}]"] = biases.get(is_warming)
+                table[f"bias {side}, {name} [{unit}]"] = biases[is_warming]
         return {"bias": table}
 
     @property
@@ -471,7 +472,6 @@ def _bias_of_branches(rows, side):
     One constant per bin and branch is fitted beside the polynomial, whose coefficients are those of
     least squares on what the means leave of errors and powers alike (Frisch and Waugh 1933).
     """
-    cells = rows.groupby(["is_warming", "bin"])
     ratio = rows["rate"] / (rows["rate"].abs().max() or 1.0)
     deviation = rows["temperature"] - rows["temperature"].mean()
     powers = pd.DataFrame(
@@ -479,11 +479,8 @@ def _bias_of_branches(rows, side):
     )
     keys = [rows["is_warming"], rows["bin"]]
     design = powers - powers.groupby(keys).transform("mean")
-    left = rows[side] - cells[side].transform("mean")
+    left = rows[side] - rows[side].groupby(keys).transform("mean")
     coefficients = np.linalg.lstsq(design, left, rcond=None)[0]
     found = (rows[side] - powers @ coefficients).groupby(keys).agg(["mean", "size"])
-    mean = found["mean"].where(found["size"] >= _FEWEST_ROWS)
-    return {
-        branch: part.droplevel(0).reindex(range(_N_TEMPERATURES))
-        for branch, part in mean.groupby(level=0)
-    }
+    means = found["mean"].where(found["size"] >= _FEWEST_ROWS).unstack("is_warming")
+    return means.reindex(index=range(_N_TEMPERATURES), columns=[True, False])

@@ -223,7 +223,7 @@ class CoverageDisplay(GyroDisplay):
             panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
         empty = np.mean(tables["cells"]["rows"] == 0)
         title = f"{empty:.0%} of the cells in range are empty (hatched)"
-        dress(panel, *map(as_label, labels), title)
+        dress(panel, as_label(labels[0]), as_label(labels[1]), title)
         panel.grid(False)
 
 
@@ -231,7 +231,7 @@ def _cells(x, y, n_bins, labels):
     """Ends of all cells, a line for each, and the number of the cell of every row."""
     edges = [bins_of(values, n)[1] for values, n in zip((x, y), n_bins, strict=True)]
     lines = np.arange(n_bins[0] * n_bins[1])
-    ends = {}
+    ends: dict[str, np.ndarray] = {}
     for place, label, each in zip(
         (lines % n_bins[0], lines // n_bins[0]), labels, edges, strict=True
     ):

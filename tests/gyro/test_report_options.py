@@ -7,10 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis.gyro._dossier import dossier_of
-from skanfis.gyro._limits import parse_limit
 from skanfis.gyro._options import make_parser
-from skanfis.gyro._specification import check_limits
+from skanfis.gyro._report_options import check_limit, parse_limit, report_options
 
 
 @pytest.mark.parametrize(
@@ -53,8 +51,8 @@ def test_what_may_not(text, message):
 
 
 def table_of(value, low=np.nan, high=np.nan):
-    line = {"group": "all", "figure": "bias", "unit": "deg/h", "after": value}
-    return pd.DataFrame([line | {"after_low": low, "after_high": high, "note": "no rate changes"}])
+    line = {"figure": "bias", "unit": "deg/h", "after": value, "note": "no rate changes"}
+    return pd.DataFrame([line | {"after_low": low, "after_high": high}]).set_index("figure")
 
 
 @pytest.mark.parametrize(
@@ -75,7 +73,7 @@ def table_of(value, low=np.nan, high=np.nan):
     ],
 )
 def test_both_sides_of_a_limit(text, value, result):
-    (check,) = check_limits([parse_limit(text)], table_of(value))
+    check = check_limit(parse_limit(text), table_of(value))
     assert check.result == result
     assert bool(check.remark) == (result == "not measured")
 
@@ -84,34 +82,21 @@ def test_both_sides_of_a_limit(text, value, result):
     ("low", "high", "is_sure"), [(1.0, 4.9, True), (1.0, 5.1, False), (-6.0, 1.0, False)]
 )
 def test_an_interval_over_the_limit_is_said(low, high, is_sure):
-    (check,) = check_limits([parse_limit("bias=5deg/h")], table_of(1.0, low, high))
+    check = check_limit(parse_limit("bias=5deg/h"), table_of(1.0, low, high))
     assert check.result == "pass"
     assert (check.remark == "") == is_sure
 
 
-def test_the_dossier_has_the_files_as_they_are(tmp_path):
+def test_the_files_are_told_as_they_are(tmp_path):
     content = bytes(range(256)) * 5000
     (tmp_path / "a b.csv").write_bytes(content)
-    typed = [
-        "--min-coverage",
-        "0",
-        "--serial",
-        "7",
-        "--operator",
-        "Ö",
-        "--limits",
-        "bias=5deg/h",
-        "--report-unit=deg/h",
-    ]
-    dossier = dossier_of(
-        make_parser().parse_args([str(tmp_path / "a b.csv"), *typed]), [tmp_path / "a b.csv"]
-    )
-    (file,) = dossier.files
-    assert (file.name, file.n_bytes) == ("a b.csv", len(content))
-    assert file.sha256 == hashlib.sha256(content).hexdigest()
-    assert (dossier.serial, dossier.operator, dossier.unit) == ("7", "Ö", "deg/h")
-    assert dossier.limits == (parse_limit("bias=5deg/h"),)
-    assert {("limits", "bias=5deg/h"), ("min-coverage", "0.0")} <= set(dossier.options)
+    path = tmp_path / "a b.csv"
+    typed = "--min-coverage 0 --serial 7 --operator Ö --limits bias=5deg/h --report-unit=deg/h"
+    found = report_options(make_parser().parse_args([str(path), *typed.split()]), [path])
+    assert found.files == (("a b.csv", len(content), hashlib.sha256(content).hexdigest()),)
+    assert (found.serial, found.operator, found.unit) == ("7", "Ö", "deg/h")
+    assert found.limits == (parse_limit("bias=5deg/h"),)
+    assert {("limits", "bias=5deg/h"), ("min-coverage", "0.0")} <= set(found.options)
 
 
 def test_a_bad_limit_is_told_in_one_line(capsys):
