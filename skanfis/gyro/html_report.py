@@ -44,18 +44,9 @@ _PROOF = (
 )
 _READING = (
     "The model is the mean of its rules by their strengths. Whether each rule holds by itself is "
-    "measured on the rows of the log; standard deviation (sd) and range are those of what the "
-    'rules were taught. The page "What to believe of a rule" of the documentation says more.'
+    "measured on the rows of the log, in standard deviations and ranges of what the rules were "
+    'taught. The page "What to believe of a rule" of the documentation says more.'
 )
-_FIGURES_OF_READING = {
-    "strongest_alone": "strongest rule alone, off the model, RMS [sd]",
-    "disagreement": "disagreement of the rules, RMS [sd]",
-    "greatest_sum": "greatest sum of the sizes of contributions [ranges]",
-    "rules_beyond": "rules whose value at their own center lies far beyond the range",
-    "least_truth": "truth of the least true term",
-    "greatest_crossing": "highest crossing of neighbouring terms",
-    "wordless": "part of the rows on which no term of an input is true",
-}
 
 
 class Block(NamedTuple):
@@ -412,11 +403,7 @@ def _reading(results):
         text = "Nothing measured here speaks against reading the rules one by one."
         blocks.append(Block("text", text))
     lines = [
-        (
-            _FIGURES_OF_READING.get(name, _words(name)),
-            f"{value:.3g}" if name == "rules_beyond" else figures(value),
-            f"{found.limits[name]:g}" if name in found.limits else "–",
-        )
+        (_words(name), figures(value), f"{found.limits.get(name, '–')}")
         for name, value in found.summary.items()
         if np.isfinite(value)
     ]
@@ -426,14 +413,10 @@ def _reading(results):
 def _log(results):
     """The log: its size, ranges and scale factor; and the options of the command."""
     calibration, rows = results.calibration, results.log
-    lines = [("rows", f"{calibration.n_rows:,}", "")]
-    if calibration.is_thinned:
-        lines.append(("rows kept, drawn at random", f"{len(rows):,}", ""))
-    for name in ("run", "device"):
-        if name in rows:
-            lines.append((f"{name}s", f"{rows[name].nunique():,}", ""))
-    if calibration.n_fit_rows < len(rows):
-        lines.append(("rows fitted to, chosen at random", f"{calibration.n_fit_rows:,}", ""))
+    counts = {"rows": calibration.n_rows, "rows kept, drawn at random": len(rows)}
+    counts["rows fitted to, chosen at random"] = calibration.n_fit_rows
+    counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}
+    lines = [(name, f"{count:,}", "") for name, count in counts.items()]
     for name in ("temperature", "rate", "output"):
         unit = "°/s" if name == "rate" else _unit_of(calibration, name)
         lines.append((name, f"{rows[name].min():.5g} to {rows[name].max():.5g}", unit))

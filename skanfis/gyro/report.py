@@ -203,11 +203,11 @@ def gyro_report(
         if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
     ]
     generator = check_random_state(random_state)
-    parts = {"all": table}
+    parts = [("all", table)]
     if groups is not None:
-        parts |= dict(iter(table.groupby("groups", sort=False)))
+        parts += table.groupby("groups", sort=False, dropna=False)
     lines, resampled = [], {}
-    for group, part in parts.items():
+    for group, part in parts:
         seed = generator.randint(2**31 - 1)
         found, resampled[group] = _lines(part, figures, allan, confidence_level, n_resamples, seed)
         lines += [{"group": group} | line for line in found]
@@ -219,9 +219,7 @@ def gyro_report(
         values = report.columns.intersection(_VALUES)
         report = report.assign(unit=units, **report[values].mul(np.array(factors), axis=0))
     # Before compensation nothing is reduced.
-    report.loc[report["figure"] == "reduction_factor", report.columns.intersection(_VALUES[:3])] = (
-        np.nan
-    )
+    report.loc[report["figure"] == "reduction_factor", _VALUES[:3]] = np.nan
     report.attrs["resampled"] = resampled
     return report
 

@@ -143,6 +143,8 @@ def test_bad_columns_are_named(kind, log):
         kind.from_predictions(rate, before, after.where(after.index > 0, np.inf), **columns)
     with pytest.raises(ValueError, match="rate must be finite"):
         kind.from_predictions(rate.where(rate.index > 0), before, after, **columns)
+    with pytest.raises(ValueError, match="after is NaN in all rows"):
+        kind.from_predictions(rate, before, after * np.nan, **columns)
     with pytest.raises(TypeError, match=f"{kind.__name__} needs {WANTS[kind][0]}"):
         kind.from_predictions(rate, before, after)
 

@@ -214,16 +214,6 @@ def test_what_is_missing_is_said(log):
     assert "no run is as long as two averaging times" in long.loc["bias_stability_90s", "note"]
 
 
-@pytest.mark.theory
-def test_a_million_rows_in_seconds(rng):
-    """Resampling works on thinned rows; the figures themselves on all."""
-    rate = np.tile(np.linspace(-100, 100, 1000), 1000)
-    before = rate + 0.01 + 1e-3 * rng.normal(size=rate.size)
-    run = np.repeat(np.arange(10), 100_000)
-    report = gyro_report(rate, before, run=run, time=np.tile(np.arange(1e5), 10), n_resamples=20)
-    assert figures(report).loc["bias", "before"] == pytest.approx(36.0, rel=1e-3)
-
-
 def test_allan_deviation_is_read(rng):
     pytest.importorskip("allantools")
     error = 0.05 / 60.0 * rng.normal(size=4096)

@@ -131,6 +131,9 @@ class GyroDisplay:
         columns = {name: options.pop(name) for name in names}
         rates = {"rate": rate, "before": before, "after": after}
         rows = table_of(rates | columns, labels=("run", "groups"), gaps=("before", "after"))
+        for side in ("before", "after"):
+            if rows[side].isna().all():
+                raise ValueError(f"{side} is NaN in all rows: there is nothing to draw.")
         factor = RATE_UNITS.get(unit, 1.0)
         errors = {side: factor * (rows[side] - rows["rate"]) for side in ("before", "after")}
         return cls(cls._computed(rows.assign(**errors), unit, **options))

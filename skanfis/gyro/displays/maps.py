@@ -7,7 +7,7 @@ import pandas as pd
 
 from ...inspection.labels import as_label
 from .._ask import ask
-from .._columns import evenly_chosen
+from .._columns import check_column, evenly_chosen
 from ._base import GyroDisplay, bins_of, dress, figures, mark_decades, signs
 
 __all__ = ["CoverageDisplay", "ResidualSurfaceDisplay"]
@@ -175,7 +175,7 @@ class CoverageDisplay(GyroDisplay):
         labels = [_words(name, units.get(name)) for name in (x, y)]
         grid = X.median().to_frame().T.assign(**others)
         grid = grid.loc[grid.index.repeat(n_points**2)].reset_index(drop=True)
-        values = [_beyond(X[name], n_points, margin) for name in (x, y)]
+        values = [_beyond(check_column(X[name], name), n_points, margin) for name in (x, y)]
         grid[x], grid[y] = (each.ravel() for each in np.meshgrid(*values))
         ends, cells = _cells(X[x], X[y], (n_cells, n_cells), labels)
         ends["rows"] = np.bincount(cells, minlength=n_cells**2)
