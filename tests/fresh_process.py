@@ -97,6 +97,7 @@ def pyplot_of_pictures():
     for half in [name for name in sys.modules if name.startswith("matplotlib")]:
         del sys.modules[half]
     from matplotlib.figure import Figure
+
     from skanfis.gyro import ErrorDisplay
 
     display = ErrorDisplay.computed([0, 1], [0, 1], [0, 1], position=[0, 1])

@@ -81,7 +81,15 @@ ONLY = {
         ],
     ]
 }
-ONLY_INSIDE_FUNCTIONS = {"dask", "matplotlib", "allantools", "jinja2", "onnx", "pyarrow", "skl2onnx"}
+ONLY_INSIDE_FUNCTIONS = {
+    "dask",
+    "matplotlib",
+    "allantools",
+    "jinja2",
+    "onnx",
+    "pyarrow",
+    "skl2onnx",
+}
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 # What has an underscore belongs to its layer, but for these modules of the root: they are of all
 # layers that the table lets take them, and none of the user's.

@@ -42,10 +42,15 @@ _PROOF = (
     "calibration too, by the policy there: whatever the inputs, the compensator does no more. It "
     "says nothing of how far the gyro is from the compensator."
 )
-_READING = (
+_READING = {
+    "strongest_alone": "strongest rule alone, off the model, RMS [sd]",
+    "least_truth": "truth of the least true term",
+    "greatest_crossing": "highest crossing of neighbouring terms",
+}
+_ALONE = (
     "The model is the mean of its rules by their strengths. Whether each rule holds by itself is "
-    "measured on the rows of the log, in standard deviations and ranges of what the rules were "
-    'taught. The page "What to believe of a rule" of the documentation says more.'
+    "measured on the rows of the log, in standard deviations (sd) of what the rules were taught. "
+    'The page "What to believe of a rule" of the documentation says more.'
 )
 
 
@@ -398,12 +403,12 @@ def _rules(results):
 def _reading(results):
     """Whether the rules can be read one by one."""
     found = results.readability
-    blocks = [Block("text", _READING), *(Block("warn", sentence) for sentence in found.findings)]
+    blocks = [Block("text", _ALONE), *(Block("warn", sentence) for sentence in found.findings)]
     if not found.findings:
         text = "Nothing measured here speaks against reading the rules one by one."
         blocks.append(Block("text", text))
     lines = [
-        (_words(name), figures(value), f"{found.limits.get(name, '–')}")
+        (_READING.get(name, _words(name)), figures(value), f"{found.limits.get(name, '–')}")
         for name, value in found.summary.items()
         if np.isfinite(value)
     ]
@@ -413,8 +418,11 @@ def _reading(results):
 def _log(results):
     """The log: its size, ranges and scale factor; and the options of the command."""
     calibration, rows = results.calibration, results.log
-    counts = {"rows": calibration.n_rows, "rows kept, drawn at random": len(rows)}
-    counts["rows fitted to, chosen at random"] = calibration.n_fit_rows
+    counts = {"rows": calibration.n_rows}
+    if calibration.is_thinned:
+        counts["rows kept, drawn at random"] = len(rows)
+    if calibration.n_fit_rows < len(rows):
+        counts["rows fitted to, chosen at random"] = calibration.n_fit_rows
     counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}
     lines = [(name, f"{count:,}", "") for name, count in counts.items()]
     for name in ("temperature", "rate", "output"):

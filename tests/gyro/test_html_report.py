@@ -174,9 +174,7 @@ def test_says_whether_the_rules_can_be_read(physics, few_rivals, no_drawing):
     section = text[text.index("Can the rules be read?") :]
     for sentence in found.findings or ["Nothing measured here speaks against"]:
         assert sentence in section
-    assert f"strongest alone{figures(found.summary['strongest_alone'])}0.5" in section.replace(
-        "\n", ""
-    )
+    assert f"[sd]{figures(found.summary['strongest_alone'])}0.5" in section.replace("\n", "")
 
 
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):

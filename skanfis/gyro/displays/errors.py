@@ -108,8 +108,7 @@ class ErrorDisplay(GyroDisplay):
                 f"peak [{unit}]": errors.abs().max().to_numpy(),
             }
         )
-        tables = {"points": points.reset_index(drop=True), "bands": bands, "whole": whole}
-        return tables
+        return {"points": points.reset_index(drop=True), "bands": bands, "whole": whole}
 
     def _draw(self, axes, tables):
         points, bands = tables["points"], tables["bands"]
