@@ -237,8 +237,10 @@ def table_of(columns, labels=(), gaps=()):
         if name in labels:
             found[name] = check_labels(values, name, n_rows)
         elif name in gaps:
-            is_gap = np.asarray(pd.isna(values))
-            filled = check_column(np.where(is_gap, 0.0, values), name, n_rows)
+            numbers = np.asarray(values)
+            numbers = numbers if numbers.dtype.kind in "fiu" else numbers.astype(object)
+            is_gap = pd.isna(numbers)
+            filled = check_column(np.where(is_gap, 0.0, numbers), name, n_rows)
             found[name] = np.where(is_gap, np.nan, filled)
         else:
             found[name] = check_column(values, name, n_rows)
