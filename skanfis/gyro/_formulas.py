@@ -25,11 +25,7 @@ def formula_of(calibration, name):
 
 
 def rules_text(calibration, found=None):
-    """The rules as sentences, after the formula of the law where there is one.
-
-    In front of them stands what speaks against reading them one by one; ``found`` is their
-    readability where it has been measured already.
-    """
+    """The rules as sentences, behind what speaks against reading them and the law's formula."""
     found = readability_of(calibration) if found is None else found
     caution = ""
     if found.findings:

@@ -97,10 +97,7 @@ def errors_and_verdict(calibration):
 
 
 def readability_of(calibration):
-    """Whether the rules can be read, on the rows of the log, against what they were taught.
-
-    Beside the arcsine law that is what the law leaves of the rate, otherwise the gyro's error.
-    """
+    """Whether the rules can be read: against what the law leaves of the rate, or the error."""
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
     X, estimator = calibration.X.iloc[places], calibration.compensator.estimator
     if not calibration.recipe.physics:

@@ -1,13 +1,9 @@
-"""The pictures of a calibration's report, each drawn on a figure of its own.
-
-The figures are not pyplot's: no screen is asked for, and none stays open.
-"""
+"""The pictures of a calibration's report, each drawn on a figure of its own, not pyplot's."""
 
 import base64
 import io
 import re
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -24,7 +20,7 @@ from .displays import (
     ScaleFactorErrorDisplay,
 )
 
-__all__ = ["PICTURES", "Picture", "draw", "draw_coverage", "draw_memberships"]
+__all__ = ["PICTURES", "draw", "draw_coverage", "draw_memberships"]
 
 _DOTS_PER_INCH = 160  # sharp in print
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
@@ -33,10 +29,9 @@ _CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls
 
 
 class Picture(NamedTuple):
-    """What a page shows: the image, what those who cannot see it are told, and the data behind it.
+    """What a page shows: a PNG image, what those who cannot see it are told, CSV files; in base64.
 
-    ``image`` is PNG, and the values of ``files`` are CSV, all in base64; ``is_tall`` tells how the
-    picture stands on paper.
+    ``is_tall`` tells how the picture stands on paper.
     """
 
     image: str
@@ -46,116 +41,69 @@ class Picture(NamedTuple):
     is_tall: bool
 
 
-class Plan(NamedTuple):
-    """A display, and what makes its arguments of results; these give None where it has no sense.
-
-    The first sentence of the caption is read to those who cannot see the picture.
-    """
-
-    subject: str
-    display: Any
-    arguments: Callable
-    caption: str
-
-
-def _by_time(results):
-    if results.time is None:
-        return None
-    label = "time since power-on [s]"
-    return {"position": results.since_power_on, "position_label": label, "unit": results.unit}
-
-
-def _by_temperature(results):
-    label = "temperature [degC]"
-    return {"position": results.temperature, "position_label": label, "unit": results.unit}
-
-
-def _over_rates(results):
-    return {"temperature": results.temperature} if np.ptp(results.rate) else None
-
-
-def _surface(results):
-    arguments = _over_rates(results)
-    return arguments and arguments | {"unit": results.unit}
-
-
-def _loop(results):
-    change = results.temperature_rate
-    if change is None or not change.min() < -_CLEARLY < _CLEARLY < change.max():
-        return None
-    temperatures = {"temperature": results.temperature, "temperature_rate": change}
-    return temperatures | {"unit": results.unit}
-
-
-def _groups(results):
-    return {"groups": results.calibration.split.labels.astype(str), "unit": results.unit}
-
-
-def _allan(results):
-    if isinstance(results.of_allan, str):
-        return None
-    return results.of_allan | {"unit": results.unit}
-
-
+# Name of the files, display, and caption, whose first sentence is read to those who cannot see.
 PICTURES = (
-    Plan(
-        "error-by-time",
-        ErrorDisplay,
-        _by_time,
-        "Error against time, before and after. Bands reach from the smallest to the largest error.",
-    ),
-    Plan(
-        "error-by-temperature",
-        ErrorDisplay,
-        _by_temperature,
-        "Error against temperature, before and after.",
-    ),
-    Plan(
+    ("error-by-time", ErrorDisplay, "Error against time, before and after."),
+    ("error-by-temperature", ErrorDisplay, "Error against temperature, before and after."),
+    (
         "scale-factor-error",
         ScaleFactorErrorDisplay,
-        _over_rates,
         "Scale-factor error against rate, in three bands of temperature.",
     ),
-    Plan(
+    (
         "hysteresis",
         HysteresisDisplay,
-        _loop,
         "Bias against temperature, while warming and while cooling. What depends on the rate is "
         "taken off, other than in the table. Temperature alone cannot close a loop.",
     ),
-    Plan(
+    (
         "residual-surface",
         ResidualSurfaceDisplay,
-        _surface,
         "Mean residual and number of rows over temperature and rate.",
     ),
-    Plan(
-        "held-out-groups",
-        GroupResidualDisplay,
-        _groups,
-        "RMS error of every held-out group, the worst at the top.",
-    ),
-    Plan(
+    ("held-out-groups", GroupResidualDisplay, "RMS error of every held-out group."),
+    (
         "allan-deviation",
         AllanDisplay,
-        _allan,
         "Allan deviation of the error, over the runs that are in range from end to end.",
     ),
 )
 
 
 def draw(plan, results):
-    """The picture of a plan; None where it has no sense."""
+    """The picture of one line of PICTURES; None where it has no sense."""
     from matplotlib.figure import Figure
 
-    arguments = plan.arguments(results)
+    subject, kind, caption = plan
+    arguments = _arguments(results).get(subject)
     if arguments is None:
         return None
     rows = arguments.pop("rows", slice(None))
     rates = (each[rows] for each in (results.rate, results.before, results.after))
-    display = plan.display.computed(*rates, **arguments)
+    unit = None if kind is ScaleFactorErrorDisplay else results.unit
+    display = kind.computed(*rates, unit, **arguments)
     display.plot(display.panels(Figure))
-    return _picture(plan.subject, display.figure_, display.tables(), plan.caption)
+    return _picture(subject, display.figure_, display.tables(), caption)
+
+
+def _arguments(results):
+    """What each display is made of, where it has a sense."""
+    temperature, change = results.temperature, results.temperature_rate
+    label = "temperature [degC]"
+    found = {
+        "error-by-temperature": {"position": temperature, "position_label": label},
+        "held-out-groups": {"groups": results.calibration.split.labels.astype(str)},
+    }
+    if results.time is not None:
+        label = "time since power-on [s]"
+        found["error-by-time"] = {"position": results.since_power_on, "position_label": label}
+    if np.ptp(results.rate):
+        found["scale-factor-error"] = found["residual-surface"] = {"temperature": temperature}
+    if change is not None and change.min() < -_CLEARLY < _CLEARLY < change.max():
+        found["hysteresis"] = {"temperature": temperature, "temperature_rate": change}
+    if isinstance(results.of_allan, dict):
+        found["allan-deviation"] = dict(results.of_allan)
+    return found
 
 
 def draw_coverage(calibration):

@@ -1,9 +1,6 @@
 """What the command is told for its report: whose gyro, in which unit, and limits to be kept.
 
-bias=5deg/h             the size of the bias is at most 5 deg/h
-bias=-2:5deg/h          it lies from -2 to 5 deg/h
-reduction_factor=10     it is 10 or more: of this figure more is better
-residual_rms=:0.01deg/s it is at most 0.01 deg/s
+A limit is FIGURE=VALUE: bias=5deg/h says that the bias is 5 deg/h at most, without its sign.
 """
 
 import argparse
@@ -14,9 +11,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from ._figures_of_merit import figures_of_merit
 from ._rate_units import RATE_UNITS, in_rate_unit, rate_unit_of
 from .allan import ALLAN_FIGURES
-from .report import figures_of_merit
 
 __all__ = [
     "Check",
@@ -28,30 +25,27 @@ __all__ = [
     "report_options",
 ]
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_FORM = re.compile(rf"(?P<low>{_NUMBER})?(?P<colon>:)?(?P<high>{_NUMBER})?(?P<unit>[^\d.:+-].*)?")
+_FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")
 _SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
-# Of these more is better.
-_AT_LEAST = ("reduction_factor",)
+_AT_LEAST = ("reduction_factor",)  # of this more is better
 
 
 class Limit(NamedTuple):
-    """From ``low`` to ``high``, both kept; ``text`` is what was typed, ``unit`` that of both."""
+    """The size that a figure may have at most, or at least; ``text`` is what was typed of it."""
 
     figure: str
-    low: float
-    high: float
+    value: float
     unit: str
     text: str
 
     def keeps(self, value):
         """Whether a value in the limit's unit keeps it."""
-        return bool(self.low <= value <= self.high)
+        return bool(value >= self.value if self.figure in _AT_LEAST else abs(value) <= self.value)
 
 
 class Check(NamedTuple):
-    """A limit and the figure after compensation, in one unit: "pass", "fail" or "not measured"."""
+    """A limit, the figure in its unit, and "pass", "fail" or "not measured"."""
 
     limit: Limit
     value: float
@@ -60,10 +54,7 @@ class Check(NamedTuple):
 
 
 class ReportOptions(NamedTuple):
-    """All may be missing. ``unit`` is that of all errors, or "auto"; ``options`` are pairs.
-
-    ``files`` have a name without folders, a size [bytes] and the SHA-256 of their bytes.
-    """
+    """All may be missing. ``files`` have a name, a size [bytes] and the SHA-256 of their bytes."""
 
     made: str = ""
     serial: str = ""
@@ -85,10 +76,10 @@ def add_report_options(parser):
         action="extend",
         type=_limit_of_option,
         default=[],
-        metavar="FIGURE=LIMIT",
+        metavar="FIGURE=VALUE",
         help="limits of the specification for figures of merit after compensation, with units: "
-        "residual_rms=0.01deg/s (at most), bias=-2:5deg/h (from, to), reduction_factor=10 (at "
-        "least); the report says of each whether it is kept",
+        "residual_rms=0.01deg/s (at most), reduction_factor=10 (at least); the report says of each "
+        "whether it is kept",
     )
     group.add_argument(
         "--report-unit",
@@ -124,61 +115,45 @@ def report_options(options, paths):
 
 def parse_limit(text):
     """A limit such as ``bias=5deg/h``; ValueError where it is none."""
-    figure, equals, typed = text.partition("=")
-    if not equals or figure not in _UNITS:
+    figure, _, typed = text.partition("=")
+    if figure not in _UNITS:
         raise ValueError(
-            f"{text!r} must be FIGURE=LIMIT, with a figure of merit of: {', '.join(_UNITS)}."
+            f"{text!r} must be FIGURE=VALUE, with a figure of merit of: {', '.join(_UNITS)}."
         )
-    found = _FORM.fullmatch(typed.strip())
-    if found is None or (found["low"] is None and found["high"] is None):
+    usual, found = _UNITS[figure], _FORM.fullmatch(typed)
+    if found is None:
         raise ValueError(
-            f"{text!r}: {typed!r} must be a number, or LOW:HIGH of which one may be missing, and a "
-            f"unit, as in {figure}=-2:5{_UNITS[figure]}."
+            f"{text!r}: {typed!r} must be a number, not negative, and a unit, as in "
+            f"{figure}=5{usual}."
         )
-    low = -math.inf if found["low"] is None else float(found["low"])
-    high = math.inf if found["high"] is None else float(found["high"])
-    if found["colon"] and not low <= high:
-        raise ValueError(f"{text!r}: the lower limit {low:g} is above the upper one, {high:g}.")
-    if not found["colon"]:
-        if found["high"] is not None:
-            raise ValueError(f"{text!r}: two numbers need a colon between them, as in -2:5.")
-        if low < 0:
-            raise ValueError(f"{text!r}: one number limits the size, and must not be negative.")
-        low, high = (low, math.inf) if figure in _AT_LEAST else (-low, low)
-    return Limit(figure, low, high, _unit(text, figure, found["unit"]), typed.strip())
+    unit = found["unit"]
+    for sign, name in _SPELLINGS:
+        unit = unit.replace(sign, name)
+    known = [in_rate_unit(usual, name)[0] for name in RATE_UNITS]
+    if rate_unit_of(usual) is None:
+        # Without its unit, and "ppm" alone, it is clear as well.
+        known = [usual, "", usual.partition(" ")[0]]
+    if unit not in known:
+        wanted = " or ".join(filter(None, dict.fromkeys(known)))
+        wanted = f"is in {wanted}" if wanted else "has no unit"
+        raise ValueError(f"{text!r}: {figure} {wanted}; found {unit!r}.")
+    unit = unit if rate_unit_of(usual) else usual
+    return Limit(figure, float(found["value"]), unit, typed.strip())
 
 
 def check_limit(limit, lines):
     """Whether a figure keeps its limit, by the lines of a table of :func:`gyro_report`."""
     if limit.figure not in lines.index:
         return Check(limit, math.nan, "not measured", "the log does not give this figure")
-    line = lines.loc[limit.figure]
-    unit, wanted = line["unit"], rate_unit_of(line["unit"])
-    factor = 1.0 if wanted is None else in_rate_unit(limit.unit, wanted)[1]
-    limit = limit._replace(low=factor * limit.low, high=factor * limit.high, unit=unit)
-    value, low, high = (line[name] for name in ("after", "after_low", "after_high"))
+    line, wanted = lines.loc[limit.figure], rate_unit_of(limit.unit)
+    factor = 1.0 if wanted is None else in_rate_unit(line["unit"], wanted)[1]
+    value, low, high = (factor * line[name] for name in ("after", "after_low", "after_high"))
     if math.isnan(value):
         return Check(limit, value, "not measured", line["note"])
     is_kept = limit.keeps(value)
     is_sure = math.isnan(low) or limit.keeps(low) == limit.keeps(high) == is_kept
     remark = "" if is_sure else "its interval reaches over the limit"
     return Check(limit, value, "pass" if is_kept else "fail", remark)
-
-
-def _unit(text, figure, typed):
-    usual = _UNITS[figure]
-    typed = "" if typed is None else typed.strip()
-    for sign, name in _SPELLINGS:
-        typed = typed.replace(sign, name)
-    if rate_unit_of(usual) is not None:
-        known = [in_rate_unit(usual, name)[0] for name in RATE_UNITS]
-    else:
-        known = [usual, "", "ppm"] if usual.startswith("ppm of") else [usual, ""]
-    if typed in known:
-        return typed if rate_unit_of(usual) is not None else usual
-    wanted = " or ".join(filter(None, known))
-    wanted = f"is in {wanted}" if wanted else "has no unit"
-    raise ValueError(f"{text!r}: {figure} {wanted}; found {typed!r}.")
 
 
 def _limit_of_option(text):

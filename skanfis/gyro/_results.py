@@ -3,10 +3,7 @@
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 
-from ._budget import budget_of
-from ._certain import certain_of
 from ._columns import label_texts
 from ._headline import readability_of
 from ._rate_units import RATE_UNITS
@@ -21,16 +18,10 @@ __all__ = ["Results"]
 
 _PER_MINUTE = 60.0
 _SMALL = 0.05  # deg/s
-# A line of the table for each: beyond, nobody reads it.
-_MOST_GROUPS = 40
 
 
 class Results:
-    """What several parts of the report need.
-
-    ``after`` is the held-out compensated rate where a row was in range, NaN elsewhere, and so is
-    ``before``: a flagged row is not to be trusted, and has a figure of its own.
-    """
+    """What several parts of the report need; rates are NaN where a row was out of range."""
 
     def __init__(self, calibration, options=None):
         self.calibration = calibration
@@ -55,30 +46,15 @@ class Results:
         if self.unit == "auto":
             # That in which errors are no long row of zeros.
             self.unit = "deg/s" if rms(self.error_before) > _SMALL else "deg/h"
+        self.symbol = signs(self.unit)
 
     def shown(self, error):
         """An error [deg/s] in the unit for errors, without it; a dash where it is not known."""
         return figures(RATE_UNITS[self.unit] * error) if np.isfinite(error) else "–"
 
-    @property
-    def symbol(self):
-        """Sign of the unit for errors."""
-        return signs(self.unit)
-
     @cached_property
     def merit(self):
-        """Figures of merit of all rows in range, and of each group where there are few."""
-        table = self._report(random_state=0, allan=isinstance(self.of_allan, dict))
-        labels = self.calibration.split.labels
-        if np.unique(labels.astype(str)).size > _MOST_GROUPS:
-            return table
-        # Their intervals, which would take the longest of all, are not shown.
-        groups = self._report(groups=labels, n_resamples=0)
-        both = pd.concat([table, groups[groups["group"] != "all"]], ignore_index=True)
-        both.attrs = table.attrs
-        return both
-
-    def _report(self, **options):
+        """Figures of merit of all rows in range."""
         return gyro_report(
             self.rate,
             self.calibration.before,
@@ -91,7 +67,8 @@ class Results:
             # At rest there is no scale factor; any full scale will do.
             full_scale=np.abs(self.rate).max() or 1.0,
             rate_unit=self.unit,
-            **options,
+            allan=isinstance(self.of_allan, dict),
+            random_state=0,
         )
 
     @cached_property
@@ -115,20 +92,10 @@ class Results:
     @cached_property
     def checks(self):
         """The limits of the specification, and whether they are kept."""
-        lines = self.merit[self.merit["group"] == "all"].set_index("figure")
+        lines = self.merit.set_index("figure")
         return [check_limit(limit, lines) for limit in self.options.limits]
 
     @cached_property
     def readability(self):
         """Whether the rules can be read one by one."""
         return readability_of(self.calibration)
-
-    @cached_property
-    def budget(self):
-        """The parts of a row's uncertainty."""
-        return budget_of(self.calibration)
-
-    @cached_property
-    def certain(self):
-        """What is proven over the box that was asked for."""
-        return certain_of(self.calibration)

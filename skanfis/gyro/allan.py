@@ -20,12 +20,7 @@ from ._columns import check_column
 from ._rate_units import PER_HOUR
 from .metrics import rows_by_run
 
-__all__ = [
-    "ALLAN_FIGURES",
-    "allan_coefficients",
-    "allan_deviation",
-    "rows_for_allan",
-]
+__all__ = ["ALLAN_FIGURES", "allan_coefficients", "allan_deviation", "rows_for_allan"]
 
 ALLAN_FIGURES = {
     "angle_random_walk": "deg/sqrt(h)",
@@ -45,10 +40,7 @@ _UNEVEN = 0.01  # largest deviation of the time between rows, relative
 def allan_deviation(
     error: ArrayLike, sampling_interval: float, *, run: ArrayLike | None = None
 ) -> pd.DataFrame:
-    """Overlapping Allan deviation of the error, in octaves up to a tenth of the run.
-
-    Computed by allantools (``allantools.oadev``), an optional dependency. The runs of one log give
-    one curve: their variances are averaged with the number of differences each has.
+    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
 
     Parameters
     ----------
@@ -57,13 +49,12 @@ def allan_deviation(
     sampling_interval : float
         Time between rows, positive [s].
     run : array-like of shape (n_rows,), default=None
-        Labels of the runs; None is one run. No difference is taken from one run to another.
+        Labels of the runs, whose variances are averaged; None is one run.
 
     Returns
     -------
     curve : DataFrame of shape (n_times, 4)
-        averaging_time [s]; deviation [deg/h]; error, its standard error deviation / sqrt(n)
-        [deg/h]; n, the number of differences.
+        averaging_time [s]; deviation [deg/h]; its standard error [deg/h]; n, the differences.
 
     Raises
     ------
@@ -91,7 +82,7 @@ def allan_deviation(
     error = check_column(error, "error")
     if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
         raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
-    found = []
+    parts = []
     for rows in rows_by_run(run, error.size):
         if rows.size < _ROWS_PER_TIME:
             continue
@@ -100,27 +91,27 @@ def allan_deviation(
         )
         multiple = np.round(times / sampling_interval)
         part = pd.DataFrame({"multiple": multiple, "sum": counts * deviations**2, "n": counts})
-        found.append(part[multiple * _ROWS_PER_TIME <= rows.size])
-    if not found:
+        parts.append(part[multiple * _ROWS_PER_TIME <= rows.size])
+    if not parts:
         raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
-    curve = pd.concat(found).groupby("multiple", as_index=False).sum()
-    deviation = np.sqrt(curve["sum"] / curve["n"])
-    return pd.DataFrame(
-        {
-            "averaging_time": curve["multiple"] * sampling_interval,
-            "deviation": deviation,
-            "error": deviation / np.sqrt(curve["n"]),
-            "n": curve["n"].astype(int),
-        }
-    )
+    curve = pd.concat(parts).groupby("multiple", as_index=False).sum()
+    times, counts = curve["multiple"] * sampling_interval, curve["n"].astype(int)
+    deviation = np.sqrt(curve["sum"] / counts)
+    standard_error = deviation / np.sqrt(counts)
+    columns = {
+        "averaging_time": times,
+        "deviation": deviation,
+        "error": standard_error,
+        "n": counts,
+    }
+    return pd.DataFrame(columns)
 
 
 @dataclass(frozen=True)
 class AllanCoefficients:
-    """What an Allan curve says of the noise; None where it says nothing, with the reason.
+    """What an Allan curve says of the noise; None where it says nothing, with the reason in notes.
 
-    N [deg/sqrt(h)], the curve's minimum [deg/h], B = minimum / 0.664 [deg/h] and K [deg/h/sqrt(h)];
-    ``notes`` has the reasons by name.
+    N [deg/sqrt(h)], the minimum [deg/h], B = minimum / 0.664 [deg/h] and K [deg/h/sqrt(h)].
     """
 
     angle_random_walk: float | None
@@ -133,20 +124,18 @@ class AllanCoefficients:
 def allan_coefficients(averaging_time: ArrayLike, deviation: ArrayLike) -> AllanCoefficients:
     """Read angle random walk, bias instability and rate random walk off an Allan curve.
 
-    A slope counts as found where a line through three neighbouring points has it within 0.15; the
-    coefficient is that of the lowest such line, before the minimum for N and after it for K: what
-    else is in the noise only adds to the curve. A minimum at an end of the curve is none.
+    A slope is found where a line through three neighbouring points has it within 0.15; the lowest
+    such line counts, before the minimum for N and after it for K. A minimum at an end is none.
 
     Parameters
     ----------
-    averaging_time : array-like of shape (n_times,)
-        Increasing, positive [s]; best in octaves, and none longer than a tenth of the record.
-    deviation : array-like of shape (n_times,)
-        Allan deviation, positive [deg/h].
+    averaging_time, deviation : array-like of shape (n_times,)
+        Averaging times, increasing and positive [s]; Allan deviation, positive [deg/h].
 
     Returns
     -------
     coefficients : AllanCoefficients
+        angle_random_walk, allan_minimum, bias_instability, rate_random_walk, and notes.
 
     Raises
     ------

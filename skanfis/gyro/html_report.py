@@ -13,6 +13,8 @@ import sklearn
 from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
+from ._budget import budget_of
+from ._certain import certain_of
 from ._formulas import formula_of, law_table, on_board, rules_text
 from ._headline import ARTICLES, headline, held_out_groups
 from ._pictures import PICTURES, draw, draw_coverage, draw_memberships
@@ -25,32 +27,15 @@ from .metrics import rms
 
 __all__ = ["check_installed", "report_page"]
 
-_COUNTS = ("rows", "rows_refused", "rows_outside")
 _UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
-_CHECKED = (
-    "A row outside the range of that model's training data is flagged, as it would be on board, "
-    "and has a figure of its own above. All other figures and pictures, before and after "
-    "compensation alike, are of the rows in range."
-)
 _BUDGET = (
     "Combined and RMS error are two ways to one figure: where the error is clearly larger, the "
-    "rules cannot follow the gyro between the groups, and no part of the budget knows of it. Slow "
-    "drift within a group is in the noise, what groups do to the model in what is not repeatable."
+    "rules cannot follow the gyro between the groups, and no part of the budget knows of it."
 )
-_PROOF = (
-    "Proven by interval arithmetic over every point of the box, beyond the range of the "
-    "calibration too, by the policy there: whatever the inputs, the compensator does no more. It "
-    "says nothing of how far the gyro is from the compensator."
-)
-_READING = {
-    "strongest_alone": "strongest rule alone, off the model, RMS [sd]",
-    "least_truth": "truth of the least true term",
-    "greatest_crossing": "highest crossing of neighbouring terms",
-}
+_PROOF = "Proven for every point of the box. How far the gyro is from the compensator is not."
 _ALONE = (
     "The model is the mean of its rules by their strengths. Whether each rule holds by itself is "
-    "measured on the rows of the log, in standard deviations (sd) of what the rules were taught. "
-    'The page "What to believe of a rule" of the documentation says more.'
+    "measured on the rows of the log."
 )
 
 
@@ -74,7 +59,7 @@ def report_page(calibration, title, options=None):
     target = "rate" if recipe.physics else "rate error"
     inputs = ", ".join(map(_words, recipe.inputs))
     cautions = calibration.cautions_in(results.symbol, RATE_UNITS[results.unit])
-    sections = [_identity, _check, _instead, _merit, _pictures, _use, _sure, _rules, _reading, _log]
+    sections = [_identity, _check, _instead, _merit, _pictures, _use, _sure, _rules, _log]
     kept = verdict.model_is_worth_it and all(check.result == "pass" for check in results.checks)
     return _template().render(
         title=f"Gyro compensation: {title}",
@@ -83,7 +68,6 @@ def report_page(calibration, title, options=None):
         verdict_kind="good" if kept else "bad",
         reasons=map(signs, _reasons(results)),
         cautions=[f"Warning: {sentence}" for sentence in cautions],
-        cards=_cards(results),
         sections=[section for make in sections if (section := make(results))],
         footer=f"Made by {_programs()}. Figures of merit in the terms of IEEE Std 952.",
     )
@@ -103,10 +87,9 @@ def check_installed():
 
 
 def _template():
-    try:
-        from jinja2 import Environment
-    except ImportError as error:
-        raise ImportError("the report needs jinja2: pip install jinja2") from error
+    check_installed()
+    from jinja2 import Environment
+
     environment = Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_without_hidden_signs
     )
@@ -140,29 +123,6 @@ def _reasons(results):
         yield 'The rules are not fit to be read one by one: "Can the rules be read?" says why.'
 
 
-def _cards(results):
-    """What, value, and a remark: the error before and after, on the same rows."""
-    calibration, errors = results.calibration, results.calibration.verdict.rms
-    simpler = [name for name in errors if name in ARTICLES and name != NOTHING]
-    best = min(simpler, key=errors.get)
-    before, after = rms(results.error_before), rms(results.error_after)
-    worst = np.abs(results.error_after).max()
-    unit, beside = results.symbol, _times(errors[NOTHING], errors[best])
-    cards = [
-        ("RMS error before", f"{results.shown(before)} {unit}", "the same held-out rows in range"),
-        ("RMS error after", f"{results.shown(after)} {unit}", "held-out rows in range"),
-        ("Reduction", _times(before, after), f"{ARTICLES[best]} alone: {beside}"),
-        ("Largest error after", f"{results.shown(worst)} {unit}", "same rows"),
-        ("Rules", str(calibration.rules[-1].n_rules_), _terms_text(calibration.choice.terms)),
-    ]
-    beyond = ~calibration.inside & np.isfinite(calibration.after)
-    if beyond.any():
-        remark = f"{beyond.mean():.1%} of the held-out rows, all flagged"
-        error = rms((calibration.after - results.rate)[beyond])
-        cards.append(("RMS out of range", f"{results.shown(error)} {unit}", remark))
-    return cards
-
-
 def _identity(results):
     """What is needed to find this calibration again, and to repeat it."""
     options = results.options
@@ -177,39 +137,44 @@ def _identity(results):
         lines = [(name, f"{n_bytes:,}", digest) for name, n_bytes, digest in options.files]
         blocks.append(_table(["file of the log", "bytes", "SHA-256"], lines))
     text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
-    return "This calibration", [*blocks, Block("soft", text)]
+    blocks.append(Block("soft", text))
+    if options.options:
+        text = "\n".join(f"{name}: {value}" for name, value in options.options)
+        blocks.append(Block("details", text, "Options of the command"))
+    return "This calibration", blocks
 
 
 def _check(results):
     """How it was checked, and what is simpler on the same rows."""
     calibration, verdict = results.calibration, results.calibration.verdict
-    text = (
+    texts = [
         "Every row was compensated by a model that had not seen its group: "
-        f"{calibration.split.sentence}. {_CHECKED}"
-    )
-    blocks = [Block("text", text)]
+        f"{calibration.split.sentence}. A row outside the range of that model's training data is "
+        "flagged, as it would be on board. All figures and pictures are of the rows in range."
+    ]
+    beyond = ~calibration.inside & np.isfinite(calibration.after)
+    if beyond.any():
+        error = results.shown(rms((calibration.after - results.rate)[beyond]))
+        texts.append(
+            f"{beyond.mean():.1%} of the held-out rows are out of range; on them the RMS error "
+            f"after compensation is {error} {results.symbol}."
+        )
     if calibration.is_thinned:
-        text = (
+        texts.append(
             f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, drawn "
             "at random from every stretch of every run, with those at the ends of the ranges. "
             "Figures that need every row, of bias stability and Allan's deviation, are left out."
         )
-        blocks.append(Block("text", text))
     if calibration.fold_choices is not None:
         found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
-        several = ", ".join(f"{text} in {count}" for text, count in found.most_common())
-        text = (
-            "Within each fold the structure was chosen from the fold's training rows alone: "
-            f"{several} of {len(calibration.fold_choices)} folds. The final model has "
-            f"{_terms_text(calibration.choice.terms)}."
-        )
-        blocks.append(Block("text", text))
+        several = ", ".join(f"{text} in {count} folds" for text, count in found.most_common())
+        texts.append(f"Each fold's training rows alone chose its structure: {several}.")
+    blocks = [Block("text", text) for text in texts]
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
-        "On the same folds, held-out rows in range and inputs. What this model is better by is the "
-        f"ratio of RMS errors, as the geometric mean over {held_out_groups(calibration)}, with its "
-        "95 % interval by Student's t. Recommended is the simplest that no more elaborate one "
-        "beats decisively: with an interval above 1.02."
+        "On the same held-out rows in range. What this model is better by is the ratio of RMS "
+        f"errors, in the geometric mean over {held_out_groups(calibration)}. Recommended is the "
+        "simplest that no more elaborate one beats with an interval above 1.02."
     )
     blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []
@@ -218,15 +183,13 @@ def _check(results):
         if gain is not None:
             better, interval = f"{figures(gain.factor)} ×", _interval(gain.low, gain.high)
         use = "recommended" if name == verdict.recommended else ""
-        factor = _times(verdict.rms[NOTHING], error)
-        lines.append((name, results.shown(error), factor, better, interval, use))
+        factor = verdict.rms[NOTHING] / error if error else np.inf
+        lines.append((name, results.shown(error), f"{figures(factor)} ×", better, interval, use))
     error = f"RMS error [{results.symbol}]"
     head = ["compensation", error, "reduction", "this model better by", "95 % interval", "result"]
-    blocks.append(_table(head, lines))
-    for simple in calibration.simpler:
-        if simple.missing:
-            blocks.append(Block("soft", f"{simple.name}: {simple.missing}"))
-    return "How it was checked", blocks
+    missing = [simple for simple in calibration.simpler if simple.missing]
+    notes = [Block("soft", f"{simple.name}: {simple.missing}") for simple in missing]
+    return "How it was checked", [*blocks, _table(head, lines), *notes]
 
 
 def _instead(results):
@@ -242,75 +205,37 @@ def _instead(results):
         f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
         "deg/s, inputs in the units of the range of the calibration below."
     )
-    formula = Block("details", formula_of(calibration, name), "What to compute", is_open=True)
-    blocks = [Block("text", text), formula]
     if wanted := options_for(name, calibration.X.shape[1]):
-        text = f"The command writes its files, C code included, with {wanted}: a single rule is a "
-        blocks.append(Block("text", text + "straight line."))
-    return "What to use instead", blocks
+        text += f" The command writes its files, C code included, with {wanted}."
+    formula = Block("details", formula_of(calibration, name), "What to compute", is_open=True)
+    return "What to use instead", [Block("text", text), formula]
 
 
 def _merit(results):
-    """The table for all rows in range, the limits, and one line per held-out group."""
-    table = results.merit
-    whole = table[(table["group"] == "all") & ~table["figure"].isin(_COUNTS)]
-    known = whole[whole[["before", "after"]].notna().any(axis=1)]
+    """The figures of merit of all rows in range, and the limits."""
+    table = results.merit[~results.merit["figure"].str.startswith("rows")]
     lines = []
-    for _, line in known.iterrows():
-        cells = [
-            cell
-            for side in ("before", "after")
-            for cell in (_shown(line[side]), _interval(line[f"{side}_low"], line[f"{side}_high"]))
-        ]
+    for _, line in table[table[["before", "after"]].notna().any(axis=1)].iterrows():
+        cells = []
+        for side in ("before", "after"):
+            value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
+            cells += [_shown(value), _interval(low, high)]
         lines.append((_words(line["figure"]), *cells, signs(line["unit"])))
-    resampled = table.attrs["resampled"]["all"]
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit"]
+    resampled = results.merit.attrs["resampled"]["all"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
-    for note, part in whole[whole["note"] != ""].groupby("note", sort=False):
+    for note, part in table[table["note"] != ""].groupby("note", sort=False):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
-        blocks += [Block("heading", "Limits of the specification"), _specification(results)]
-    groups = table[table["group"] != "all"]
-    if len(groups):
-        blocks += _by_group(results, groups)
+        checks = [
+            (_words(limit.figure), signs(limit.text), _shown(value), signs(limit.unit), *told)
+            for limit, value, *told in results.checks
+        ]
+        caption = "After compensation by the fuzzy rules, on the held-out rows in range"
+        head = ["figure", "required", "after", "unit", "result", "remark"]
+        heading = Block("heading", "Limits of the specification")
+        blocks += [heading, _table(head, checks, caption)]
     return "Figures of merit", blocks
-
-
-def _specification(results):
-    lines = []
-    for limit, value, result, remark in results.checks:
-        low, high = figures(limit.low), figures(limit.high)
-        required = f"{low} to {high}"
-        if limit.low == -limit.high:
-            required = f"size at most {high}"
-        elif np.isinf(limit.high):
-            required = f"at least {low}"
-        elif np.isinf(limit.low):
-            required = f"at most {high}"
-        if not limit.text.endswith(limit.unit):
-            required += f" ({signs(limit.text)})"  # typed in another unit than the report's
-        unit = signs(limit.unit)
-        lines.append((_words(limit.figure), required, _shown(value), unit, result, remark))
-    caption = "After compensation by the fuzzy rules, on the held-out rows in range"
-    return _table(["figure", "required", "after", "unit", "result", "remark"], lines, caption)
-
-
-def _by_group(results, groups):
-    kind = results.calibration.split.kind.split("+")[0]
-    after = groups.pivot(index="group", columns="figure", values="after")
-    before = groups[groups["figure"] == "residual_rms"].set_index("group")["before"]
-    lines = []
-    for group in groups["group"].unique():
-        line = after.loc[group]
-        factor = line["reduction_factor"]
-        errors = [before[group], line["residual_rms"], line["residual_peak"]]
-        reduction = f"{figures(factor)} ×" if np.isfinite(factor) else "–"
-        counts = [f"{line[name]:,.0f}" for name in ("rows", "rows_refused")]
-        lines.append((group, *counts, *map(_shown, errors), reduction))
-    unit = results.symbol
-    errors = [f"RMS before [{unit}]", f"RMS after [{unit}]", f"peak after [{unit}]"]
-    head = [kind, "rows", "out of range", *errors, "reduction"]
-    return [Block("heading", f"By held-out {kind}"), _table(head, lines)]
 
 
 def _pictures(results):
@@ -343,7 +268,8 @@ def _use(results):
 
 def _sure(results):
     """The uncertainty budget, and the bounds over a box of inputs."""
-    calibration, budget, certain = results.calibration, results.budget, results.certain
+    calibration = results.calibration
+    budget, certain = budget_of(calibration), certain_of(calibration)
     between = f"between the means of the {held_out_groups(calibration)}"
     if not np.isfinite(budget.scatter):
         between = "not known: fewer than two held-out groups have rows in range"
@@ -351,13 +277,14 @@ def _sure(results):
     if np.isnan(budget.model):
         posterior = "not known: the rules have too many parameters"
     ends = _interval(budget.scatter_low, budget.scatter_high, results.shown)
-    lines = [
-        ("noise", results.shown(budget.noise), "", "of a row, within its group"),
-        ("not repeatable", results.shown(budget.scatter), ends, between),
-        ("model", results.shown(budget.model), "", posterior),
-        ("combined", results.shown(budget.combined), "", "root of the sum of squares"),
-        ("for comparison", results.shown(rms(results.error_after)), "", "RMS error, held-out rows"),
+    parts = [
+        ("noise", budget.noise, "", "of a row, within its group"),
+        ("not repeatable", budget.scatter, ends, between),
+        ("model", budget.model, "", posterior),
+        ("combined", budget.combined, "", "root of the sum of squares"),
+        ("for comparison", rms(results.error_after), "", "RMS error, held-out rows"),
     ]
+    lines = [(part, results.shown(size), *rest) for part, size, *rest in parts]
     head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
     caption = "Of one compensated row in range, in a group that the model has not seen"
     size, place = certain.attained
@@ -366,9 +293,8 @@ def _sure(results):
         f"{_words(name)} {value:.5g} {_unit_of(calibration, name)}"
         for name, value in zip(names, _rounded(place), strict=True)
     )
-    what = (
-        "addition of the rules to the arcsine law" if calibration.recipe.physics else "compensation"
-    )
+    added = calibration.recipe.physics
+    what = "addition of the rules to the arcsine law" if added else "compensation"
     proven = [
         (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}", ""),
         ("largest that was met", f"{results.shown(size)} {results.symbol}", f"at {at}"),
@@ -387,7 +313,7 @@ def _sure(results):
 
 
 def _rules(results):
-    """The rules in pictures and as text."""
+    """The rules in pictures and as text, and whether they can be read one by one."""
     calibration, blocks = results.calibration, []
     if calibration.recipe.physics:
         law = law_table(calibration.compensator.estimator.base_, calibration.recipe)
@@ -395,28 +321,22 @@ def _rules(results):
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
     if (picture := draw_memberships(calibration)) is not None:
         blocks.append(Block("pictures", [picture]))
+    findings = results.readability.findings
     text, steps = rules_text(calibration, results.readability), on_board(calibration.compensator)
-    blocks.append(Block("details", text, "All rules as text"))
-    return "The rules", [*blocks, Block("details", steps, "What to compute on board")]
-
-
-def _reading(results):
-    """Whether the rules can be read one by one."""
-    found = results.readability
-    blocks = [Block("text", _ALONE), *(Block("warn", sentence) for sentence in found.findings)]
-    if not found.findings:
-        text = "Nothing measured here speaks against reading the rules one by one."
-        blocks.append(Block("text", text))
-    lines = [
-        (_READING.get(name, _words(name)), figures(value), f"{found.limits.get(name, '–')}")
-        for name, value in found.summary.items()
-        if np.isfinite(value)
+    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
+    fit = "Nothing measured here speaks against reading the rules one by one."
+    return "The rules", [
+        *blocks,
+        Block("details", text, f"All rules as text ({n_rules}, {terms})"),
+        Block("details", steps, "What to compute on board"),
+        Block("heading", "Can the rules be read?"),
+        Block("text", _ALONE if findings else f"{_ALONE} {fit}"),
+        *(Block("warn", sentence) for sentence in findings),
     ]
-    return "Can the rules be read?", [*blocks, _table(["figure", "value", "limit"], lines)]
 
 
 def _log(results):
-    """The log: its size, ranges and scale factor; and the options of the command."""
+    """The log: its size, ranges and scale factor."""
     calibration, rows = results.calibration, results.log
     counts = {"rows": calibration.n_rows}
     if calibration.is_thinned:
@@ -431,11 +351,7 @@ def _log(results):
     if calibration.recipe.output_unit in SIGNALS:
         unit = f"{calibration.recipe.output_unit} per °/s"
         lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
-    blocks = [_table(["quantity", "value", "unit"], lines)]
-    if results.options.options:
-        text = "\n".join(f"{name}: {value}" for name, value in results.options.options)
-        blocks.append(Block("details", text, "Options of the command"))
-    return "The log and the options", blocks
+    return "The log", [_table(["quantity", "value", "unit"], lines)]
 
 
 def _box(calibration, names, ends):
@@ -456,10 +372,6 @@ def _interval(low, high, shown=figures):
 
 def _shown(value):
     return figures(value) if np.isfinite(value) else "–"
-
-
-def _times(before, after):
-    return f"{figures(before / after if after else float('inf'))} ×"
 
 
 def _rounded(values):

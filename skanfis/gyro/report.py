@@ -1,90 +1,27 @@
 """One table of all figures of merit, per group, before and after, with bootstrap intervals."""
 
-from collections.abc import Callable
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy.stats import binned_statistic
-from sklearn.utils import check_random_state, resample
+from sklearn.utils import check_random_state
 
 from . import metrics
 from ._columns import check_column, check_labels
+from ._figures_of_merit import LARGEST_VALUES, figures_of_merit, taken
 from ._rate_units import RATE_UNITS, in_rate_unit
 from .allan import ALLAN_FIGURES, allan_coefficients, allan_deviation, rows_for_allan
 
-__all__ = ["figures_of_merit", "gyro_report", "table_of"]
+__all__ = ["gyro_report", "table_of"]
 
 _VALUES = ["before", "before_low", "before_high", "after", "after_low", "after_high"]
-# A nonlinearity is looked for in means over such parts of the range of rates.
-_RATE_BINS = 101
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
 _N_BLOCKS = 30
 # The spread comes from the runs or blocks: evenly thinned rows show it as well.
 _MOST_ROWS = 2_000
 _FEWEST_DEFINED = 0.9  # part of the resamples that must have the figure
-
-
-class Figure(NamedTuple):
-    """A figure of merit of some columns; those in ``also`` are given by name where there are such.
-
-    With ``combine``, the function is of one run, and ``combine`` of the values of all runs.
-    """
-
-    name: str
-    unit: str
-    function: Callable
-    needs: tuple[str, ...]
-    also: tuple[str, ...] = ()
-    combine: Callable | None = None
-    fewest_runs: int = 1
-
-    def of(self, rows):
-        also = {name: rows[name] for name in self.also if name in rows}
-        return self.function(*(rows[name] for name in self.needs), **also)
-
-    def by_run(self, rows):
-        runs = metrics.rows_by_run(rows.get("run"), rows["rate"].size, self.fewest_runs)
-        return np.array([self.of(_taken(rows, run)) for run in runs])
-
-    def value(self, rows):
-        return self.of(rows) if self.combine is None else self.combine(self.by_run(rows))
-
-
-def figures_of_merit(full_scale=1.0, nominal=1.0, averaging_times=(10.0, 100.0)):
-    """All figures but those of Allan, in the order of the table."""
-    rates, error, thermal = ("rate", "output"), ("error",), ("temperature", "temperature_rate")
-    curve = {"full_scale": full_scale}
-    off, ppm = partial(_off_nominal, nominal=nominal), "ppm of full scale"
-    largest, root = (partial(_nonlinearity, statistic=name, **curve) for name in ("max", "rms"))
-    by_run, spread = metrics.scale_factor, metrics.relative_spread
-    in_temperature = metrics.scale_factor_temperature_sensitivity
-    slope, ramp = metrics.bias_temperature_sensitivity, metrics.bias_ramp_sensitivity
-    table: list[tuple[Any, ...]] = [
-        ("residual_rms", "deg/s", metrics.rms, ("residual",)),
-        ("residual_peak", "deg/s", _peak, ("residual",)),
-        ("residual_peak_to_peak", "deg/s", np.ptp, ("residual",)),
-        ("reduction_factor", "", _reduction, ("rate", "before", "after")),
-        ("scale_factor_error", "ppm", off, rates),
-        ("scale_factor_nonlinearity", ppm, largest, rates),
-        ("scale_factor_nonlinearity_rms", ppm, root, rates),
-        ("scale_factor_asymmetry", "ppm", metrics.scale_factor_asymmetry, rates),
-        ("scale_factor_repeatability", "ppm", by_run, rates, (), spread, 2),
-        ("scale_factor_temperature_sensitivity", "ppm/degC", in_temperature, (*rates, thermal[0])),
-        ("bias", "deg/h", metrics.bias, error),
-        ("bias_repeatability", "deg/h", np.mean, error, (), metrics.spread_of_bias, 2),
-        ("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", thermal[0]), thermal[1:]),
-        ("bias_ramp_sensitivity", "deg/h/(degC/min)", ramp, ("error", thermal[1]), thermal[:1]),
-        ("hysteresis", "deg/h", metrics.hysteresis, ("error", *thermal)),
-    ]
-    for seconds in averaging_times:
-        squares = partial(metrics.squares_of_means, averaging_time=seconds)
-        name, pooled = f"bias_stability_{seconds:g}s", metrics.pooled_deviation
-        table.append((name, "deg/h", squares, ("error", "time"), (), pooled))
-    return [Figure(*line) for line in table]
 
 
 def gyro_report(
@@ -109,18 +46,15 @@ def gyro_report(
 ) -> pd.DataFrame:
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
 
-    Give held-out predictions: the figures of rows that a compensator was fitted to say nothing.
-    The intervals are percentiles of a bootstrap over whole runs where a group has five or more, and
-    otherwise over some thirty blocks of consecutive rows.
+    Give held-out predictions. The intervals are percentiles of a bootstrap over whole runs where a
+    group has five or more, and otherwise over some thirty blocks of consecutive rows.
 
     Parameters
     ----------
-    rate : array-like of shape (n_rows,)
-        True rate, the earth's rate about the input axis included [deg/s].
-    before, after : array-like of shape (n_rows,)
-        Rate indicated without compensation (raw counts over their scale factor) and compensated
-        rate [deg/s]. Rows where ``after`` is NaN, which the compensator refused, are left out of
-        all figures and counted. ``after=None`` tabulates ``before`` alone.
+    rate, before : array-like of shape (n_rows,)
+        True rate, and rate indicated without compensation [deg/s].
+    after : array-like of shape (n_rows,), default=None
+        Compensated rate [deg/s]; rows where it is NaN are counted and left out of all figures.
     temperature, temperature_rate, time : array-like of shape (n_rows,), default=None
         [degC], [degC/min], and [s], increasing within each run, for the figures that need them.
     run : array-like of shape (n_rows,), default=None
@@ -136,15 +70,13 @@ def gyro_report(
     averaging_times : tuple of float, default=(10.0, 100.0)
         Lengths of the means of the bias stability, positive [s].
     allan : bool, default=False
-        Whether to read N, B and K off the Allan deviation of indicated less true rate, over the
-        runs without a refused row; needs ``time``, and allantools.
+        Whether to read N, B and K off the Allan deviation; needs ``time``, and allantools.
     confidence_level, n_resamples : float, int, default=0.95, 200
         Of the intervals; zero resamples make none.
     rate_unit : {"deg/s", "deg/h"}, default=None
-        Unit of every figure that is a rate, or a rate per something; None leaves to each the unit
-        that is usual: deg/s for residuals, deg/h for biases.
+        Unit of every figure that is a rate, or a rate per something; None leaves each its usual.
     random_state : int, RandomState instance or None, default=None
-        Seed of the bootstrap; an int makes the intervals reproducible.
+        Seed of the bootstrap.
 
     Returns
     -------
@@ -163,17 +95,12 @@ def gyro_report(
 
     Examples
     --------
-    >>> from skanfis.datasets import make_ofog
-    >>> from skanfis.gyro import OpenLoopArcsineRegressor, gyro_report
-    >>> log = make_ofog(n_devices=1, n_runs=6, random_state=0)
-    >>> train, test = log[log["run"] < 4], log[log["run"] >= 4]
-    >>> law = OpenLoopArcsineRegressor("output", "temperature")
-    >>> law = law.fit(train[["output", "temperature"]], train["rate"])
-    >>> compensated = law.predict(test[["output", "temperature"]])
-    >>> report = gyro_report(test["rate"], test["output"], compensated, random_state=0)
-    >>> nonlinearity = report.set_index("figure").loc["scale_factor_nonlinearity"]
-    >>> bool(nonlinearity["before"] > 10_000 > nonlinearity["after_high"])
-    True
+    >>> import numpy as np
+    >>> from skanfis.gyro import gyro_report
+    >>> rate = np.linspace(-100.0, 100.0, 101)
+    >>> report = gyro_report(rate, 1.001 * rate + 0.01, rate + 0.001, random_state=0)
+    >>> report.set_index("figure").loc[["scale_factor_error", "bias"], "before"].round(1).tolist()
+    [1000.0, 36.0]
     """
     if inside is not None and np.asarray(inside).dtype != bool:
         raise ValueError(f"inside must be bool; its dtype is {np.asarray(inside).dtype}.")
@@ -250,21 +177,25 @@ def table_of(columns, labels=(), gaps=()):
 
 def _lines(part, figures, allan, confidence_level, n_resamples, seed):
     """Lines of one group, and what was resampled."""
-    is_answered = part["after"].notna() if "after" in part else pd.Series(True, part.index)
+    sides = [side for side in ("before", "after") if side in part]
+    is_answered = part[sides[-1]].notna()
     answered = part[is_answered]
     units, kind = _units(answered)
     random_state = np.random.RandomState(seed)
     n_resamples = n_resamples if units else 0
-    places = np.arange(len(units))
-    draws = [resample(places, random_state=random_state) for _ in range(n_resamples)]
+    draws = [random_state.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
     cells = {}
-    for side in ("before", "after"):
-        if side in part:
-            cells[side] = _cells(answered, side, figures, units, kind, draws, confidence_level)
-            cells[side] += _allan_cells(part, side, is_answered.to_numpy()) if allan else []
+    for side in sides:
+        cells[side] = _cells(answered, side, figures, units, kind, draws, confidence_level)
+        cells[side] += _allan_cells(part, side, is_answered.to_numpy()) if allan else []
     names = [(figure.name, figure.unit) for figure in figures]
     names += ALLAN_FIGURES.items() if allan else []
-    lines = _counts(part, is_answered)
+    lines = [{"figure": "rows", "before": float(len(part)), "after": float(len(part))}]
+    if "after" in part:
+        lines.append({"figure": "rows_refused", "after": float((~is_answered).sum())})
+    if "inside" in part:
+        lines.append({"figure": "rows_outside", sides[-1]: float((~part["inside"]).sum())})
+    lines = [line | {"unit": "", "note": ""} for line in lines]
     for place, (name, unit) in enumerate(names):
         line = {"figure": name, "unit": unit}
         for side, found in cells.items():
@@ -286,17 +217,6 @@ def _units(rows):
     return blocks, "blocks of rows"
 
 
-def _counts(part, is_answered):
-    """Lines that count rows: all of them, those refused and those out of bounds."""
-    n_rows, last = float(len(part)), "after" if "after" in part else "before"
-    lines = [{"figure": "rows", "before": n_rows, "after": n_rows}]
-    if "after" in part:
-        lines.append({"figure": "rows_refused", "after": float((~is_answered).sum())})
-    if "inside" in part:
-        lines.append({"figure": "rows_outside", last: float((~part["inside"]).sum())})
-    return [line | {"unit": "", "note": ""} for line in lines]
-
-
 def _cells(table, side, figures, units, kind, draws, confidence_level):
     """Value, ends of the interval, and a note, of each figure."""
     if table.empty:
@@ -306,7 +226,7 @@ def _cells(table, side, figures, units, kind, draws, confidence_level):
     step = max(1, -(-len(table) // _MOST_ROWS))
     thinned = [unit[::step] for unit in units]
     samples = [
-        _with_errors(_taken(columns, np.concatenate([thinned[i] for i in draw])), side)
+        _with_errors(taken(columns, np.concatenate([thinned[i] for i in draw])), side)
         for draw in draws
     ]
     tails = [50.0 * (1.0 - confidence_level), 50.0 * (1.0 + confidence_level)]
@@ -316,35 +236,27 @@ def _cells(table, side, figures, units, kind, draws, confidence_level):
         with np.errstate(divide="ignore", invalid="ignore"):
             value, note = _or_nan(figure.value, rows)
             if draws and not note:
-                note = _why_no_interval(figure, kind)
-            if draws and not note:
-                spread = _spread(figure, rows, samples, draws)
-                if np.isfinite(spread).mean() < _FEWEST_DEFINED:
-                    note = "no interval: too many resamples do not have this figure"
-                else:
-                    ends = np.percentile(spread[np.isfinite(spread)], tails)
+                ends, note = _interval(figure, rows, samples, draws, kind, tails)
         cells.append((value, *ends, note))
     return cells
 
 
-def _why_no_interval(figure, kind):
-    if figure.function in (_peak, np.ptp):
-        return "largest value: no interval"
-    if figure.combine is not None and kind != "runs":
-        return f"no interval: fewer than {_FEWEST_RUNS} runs"
-    return ""
-
-
-def _spread(figure, rows, samples, draws):
-    """Values of a figure over the resamples."""
+def _interval(figure, rows, samples, draws, kind, tails):
+    """Ends of the interval, and why it has none."""
+    nothing = (np.nan, np.nan)
+    if figure.name in LARGEST_VALUES:
+        return nothing, "largest value: no interval"
     if figure.combine is None:
-        return np.array([_or_nan(figure.of, sample)[0] for sample in samples])
-    by_run = figure.by_run(rows)
-    return np.array([_or_nan(figure.combine, by_run[draw])[0] for draw in draws])
-
-
-def _taken(columns, rows):
-    return {name: column[rows] for name, column in columns.items()}
+        spread = np.array([_or_nan(figure.of, sample)[0] for sample in samples])
+    elif kind != "runs":
+        return nothing, f"no interval: fewer than {_FEWEST_RUNS} runs"
+    else:
+        by_run = figure.by_run(rows)
+        spread = np.array([_or_nan(figure.combine, by_run[draw])[0] for draw in draws])
+    spread, n_resamples = spread[np.isfinite(spread)], len(draws)
+    if spread.size < _FEWEST_DEFINED * n_resamples:
+        return nothing, "no interval: too many resamples do not have this figure"
+    return np.percentile(spread, tails), ""
 
 
 def _with_errors(rows, side):
@@ -376,29 +288,3 @@ def _or_nan(function, *arguments):
         return function(*arguments), ""
     except ValueError as error:
         return np.nan, str(error)
-
-
-def _peak(residual):
-    return np.abs(residual).max()
-
-
-def _reduction(rate, before, after):
-    if not np.any(after - rate):
-        raise ValueError("after is zero everywhere: a factor without bound.")
-    return metrics.rms(before - rate) / metrics.rms(after - rate)
-
-
-def _off_nominal(rate, output, nominal):
-    if nominal == 0 or not np.isfinite(nominal):
-        raise ValueError(f"nominal={nominal} must be finite and not zero.")
-    return 1e6 * (metrics.scale_factor(rate, output) / nominal - 1.0)
-
-
-def _nonlinearity(rate, output, full_scale, statistic):
-    """Of the means over bins of the rate's range: that of single rows would be their noise."""
-    if np.ptp(rate) > 0:
-        means = binned_statistic(rate, [rate, output], "mean", bins=_RATE_BINS).statistic
-        rate, output = means[:, np.isfinite(means[0])]
-    return metrics.scale_factor_nonlinearity(
-        rate, output, statistic=statistic, full_scale=full_scale
-    )

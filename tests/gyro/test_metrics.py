@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from skanfis.gyro import metrics
+from skanfis.gyro._figures_of_merit import figures_of_merit
 
 HOUR = 3600.0
+
+
+def figure(name, full_scale=100.0, **columns):
+    """A figure of the table, of these columns."""
+    found = next(each for each in figures_of_merit(full_scale) if each.name == name)
+    return found.value({key: np.asarray(column) for key, column in columns.items()})
 
 
 @pytest.fixture
@@ -20,13 +27,12 @@ def test_scale_factor_of_either_sign(table):
     rate, temperature = table
     assert metrics.scale_factor(rate, 62_018.6 * rate + 800.0) == pytest.approx(62_018.6)
     assert metrics.scale_factor(rate, -5.0 * rate) == pytest.approx(-5.0)
-    found = metrics.scale_factor_nonlinearity(rate, -5.0 * rate + 3.0)
-    assert found == pytest.approx(0.0, abs=1e-6)
     output = np.where(rate > 0, 1.0002, 0.9998) * rate + 0.3
-    assert metrics.scale_factor_asymmetry(rate, output) == pytest.approx(400.0)
+    assert figure("scale_factor_asymmetry", rate=rate, output=output) == pytest.approx(400.0)
     # The mean temperature is 20 degC, so that the slope is relative to the factor there.
-    output = 2.0 * (1 - 410e-6 * (temperature - 20.0)) * rate + 0.01 * temperature
-    found = metrics.scale_factor_temperature_sensitivity(rate, output, temperature)
+    columns = {"rate": rate, "temperature": temperature}
+    columns["output"] = 2.0 * (1 - 410e-6 * (temperature - 20.0)) * rate + 0.01 * temperature
+    found = figure("scale_factor_temperature_sensitivity", **columns)
     assert found == pytest.approx(-410.0)
 
 
@@ -37,12 +43,14 @@ def test_nonlinearity_of_a_sine():
     p^2 (1/6 - 1/10) = p^2/15, relative to the line there. P3 has the mean square 1/7.
     """
     phase, x = 0.05, np.linspace(-1.0, 1.0, 20_001)
-    rate, output, expected = 100.0 * x, np.sin(phase * x), 1e6 * phase**2 / 15
-    found = metrics.scale_factor_nonlinearity(rate, output)
-    assert found == pytest.approx(expected, rel=1e-3)
-    root = metrics.scale_factor_nonlinearity(rate, output, statistic="rms")
-    assert root == pytest.approx(expected / np.sqrt(7), rel=1e-3)
-    assert metrics.scale_factor_nonlinearity(rate, output, full_scale=200.0) == found / 2
+    columns = {"rate": 100.0 * x, "output": np.sin(phase * x)}
+    expected = 1e6 * phase**2 / 15
+    # The outermost of 101 bins has its mean at 1 - 1/101, where the cubic falls six times as fast.
+    found = figure("scale_factor_nonlinearity", **columns)
+    assert found == pytest.approx(expected * (1 - 6 / 101), rel=0.005)
+    root = figure("scale_factor_nonlinearity_rms", **columns)
+    assert root == pytest.approx(expected / np.sqrt(7), rel=0.02)
+    assert figure("scale_factor_nonlinearity", 200.0, **columns) == pytest.approx(found / 2)
 
 
 def test_repeatability_is_the_spread_over_runs(table):
@@ -50,11 +58,13 @@ def test_repeatability_is_the_spread_over_runs(table):
     factors = np.array([1.0, 1.0002, 0.9995, 1.0001])
     output = (factors[:, None] * rate + [[0.1], [0.2], [-3.0], [0.0]]).ravel()
     run = np.repeat(["a", "b", "c", "d"], rate.size)
-    found = metrics.scale_factor_repeatability(np.tile(rate, 4), output, run)
+    columns = {"rate": np.tile(rate, 4), "output": output, "run": run}
+    found = figure("scale_factor_repeatability", **columns)
     assert found == pytest.approx(1e6 * factors.std(ddof=1) / factors.mean())
     means, sizes = np.array([1.0, -2.0, 4.0]), (3, 5, 9)  # deg/h
     error, run = np.repeat(means, sizes) / HOUR, np.repeat([7, 3, 5], sizes)
-    assert metrics.bias_repeatability(error, run) == pytest.approx(means.std(ddof=1))
+    found = figure("bias_repeatability", error=error, run=run, rate=error)
+    assert found == pytest.approx(means.std(ddof=1))
 
 
 def test_input_error_takes_the_scale_factor_out(table):
@@ -69,10 +79,12 @@ def test_sensitivities_found_together_do_not_count_for_each_other():
     time = np.linspace(0.0, 3.0, 200)
     temperature, ramp = 1.0 - np.exp(-time), 0.7 * np.exp(-time) + 0.1 * np.sin(9 * time)
     error = 5.0 * ramp / HOUR
-    assert metrics.bias_temperature_sensitivity(error, temperature) < -2.0
-    together = metrics.bias_temperature_sensitivity(error, temperature, temperature_rate=ramp)
-    assert together == pytest.approx(0.0, abs=1e-9)
-    assert metrics.bias_ramp_sensitivity(error, ramp, temperature=temperature) == pytest.approx(5.0)
+    columns = {"error": error, "temperature": temperature}
+    name = "bias_temperature_sensitivity"
+    assert figure(name, **columns) < -2.0
+    columns["temperature_rate"] = ramp
+    assert figure(name, **columns) == pytest.approx(0.0, abs=1e-9)
+    assert figure("bias_ramp_sensitivity", **columns) == pytest.approx(5.0)
 
 
 def test_bias_stability_of_planted_means():
@@ -106,21 +118,6 @@ def test_hysteresis_of_a_planted_loop(rng):
         (lambda: metrics.scale_factor([], []), "rate is empty"),
         (lambda: metrics.scale_factor([[1, 2]], [[1, 2]]), "rate must have one dimension"),
         (lambda: metrics.scale_factor(["a"], [1]), "rate must hold numbers"),
-        (lambda: metrics.scale_factor_nonlinearity([1, 2], [1, 2], statistic="p"), "statistic='p'"),
-        (lambda: metrics.scale_factor_nonlinearity([1, 2], [1, 2], full_scale=-1), "full_scale=-1"),
-        (lambda: metrics.scale_factor_asymmetry([1, 2], [1, 2]), "two different negative rates"),
-        (lambda: metrics.scale_factor_repeatability([1, 2], [1, 2], [0, 0]), "There is 1 run"),
-        (
-            lambda: metrics.scale_factor_temperature_sensitivity([1, 2, 3], [1, 2, 3], [5, 5, 5]),
-            "do not change independently",
-        ),
-        (lambda: metrics.bias_temperature_sensitivity([1, 2], [5, 5]), "temperature never changes"),
-        (lambda: metrics.bias_ramp_sensitivity([1, 2], [5, 5]), "temperature_rate never changes"),
-        (
-            lambda: metrics.bias_ramp_sensitivity([1, 2, 3], [1, 2, 3], temperature=[2, 4, 6]),
-            "do not change independently",
-        ),
-        (lambda: metrics.bias_repeatability([1, 2], [0, 0]), "There is 1 run"),
         (lambda: metrics.bias_stability([1, 2], [1, 1]), "time must increase"),
         (lambda: metrics.bias_stability([1, 2], [0, 60]), "rows are 60 s apart"),
         (lambda: metrics.bias_stability([1, 2], [0, 1]), "no run is as long as two"),
@@ -132,3 +129,34 @@ def test_hysteresis_of_a_planted_loop(rng):
 def test_what_cannot_be_found_is_said(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "message"),
+    [
+        ("scale_factor_asymmetry", {"rate": [1, 2], "output": [1, 2]}, "different negative rates"),
+        (
+            "scale_factor_temperature_sensitivity",
+            {"rate": [1, 2, 3], "output": [1, 2, 3], "temperature": [5, 5, 5]},
+            "do not change independently",
+        ),
+        (
+            "bias_ramp_sensitivity",
+            {"error": [1, 2, 3], "temperature_rate": [1, 2, 3], "temperature": [2, 4, 6]},
+            "do not change independently",
+        ),
+        (
+            "bias_temperature_sensitivity",
+            {"error": [1, 2], "temperature": [5, 5]},
+            "temperature never changes",
+        ),
+        (
+            "bias_repeatability",
+            {"error": [1, 2], "run": [0, 0], "rate": [1, 2]},
+            "There is 1 run",
+        ),
+    ],
+)
+def test_what_the_table_cannot_find_is_said(name, columns, message):
+    with pytest.raises(ValueError, match=message):
+        figure(name, **columns)

@@ -77,11 +77,6 @@ def test_figures_are_those_of_the_plain_functions(log):
         "residual_rms": metrics.rms(log["before"] - rate),
         "residual_peak": np.abs(log["before"] - rate).max(),
         "residual_peak_to_peak": np.ptp(log["before"] - rate),
-        "scale_factor_asymmetry": metrics.scale_factor_asymmetry(rate, log["before"]),
-        "scale_factor_repeatability": metrics.scale_factor_repeatability(
-            rate, log["before"], log["run"]
-        ),
-        "bias_repeatability": metrics.bias_repeatability(error, log["run"]),
         "bias_stability_10s": metrics.bias_stability(error, log["time"], run=log["run"]),
         "hysteresis": metrics.hysteresis(error, log["temperature"], log["temperature_rate"]),
     }

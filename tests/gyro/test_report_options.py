@@ -1,7 +1,6 @@
 """Limits of a specification: what may be typed, and which side of a limit a figure is on."""
 
 import hashlib
-import math
 
 import numpy as np
 import pandas as pd
@@ -12,36 +11,30 @@ from skanfis.gyro._report_options import check_limit, parse_limit, report_option
 
 
 @pytest.mark.parametrize(
-    ("text", "low", "high", "unit"),
+    ("text", "value", "unit"),
     [
-        ("bias=5deg/h", -5.0, 5.0, "deg/h"),
-        ("bias=-2:5deg/h", -2.0, 5.0, "deg/h"),
-        ("residual_rms=:1e-2 °/s", -math.inf, 0.01, "deg/s"),
-        ("bias=.5:deg/s", 0.5, math.inf, "deg/s"),
-        ("reduction_factor=10", 10.0, math.inf, ""),
-        ("scale_factor_nonlinearity=500ppm", -500.0, 500.0, "ppm of full scale"),
-        ("scale_factor_error=500", -500.0, 500.0, "ppm"),
-        ("bias_ramp_sensitivity=2deg/s/(°C/min)", -2.0, 2.0, "deg/s/(degC/min)"),
-        ("angle_random_walk=0.1°/√h", -0.1, 0.1, "deg/sqrt(h)"),
+        ("bias=5deg/h", 5.0, "deg/h"),
+        ("residual_rms= 1e-2 °/s", 0.01, "deg/s"),
+        ("reduction_factor=10", 10.0, ""),
+        ("scale_factor_nonlinearity=500ppm", 500.0, "ppm of full scale"),
+        ("scale_factor_error=.5", 0.5, "ppm"),
+        ("bias_ramp_sensitivity=2deg/s/(°C/min)", 2.0, "deg/s/(degC/min)"),
+        ("angle_random_walk=0.1°/√h", 0.1, "deg/sqrt(h)"),
     ],
 )
-def test_what_may_be_typed(text, low, high, unit):
+def test_what_may_be_typed(text, value, unit):
     limit = parse_limit(text)
-    assert (limit.low, limit.high, limit.unit) == (low, high, unit)
+    assert (limit.value, limit.unit) == (value, unit)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("bias", "must be FIGURE=LIMIT, with a figure of merit of: residual_rms"),
-        ("drift=5deg/h", "must be FIGURE=LIMIT"),
+        ("bias", "'' must be a number"),
+        ("drift=5deg/h", "must be FIGURE=VALUE, with a figure of merit of: residual_rms"),
         ("bias=5", "bias is in deg/s or deg/h; found ''"),
         ("angle_random_walk=1deg/h", r"is in deg/sqrt\(h\); found 'deg/h'"),
-        ("bias=5ppm", "bias is in deg/s or deg/h; found 'ppm'"),
-        ("bias=five", "must be a number, or LOW:HIGH"),
-        ("bias=:deg/h", "must be a number, or LOW:HIGH"),
-        ("bias=5:-2deg/h", "lower limit 5 is above the upper one, -2"),
-        ("bias=-5deg/h", "one number limits the size"),
+        ("bias=-2:5deg/h", "must be a number, not negative, and a unit, as in bias=5deg/h"),
         ("reduction_factor=10ppm", "reduction_factor has no unit; found 'ppm'"),
     ],
 )
@@ -60,7 +53,6 @@ def table_of(value, low=np.nan, high=np.nan):
     [
         *(("bias=5deg/h", 5.0, "pass"), ("bias=5deg/h", 5.0 + 1e-9, "fail")),
         *(("bias=5deg/h", -5.0, "pass"), ("bias=5deg/h", -5.0 - 1e-9, "fail")),
-        *(("bias=-2:5deg/h", -2.0, "pass"), ("bias=-2:5deg/h", -2.1, "fail")),
         # 0.001 deg/s is 3.6 deg/h.
         *(("bias=0.001deg/s", 3.599, "pass"), ("bias=0.001deg/s", 3.601, "fail")),
         *(("bias=5deg/h", np.nan, "not measured"), ("hysteresis=5deg/h", 1.0, "not measured")),

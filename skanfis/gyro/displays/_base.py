@@ -10,27 +10,16 @@ from numpy.typing import ArrayLike
 from .._rate_units import RATE_UNITS
 from ..report import table_of
 
-__all__ = [
-    "AFTER",
-    "BEFORE",
-    "GyroDisplay",
-    "bins_of",
-    "dress",
-    "figures",
-    "mark_decades",
-    "signs",
-]
+__all__ = ["SIDES", "GyroDisplay", "bins_of", "dress", "figures", "mark_decades", "signs"]
 
 # Colours that the colour-blind can tell apart.
-BEFORE, AFTER = "#d55e00", "#0072b2"
+SIDES = (("before", "#d55e00"), ("after", "#0072b2"))
 _SIGNS = (("degC", "°C"), ("deg/", "°/"), ("sqrt(h)", "√h"))
-_LEAST_ROOM = 0.14  # between two marks, as a part of the axis
+_BESIDE = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False}
 
 
 class GyroDisplay:
-    """A picture that is drawn from tables; ``from_predictions`` of each makes these.
-
-    Once drawn, ``figure_`` is the figure, ``axes_`` are its axes, and ``ax_`` the first of them.
+    """A picture drawn from tables; ``figure_``, ``axes_`` and ``ax_``, the first, once drawn.
 
     Parameters
     ----------
@@ -48,6 +37,7 @@ class GyroDisplay:
 
     # Tables of what is drawn, from the errors of all rows in the unit, and options.
     _computed: ClassVar[Callable[..., dict[str, pd.DataFrame]]]
+    _draw: Callable[..., None]
 
     def __init__(self, tables: dict[str, pd.DataFrame]):
         self._tables = tables
@@ -84,7 +74,7 @@ class GyroDisplay:
         if self.axes_.size != n_axes:
             raise ValueError(f"ax has {self.axes_.size} axes; this picture needs {n_axes}.")
         self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
-        self._draw(self.axes_, self._tables)
+        self._draw(self.axes_, **{name.replace("-", "_"): t for name, t in self._tables.items()})
         return self
 
     @classmethod
@@ -109,7 +99,7 @@ class GyroDisplay:
         ax : matplotlib axes or array of these, default=None
             Where to draw, one for each panel; None makes a figure.
         **options
-            The other parameters that the class describes.
+            What the class describes.
 
         Returns
         -------
@@ -128,9 +118,9 @@ class GyroDisplay:
             if name not in options:
                 raise TypeError(f"{cls.__name__} needs {name}, with one value per row.")
         names = [name for name in (*cls._PER_ROW, *cls._OPTIONAL) if name in options]
-        columns = {name: options.pop(name) for name in names}
-        rates = {"rate": rate, "before": before, "after": after}
-        rows = table_of(rates | columns, labels=("run", "groups"), gaps=("before", "after"))
+        columns = {"rate": rate, "before": before, "after": after}
+        columns |= {name: options.pop(name) for name in names}
+        rows = table_of(columns, labels=("run", "groups"), gaps=("before", "after"))
         for side in ("before", "after"):
             if rows[side].isna().all():
                 raise ValueError(f"{side} is NaN in all rows: there is nothing to draw.")
@@ -185,22 +175,19 @@ class GyroDisplay:
         after = before - predicted if predicts == "error" else predicted
         return cls.from_predictions(rate, before, after, ax=ax, **options)
 
+    def panels(self, make_figure):
+        """Axes of a new figure."""
+        figure = make_figure(figsize=self._size(), layout="constrained")
+        return figure.subplots(**self._PANELS)
+
     @property
     def _unit(self):
         """That of the errors, which stand in the last column."""
         *_, table = self._tables.values()
         return table.columns[-1].rpartition("[")[2].rstrip("]")
 
-    def panels(self, make_figure):
-        """Axes of a new figure."""
-        figure = make_figure(figsize=self._size(), layout="constrained")
-        return figure.subplots(**self._PANELS)
-
     def _size(self):
         return self._SIZE
-
-    def _draw(self, axes, tables):
-        raise NotImplementedError
 
 
 def bins_of(values, n_bins):
@@ -210,13 +197,15 @@ def bins_of(values, n_bins):
     return pd.cut(values, edges, labels=False, include_lowest=True), edges
 
 
-def dress(axes, xlabel=None, ylabel=None, title=None):
-    """Labels, a light grid, no box."""
+def dress(axes, xlabel="", ylabel="", title="", legend=None):
+    """Labels, a light grid, no box; ``legend`` is the title of one beside the panel."""
     axes.grid(True, color="0.9", linewidth=0.8)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.set(xlabel=signs(xlabel or ""), ylabel=signs(ylabel or ""))
-    axes.set_title(signs(title or ""), loc="left", fontsize="medium")
+    axes.set(xlabel=signs(xlabel), ylabel=signs(ylabel))
+    axes.set_title(signs(title), loc="left", fontsize="medium")
+    if legend is not None:
+        axes.legend(title=legend, **_BESIDE)
 
 
 def signs(text):
@@ -235,22 +224,12 @@ def figures(value):
 
 
 def mark_decades(axis, low, high):
-    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten.
+    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    Whole decades first, then 2 and 5 of each, then the others, as far as there is room between.
-    """
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
-
-    decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
-    room = _LEAST_ROOM * np.log(high / low)
-    shown: list[float] = []
-    for digit in (1, 2, 5, 3, 4, 6, 7, 8, 9):
-        for place in (digit * 10.0**decade for decade in decades):
-            is_free = all(abs(np.log(place / other)) >= room for other in shown)
-            if low <= place <= high and is_free:
-                shown.append(place)
-    axis.set_major_locator(FixedLocator(sorted(shown) if len(shown) > 1 else [low, high]))
-    axis.set_major_formatter(
-        FuncFormatter(lambda v, _: f"{v:,.0f}" if 100.0 <= v < 1e6 else f"{v:.3g}")
-    )
+    decades = np.log10(high / low)
+    digits = (1, 2, 3, 5) if decades < 1.0 else (1, 3) if decades < 3.0 else (1,)
+    axis.set_major_locator(LogLocator(subs=digits, numticks=8))
+    form = FuncFormatter(lambda v, _: f"{v:,.0f}" if 100.0 <= v < 1e6 else f"{v:.3g}")
+    axis.set_major_formatter(form)
     axis.set_minor_formatter(NullFormatter())

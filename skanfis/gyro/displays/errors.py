@@ -1,7 +1,7 @@
 """The error before and after a compensation: over time, by group, by rate, as a loop, by Allan."""
 
 import textwrap
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
@@ -11,16 +11,7 @@ from .._columns import evenly_chosen
 from .._rate_units import PER_HOUR, RATE_UNITS
 from ..allan import allan_coefficients, allan_deviation
 from ..metrics import rms
-from ._base import (
-    AFTER,
-    BEFORE,
-    GyroDisplay,
-    bins_of,
-    dress,
-    figures,
-    mark_decades,
-    signs,
-)
+from ._base import SIDES, GyroDisplay, bins_of, dress, figures, mark_decades, signs
 
 __all__ = [
     "AllanDisplay",
@@ -30,24 +21,18 @@ __all__ = [
     "ScaleFactorErrorDisplay",
 ]
 
-_TWO_ROWS: dict[str, Any] = {"nrows": 2, "sharex": True}
-_SIDES = (("before", BEFORE), ("after", AFTER))
-_BESIDE = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "frameon": False}
-_WARMING, _COOLING = "#c8443c", "#3a6ea5"
+_TWO_ROWS = {"nrows": 2, "sharex": True}
+_BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
 # Bands about two dots wide in the picture; points beyond cover one another.
 _N_BANDS, _N_POINTS = 300, 3_000
 # The worst groups: more lines cannot be read.
-MOST_GROUPS = 30
+_MOST_GROUPS = 30
 # Enough to show a loop, and few enough that every bin has rows; fewer rows have no mean.
 _N_TEMPERATURES, _FEWEST_ROWS = 25, 3
 # Odd ones: what an error of the scale factor adds changes its sign with the rate.
 _POWERS = (1, 3, 5, 7)
-# Odd, so that a bin has the rest in its middle; nearer to rest, a bias over the rate would fill
-# the picture.
+# Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
 _N_RATES, _SMALLEST_SHARE = 41, 0.05
-# Part by which a line of slope -1/2 may miss the first point of the curve, or it is no white noise.
-_NEARLY = 0.3
-_PER_ROOT_HOUR = 60.0  # deg/h at 1 s per deg/sqrt(h)
 _CAUTION = (
     "Smoothing is not compensation: a filter lowers the left of a curve and hides as much of the "
     "motion. What a compensation takes away lies on the right, at long averaging times."
@@ -57,107 +42,79 @@ _CAUTION = (
 class ErrorDisplay(GyroDisplay):
     """The rate error before and after compensation, against time or temperature.
 
-    Two panels, each with its own scale. A band reaches from the smallest to the largest error of
-    all rows, so that no peak is lost; points are some of the rows.
+    A band reaches from the smallest to the largest error of all rows; points are some of the rows.
+
+    ``from_predictions`` takes ``position``, a time or temperature per row, and ``position_label``.
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "points", "bands", and "whole", the RMS and peak of all rows.
-
-    Other Parameters
-    ----------------
-    position : array-like of shape (n_rows,)
-        Time, temperature, or what else to draw the error against.
-    position_label : str, default="time [s]"
-        What the position is, with its unit.
+        As :meth:`tables` gives them.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from skanfis.gyro import ErrorDisplay
-    >>> rate, time = np.zeros(4), [0.0, 1.0, 2.0, 3.0]
-    >>> before, after = [0.3, -0.3, 0.3, -0.3], [0.1, -0.1, 0.1, -0.1]
-    >>> display = ErrorDisplay.from_predictions(rate, before, after, position=time)
-    >>> display.tables()["whole"]["RMS error [deg/s]"].tolist()
+    >>> before, after = [0.3, -0.3, 0.3], [0.1, -0.1, 0.1]
+    >>> display = ErrorDisplay.from_predictions([0, 0, 0], before, after, position=[0, 1, 2])
+    >>> display.tables()["whole"]["RMS error [deg/s]"].round(3).tolist()
     [0.3, 0.1]
     """
 
     _PER_ROW = ("position",)
-    _PANELS = _TWO_ROWS
+    _PANELS: ClassVar = _TWO_ROWS
 
     @classmethod
     def _computed(cls, rows, unit, position_label="time [s]"):
         errors = rows[["before", "after"]]
         bins, edges = bins_of(rows["position"], _N_BANDS)
         ends = errors.groupby(bins).agg(["min", "max"]).reindex(range(_N_BANDS))
-        bands = pd.DataFrame(
-            {f"{position_label}, from": edges[:-1], f"{position_label}, to": edges[1:]}
-            | {
-                f"{name} error {side} [{unit}]": ends[side, end].to_numpy()
-                for side in errors
-                for name, end in (("smallest", "min"), ("largest", "max"))
-            }
-        )
+        bands = {f"{position_label}, from": edges[:-1], f"{position_label}, to": edges[1:]}
+        for side in errors:
+            bands[f"smallest error {side} [{unit}]"] = ends[side, "min"]
+            bands[f"largest error {side} [{unit}]"] = ends[side, "max"]
         points = rows.loc[evenly_chosen(len(rows), _N_POINTS), ["position", "before", "after"]]
         points.columns = [position_label, *(f"error {side} [{unit}]" for side in errors)]
-        whole = pd.DataFrame(
-            {
-                "errors": errors.columns,
-                f"RMS error [{unit}]": [rms(errors[side].dropna()) for side in errors],
-                f"peak [{unit}]": errors.abs().max().to_numpy(),
-            }
-        )
-        return {"points": points.reset_index(drop=True), "bands": bands, "whole": whole}
+        whole = {
+            "errors": errors.columns,
+            f"RMS error [{unit}]": [rms(errors[side].dropna()) for side in errors],
+            f"peak [{unit}]": errors.abs().max().to_numpy(),
+        }
+        points = points.reset_index(drop=True)
+        return {"points": points, "bands": pd.DataFrame(bands), "whole": pd.DataFrame(whole)}
 
-    def _draw(self, axes, tables):
-        points, bands = tables["points"], tables["bands"]
-        label = points.columns[0]
-        starts, ends = bands.iloc[:, 0], bands.iloc[:, 1]
-        for place, (panel, (side, color)) in enumerate(zip(axes, _SIDES, strict=True)):
-            low, high = (
-                bands[f"{end} error {side} [{self._unit}]"] for end in ("smallest", "largest")
-            )
-            panel.fill_between(
-                [*starts, ends.iloc[-1]],
-                [*low, low.iloc[-1]],
-                [*high, high.iloc[-1]],
-                step="post",
-                color=color,
-                alpha=0.22,
-                linewidth=0,
-            )
-            error = points[f"error {side} [{self._unit}]"]
-            panel.plot(points[label], error, ".", color=color, markersize=2.5, alpha=0.6, mew=0)
-            size, peak = map(figures, tables["whole"].iloc[place, 1:])
+    def _draw(self, axes, points, bands, whole):
+        # Every band is a step, and the last one ends.
+        steps = pd.concat([bands, bands.tail(1)]).to_numpy(copy=True)
+        steps[-1, 0] = steps[-1, 1]
+        for place, (panel, (side, color)) in enumerate(zip(axes, SIDES, strict=True)):
+            low, high = steps[:, 2 + 2 * place : 4 + 2 * place].T
+            style = {"step": "post", "color": color, "alpha": 0.22, "linewidth": 0}
+            panel.fill_between(steps[:, 0], low, high, **style)
+            error = points.iloc[:, 1 + place]
+            style = {"color": color, "markersize": 2.5, "alpha": 0.6, "mew": 0}
+            panel.plot(points.iloc[:, 0], error, ".", **style)
+            size, peak = map(figures, whole.iloc[place, 1:])
             title = f"{side}: RMS {size}, peak {peak} {self._unit}"
             dress(panel, ylabel=f"error [{self._unit}]", title=title)
-        axes[-1].set_xlabel(signs(label))
+        axes[-1].set_xlabel(signs(points.columns[0]))
 
 
 class GroupResidualDisplay(GyroDisplay):
-    """RMS error of every held-out group, before and after compensation, on a logarithmic axis.
+    """RMS error of every held-out group, before and after, the worst 30 from the top down.
 
-    One line per run, device or rate level, the worst at the top; with more than 30, only the worst
-    are drawn. A compensation is as good as the groups on which it is bad.
+    ``from_predictions`` takes ``groups``, the label of each row's held-out group.
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "groups", the smallest error after compensation first.
-
-    Other Parameters
-    ----------------
-    groups : array-like of shape (n_rows,)
-        Label of the group of each row, which was held out when its rows were compensated.
+        As :meth:`tables` gives them.
 
     Examples
     --------
-    >>> import numpy as np
     >>> from skanfis.gyro import GroupResidualDisplay
-    >>> display = GroupResidualDisplay.from_predictions(
-    ...     np.zeros(4), [1, -1, 2, 2], [0.3, -0.3, 0.1, 0.1], groups=["cold", "cold", "hot", "hot"]
-    ... )
+    >>> before, after = [1, -1, 2, 2], [0.3, -0.3, 0.1, 0.1]
+    >>> groups = ["cold", "cold", "hot", "hot"]
+    >>> display = GroupResidualDisplay.from_predictions([0] * 4, before, after, groups=groups)
     >>> display.tables()["groups"]["group"].tolist()
     ['hot', 'cold']
     """
@@ -173,19 +130,16 @@ class GroupResidualDisplay(GyroDisplay):
         return {"groups": table}
 
     def _size(self):
-        return 6.2, 1.4 + 0.2 * min(len(self._tables["groups"]), MOST_GROUPS)
+        return 6.2, 1.4 + 0.2 * min(len(self._tables["groups"]), _MOST_GROUPS)
 
-    def _draw(self, axes, tables):
-        (panel,), table = axes, tables["groups"]
-        shown = table.iloc[-MOST_GROUPS:]
-        before, after = (shown.iloc[:, place].to_numpy() for place in (1, 2))
-        lines = np.arange(len(shown))
-        panel.hlines(lines, after, before, color="0.8", linewidth=2, zorder=1)
-        panel.plot(before, lines, "o", color=BEFORE, label="before", markersize=5)
-        panel.plot(after, lines, "o", color=AFTER, label="after", markersize=5)
+    def _draw(self, axes, groups):
+        (panel,), shown = axes, groups.iloc[-_MOST_GROUPS:]
+        errors, lines = shown.iloc[:, 1:].to_numpy(), np.arange(len(shown))
+        panel.hlines(lines, errors[:, 1], errors[:, 0], color="0.8", linewidth=2, zorder=1)
+        for (side, color), error in zip(SIDES, errors.T, strict=True):
+            panel.plot(error, lines, "o", color=color, label=side, markersize=5)
         panel.set_xscale("log")
-        drawn = np.concatenate([before, after])
-        drawn = drawn[drawn > 0]
+        drawn = errors[errors > 0]
         if drawn.size:
             low, high = drawn.min(), drawn.max()
             # Beside the values, and a factor of four in all at least.
@@ -194,59 +148,40 @@ class GroupResidualDisplay(GyroDisplay):
             mark_decades(panel.xaxis, low / room, high * room)
         panel.set_yticks(lines, [as_label(group) for group in shown["group"]])
         panel.set_ylim(-0.7, len(shown) - 0.3)
-        extent = f"worst {len(shown)} of {len(table)}" if len(shown) < len(table) else len(shown)
-        middle, worst = figures(table.iloc[:, 2].median()), figures(shown.iloc[:, 2].max())
-        dress(
-            panel,
-            f"RMS error [{self._unit}]",
-            "held-out group",
-            f"{extent} groups: after, {middle} in the median, {worst} in the worst",
-        )
-        panel.legend(**_BESIDE)
+        extent = f"worst {len(shown)} of {len(groups)}" if len(shown) < len(groups) else len(shown)
+        middle, worst = figures(groups.iloc[:, 2].median()), figures(shown.iloc[:, 2].max())
+        title = f"{extent} groups: after, {middle} in the median, {worst} in the worst"
+        dress(panel, f"RMS error [{self._unit}]", "held-out group", title, legend="")
 
 
 class ScaleFactorErrorDisplay(GyroDisplay):
-    r"""Scale-factor error against rate, at several temperatures, before and after compensation.
+    """Scale-factor error against rate, in bands of temperature, before and after compensation.
 
-    The temperature's range is cut into equal bands, and the rate's into equal bins. In each, the
-    bias, which is the error at rest of the band's least-squares line, is taken off the error, and
-    the rest divided by the rate,
+    It is what the bias, read off the band's least-squares line, leaves of the error, over the rate.
+    Rates below 5 % of the largest are left out.
 
-    .. math:: 10^6 \, \frac{\overline{\text{error} - \text{bias}}}{\overline{\text{rate}}} ,
-
-    but for rates below 5 % of the largest, where any error is a large one in ppm.
+    ``from_predictions`` takes ``temperature`` [degC] and ``n_temperatures``, the number of bands.
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "scale-factor", a row per band and bin that has rows.
-
-    Other Parameters
-    ----------------
-    temperature : array-like of shape (n_rows,)
-        Temperature [degC].
-    n_temperatures : int, default=3
-        Number of bands of the temperature.
+        As :meth:`tables` gives them.
 
     Examples
     --------
     >>> import numpy as np
     >>> from skanfis.gyro import ScaleFactorErrorDisplay
-    >>> rate, temperature = np.meshgrid(np.linspace(-100, 100, 41), [0.0, 25.0, 50.0])
-    >>> error = (-410e-6 * (temperature - 25) * rate).ravel()  # -410 ppm/degC
-    >>> rate, temperature = rate.ravel(), temperature.ravel()
+    >>> rate, temperature = np.linspace(-100, 100, 41), np.full(41, 25.0)
     >>> display = ScaleFactorErrorDisplay.from_predictions(
-    ...     rate, rate + error, rate, temperature=temperature
+    ...     rate, 1.001 * rate, rate, temperature=temperature
     ... )
-    >>> display.tables()["scale-factor"][
-    ...     "scale-factor error before [ppm]"
-    ... ].round().unique().tolist()
-    [10250.0, 0.0, -10250.0]
+    >>> display.tables()["scale-factor"].iloc[:, -2:].round().max().tolist()
+    [1000.0, 0.0]
     """
 
     _PER_ROW = ("temperature",)
     _UNITS = ("ppm",)
-    _PANELS = _TWO_ROWS
+    _PANELS: ClassVar = _TWO_ROWS
 
     @classmethod
     def _computed(cls, rows, unit, n_temperatures=3):
@@ -268,12 +203,12 @@ class ScaleFactorErrorDisplay(GyroDisplay):
         table = pd.concat([pd.DataFrame(ends), table.drop(columns=["band", "bin"])], axis=1)
         return {"scale-factor": table}
 
-    def _draw(self, axes, tables):
+    def _draw(self, axes, scale_factor):
         import matplotlib
 
-        bands = tables["scale-factor"].groupby(list(tables["scale-factor"].columns[:2]))
+        bands = scale_factor.groupby(list(scale_factor.columns[:2]))
         colors = matplotlib.colormaps["plasma"](np.linspace(0.05, 0.75, bands.ngroups))
-        for panel, (side, _) in zip(axes, _SIDES, strict=True):
+        for panel, (side, _) in zip(axes, SIDES, strict=True):
             column = f"scale-factor error {side} [ppm]"
             for (ends, band), color in zip(bands, colors, strict=True):
                 known = band.dropna(subset=column)
@@ -281,44 +216,37 @@ class ScaleFactorErrorDisplay(GyroDisplay):
                 # The line is broken at rest.
                 for half, label in ((rate < 0, f"{np.mean(ends):.0f} °C"), (rate > 0, None)):
                     panel.plot(rate[half], ppm[half], ".-", color=color, label=label, lw=1.2, ms=4)
-            largest = figures(tables["scale-factor"][column].abs().max())
-            title = f"{side}: largest {largest} ppm"
-            dress(panel, ylabel="scale-factor error [ppm]", title=title)
+            title = f"{side}: largest {figures(scale_factor[column].abs().max())} ppm"
+            legend = "around" if panel is axes[0] else None
+            dress(panel, ylabel="scale-factor error [ppm]", title=title, legend=legend)
         axes[-1].set_xlabel(signs("true rate [deg/s]"))
-        axes[0].legend(title="around", fontsize="small", **_BESIDE)
 
 
 class HysteresisDisplay(GyroDisplay):
     """Bias against temperature while it rises and while it falls, before and after compensation.
 
-    Where the bias depends on more than the temperature that is logged, the two branches part. No
-    function of temperature alone can close such a loop. A dependence of the error on the rate (an
-    odd polynomial, whose coefficients change linearly with temperature) is fitted together with the
-    two branches and taken off.
+    What the error owes to the rate (an odd polynomial, linear in temperature) is taken off.
+
+    ``from_predictions`` takes ``temperature`` [degC], ``temperature_rate`` [degC/min] and
+    ``least_rate_of_change``, below which a row belongs to neither branch (0.05 degC/min).
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "bias", by temperature; NaN where there are fewer than 3 rows.
-
-    Other Parameters
-    ----------------
-    temperature, temperature_rate : array-like of shape (n_rows,)
-        Temperature [degC], and how fast it changes [degC/min]: its sign tells warming from cooling.
-    least_rate_of_change : float, default=0.05
-        Rows that change more slowly [degC/min] belong to neither branch.
+        As :meth:`tables` gives them.
 
     Examples
     --------
     >>> import numpy as np
     >>> from skanfis.gyro import HysteresisDisplay
-    >>> time = np.linspace(0, 2, 2001)
-    >>> temperature = 20 + 30 * np.sin(np.pi * time)
-    >>> temperature_rate = np.cos(np.pi * time)  # degC/min
-    >>> bias = (0.5 * temperature + 10 * temperature_rate) / 3600
-    >>> rate = np.zeros(2001)
+    >>> rate, angle = np.zeros(2001), np.linspace(0, 2 * np.pi, 2001)
     >>> display = HysteresisDisplay.from_predictions(
-    ...     rate, bias, rate, temperature=temperature, temperature_rate=temperature_rate
+    ...     rate,
+    ...     10 * np.cos(angle),
+    ...     rate,
+    ...     unit="deg/s",
+    ...     temperature=20 + 30 * np.sin(angle),
+    ...     temperature_rate=np.cos(angle),
     ... )
     >>> round(display.gap_before_), display.gap_after_
     (20, 0.0)
@@ -326,18 +254,19 @@ class HysteresisDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature", "temperature_rate")
     _UNITS = ("deg/h", "deg/s")
-    _PANELS = _TWO_ROWS
+    _PANELS: ClassVar = _TWO_ROWS
 
     @classmethod
     def _computed(cls, rows, unit, least_rate_of_change=0.05):
         bins, edges = bins_of(rows["temperature"], _N_TEMPERATURES)
-        rows = rows.assign(bin=bins, is_warming=rows["temperature_rate"] > 0)
+        branch = np.where(rows["temperature_rate"] > 0, *_BRANCHES)
+        rows = rows.assign(bin=bins, branch=branch)
         moving = rows[rows["temperature_rate"].abs() >= least_rate_of_change]
         table = pd.DataFrame({"temperature [degC]": 0.5 * (edges[:-1] + edges[1:])})
         for side in ("before", "after"):
             biases = _bias_of_branches(moving.dropna(subset=side), side)
-            for name, is_warming in (("warming", True), ("cooling", False)):
-                table[f"bias {side}, {name} [{unit}]"] = biases[is_warming]
+            for name in _BRANCHES:
+                table[f"bias {side}, {name} [{unit}]"] = biases[name]
         return {"bias": table}
 
     @property
@@ -350,55 +279,47 @@ class HysteresisDisplay(GyroDisplay):
         """Largest distance between the branches after compensation."""
         return self._gap("after")
 
-    def _branches(self, side):
-        table = self._tables["bias"]
-        return [table[f"bias {side}, {name} [{self._unit}]"] for name in ("warming", "cooling")]
-
     def _gap(self, side):
         warming, cooling = self._branches(side)
         return float((warming - cooling).abs().max())
 
-    def _draw(self, axes, tables):
-        temperature = tables["bias"]["temperature [degC]"]
-        for panel, (side, _) in zip(axes, _SIDES, strict=True):
-            warming, cooling = self._branches(side)
-            met = warming.notna() & cooling.notna()
-            panel.fill_between(temperature, warming, cooling, where=met, color="0.9", linewidth=0)
-            panel.plot(temperature, warming, "^-", color=_WARMING, label="warming", ms=4)
-            panel.plot(temperature, cooling, "v-", color=_COOLING, label="cooling", ms=4)
-            gap = f"largest gap {figures(self._gap(side))} {self._unit}"
-            title = f"{side}: {gap if met.any() else 'branches never meet'}"
-            dress(panel, ylabel=f"bias [{self._unit}]", title=title)
+    def _branches(self, side):
+        table = self._tables["bias"]
+        return [table[f"bias {side}, {name} [{self._unit}]"] for name in _BRANCHES]
+
+    def _draw(self, axes, bias):
+        temperature = bias["temperature [degC]"]
+        for panel, (side, _) in zip(axes, SIDES, strict=True):
+            branches = self._branches(side)
+            panel.fill_between(temperature, *branches, color="0.9", linewidth=0)
+            for values, (name, (form, color)) in zip(branches, _BRANCHES.items(), strict=True):
+                panel.plot(temperature, values, form, color=color, label=name, ms=4)
+            gap = self._gap(side)
+            found = f"largest gap {figures(gap)} {self._unit}"
+            title = f"{side}: {'branches never meet' if np.isnan(gap) else found}"
+            legend = "" if panel is axes[0] else None
+            dress(panel, ylabel=f"bias [{self._unit}]", title=title, legend=legend)
         axes[-1].set_xlabel("temperature [°C]")
-        axes[0].legend(**_BESIDE)
 
 
 class AllanDisplay(GyroDisplay):
     """Allan deviation of the error against averaging time, before and after compensation.
 
-    Angle random walk N is read where the slope of -1/2 passes 1 s, bias instability B at the
-    minimum; both are drawn where the data reach them. The picture carries a caution, because a
-    lower curve is often shown as proof of compensation: any filter lowers it at short times.
+    The legend has N and B where the curve has them, the title a caution against smoothing.
+    ``from_predictions`` takes ``sampling_interval`` [s] and ``run``, labels of the runs or None.
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "allan"; the error is the deviation's standard error.
-
-    Other Parameters
-    ----------------
-    sampling_interval : float
-        Time between rows [s], which are evenly spaced within each run.
-    run : array-like of shape (n_rows,), default=None
-        Labels of the runs, over whose breaks no mean is taken; None is one run.
+        As :meth:`tables` gives them.
 
     Examples
     --------
     >>> import numpy as np
     >>> from skanfis.gyro import AllanDisplay
-    >>> noise = 0.01 * np.random.default_rng(0).standard_normal((2, 20_000))  # deg/s at 1 Hz
+    >>> rate, noise = np.zeros(20_000), np.random.default_rng(0).standard_normal((2, 20_000))
     >>> display = AllanDisplay.from_predictions(
-    ...     np.zeros(20_000), *noise, sampling_interval=1.0
+    ...     rate, *noise, sampling_interval=1.0
     ... )  # doctest: +SKIP
     >>> len(display.tables()["allan"])  # doctest: +SKIP
     22
@@ -409,9 +330,10 @@ class AllanDisplay(GyroDisplay):
 
     @classmethod
     def _computed(cls, rows, unit, sampling_interval):
-        run, parts = rows.get("run"), []
+        parts = []
         for side in ("before", "after"):
-            curve = allan_deviation(rows[side], sampling_interval, run=run)  # times 3600, for deg/s
+            # This takes deg/s and gives deg/h: 3600 times the unit of what it is given.
+            curve = allan_deviation(rows[side], sampling_interval, run=rows.get("run"))
             columns = {
                 "curve": side,
                 "averaging time [s]": curve["averaging_time"],
@@ -421,42 +343,35 @@ class AllanDisplay(GyroDisplay):
             parts.append(pd.DataFrame(columns))
         return {"allan": pd.concat(parts, ignore_index=True)}
 
-    def _draw(self, axes, tables):
+    def _draw(self, axes, allan):
         (panel,) = axes
-        for side, color in _SIDES:
-            curve = tables["allan"][tables["allan"]["curve"] == side]
-            time, deviation, error = (curve.iloc[:, place].to_numpy() for place in (1, 2, 3))
-            low = np.maximum(deviation - error, 0.1 * deviation)
+        for side, color in SIDES:
+            time, deviation, error = allan[allan["curve"] == side].iloc[:, 1:].to_numpy().T
+            low, label = (
+                np.maximum(deviation - error, 0.1 * deviation),
+                self._label(time, deviation),
+            )
             panel.fill_between(time, low, deviation + error, color=color, alpha=0.18, linewidth=0)
-            panel.loglog(time, deviation, "o-", color=color, label=side, ms=3, linewidth=1.4)
-            self._mark(panel, time, deviation, color)
+            panel.loglog(time, deviation, "o-", color=color, label=side + label, ms=3, lw=1.4)
         dress(panel, "averaging time [s]", f"Allan deviation [{self._unit}]")
         mark_decades(panel.xaxis, *panel.get_xlim())
         mark_decades(panel.yaxis, *panel.get_ylim())
         panel.legend(frameon=False)
         panel.set_title("\n".join(textwrap.wrap(_CAUTION, 76)), loc="left", fontsize="small")
 
-    def _mark(self, panel, time, deviation, color):
-        """N at 1 s on its line of slope -1/2, and B at the minimum, where the curve has them."""
+    def _label(self, time, deviation):
+        """What is read off a curve, in words."""
         factor = RATE_UNITS[self._unit] / RATE_UNITS["deg/h"]
         try:
             read = allan_coefficients(time, deviation / factor)
         except ValueError:
-            return  # too few points, or no noise at all
-        style = {"textcoords": "offset points", "color": color, "fontsize": "small"}
-        lowest = np.argmin(deviation)
-        if (walk := read.angle_random_walk) is not None:
-            ends = np.array([1.0, time[lowest]])
-            level = factor * _PER_ROOT_HOUR * walk / np.sqrt(ends)
-            expected = level[0] / np.sqrt(time[0])
-            if abs(deviation[0] / expected - 1.0) < _NEARLY:
-                panel.plot(ends, level, ":", color=color, linewidth=1.2)
-                text = f"N = {figures(walk)} °/√h"
-                panel.annotate(text, (ends[0], level[0]), xytext=(6, 4), **style)
-        if read.bias_instability is not None:
-            text = f"B = {figures(factor * read.bias_instability)} {signs(self._unit)}"
-            place = (time[lowest], deviation[lowest])
-            panel.annotate(text, place, xytext=(0, -14), ha="center", **style)
+            return ""  # too few points, or no noise at all
+        walk, instability, text = read.angle_random_walk, read.bias_instability, ""
+        if walk is not None:
+            text += f", N = {figures(walk)} °/√h"
+        if instability is not None:
+            text += f", B = {figures(factor * instability)} {signs(self._unit)}"
+        return text
 
 
 def _bias(rows):
@@ -466,20 +381,14 @@ def _bias(rows):
 
 
 def _bias_of_branches(rows, side):
-    """Mean error at rest by bin of temperature, for each branch.
-
-    One constant per bin and branch is fitted beside the polynomial, whose coefficients are those of
-    least squares on what the means leave of errors and powers alike (Frisch and Waugh 1933).
-    """
+    """Mean error at rest by bin and branch, fitted together with the polynomial (Frisch, Waugh)."""
     ratio = rows["rate"] / (rows["rate"].abs().max() or 1.0)
     deviation = rows["temperature"] - rows["temperature"].mean()
-    powers = pd.DataFrame(
-        {k: ratio**k for k in _POWERS} | {-k: ratio**k * deviation for k in _POWERS}
-    )
-    keys = [rows["is_warming"], rows["bin"]]
+    powers = {k: ratio**k for k in _POWERS} | {-k: ratio**k * deviation for k in _POWERS}
+    powers, keys = pd.DataFrame(powers), [rows["branch"], rows["bin"]]
     design = powers - powers.groupby(keys).transform("mean")
     left = rows[side] - rows[side].groupby(keys).transform("mean")
     coefficients = np.linalg.lstsq(design, left, rcond=None)[0]
     found = (rows[side] - powers @ coefficients).groupby(keys).agg(["mean", "size"])
-    means = found["mean"].where(found["size"] >= _FEWEST_ROWS).unstack("is_warming")
-    return means.reindex(index=range(_N_TEMPERATURES), columns=[True, False])
+    means = found["mean"].where(found["size"] >= _FEWEST_ROWS).unstack("branch")
+    return means.reindex(index=range(_N_TEMPERATURES), columns=list(_BRANCHES))

@@ -24,28 +24,20 @@ _NEARLY_ALL = 0.995
 class ResidualSurfaceDisplay(GyroDisplay):
     """Mean error after compensation over temperature and rate, beside the number of rows.
 
-    What has a colour of its own on the left is not noise: averages over many rows are left. Where
-    the right-hand panel is empty, nothing is known of the compensation.
+    ``from_predictions`` takes ``temperature`` [degC] and ``n_bins`` of temperature and of rate.
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "cells", the empty ones too.
-
-    Other Parameters
-    ----------------
-    temperature : array-like of shape (n_rows,)
-        Temperature [degC].
-    n_bins : tuple of two ints, default=(24, 24)
-        Number of cells in temperature and in rate.
+        As :meth:`tables` gives them.
 
     Examples
     --------
     >>> import numpy as np
     >>> from skanfis.gyro import ResidualSurfaceDisplay
-    >>> rate, temperature = np.array([-50.0, 50.0, 50.0]), np.array([10.0, 10.0, 30.0])
+    >>> rate, after = np.array([-50.0, 50.0, 50.0]), [-50.0, 50.25, 50.5]
     >>> display = ResidualSurfaceDisplay.from_predictions(
-    ...     rate, rate + 1.0, rate + [0.0, 0.25, 0.5], temperature=temperature, n_bins=(2, 2)
+    ...     rate, rate, after, temperature=[10.0, 10.0, 30.0], n_bins=(2, 2)
     ... )
     >>> display.tables()["cells"]["mean error after [deg/s]"].to_numpy()
     array([0.  ,  nan, 0.25, 0.5 ])
@@ -64,20 +56,18 @@ class ResidualSurfaceDisplay(GyroDisplay):
         ends[f"mean error after [{unit}]"] = found["mean"]
         return {"cells": ends}
 
-    def _draw(self, axes, tables):
+    def _draw(self, axes, cells):
         from matplotlib.colors import LogNorm
 
-        cells = tables["cells"]
         residual, counts = cells.iloc[:, -1], cells["rows"]
         limit = residual.abs().quantile(_NEARLY_ALL) or 1.0
         mesh = _draw_cells(axes[0], cells, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
-        bar = self.figure_.colorbar(mesh, ax=axes[0], extend="both")
-        bar.set_label(signs(cells.columns[-1]))
+        label = signs(cells.columns[-1])
+        self.figure_.colorbar(mesh, ax=axes[0], extend="both").set_label(label)
         # A scale needs two ends, even where all cells have as many rows.
         norm = LogNorm(vmin=1, vmax=max(counts.max(), 2))
         mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
-        bar = self.figure_.colorbar(mesh, ax=axes[1])
-        bar.set_label("rows in the cell")
+        bar = self.figure_.colorbar(mesh, ax=axes[1], label="rows in the cell")
         mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
         title = f"residual: largest {figures(residual.abs().max())} {self._unit}"
         dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
@@ -88,17 +78,14 @@ class ResidualSurfaceDisplay(GyroDisplay):
 class CoverageDisplay(GyroDisplay):
     """Where the calibration data cover what a compensator may be asked: a map over two inputs.
 
-    Cells that hold no row are hatched, whatever the model says of them. In the others the colour is
-    :meth:`skanfis.ANFISRegressor.coverage`, from 0 (no data speak here) to 1. Outside the dashed
-    line rows are flagged as out of bounds; beyond the dotted line, inside it, the coverage is below
-    ``min_coverage``, and rows are flagged too. For colour and lines all other inputs are
-    held at one value; a row of any value fills a cell.
+    Cells without a row are hatched; in the others the colour is the coverage, from 0 to 1. Outside
+    the dashed line rows are flagged, and within it where the coverage is below ``min_coverage``,
+    beyond the dotted line. Colour and lines hold all other inputs at one value.
 
     Parameters
     ----------
     tables : dict of str to DataFrame
-        As :meth:`tables` gives them: "points" with their coverage, some of the "rows", and "cells"
-        with their number of rows, the empty ones too.
+        As :meth:`tables` gives them.
     min_coverage : float, default=0.1
         Rows that are covered less are flagged.
 
@@ -110,8 +97,7 @@ class CoverageDisplay(GyroDisplay):
     >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
     >>> X = log[["temperature", "output"]]
     >>> model = ANFISRegressor(2).fit(X, log["error"])
-    >>> display = CoverageDisplay.from_estimator(model, X)
-    >>> len(display.tables()["points"])
+    >>> len(CoverageDisplay.from_estimator(model, X).tables()["points"])
     9216
     """
 
@@ -150,12 +136,9 @@ class CoverageDisplay(GyroDisplay):
         others : dict of str to float, default=None
             Values to hold other inputs at; the median of X where they are not named.
         units : dict of str to str, default=None
-            Units of the columns, for the labels, beside those of temperature, output, time and
-            temperature_rate: degC, deg/s, s and degC/min.
-        n_points : int, default=96
-            Number of values on each axis.
-        n_cells : int, default=24
-            Number of cells on each axis, over the range of X.
+            Units of the columns, for the labels, beside those that are usual in a log.
+        n_points, n_cells : int, default=96, 24
+            Number of values, and of cells, on each axis.
         min_coverage : float, default=0.1
             Rows that are covered less are flagged.
         margin : float, default=0.15
@@ -175,44 +158,36 @@ class CoverageDisplay(GyroDisplay):
         labels = [_words(name, units.get(name)) for name in (x, y)]
         grid = X.median().to_frame().T.assign(**others)
         grid = grid.loc[grid.index.repeat(n_points**2)].reset_index(drop=True)
-        values = [_beyond(check_column(X[name], name), n_points, margin) for name in (x, y)]
+        values = []
+        for column in (check_column(X[name], name) for name in (x, y)):
+            beyond = margin * np.ptp(column)
+            ends = column.min() - beyond, column.max() + beyond
+            values.append(np.linspace(*ends, n_points))
         grid[x], grid[y] = (each.ravel() for each in np.meshgrid(*values))
-        ends, cells = _cells(X[x], X[y], (n_cells, n_cells), labels)
-        ends["rows"] = np.bincount(cells, minlength=n_cells**2)
+        cells, numbers = _cells(X[x], X[y], (n_cells, n_cells), labels)
+        cells["rows"] = np.bincount(numbers, minlength=n_cells**2)
         points = grid[[x, y]].set_axis(labels, axis=1)
         points["coverage"] = ask(estimator, "coverage", grid)
         points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
-        held = _cell_numbers(grid[x], grid[y], *_edges(ends)).map(ends["rows"] > 0)
-        points["in a cell with data"] = held.eq(True).astype(int)
-        some = evenly_chosen(len(X), _N_POINTS)
-        rows = X[[x, y]].iloc[some].set_axis(labels, axis=1).reset_index(drop=True)
-        tables = {"points": points, "rows": rows, "cells": ends}
+        numbers = _cell_numbers(grid[x], grid[y], *_edges(cells))
+        points["in a cell with data"] = numbers.map(cells["rows"] > 0).eq(True).astype(int)
+        rows = X[[x, y]].iloc[evenly_chosen(len(X), _N_POINTS)].set_axis(labels, axis=1)
+        tables = {"points": points, "rows": rows.reset_index(drop=True), "cells": cells}
         return cls(tables, min_coverage=min_coverage).plot(ax)
 
-    def _draw(self, axes, tables):
+    def _draw(self, axes, points, rows, cells):
         from matplotlib.colors import LinearSegmentedColormap
 
-        (panel,), points = axes, tables["points"]
-        labels = points.columns[:2]
+        (panel,), labels = axes, points.columns[:2]
         x, y = (points[label].unique() for label in labels)
-        shape = (y.size, x.size)
-        coverage, inside, held = (
-            points[name].to_numpy().reshape(shape)
-            for name in ("coverage", "in range", "in a cell with data")
-        )
+        coverage, inside, held = points.iloc[:, 2:].to_numpy().T.reshape(3, y.size, x.size)
         panel.set_facecolor(_NO_DATA)
         panel.patch.set(hatch="////", edgecolor="0.75", linewidth=0)
-        mesh = panel.pcolormesh(
-            x,
-            y,
-            np.where(held, coverage, np.nan),
-            cmap=LinearSegmentedColormap.from_list("coverage", _COLORS),
-            vmin=0,
-            vmax=1,
-            rasterized=True,
-        )
-        self.figure_.colorbar(mesh, ax=panel).set_label("coverage where there are data")
-        panel.plot(*tables["rows"].to_numpy().T, ".", color="0.15", ms=1.5, alpha=0.35, mew=0)
+        colors = LinearSegmentedColormap.from_list("coverage", _COLORS)
+        style = {"cmap": colors, "vmin": 0, "vmax": 1, "rasterized": True}
+        mesh = panel.pcolormesh(x, y, np.where(held, coverage, np.nan), **style)
+        self.figure_.colorbar(mesh, ax=panel, label="coverage where there are data")
+        panel.plot(*rows.to_numpy().T, ".", color="0.15", ms=1.5, alpha=0.35, mew=0)
         left, bottom = x[inside.any(axis=0)], y[inside.any(axis=1)]
         if left.size and bottom.size:
             corners = left[[0, -1, -1, 0, 0]], bottom[[0, 0, -1, -1, 0]]
@@ -221,7 +196,7 @@ class CoverageDisplay(GyroDisplay):
         if np.nanmin(flagged, initial=np.inf) < self.min_coverage:
             style = {"colors": "0.15", "linestyles": ":", "linewidths": 1.2}
             panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
-        empty = np.mean(tables["cells"]["rows"] == 0)
+        empty = np.mean(cells["rows"] == 0)
         title = f"{empty:.0%} of the cells in range are empty (hatched)"
         dress(panel, as_label(labels[0]), as_label(labels[1]), title)
         panel.grid(False)
@@ -230,11 +205,9 @@ class CoverageDisplay(GyroDisplay):
 def _cells(x, y, n_bins, labels):
     """Ends of all cells, a line for each, and the number of the cell of every row."""
     edges = [bins_of(values, n)[1] for values, n in zip((x, y), n_bins, strict=True)]
-    lines = np.arange(n_bins[0] * n_bins[1])
-    ends: dict[str, np.ndarray] = {}
-    for place, label, each in zip(
-        (lines % n_bins[0], lines // n_bins[0]), labels, edges, strict=True
-    ):
+    places = np.divmod(np.arange(n_bins[0] * n_bins[1]), n_bins[0])[::-1]
+    ends = {}
+    for label, place, each in zip(labels, places, edges, strict=True):
         ends |= {f"{label}, from": each[place], f"{label}, to": each[place + 1]}
     return pd.DataFrame(ends), _cell_numbers(x, y, *edges).astype(int)
 
@@ -258,12 +231,6 @@ def _draw_cells(axes, cells, values, **options):
     axes.set_facecolor(_NO_DATA)
     shape = (y.size - 1, x.size - 1)
     return axes.pcolormesh(x, y, values.to_numpy().reshape(shape), rasterized=True, **options)
-
-
-def _beyond(values, n_points, margin):
-    """Equal steps over the values and a part of their range on both sides."""
-    beyond = margin * np.ptp(values)
-    return np.linspace(values.min() - beyond, values.max() + beyond, n_points)
 
 
 def _words(name, unit):
