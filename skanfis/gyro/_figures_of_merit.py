@@ -52,7 +52,7 @@ def figures_of_merit(full_scale=1.0, nominal=1.0, averaging_times=(10.0, 100.0))
     largest, root = (partial(_nonlinearity, full_scale=full_scale, size=s) for s in (_peak, _rms))
     full = "ppm of full scale"
     slope, slope_in_ramp = (partial(_bias_sensitivity, name=name) for name in (heat, ramp))
-    by_run = {"combine": _relative_spread, "fewest_runs": 2}
+    by_run = metrics.scale_factor
     table = [
         Figure("residual_rms", "deg/s", _rms, residual),
         Figure("residual_peak", "deg/s", _peak, residual),
@@ -62,7 +62,7 @@ def figures_of_merit(full_scale=1.0, nominal=1.0, averaging_times=(10.0, 100.0))
         Figure("scale_factor_nonlinearity", full, largest, rates),
         Figure("scale_factor_nonlinearity_rms", full, root, rates),
         Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
-        Figure("scale_factor_repeatability", "ppm", metrics.scale_factor, rates, **by_run),
+        Figure("scale_factor_repeatability", "ppm", by_run, rates, "", _relative_spread, 2),
         Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
         Figure("bias", "deg/h", metrics.bias, error),
         Figure("bias_repeatability", "deg/h", np.mean, error, "", _spread_of_bias, 2),

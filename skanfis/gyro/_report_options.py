@@ -3,10 +3,10 @@
 A limit is FIGURE=VALUE: bias=5deg/h says that the bias is 5 deg/h at most, without its sign.
 """
 
-import argparse
 import hashlib
 import math
 import re
+from argparse import ArgumentTypeError
 from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -74,12 +74,11 @@ def add_report_options(parser):
         "--limits",
         nargs="+",
         action="extend",
-        type=_limit_of_option,
+        type=parse_limit,
         default=[],
         metavar="FIGURE=VALUE",
-        help="limits of the specification for figures of merit after compensation, with units: "
-        "residual_rms=0.01deg/s (at most), reduction_factor=10 (at least); the report says of each "
-        "whether it is kept",
+        help="limits of the specification for figures of merit after compensation, with units, as "
+        "in residual_rms=0.01deg/s (at most), reduction_factor=10 (at least)",
     )
     group.add_argument(
         "--report-unit",
@@ -114,15 +113,15 @@ def report_options(options, paths):
 
 
 def parse_limit(text):
-    """A limit such as ``bias=5deg/h``; ValueError where it is none."""
+    """A limit such as ``bias=5deg/h``; ArgumentTypeError where it is none."""
     figure, _, typed = text.partition("=")
     if figure not in _UNITS:
-        raise ValueError(
+        raise ArgumentTypeError(
             f"{text!r} must be FIGURE=VALUE, with a figure of merit of: {', '.join(_UNITS)}."
         )
     usual, found = _UNITS[figure], _FORM.fullmatch(typed)
     if found is None:
-        raise ValueError(
+        raise ArgumentTypeError(
             f"{text!r}: {typed!r} must be a number, not negative, and a unit, as in "
             f"{figure}=5{usual}."
         )
@@ -136,7 +135,7 @@ def parse_limit(text):
     if unit not in known:
         wanted = " or ".join(filter(None, dict.fromkeys(known)))
         wanted = f"is in {wanted}" if wanted else "has no unit"
-        raise ValueError(f"{text!r}: {figure} {wanted}; found {unit!r}.")
+        raise ArgumentTypeError(f"{text!r}: {figure} {wanted}; found {unit!r}.")
     unit = unit if rate_unit_of(usual) else usual
     return Limit(figure, float(found["value"]), unit, typed.strip())
 
@@ -154,13 +153,6 @@ def check_limit(limit, lines):
     is_sure = math.isnan(low) or limit.keeps(low) == limit.keeps(high) == is_kept
     remark = "" if is_sure else "its interval reaches over the limit"
     return Check(limit, value, "pass" if is_kept else "fail", remark)
-
-
-def _limit_of_option(text):
-    try:
-        return parse_limit(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def _as_typed(value):

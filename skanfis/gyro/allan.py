@@ -76,8 +76,7 @@ def allan_deviation(
         from allantools import oadev
     except ImportError as reason:
         raise ImportError(
-            "The Allan deviation needs allantools, which is not installed: "
-            "pip install allantools (the extra 'allan'; in a clone pip install '.[allan]')."
+            "The Allan deviation needs allantools: pip install allantools."
         ) from reason
     error = check_column(error, "error")
     if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
@@ -162,27 +161,27 @@ def allan_coefficients(averaging_time: ArrayLike, deviation: ArrayLike) -> Allan
         raise ValueError(f"deviation must be positive; its smallest value is {deviation.min():g}.")
     lowest = int(np.argmin(deviation))
     notes: dict[str, str] = {}
+    found: dict[str, float | None] = dict.fromkeys(ALLAN_FIGURES)
     # sigma sqrt(tau) is N where the slope is -1/2: 1 deg/h at 1 s is 1/60 deg/sqrt(h).
     walk = _level(tau[: lowest + 1], deviation[: lowest + 1], -0.5)
     if walk is None:
         notes["angle_random_walk"] = "no slope of -1/2"
-    minimum: float | None = float(deviation[lowest])
+    else:
+        found["angle_random_walk"] = walk / 60.0
     if lowest in (0, tau.size - 1):
         side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
         reason = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
         notes["allan_minimum"] = notes["bias_instability"] = reason
-        minimum = None
+    else:
+        found["allan_minimum"] = minimum = float(deviation[lowest])
+        found["bias_instability"] = minimum / float(_FLICKER)
     drift = _level(tau[lowest:], deviation[lowest:], 0.5)
     if drift is None:
         notes["rate_random_walk"] = "no slope of +1/2"
-    return AllanCoefficients(
-        angle_random_walk=None if walk is None else walk / 60.0,
-        allan_minimum=minimum,
-        bias_instability=None if minimum is None else minimum / float(_FLICKER),
+    else:
         # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
-        rate_random_walk=None if drift is None else float(drift * np.sqrt(3.0) * 60.0),
-        notes=notes,
-    )
+        found["rate_random_walk"] = float(drift * np.sqrt(3.0) * 60.0)
+    return AllanCoefficients(**found, notes=notes)
 
 
 def rows_for_allan(time, run, answered):

@@ -33,17 +33,10 @@ _BUDGET = (
     "rules cannot follow the gyro between the groups, and no part of the budget knows of it."
 )
 _PROOF = "Proven for every point of the box. How far the gyro is from the compensator is not."
-_ALONE = (
-    "The model is the mean of its rules by their strengths. Whether each rule holds by itself is "
-    "measured on the rows of the log."
-)
 
 
 class Block(NamedTuple):
-    """Part of a section: a "text", "warn", "soft" or "heading", a "table", "pictures", "details".
-
-    ``title`` is the caption of a table, or what stands in front of details until they are opened.
-    """
+    """Part of a section: "text", "warn", "soft", "heading", "table", "pictures" or "details"."""
 
     kind: str
     content: Any
@@ -115,27 +108,17 @@ def _reasons(results):
             parts += [f"{words}: {', '.join(names)}"] if names else []
         yield f"Specification: {'; '.join(parts)}."
     if not results.calibration.verdict.model_is_worth_it:
-        yield (
-            "The files of this calibration hold the fuzzy rules all the same, and what follows is "
-            'about them; "What to use instead" has the simpler compensation.'
-        )
-    if results.readability.findings:
-        yield 'The rules are not fit to be read one by one: "Can the rules be read?" says why.'
+        yield "The files, and the figures below, are of the fuzzy rules all the same."
 
 
 def _identity(results):
     """What is needed to find this calibration again, and to repeat it."""
     options = results.options
-    entries = {
-        "device, serial number": options.serial or "not given",
-        "operator": options.operator or "not given",
-        "made": options.made or "not given",
-        "program": _programs(),
-    }
-    blocks = [_table(["what", "entry"], entries.items())]
+    names = "device, serial number", "operator", "made"
+    entries = [each or "not given" for each in (options.serial, options.operator, options.made)]
+    blocks = [_table(["what", "entry"], zip(names, entries, strict=True))]
     if options.files:
-        lines = [(name, f"{n_bytes:,}", digest) for name, n_bytes, digest in options.files]
-        blocks.append(_table(["file of the log", "bytes", "SHA-256"], lines))
+        blocks.append(_table(["file of the log", "bytes", "SHA-256"], options.files))
     text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
     blocks.append(Block("soft", text))
     if options.options:
@@ -270,43 +253,32 @@ def _sure(results):
     """The uncertainty budget, and the bounds over a box of inputs."""
     calibration = results.calibration
     budget, certain = budget_of(calibration), certain_of(calibration)
-    between = f"between the means of the {held_out_groups(calibration)}"
-    if not np.isfinite(budget.scatter):
-        between = "not known: fewer than two held-out groups have rows in range"
-    posterior = "posterior of the rules, RMS over the rows"
-    if np.isnan(budget.model):
-        posterior = "not known: the rules have too many parameters"
-    ends = _interval(budget.scatter_low, budget.scatter_high, results.shown)
     parts = [
-        ("noise", budget.noise, "", "of a row, within its group"),
-        ("not repeatable", budget.scatter, ends, between),
-        ("model", budget.model, "", posterior),
-        ("combined", budget.combined, "", "root of the sum of squares"),
-        ("for comparison", rms(results.error_after), "", "RMS error, held-out rows"),
+        ("noise", budget.noise, "of a row, within its group"),
+        ("not repeatable", budget.scatter, f"between the {held_out_groups(calibration)}"),
+        ("model", budget.model, "posterior of the rules, RMS over the rows"),
+        ("combined", budget.combined, "root of the sum of squares"),
+        ("for comparison", rms(results.error_after), "RMS error, held-out rows"),
     ]
-    lines = [(part, results.shown(size), *rest) for part, size, *rest in parts]
+    lines = [[part, results.shown(size), "", meaning] for part, size, meaning in parts]
+    lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
     head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
     caption = "Of one compensated row in range, in a group that the model has not seen"
-    size, place = certain.attained
-    names = certain.found.input_names
-    at = ", ".join(
-        f"{_words(name)} {value:.5g} {_unit_of(calibration, name)}"
-        for name, value in zip(names, _rounded(place), strict=True)
-    )
+    size, names = certain.attained[0], certain.found.input_names
     added = calibration.recipe.physics
     what = "addition of the rules to the arcsine law" if added else "compensation"
     proven = [
-        (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}", ""),
-        ("largest that was met", f"{results.shown(size)} {results.symbol}", f"at {at}"),
+        (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
+        ("largest that was met", f"{results.shown(size)} {results.symbol}"),
     ]
     if certain.rate_rises is not None:
         told = "proven" if certain.rate_rises else "not proven"
-        proven.append(("the compensated rate follows the output, never against it", told, ""))
+        proven.append(("the compensated rate follows the output, never against it", told))
     return "How sure", [
         _table(head, lines, caption),
         Block("soft", _BUDGET),
         Block("heading", "What is proven"),
-        _table(["over the box below", "result", "remark"], proven),
+        _table(["over the box below", "result"], proven),
         _box(calibration, names, _rounded(certain.found.box)),
         Block("soft", _PROOF),
     ]
@@ -330,8 +302,7 @@ def _rules(results):
         Block("details", text, f"All rules as text ({n_rules}, {terms})"),
         Block("details", steps, "What to compute on board"),
         Block("heading", "Can the rules be read?"),
-        Block("text", _ALONE if findings else f"{_ALONE} {fit}"),
-        *(Block("warn", sentence) for sentence in findings),
+        *([Block("warn", sentence) for sentence in findings] or [Block("text", fit)]),
     ]
 
 
@@ -363,7 +334,7 @@ def _box(calibration, names, ends):
 
 
 def _table(head, lines, caption=""):
-    return Block("table", pd.DataFrame(list(lines), columns=head), caption)
+    return Block("table", pd.DataFrame(list(lines), columns=list(head)), caption)
 
 
 def _interval(low, high, shown=figures):

@@ -46,8 +46,8 @@ def gyro_report(
 ) -> pd.DataFrame:
     """Tabulate the figures of merit of a gyro per group, before and after its compensation.
 
-    Give held-out predictions. The intervals are percentiles of a bootstrap over whole runs where a
-    group has five or more, and otherwise over some thirty blocks of consecutive rows.
+    Give held-out predictions. Intervals are of a bootstrap over runs where a group has five or
+    more, and otherwise over some thirty blocks of rows.
 
     Parameters
     ----------
@@ -57,16 +57,12 @@ def gyro_report(
         Compensated rate [deg/s]; rows where it is NaN are counted and left out of all figures.
     temperature, temperature_rate, time : array-like of shape (n_rows,), default=None
         [degC], [degC/min], and [s], increasing within each run, for the figures that need them.
-    run : array-like of shape (n_rows,), default=None
-        Labels of the runs; None is one run.
-    groups : array-like of shape (n_rows,), default=None
-        Labels of the groups that get a table of their own beside the whole.
+    run, groups : array-like of shape (n_rows,), default=None
+        Labels of the runs (None is one run), and of groups that get a table of their own.
     inside : array-like of bool of shape (n_rows,), default=None
         Rows in the bounds of the calibration; the others are counted and stay in.
-    full_scale : float, default=None
-        Rate to which the nonlinearity is related, positive [deg/s]; None is the largest true rate.
-    nominal_scale_factor : float, default=1.0
-        Nominal scale factor of ``before`` and ``after``, not zero.
+    full_scale, nominal_scale_factor : float, default=None, 1.0
+        Rate of full scale [deg/s] (None: the largest true rate), and nominal scale factor.
     averaging_times : tuple of float, default=(10.0, 100.0)
         Lengths of the means of the bias stability, positive [s].
     allan : bool, default=False

@@ -151,11 +151,7 @@ def test_bad_columns_are_named(kind, log):
 
 @pytest.mark.parametrize(
     ("low", "factor"),
-    # Within a decade, over one or two, and over many; from each side of a label.
-    [
-        *((2e-6, 1.0), (0.004, 1.0), (0.9, 3.0), (3.0, 3.0)),
-        *((3.0, 40.0), (2000.0, 40.0), (2e-6, 1e5), (0.9, 1e5)),
-    ],
+    [(2e-6, 1.0), (0.9, 3.0), (3.0, 3.0), (3.0, 40.0), (2000.0, 40.0), (0.9, 1e5)],
 )
 def test_numbers_on_a_logarithmic_axis_can_be_read(low, factor):
     after = np.repeat([low, 0.5 * low * (1 + factor), low * factor, low], 10)
@@ -262,30 +258,16 @@ def test_coverage_is_that_of_the_estimator(rng):
     np.testing.assert_allclose(points["coverage"].iloc[[0, 220]], expected)
     assert points["in range"].iloc[[0, 220]].tolist() == [0, 1]
     assert display.ax_.get_xlabel() == "temperature [°C]"
+    # An L of data: the corner has no row, however well neighbours cover it.
+    part = X[(X["temperature"] < 25.0) | (X["output"] < 9.0)]
+    cells = CoverageDisplay.from_estimator(pipeline, part, n_cells=2).tables()["cells"]
+    assert (cells["rows"] > 0).tolist() == [True, True, True, False]
     beyond = CoverageDisplay.from_estimator(pipeline, X, n_points=5, others={"time": 9.0})
     assert not beyond.tables()["points"]["in range"].any()
     with pytest.raises(ValueError, match="'speed' is no column of X"):
         CoverageDisplay.from_estimator(pipeline, X, x="speed")
     with pytest.raises(ValueError, match="LinearRegression has no method 'coverage'"):
         CoverageDisplay.from_estimator(LinearRegression().fit(X, X["output"]), X)
-
-
-def test_cells_without_rows_are_empty_on_the_map(rng):
-    """An L of data: the corner has no row, however well neighbours cover it."""
-    x, y = rng.uniform(0.0, 10.0, (2, 4000))
-    x[:3], y[:3] = [0.0, 10.0, 0.0], [0.0, 0.0, 10.0]
-    X = pd.DataFrame({"temperature": x, "output": y})[(x < 5.0) | (y < 5.0)]
-    model = quick(1).fit(X, X["output"])
-    display = CoverageDisplay.from_estimator(model, X, n_cells=10, n_points=41, margin=0.2)
-    points, cells = display.tables()["points"], display.tables()["cells"]
-    at = points.iloc[:, :2].to_numpy()
-    empty = (at > 5.0).all(axis=1) | (at > 10.0).any(axis=1) | (at < 0.0).any(axis=1)
-    shown = ~np.ma.getmaskarray(display.ax_.collections[0].get_array()).ravel()
-    off_edge = ~np.isclose(at, 5.0).any(axis=1)
-    np.testing.assert_array_equal(shown[off_edge], ~empty[off_edge])
-    np.testing.assert_array_equal(points["in a cell with data"], shown)
-    assert (cells["rows"].sum(), (cells["rows"] == 0).sum()) == (len(X), 25)
-    assert "25% of the cells in range are empty" in display.ax_.get_title(loc="left")
 
 
 def test_allan_curve_of_white_noise_and_drift(rng):

@@ -1,6 +1,7 @@
 """Limits of a specification: what may be typed, and which side of a limit a figure is on."""
 
 import hashlib
+from argparse import ArgumentTypeError
 
 import numpy as np
 import pandas as pd
@@ -39,7 +40,7 @@ def test_what_may_be_typed(text, value, unit):
     ],
 )
 def test_what_may_not(text, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ArgumentTypeError, match=message):
         parse_limit(text)
 
 

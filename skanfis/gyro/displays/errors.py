@@ -112,9 +112,8 @@ class GroupResidualDisplay(GyroDisplay):
     Examples
     --------
     >>> from skanfis.gyro import GroupResidualDisplay
-    >>> before, after = [1, -1, 2, 2], [0.3, -0.3, 0.1, 0.1]
-    >>> groups = ["cold", "cold", "hot", "hot"]
-    >>> display = GroupResidualDisplay.from_predictions([0] * 4, before, after, groups=groups)
+    >>> options = {"groups": ["cold", "hot"]}
+    >>> display = GroupResidualDisplay.from_predictions([0, 0], [1, 2], [0.3, 0.1], **options)
     >>> display.tables()["groups"]["group"].tolist()
     ['hot', 'cold']
     """
@@ -139,13 +138,8 @@ class GroupResidualDisplay(GyroDisplay):
         for (side, color), error in zip(SIDES, errors.T, strict=True):
             panel.plot(error, lines, "o", color=color, label=side, markersize=5)
         panel.set_xscale("log")
-        drawn = errors[errors > 0]
-        if drawn.size:
-            low, high = drawn.min(), drawn.max()
-            # Beside the values, and a factor of four in all at least.
-            room = max(1.15, 2.0 / np.sqrt(high / low))
-            panel.set_xlim(low / room, high * room)
-            mark_decades(panel.xaxis, low / room, high * room)
+        panel.margins(x=0.2)
+        mark_decades(panel.xaxis, *panel.get_xlim())
         panel.set_yticks(lines, [as_label(group) for group in shown["group"]])
         panel.set_ylim(-0.7, len(shown) - 0.3)
         extent = f"worst {len(shown)} of {len(groups)}" if len(shown) < len(groups) else len(shown)
@@ -169,12 +163,9 @@ class ScaleFactorErrorDisplay(GyroDisplay):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from skanfis.gyro import ScaleFactorErrorDisplay
-    >>> rate, temperature = np.linspace(-100, 100, 41), np.full(41, 25.0)
-    >>> display = ScaleFactorErrorDisplay.from_predictions(
-    ...     rate, 1.001 * rate, rate, temperature=temperature
-    ... )
+    >>> rates, options = ([-100, 100], [-100.1, 100.1], [-100, 100]), {"temperature": [25, 25]}
+    >>> display = ScaleFactorErrorDisplay.from_predictions(*rates, **options)
     >>> display.tables()["scale-factor"].iloc[:, -2:].round().max().tolist()
     [1000.0, 0.0]
     """
@@ -240,14 +231,9 @@ class HysteresisDisplay(GyroDisplay):
     >>> import numpy as np
     >>> from skanfis.gyro import HysteresisDisplay
     >>> rate, angle = np.zeros(2001), np.linspace(0, 2 * np.pi, 2001)
-    >>> display = HysteresisDisplay.from_predictions(
-    ...     rate,
-    ...     10 * np.cos(angle),
-    ...     rate,
-    ...     unit="deg/s",
-    ...     temperature=20 + 30 * np.sin(angle),
-    ...     temperature_rate=np.cos(angle),
-    ... )
+    >>> options = {"temperature": np.sin(angle), "temperature_rate": np.cos(angle)}
+    >>> before = 10 * np.cos(angle) / 3600
+    >>> display = HysteresisDisplay.from_predictions(rate, before, rate, **options)
     >>> round(display.gap_before_), display.gap_after_
     (20, 0.0)
     """
@@ -272,33 +258,27 @@ class HysteresisDisplay(GyroDisplay):
     @property
     def gap_before_(self) -> float:
         """Largest distance between the branches before compensation."""
-        return self._gap("before")
+        return self._gap(self._tables["bias"].iloc[:, 1:3])
 
     @property
     def gap_after_(self) -> float:
         """Largest distance between the branches after compensation."""
-        return self._gap("after")
+        return self._gap(self._tables["bias"].iloc[:, 3:5])
 
-    def _gap(self, side):
-        warming, cooling = self._branches(side)
-        return float((warming - cooling).abs().max())
-
-    def _branches(self, side):
-        table = self._tables["bias"]
-        return [table[f"bias {side}, {name} [{self._unit}]"] for name in _BRANCHES]
+    def _gap(self, branches):
+        return float(branches.diff(axis=1).iloc[:, 1].abs().max())
 
     def _draw(self, axes, bias):
         temperature = bias["temperature [degC]"]
-        for panel, (side, _) in zip(axes, SIDES, strict=True):
-            branches = self._branches(side)
+        gaps, legends = (self.gap_before_, self.gap_after_), ("", None)
+        for place, (panel, (side, _)) in enumerate(zip(axes, SIDES, strict=True)):
+            branches = bias.iloc[:, 1 + 2 * place : 3 + 2 * place].to_numpy().T
             panel.fill_between(temperature, *branches, color="0.9", linewidth=0)
             for values, (name, (form, color)) in zip(branches, _BRANCHES.items(), strict=True):
                 panel.plot(temperature, values, form, color=color, label=name, ms=4)
-            gap = self._gap(side)
-            found = f"largest gap {figures(gap)} {self._unit}"
-            title = f"{side}: {'branches never meet' if np.isnan(gap) else found}"
-            legend = "" if panel is axes[0] else None
-            dress(panel, ylabel=f"bias [{self._unit}]", title=title, legend=legend)
+            found = f"largest gap {figures(gaps[place])} {self._unit}"
+            title = f"{side}: {'branches never meet' if np.isnan(gaps[place]) else found}"
+            dress(panel, ylabel=f"bias [{self._unit}]", title=title, legend=legends[place])
         axes[-1].set_xlabel("temperature [°C]")
 
 
@@ -315,14 +295,9 @@ class AllanDisplay(GyroDisplay):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from skanfis.gyro import AllanDisplay
-    >>> rate, noise = np.zeros(20_000), np.random.default_rng(0).standard_normal((2, 20_000))
-    >>> display = AllanDisplay.from_predictions(
-    ...     rate, *noise, sampling_interval=1.0
-    ... )  # doctest: +SKIP
-    >>> len(display.tables()["allan"])  # doctest: +SKIP
-    22
+    >>> rates, options = ([0] * 20, [1, 2] * 10, [1, 1.1] * 10), {"sampling_interval": 1.0}
+    >>> display = AllanDisplay.from_predictions(*rates, **options)  # doctest: +SKIP
     """
 
     _OPTIONAL = ("run",)
@@ -366,9 +341,8 @@ class AllanDisplay(GyroDisplay):
             read = allan_coefficients(time, deviation / factor)
         except ValueError:
             return ""  # too few points, or no noise at all
-        walk, instability, text = read.angle_random_walk, read.bias_instability, ""
-        if walk is not None:
-            text += f", N = {figures(walk)} °/√h"
+        walk, instability = read.angle_random_walk, read.bias_instability
+        text = "" if walk is None else f", N = {figures(walk)} °/√h"
         if instability is not None:
             text += f", B = {figures(factor * instability)} {signs(self._unit)}"
         return text

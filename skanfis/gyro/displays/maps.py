@@ -33,14 +33,12 @@ class ResidualSurfaceDisplay(GyroDisplay):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from skanfis.gyro import ResidualSurfaceDisplay
-    >>> rate, after = np.array([-50.0, 50.0, 50.0]), [-50.0, 50.25, 50.5]
-    >>> display = ResidualSurfaceDisplay.from_predictions(
-    ...     rate, rate, after, temperature=[10.0, 10.0, 30.0], n_bins=(2, 2)
-    ... )
-    >>> display.tables()["cells"]["mean error after [deg/s]"].to_numpy()
-    array([0.  ,  nan, 0.25, 0.5 ])
+    >>> rates = [-50, 50, 50], [-50, 50, 50], [-50, 50.25, 50.5]
+    >>> options = {"temperature": [10, 10, 30], "n_bins": (2, 2)}
+    >>> display = ResidualSurfaceDisplay.from_predictions(*rates, **options)
+    >>> display.tables()["cells"]["rows"].tolist()
+    [1, 0, 1, 1]
     """
 
     _PER_ROW = ("temperature",)
@@ -91,12 +89,11 @@ class CoverageDisplay(GyroDisplay):
 
     Examples
     --------
+    >>> import pandas as pd
     >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_ofog
     >>> from skanfis.gyro import CoverageDisplay
-    >>> log = make_ofog(n_devices=1, n_runs=4, random_state=0)
-    >>> X = log[["temperature", "output"]]
-    >>> model = ANFISRegressor(2).fit(X, log["error"])
+    >>> X = pd.DataFrame({"temperature": [10.0, 20.0, 30.0] * 9, "output": range(27)})
+    >>> model = ANFISRegressor(1).fit(X, X["output"])
     >>> len(CoverageDisplay.from_estimator(model, X).tables()["points"])
     9216
     """
@@ -133,10 +130,8 @@ class CoverageDisplay(GyroDisplay):
             Rows to draw, and from which the values of other inputs are taken.
         x, y : str, default="temperature", "output"
             Columns of X that the axes stand for.
-        others : dict of str to float, default=None
-            Values to hold other inputs at; the median of X where they are not named.
-        units : dict of str to str, default=None
-            Units of the columns, for the labels, beside those that are usual in a log.
+        others, units : dict, default=None
+            Values to hold other inputs at (default: medians), and units of columns, by name.
         n_points, n_cells : int, default=96, 24
             Number of values, and of cells, on each axis.
         min_coverage : float, default=0.1
@@ -155,14 +150,16 @@ class CoverageDisplay(GyroDisplay):
             if name not in X:
                 raise ValueError(f"{name!r} is no column of X, which has {', '.join(X)}.")
         units = _UNITS | (units or {})
-        labels = [_words(name, units.get(name)) for name in (x, y)]
+        words = [name.replace("_", " ") for name in (x, y)]
+        labels = [
+            f"{word} [{units[n]}]" if n in units else word
+            for n, word in zip((x, y), words, strict=True)
+        ]
         grid = X.median().to_frame().T.assign(**others)
         grid = grid.loc[grid.index.repeat(n_points**2)].reset_index(drop=True)
-        values = []
-        for column in (check_column(X[name], name) for name in (x, y)):
-            beyond = margin * np.ptp(column)
-            ends = column.min() - beyond, column.max() + beyond
-            values.append(np.linspace(*ends, n_points))
+        columns = [check_column(X[name], name) for name in (x, y)]
+        steps = np.linspace(-margin, 1.0 + margin, n_points)
+        values = [column.min() + steps * np.ptp(column) for column in columns]
         grid[x], grid[y] = (each.ravel() for each in np.meshgrid(*values))
         cells, numbers = _cells(X[x], X[y], (n_cells, n_cells), labels)
         cells["rows"] = np.bincount(numbers, minlength=n_cells**2)
@@ -206,7 +203,7 @@ def _cells(x, y, n_bins, labels):
     """Ends of all cells, a line for each, and the number of the cell of every row."""
     edges = [bins_of(values, n)[1] for values, n in zip((x, y), n_bins, strict=True)]
     places = np.divmod(np.arange(n_bins[0] * n_bins[1]), n_bins[0])[::-1]
-    ends = {}
+    ends: dict[str, np.ndarray] = {}
     for label, place, each in zip(labels, places, edges, strict=True):
         ends |= {f"{label}, from": each[place], f"{label}, to": each[place + 1]}
     return pd.DataFrame(ends), _cell_numbers(x, y, *edges).astype(int)
@@ -231,7 +228,3 @@ def _draw_cells(axes, cells, values, **options):
     axes.set_facecolor(_NO_DATA)
     shape = (y.size - 1, x.size - 1)
     return axes.pcolormesh(x, y, values.to_numpy().reshape(shape), rasterized=True, **options)
-
-
-def _words(name, unit):
-    return f"{name.replace('_', ' ')} [{unit}]" if unit else name
