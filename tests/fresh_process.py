@@ -76,9 +76,12 @@ def pyplot_of_pictures():
     del os.environ["MPLBACKEND"]
     for half in [name for name in sys.modules if name.startswith("matplotlib")]:
         del sys.modules[half]
-    from skanfis.gyro import _pictures
+    from matplotlib.figure import Figure
 
-    _pictures._figure(1, 1)
+    from skanfis.gyro import ErrorDisplay
+
+    display = ErrorDisplay.computed([0, 1], [0, 1], [0, 1], position=[0, 1])
+    display.plot(display.panels(Figure))
     return [name for name in sys.modules if name == "matplotlib.pyplot"]
 
 

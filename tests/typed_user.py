@@ -42,7 +42,6 @@ from skanfis.gyro import (
     group_by_run,
     gyro_report,
     read_log,
-    reduction_factor,
 )
 from skanfis.inspection import (
     LossCurveDisplay,
@@ -115,7 +114,7 @@ compensator = GyroCompensator(composed, ("output", "temperature"), predicts="rat
 compensator.write_json("compensator.json")
 applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read_log("a.csv"))
 report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
-offset: float = bias(log["error"]) * reduction_factor(log["error"], log["error"])
+offset: float = bias(log["error"])
 curve = allan_deviation(log["error"], 1.0)
 walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
 dwells: np.ndarray = log["rate"].to_numpy()

@@ -9,8 +9,8 @@ from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import units_of
 from ._console import UsageError, usage_errors
-from ._dossier import add_report_options
 from ._guess import Request
+from ._report_options import add_report_options
 from ._split import KINDS
 from .compensator import INPUTS
 from .errors import shortened

@@ -23,14 +23,15 @@ from ._console import (
     staged,
     usage_errors,
 )
-from ._dossier import dossier_of
+from ._formulas import rules_text
+from ._headline import errors_and_verdict
 from ._options import PROGRAM, make_parser, request_of
+from ._report_options import report_options
 from ._split import choose_split
-from ._summary import errors_and_verdict
 from .c_code import export_c_physics
 from .compensator import INPUTS
 from .errors import LogError
-from .html_report import report_page, rules_text
+from .html_report import check_installed, report_page
 from .log import check_different, find_logs, read
 from .metrics import hysteresis
 
@@ -109,7 +110,7 @@ def _where_from_and_to(options):
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
     names = (*_FILES, *(_C_FILES if options.c else ()))
     refuse_existing([folder / name for name in names], options.force)
-    _require_matplotlib()
+    check_installed()
     check_different(paths)
     return folder, paths
 
@@ -228,23 +229,10 @@ def _named(paths):
     return f"{paths[0]} to {paths[-1]}, {len(paths):,} files"
 
 
-def _require_matplotlib():
-    """A report without its pictures would be found out at the end only."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        message = "the report needs matplotlib: pip install matplotlib"
-        raise ImportError(message) from error
-    except ValueError as error:
-        # Of its settings; MPLBACKEND is one.
-        reason = printable(str(error).partition(";")[0])
-        raise ImportError(f"matplotlib cannot be imported: {reason}.") from error
-
-
 def _write(calibration, options, paths, folder):
     names = [Path(path).name for path in paths]
     title = printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
-    page = report_page(calibration, title, dossier_of(options, paths))
+    page = report_page(calibration, title, report_options(options, paths))
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
     compensator.write_json(folder / "compensator.json")

@@ -9,11 +9,10 @@ from sklearn.model_selection import GroupKFold
 
 from skanfis.gyro import _calibration, _simpler
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._headline import headline
+from skanfis.gyro._formulas import formula_of
+from skanfis.gyro._headline import errors_and_verdict, headline
 from skanfis.gyro._models import fit_model
-from skanfis.gyro._sections.instead import formula_of
 from skanfis.gyro._split import Split
-from skanfis.gyro._summary import errors_and_verdict
 
 pytestmark = pytest.mark.theory
 

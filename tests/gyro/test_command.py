@@ -53,7 +53,7 @@ def log():
 def no_report(monkeypatch, few_rivals):
     """Leave out the report and what it compares with, which take longer than all else together."""
     monkeypatch.setattr(
-        "skanfis.gyro.command.report_page", lambda calibration, title, dossier: title
+        "skanfis.gyro.command.report_page", lambda calibration, title, options: title
     )
 
 
