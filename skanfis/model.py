@@ -328,8 +328,8 @@ class TSKModel:
 
     def _way(self, Z, nearest):
         """The way from the nearest point in the box, no further than ``FARTHEST_ROW``."""
-        reach = (FARTHEST_ROW * self.spread)[:, None]
         with np.errstate(over="ignore"):
+            reach = (FARTHEST_ROW * self.spread)[:, None]
             return np.clip(Z - nearest, -reach, reach)
 
     def _followed(self, way):
