@@ -28,9 +28,8 @@ def fold(estimator: Any) -> TSKModel:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator; a Pipeline that ends in one, with steps in front that treat every
-        column alone (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler, "passthrough",
-        column selections, a OneHotEncoder, a ColumnTransformer of these); a
+        An ANFIS estimator; a Pipeline that ends in one, with steps in front that scale every column
+        alone, select columns or encode them (OneHotEncoder), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
         GridSearchCV over these. A TSKModel is returned as it is.
 
@@ -38,16 +37,13 @@ def fold(estimator: Any) -> TSKModel:
     -------
     model : TSKModel
         Its inputs are the raw columns that reach the model, in the order of X, by their names in X
-        ("x0", "x1", ... where it has none). In the place of a column that is one-hot encoded are
-        its indicators ("fibre_PM"). Terms and rules keep their order. ``model.predict(X)``, with X
-        of these columns, is what ``estimator.predict(X)`` is, to rounding errors.
+        ("x0", "x1", ... where it has none), and in the place of one that is one-hot encoded its
+        indicators ("fibre_PM"). It predicts what ``estimator`` does, to rounding errors.
 
     Raises
     ------
-    ValueError
-        If a step cannot be folded; it is named.
-    TypeError
-        If ``estimator`` is no such estimator.
+    ValueError, TypeError
+        If a step cannot be folded, which is named; if ``estimator`` is no such estimator.
 
     Examples
     --------
@@ -72,7 +68,6 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`fold` takes it.
     X : array-like or DataFrame of shape (n_rows, n_features)
         A table that ``estimator`` takes.
 
@@ -80,13 +75,11 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     -------
     model : TSKModel
     rows : ndarray of shape (n_rows, model.n_inputs)
-        Finite, in raw units.
 
     Raises
     ------
     ValueError, TypeError
-        As :func:`fold` does; ValueError too where X has other columns than ``estimator`` was
-        trained on, or a value that is not finite.
+        As :func:`fold`; where X has other columns than in training, or a number is not finite.
 
     Examples
     --------
@@ -108,7 +101,6 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`fold` takes it.
 
     Returns
     -------
@@ -123,8 +115,8 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     >>> from skanfis.export import fold_with_reader
     >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
     >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
-    >>> [read(part).shape for part in (X[:5], X[5:])]
-    [(5, 1), (15, 1)]
+    >>> read(X[:5]).shape
+    (5, 1)
     """
     if isinstance(estimator, TSKModel):
         inputs = [Column(j) for j in range(estimator.n_inputs)]
@@ -169,21 +161,15 @@ def last_step(estimator: Any) -> Any:
     Returns
     -------
     last : estimator
-        With a ``model_`` of rules.
-
-    Raises
-    ------
-    TypeError
-        If ``estimator`` does not end in an ANFIS estimator.
+        With a ``model_`` of rules; TypeError where there is none.
 
     Examples
     --------
-    >>> from sklearn.model_selection import GridSearchCV
+    >>> from sklearn.pipeline import make_pipeline
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import last_step
-    >>> search = GridSearchCV(ANFISRegressor(), {"n_mfs": [2]}, cv=2).fit(*make_jang_sinc())
-    >>> last_step(search).model_.n_rules
+    >>> last_step(make_pipeline(ANFISRegressor(n_mfs=2)).fit(*make_jang_sinc())).model_.n_rules
     4
     """
     label, last = _steps_of("", estimator)[-1]
@@ -197,21 +183,17 @@ def found_by_search(estimator: Any) -> Any:
     Parameters
     ----------
     estimator : estimator
-        A fitted search such as GridSearchCV, or any other.
+        A fitted search such as GridSearchCV, a search over searches, or any other.
 
     Returns
     -------
     found : estimator
-        Its ``best_estimator_``, of a search over searches that of the innermost.
 
     Examples
     --------
-    >>> from sklearn.model_selection import GridSearchCV
     >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import found_by_search
-    >>> search = GridSearchCV(ANFISRegressor(), {"n_mfs": [2]}, cv=2).fit(*make_jang_sinc())
-    >>> found_by_search(search).n_mfs
+    >>> found_by_search(ANFISRegressor(n_mfs=2)).n_mfs
     2
     """
     while hasattr(estimator, "best_estimator_"):

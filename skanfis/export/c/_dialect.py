@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._constants import FLOOR, SMALLEST_LOG_SQUARE
+from .._numbers import FLOOR, SMALLEST_LOG_SQUARE
 
 __all__ = ["DTYPES", "STANDARDS", "Dialect", "comment", "index_type", "kept_lines", "literals"]
 
@@ -24,8 +24,8 @@ class Dialect:
     """Turns templates into C.
 
     A number that ends in R becomes a constant of the type, ``$name`` the prefix of identifiers,
-    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG``, ``$SQRT`` and ``$ASIN`` its
-    functions, ``$MAX`` its largest number; further words are given to :meth:`write`.
+    ``$NAME`` that of macros, ``$real`` the type, ``$EXP`` and the like its functions, ``$MAX`` its
+    largest number.
     """
 
     name: str

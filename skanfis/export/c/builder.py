@@ -1,16 +1,14 @@
 """Rules as a part of a larger C function: for code that writes C around them, as skanfis.gyro does.
 
-What surrounds the rules is written in the same :class:`Dialect`, under the same status word, with
-the same header and self-test; :func:`skanfis.export.export_c` is made of the same parts.
+What surrounds the rules is written in the same :class:`Dialect`, under the same status word.
 """
 
 from .._numbers import Numbers
 from ._arguments import LONGEST_NAME, check_arguments, read_limits, write_files
-from ._cost import CCost
 from ._dialect import Dialect, comment, index_type, literals
 from ._header import cost_lines, header_of, input_lines, policy_line
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
-from ._source import Source
+from ._source import CCost, Source
 from ._templates import FINITE_INPUT, rejection
 from .status import STATUS
 
@@ -51,30 +49,18 @@ class RulesPart:
         Of the file.
     suffix : str
         What the identifiers of the rules have after the prefix of the file, such as "_r".
-    min_coverage : float or None
-        Rows are uncovered where the coverage is below this. None leaves coverage out; it is left
-        out too where the rules have never seen data.
-    saturate : Bounds or array-like of shape (n_outputs, 2), default=None
-        Limits between which the outputs of the rules are held.
+    min_coverage, saturate
+        As :func:`skanfis.export.export_c` takes them.
 
     Attributes
     ----------
     name : str
         What the identifiers of the rules start with.
-    model : TSKModel
-        The model as its rounded numbers hold it, for answers to compare the C code with.
-    low, high : ndarray of shape (n_inputs,)
-        The box of the training data, in the type of the file.
+    model, low, high, limits
+        The model, its box and ``saturate`` in the type of the file.
     min_coverage : float or None
-    limits : ndarray of shape (n_outputs, 2) or None
-        ``saturate`` in the type of the file.
     cost : CCost
         Of the rules alone.
-
-    Raises
-    ------
-    ValueError
-        If the type cannot hold the numbers of the model.
 
     Examples
     --------
@@ -96,9 +82,8 @@ class RulesPart:
         self.model, self.low, self.high = numbers.model, numbers.low, numbers.high
         own = Dialect(self.name, dialect.real, dialect.std)
         given = (numbers, own, model.out_of_bounds, self.min_coverage, self.limits)
-        self._source = Source(*given, is_part=True)
-        self._outer = dialect.name.upper()
-        self.cost = self._source.cost
+        self._source, self._outer = Source(*given, is_part=True), dialect.name.upper()
+        self.cost = self._source.cost()
 
     def text(self) -> str:
         """The C code, for after the lines that include other files."""

@@ -64,7 +64,8 @@ class Entry:
         """Antecedent and consequent as lists of whole numbers; weight; 1 for AND, 2 for OR."""
         match = self._match(
             _RULE,
-            "a rule such as '1 2, 3 (1) : 1' (terms of the inputs, consequents, weight, connection)",
+            "a rule such as '1 2, 3 (1) : 1' (terms of the inputs, consequents, weight, "
+            "connection)",
         )
         sides = []
         for tokens in (match[1].split(), match[2].split()):
