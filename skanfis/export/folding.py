@@ -280,10 +280,15 @@ def _with_raw_inputs(model, columns, order, names):
         np.array([c.edge(z, side) for c, z in zip(columns, edges.tolist(), strict=True)])
         for edges, side in ((model.minimum, -1.0), (model.maximum, 1.0))
     )
+    place = np.argsort(order)
+    antecedents = {}
+    for name in ("antecedent", "initial_antecedent"):
+        moved = getattr(model, name).change_units(offset, scale)
+        groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
+        antecedents[name] = replace(moved, groups=groups)
     folded = replace(
         model,
-        antecedent=_with_raw_terms(model.antecedent, offset, scale, order),
-        initial_antecedent=_with_raw_terms(model.initial_antecedent, offset, scale, order),
+        **antecedents,
         coefficients=coefficients,
         reference=(offset + scale * model.reference)[order],
         spread=(scale * model.spread)[order],
@@ -297,14 +302,6 @@ def _with_raw_inputs(model, columns, order, names):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
         return replace(folded, term_names=default_term_names(folded.antecedent))
     return folded
-
-
-def _with_raw_terms(antecedent, offset, scale, order):
-    """The same terms and rules in raw units, each term on its input's new place."""
-    place = np.argsort(order)
-    moved = antecedent.change_units(offset, scale)
-    groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
-    return replace(moved, groups=groups)
 
 
 def _with_raw_target(model, label, transformer):

@@ -1,4 +1,4 @@
-"""Reading a model from JSON, every entry checked; ``model_json`` has the format."""
+"""Reading a model from JSON, every entry checked."""
 
 import json
 from itertools import groupby
@@ -49,7 +49,16 @@ def parse_json(text):
 
 def model_of(document):
     """The model that a file's content describes."""
-    _check_version(document)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise ValueError(f'not a model of skanfis: it has no "format": "{FORMAT}".')
+    version = document.get("version")
+    if type(version) is not int or version < 1:
+        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
+    if version > VERSION:
+        raise ValueError(
+            f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
+            "upgrade skanfis to read it."
+        )
     posterior = document.get("posterior")
     document = {key: value for key, value in document.items() if key != "posterior"}
     _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
@@ -109,19 +118,6 @@ def _without_repetition(pairs):
     return members
 
 
-def _check_version(document):
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise ValueError(f'not a model of skanfis: it has no "format": "{FORMAT}".')
-    version = document.get("version")
-    if type(version) is not int or version < 1:
-        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
-    if version > VERSION:
-        raise ValueError(
-            f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
-            "upgrade skanfis to read it."
-        )
-
-
 def _inputs(inputs):
     """Names, and minimum, maximum, reference, spread as rows."""
     names, box = [], []
@@ -168,7 +164,9 @@ def _range(item, keys, where):
 
 def _read_terms(terms, n_inputs):
     """Groups of terms after training, before it, and the terms' names."""
-    names, after, before = [], [], []
+    names: list[str] = []
+    after: list[tuple] = []
+    before: list[tuple] = []
     for t, item in enumerate(terms):
         where = f"terms[{t}]"
         function = item.get("function") if isinstance(item, dict) else None
@@ -212,9 +210,8 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
     consequents: list[np.ndarray] = []
     for r, item in enumerate(rules):
         where = f"rules[{r}]"
-        own, weight, n_rows, by_output = _members(
-            item, ["terms", "weight", "rows", "consequents"], where
-        )
+        keys = ["terms", "weight", "rows", "consequents"]
+        own, weight, n_rows, by_output = _members(item, keys, where)
         table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
         weights.append(number(weight, f"{where}.weight", 0.0, 1.0 + _ROUNDING))
         rows.append(number(n_rows, f"{where}.rows", 0.0))
@@ -241,17 +238,12 @@ def _support(items, n_rules, n_inputs):
     found = []
     for r, item in enumerate(items):
         where = f"support[{r}]"
-        share, center, factor, radius = _members(
-            item, ["share", "center", "factor", "radius"], where
-        )
-        found.append(
-            (
-                number(share, f"{where}.share", 0.0, 1.0),
-                numbers(center, (n_inputs,), f"{where}.center"),
-                numbers(factor, (n_factor,), f"{where}.factor"),
-                number(radius, f"{where}.radius", 0.0),
-            )
-        )
+        keys = ["share", "center", "factor", "radius"]
+        share, center, factor, radius = _members(item, keys, where)
+        share = number(share, f"{where}.share", 0.0, 1.0)
+        center = numbers(center, (n_inputs,), f"{where}.center")
+        factor = numbers(factor, (n_factor,), f"{where}.factor")
+        found.append((share, center, factor, number(radius, f"{where}.radius", 0.0)))
     shares, centers, factors, radii = map(np.array, zip(*found, strict=True))
     # Asked for now that the file has shown to be as large.
     factor = np.zeros((n_rules, n_inputs, n_inputs))
@@ -311,20 +303,14 @@ def _rule_base(kind, groups, table):
         raise ValueError(f'"rule_base" is {shown(kind)}, not {", ".join(KINDS.values())}.')
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
-    _check_columns(inputs, table)
-    return antecedent
-
-
-def _check_columns(inputs, table):
-    """Each place in a rule is one input's, and no input has two."""
-    seen = []
-    for column in table.T:
-        own = np.unique(inputs[column[column >= 0]])
-        if own.size > 1:
-            raise ValueError("the terms at one place of the rules are of different inputs.")
-        seen += own.tolist()
-    if len(set(seen)) != len(seen):
+    # Each place in a rule is one input's, and no input has two.
+    owns = [np.unique(inputs[column[column >= 0]]) for column in table.T]
+    if any(own.size > 1 for own in owns):
+        raise ValueError("the terms at one place of the rules are of different inputs.")
+    seen = np.concatenate(owns) if owns else np.empty(0)
+    if np.unique(seen).size < seen.size:
         raise ValueError("rules have two terms of one input.")
+    return antecedent
 
 
 def _members(item, keys, where):

@@ -1,40 +1,6 @@
 """A model as JSON: to be read by people, kept in version control, and loaded without pickle.
 
-::
-
-    {
-        "format": "skanfis-model",
-        "version": 1,
-        "inputs": [{"name": "x0", "minimum": ..., "maximum": ..., "reference": ..., "spread": ...}],
-        "outputs": [{"name": "y", "minimum": ..., "maximum": ..., "spread": ...}],
-        "out_of_bounds": "linear",
-        "max_extrapolation": 0.5,
-        "rule_base": "grid",
-        "terms": [
-            {
-                "name": "low",
-                "input": 0,
-                "function": "gaussian",
-                "center": ...,
-                "log_width": ...,
-                "before_training": {"center": ..., "log_width": ...},
-            }
-        ],
-        "rules": [{"terms": [0, 3], "weight": ..., "rows": ..., "consequents": [[...]]}],
-        "support": [{"share": 1.0, "radius": ..., "center": [...], "factor": [...]}],
-    }
-
-Numbers are written so that the same double comes back; widths stay the logarithms that the model
-holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
-terms are positions in "terms", -1 for an input that it does not look at. "max_extrapolation" is
-null where the tangent has no end. An output's minimum, maximum and spread are those of the target
-in training, lower and upper the limits that were asked for, null where none was. "support" has an
-entry per rule, its factor row by row up to the diagonal. Either is null where the model knows of no
-data.
-
-On request there is "posterior" too, with "noise" (a number per output), "inputs" (those that the
-consequents are linear in), "consequents" (a triangle, row by row up to the diagonal), "premises",
-"cross", and where constraints are met with equality "pinned": the arrays of ``posterior``.
+docs/files.rst has the format. Numbers are written so that the same double comes back.
 """
 
 import json
@@ -84,10 +50,8 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import export_json
-    >>> X, y = make_jang_sinc()
-    >>> text = export_json(ANFISRegressor(n_mfs=2).fit(X, y))
-    >>> text.splitlines()[:3]
-    ['{', '  "format": "skanfis-model",', '  "version": 1,']
+    >>> export_json(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc())).splitlines()[1]
+    '  "format": "skanfis-model",'
     """
     model = fold(estimator)
     limit, before = model.max_extrapolation, _terms(model.initial_antecedent)
@@ -142,20 +106,14 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
 
 
 def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = False) -> None:
-    """Write a trained model to a JSON file, as :func:`export_json` gives it.
+    """Write a trained model to a JSON file.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
     path : str or path-like
-        Of the file, which is replaced where it exists.
     posterior : bool, default=False
-        Whether to write what ``predict(X, return_std=True)`` needs.
-
-    Raises
-    ------
-    ValueError, TypeError
-        As :func:`export_json`.
+        As :func:`export_json`, which raises what this raises, takes it.
 
     Examples
     --------
@@ -172,8 +130,7 @@ def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = F
     >>> bool((model.predict(X)[:, 0] == estimator.predict(X)).all())
     True
     """
-    text = export_json(estimator, posterior=posterior)
-    Path(path).write_text(text, encoding="utf-8", newline="\n")
+    Path(path).write_text(export_json(estimator, posterior=posterior), "utf-8", newline="\n")
 
 
 def read_json(path: str | PathLike[str]) -> TSKModel:
@@ -231,16 +188,14 @@ def _laid_out(document):
     """JSON text with one item of every list per line."""
     entries = []
     for key, value in document.items():
-        if isinstance(value, list):
-            items = [f"\n    {_written(item)}" for item in value]
-            entries.append(f'  "{key}": [{",".join(items)}\n  ]')
-        else:
-            entries.append(f'  "{key}": {_written(value)}')
+        is_list = isinstance(value, list)
+        texts = [
+            json.dumps(item, ensure_ascii=False, allow_nan=False)
+            for item in (value if is_list else [value])
+        ]
+        text = "[" + ",".join(f"\n    {item}" for item in texts) + "\n  ]" if is_list else texts[0]
+        entries.append(f'  "{key}": {text}')
     return "{\n" + ",\n".join(entries) + "\n}\n"
-
-
-def _written(value):
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _items(**columns):

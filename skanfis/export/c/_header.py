@@ -132,7 +132,6 @@ def _precision_lines(model, numbers):
 
 
 def header_of(title, lines, dialect, n_inputs, n_outputs):
-    """The header with these lines in its first comment."""
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),

@@ -1,12 +1,8 @@
 """The .c file: constant tables, and the functions that read them.
 
-The order of work is that of ``skanfis.model``: hold the inputs in the box, log memberships,
-strengths by a softmax that subtracts the largest, consequents weighed by the strengths. A grid
-normalises each input by itself and multiplies the shares in nested loops, so that it takes one
-exponential per term, not per rule and input. The continuation "linear" is worked out only for rows
-outside the box: the derivative along the way back to the box, carried forward through the same
-loops. Coverage takes a quadratic form per rule: the strongest rule is asked first, then the others,
-until there is enough.
+The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
+multiplies shares in nested loops: one exponential per term, not per rule and input. "linear" is
+worked out only outside the box, by the derivative along the way back.
 """
 
 import re
@@ -15,17 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...policies import SILENT
+from . import _templates as templates
 from ._dialect import index_type, kept_lines
 from ._families import BODIES, COSTS, HELPERS
-from ._templates import (
-    ADD_CHANGE,
-    ADD_RULE,
-    ADD_SUPPORT,
-    FINITE_INPUT,
-    FUNCTIONS,
-    PREDICT,
-    rejection,
-)
 
 __all__ = ["CCost", "Source"]
 
@@ -73,12 +61,7 @@ class CCost:
 
 
 class Source:
-    """The functions and tables of a .c file, without its self-test.
-
-    ``policy`` is that of the model for rows outside the box, ``min_coverage`` the coverage below
-    which a row is uncovered, or None; ``limits`` are those between which outputs are held, or None;
-    ``is_part`` whether the main function is for others in the same file.
-    """
+    """The functions and tables of a .c file; ``is_part`` for others in the same file."""
 
     def __init__(self, numbers, dialect, policy, min_coverage, limits=None, is_part=False):
         self.numbers, self.dialect, self.policy = numbers, dialect, policy
@@ -241,28 +224,28 @@ class Source:
 
     def _helpers(self):
         return self._filled(
-            FUNCTIONS,
+            templates.FUNCTIONS,
             given=", ".join(f"const $real *{name}" for name in self._taken),
             coverage_indices=", ".join(["r", *self._loops]),
             tangent_indices=", ".join(["i"] * (self.numbers.n_terms > 0) + self._indices),
             tangent_arrays=_declared(self.arrays()[1]),
             strengths_slope=self._strengths("t", "s", "_slope"),
-            add_support=self._over_rules(ADD_SUPPORT),
-            add_changes=self._over_rules(ADD_CHANGE),
+            add_support=self._over_rules(templates.ADD_SUPPORT),
+            add_changes=self._over_rules(templates.ADD_CHANGE),
         )
 
     def _predict(self):
-        head = rejection(self.policy, self.dialect.std).lstrip() + "\n"
+        head = templates.rejection(self.policy, self.dialect.std).lstrip() + "\n"
         return head + self._filled(
-            PREDICT,
+            templates.PREDICT,
             linkage="static " if self.is_part else "",
-            finite_input=FINITE_INPUT.strip("\n"),
+            finite_input=templates.FINITE_INPUT.strip("\n"),
             taken=", ".join(self._taken),
             arrays=_declared(self.arrays()[0]),
             indices=", ".join(["i", *self._indices]),
             limit=self.dialect.number(self.min_coverage or 0.0),
             strengths_inside=self._strengths("l", "w", ""),
-            add_rules=self._over_rules(ADD_RULE),
+            add_rules=self._over_rules(templates.ADD_RULE),
         )
 
     def _filled(self, template, **parts):

@@ -5,6 +5,7 @@ and give lists of floats; on the side of skanfis these are natural parameters (w
 logarithms). What a family cannot be raises ValueError.
 """
 
+from collections.abc import Callable
 from math import log
 
 import numpy as np
@@ -149,23 +150,21 @@ def _bell_from_file(width, slope, center):
     return [center, abs(width), slope]
 
 
-def _flank(name, left, right):
-    if left >= right:
-        raise ValueError(f"the corners of {name} [{left:g} {right:g}] must be in ascending order.")
-    return right - left
-
-
-def _s_from_file(foot, shoulder):
-    return [shoulder, _flank("smf", foot, shoulder)]
+def _s_from_file(foot, shoulder, name="smf"):
+    if foot >= shoulder:
+        raise ValueError(
+            f"the corners of {name} [{foot:g} {shoulder:g}] must be in ascending order."
+        )
+    return [shoulder, shoulder - foot]
 
 
 def _z_from_file(shoulder, foot):
-    return [shoulder, _flank("zmf", shoulder, foot)]
+    return [shoulder, _s_from_file(shoulder, foot, "zmf")[1]]
 
 
 # By family: the function's name, its number of parameters, and what turns those of the family into
 # them and back.
-_TABLE = {
+_TABLE: dict[str, tuple[str, int, Callable, Callable]] = {
     "gaussian": ("gaussmf", 2, lambda c, width: [width, c], lambda width, c: [c, abs(width)]),
     "bell": ("gbellmf", 3, lambda c, width, slope: [width, slope, c], _bell_from_file),
     "triangular": (

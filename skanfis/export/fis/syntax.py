@@ -69,13 +69,16 @@ class Entry:
         )
         sides = []
         for tokens in (match[1].split(), match[2].split()):
-            wholes = [_SIGNED_WHOLE.fullmatch(token) for token in tokens]
-            if None in wholes:
-                raise self.error(
-                    f"expected whole numbers of terms, found {shown(tokens[wholes.index(None)])}; "
-                    "hedges, written as fractions, are not supported."
-                )
-            sides.append([int(whole[1]) for whole in wholes])
+            numbers = []
+            for token in tokens:
+                whole = _SIGNED_WHOLE.fullmatch(token)
+                if whole is None:
+                    raise self.error(
+                        f"expected whole numbers of terms, found {shown(token)}; hedges, written "
+                        "as fractions, are not supported."
+                    )
+                numbers.append(int(whole[1]))
+            sides.append(numbers)
         weights, connection = self._numbers(match[3]), match[4].strip()
         if len(weights) != 1 or connection not in ("1", "2"):
             raise self.error(
