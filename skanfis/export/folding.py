@@ -69,17 +69,12 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     ----------
     estimator : fitted estimator or TSKModel
     X : array-like or DataFrame of shape (n_rows, n_features)
-        A table that ``estimator`` takes.
+        Checked: other columns than in training are refused, and numbers that are not finite.
 
     Returns
     -------
     model : TSKModel
     rows : ndarray of shape (n_rows, model.n_inputs)
-
-    Raises
-    ------
-    ValueError, TypeError
-        As :func:`fold`; where X has other columns than in training, or a number is not finite.
 
     Examples
     --------

@@ -122,13 +122,10 @@ def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = F
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import read_json, write_json
-    >>> X, y = make_jang_sinc()
-    >>> estimator = ANFISRegressor(n_mfs=2).fit(X, y)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(estimator, Path(folder) / "sinc.json")
-    ...     model = read_json(Path(folder) / "sinc.json")
-    >>> bool((model.predict(X)[:, 0] == estimator.predict(X)).all())
-    True
+    ...     write_json(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), Path(folder) / "sinc.json")
+    ...     read_json(Path(folder) / "sinc.json").n_rules
+    4
     """
     Path(path).write_text(export_json(estimator, posterior=posterior), "utf-8", newline="\n")
 

@@ -99,13 +99,6 @@ def test_terms_of_a_grid_stay_in_order_else_rules_are_listed():
     assert type(parse_fis(mixed).antecedent) is RuleTableAntecedent
 
 
-def test_names_that_stand_twice_are_numbered():
-    text = system([2, 2], [(1, 1), (2, 2)]).replace("'t2'", "'t1'").replace("'x1'", "'x0'")
-    model = parse_fis(text)
-    assert model.input_names == ("x0", "x0 (2)")
-    assert model.term_names == ("t1", "t1", "t1 (2)", "t1 (2)")
-
-
 REFUSED = [
     # the system
     ("Type=", "Type='mamdani'", "'mamdani': only Sugeno systems are supported"),
@@ -113,16 +106,13 @@ REFUSED = [
     ("DefuzzMethod=", "DefuzzMethod='wtsum'", "only the weighted average"),
     ("AndMethod=", "AndMethod='min'", "only the product"),
     ("NumInputs=", "NumInputs=two", "a whole number, found 'two'"),
-    ("NumInputs=", "NumInputs=-1", "a whole number"),
     ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
     ("NumInputs=", "NumInputs=0", "0 is not between 1 and 1000"),
     ("NumRules=", "NumRules=999999999", "is not between 1 and 100000"),
-    ("NumRules=", f"NumRules={'9' * 5000}", "a whole number"),
     ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
     ("Version=", "Version 2.0", "key=value"),
     # names
-    ("Name='by hand'", "Name='by 'hand'", "single quotes"),
     ("Name='by hand'", "Name='by \N{BELL}\x07'", "cannot be printed"),
     ("Name='by hand'", "Name=__import__('os').abort()", "a name in single quotes"),
     # sections
@@ -132,40 +122,32 @@ REFUSED = [
     ("% A comment", "stray", r"expected \[System\]"),
     # variables
     ("Range=[0 10]", "Range=[10 0]", "low < high"),
-    ("Range=[0 10]", "Range=[0 0]", "low < high"),
-    ("Range=[0 10]", "Range=[0 10 20]", "low < high"),
     ("Range=[0 10]", "Range=[0 inf]", "a finite number, found 'inf'"),
-    ("Range=[0 10]", "Range=[0 nan]", "a finite number, found 'nan'"),
     ("Range=[0 10]", "Range=[0 1e999]", "beyond 1e"),
     ("Range=[0 10]", "Range=[0 1_0]", "a finite number"),
-    ("Range=[0 10]", "Range=[0 0x10]", "a finite number"),
     ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a finite number"),
     ("Range=[0 10]", "Range=0 10", r"expected \[low high\]"),
     ("Range=[-1, +1.0]", "Range=[-1,, 1]", "a finite number, found ''"),
     # membership functions
     ("MF1='low'", "MF1='low':'trimf',[2 2 8]", r"vertical flank within its input's Range \[0 10\]"),
     ("MF1='low'", "MF1='low':'sigmf',[1 2]", "'sigmf' is not supported"),
-    ("MF1='low'", "MF1='low':'os.system',[1 2]", "'os.system' is not supported"),
     ("MF1='low'", "MF1='low':'gaussmf',[1 2", "'name':'function'"),
     ("MF1='low'", "MF1='low':'gaussmf',[1 exp(2)]", "a finite number"),
     ("MF1='low'", "MF1='low':'gaussmf',[1e-60 2]", "must be between"),
     ("MF1='low'", "MF3='low':'gaussmf',[1 2]", None),
     ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' is not supported; constant"),
     ("MF1='flat'", "MF1='flat':'constant',[3 4]", "constant takes 1 parameters, found 2"),
-    ("MF2='sloped'", "MF2='sloped':'linear',[1 2]", "linear takes 3 parameters, found 2"),
     # rules
     ("1 1, 2 1", "1 1 1, 2 1 (1) : 1", "3 numbers for 2 inputs"),
     ("1 1, 2 1", "1 1, 2 (1) : 1", "1 numbers for 2 outputs"),
     ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight 0.5; only weight 1"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 2", r"by OR \(2\)"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 3", "the connection is 1 or 2"),
-    ("1 1, 2 1", "1 1, 2 1 () : 1", "the connection is 1 or 2"),
     ("1 1, 2 1", "1 1, 2 1", "expected a rule"),
     ("1 1, 2 1", "-1 1, 2 1 (1) : 1", "NOT, a negative number"),
     ("1 1, 2 1", "1.2 1, 2 1 (1) : 1", "hedges"),
     ("1 1, 2 1", "3 1, 2 1 (1) : 1", "3 for input 'x y', which has 2"),
     ("1 1, 2 1", "1 1, 0 1 (1) : 1", "0 for output 'u'"),
-    ("1 1, 2 1", "1 1, 2 9 (1) : 1", "9 for output 'v', which has 3"),
 ]
 
 

@@ -267,19 +267,6 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
     assert_same_predictions(pipe, X.assign(kelvin=X["kelvin"] * 1.2), 50.0)
 
 
-def test_encoder_is_given_columns_as_they_are():
-    X, y = data()
-    bins = np.floor(X / X.std(axis=0))
-    pipe = make_pipeline(
-        MaxAbsScaler(), OneHotEncoder(sparse_output=False), regressor(n_mfs=1)
-    ).fit(bins, y)
-    with pytest.raises(ValueError, match=r"'onehotencoder'.* columns of the table as they are"):
-        fold(pipe)
-    unscaled = make_pipeline(OneHotEncoder(sparse_output=False), regressor(n_mfs=1)).fit(bins, y)
-    assert fold(unscaled).input_names[0] == f"x0_{bins[:, 0].min()}"
-    assert_same_predictions(unscaled, bins, 10.0)
-
-
 @pytest.mark.parametrize(
     ("step", "message"),
     [

@@ -6,8 +6,12 @@ from typing import Any
 
 from .._numbers import Numbers
 from ..folding import fold
-from ._arguments import check_arguments, read_limits, write_files
-from ._dialect import Dialect
+from ._dialect import (
+    Dialect,
+    check_arguments,
+    read_limits,
+    write_files,
+)
 from ._header import header
 from ._self_test import known_answers, self_test
 from ._source import CCost, Source

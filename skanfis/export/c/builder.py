@@ -4,8 +4,16 @@ What surrounds the rules is written in the same :class:`Dialect`, under the same
 """
 
 from .._numbers import Numbers
-from ._arguments import LONGEST_NAME, check_arguments, read_limits, write_files
-from ._dialect import Dialect, comment, index_type, literals
+from ._dialect import (
+    LONGEST_NAME,
+    Dialect,
+    check_arguments,
+    comment,
+    index_type,
+    literals,
+    read_limits,
+    write_files,
+)
 from ._header import cost_lines, header_of, input_lines, policy_line
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ._source import CCost, Source
@@ -39,39 +47,10 @@ __all__ = [
 class RulesPart:
     """The rules of a model as static functions of a larger C file, which share its status word.
 
-    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is :attr:`name`.
-
-    Parameters
-    ----------
-    model : TSKModel
-        What :func:`skanfis.export.fold` gives.
-    dialect : Dialect
-        Of the file.
-    suffix : str
-        What the identifiers of the rules have after the prefix of the file, such as "_r".
-    min_coverage, saturate
-        As :func:`skanfis.export.export_c` takes them.
-
-    Attributes
-    ----------
-    name : str
-        What the identifiers of the rules start with.
-    model, low, high, limits
-        The model, its box and ``saturate`` in the type of the file.
-    min_coverage : float or None
-    cost : CCost
-        Of the rules alone.
-
-    Examples
-    --------
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import fold
-    >>> from skanfis.export.c.builder import Dialect, RulesPart
-    >>> model = fold(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()))
-    >>> part = RulesPart(model, Dialect("plant", "double", "c99"), "_r", None)
-    >>> "static int plant_r_predict(" in part.text()
-    True
+    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is :attr:`name`: the
+    prefix of the file and ``suffix``. ``min_coverage`` and ``saturate`` are those of
+    :func:`skanfis.export.export_c`. ``model``, ``low``, ``high`` and ``limits`` are the model, its
+    box and ``saturate`` in the type of the file.
     """
 
     def __init__(self, model, dialect: Dialect, suffix: str, min_coverage, saturate=None) -> None:
