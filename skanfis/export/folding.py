@@ -126,20 +126,17 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     for label, step in steps:
         columns = columns_after(label, step, columns, names)
 
-    def name_of(column):
-        return names[column.source] if column.indicator is None else column.indicator.name
-
+    named = [names[c.source] if c.indicator is None else c.indicator.name for c in columns]
     keys = [column.key for column in columns]
-    for column in columns:
-        if keys.count(column.key) > 1:
+    for name, key in zip(named, keys, strict=True):
+        if keys.count(key) > 1:
             raise ValueError(
-                f"Column {name_of(column)!r} reaches the model {keys.count(column.key)} "
-                "times: its rules cannot be written with one membership per column. Let every "
-                "column reach it once."
+                f"Column {name!r} reaches the model {keys.count(key)} times: its rules cannot be "
+                "written with one membership per column. Let every column reach it once."
             )
-    order = np.array(sorted(range(len(columns)), key=lambda j: columns[j].key))
+    order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
     inputs = [columns[j] for j in order]
-    model = _with_raw_inputs(model, columns, order, list(map(name_of, inputs)))
+    model = _with_raw_inputs(model, columns, order, [named[j] for j in order])
     for label, transformer in reversed(_target_steps("", estimator)):
         model = _with_raw_target(model, label, transformer)
     return model, _reader(inputs, names, given is not None, model.input_names)

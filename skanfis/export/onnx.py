@@ -146,7 +146,6 @@ class _Value:
     softmax = partialmethod(_node, "Softmax", axis=1)
 
     def columns(self, positions):
-        """Columns at these positions, in their order."""
         return self._node("Gather", np.asarray(positions, dtype=np.int64), axis=1)
 
     def reshape(self, *shape):
@@ -198,7 +197,7 @@ class _Formula:
         return y
 
     def _strengths(self, z, way_out):
-        """Strengths (n_rows, n_rules) and the change of their logarithms along the way out."""
+        """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
         if not numbers.n_terms:
             return None, None

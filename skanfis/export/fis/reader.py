@@ -2,9 +2,11 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
 from os import PathLike
+from typing import NamedTuple
 
 import numpy as np
 
@@ -88,9 +90,8 @@ def parse_fis(text):
         raise ValueError("line 1: the file has no [System].")
     n_inputs, n_outputs, n_rules, and_method = _read_system(sections["System"])
     inputs = [_variable(sections, "Input", j + 1, theta_of) for j in range(n_inputs)]
-    outputs = [
-        _variable(sections, "Output", k + 1, _consequent(n_inputs)) for k in range(n_outputs)
-    ]
+    consequent = partial(_consequent, n_inputs)
+    outputs = [_variable(sections, "Output", k + 1, consequent) for k in range(n_outputs)]
     rules = _rules(sections, inputs, outputs, n_rules, and_method)
     for name, section in sections.items():
         if name not in ("System", "Rules"):
@@ -98,8 +99,7 @@ def parse_fis(text):
     return _model(inputs, outputs, *rules)
 
 
-@dataclass(frozen=True)
-class _Variable:
+class _Variable(NamedTuple):
     """An input or output: its name, its range, its membership functions and their names."""
 
     name: str
@@ -155,22 +155,18 @@ def _variable(sections, kind, number, read_term):
     return _Variable(name, low, high, names, terms)
 
 
-def _consequent(n_inputs):
-    """A reader of consequents: p0 of a constant; p0, p1 .. pd of a linear one."""
-
-    def read(function, parameters, low, high):
-        lengths = {"constant": 1, "linear": n_inputs + 1}
-        if function not in lengths:
-            raise ValueError(
-                f"the consequent {shown(function)} is not supported; constant, linear are."
-            )
-        if len(parameters) != lengths[function]:
-            raise ValueError(
-                f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
-            )
-        return [parameters[-1], *parameters[:-1]]
-
-    return read
+def _consequent(n_inputs, function, parameters, low, high):
+    """p0 of a constant; p0, p1 .. pd of a linear one."""
+    lengths = {"constant": 1, "linear": n_inputs + 1}
+    if function not in lengths:
+        raise ValueError(
+            f"the consequent {shown(function)} is not supported; constant, linear are."
+        )
+    if len(parameters) != lengths[function]:
+        raise ValueError(
+            f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
+        )
+    return [parameters[-1], *parameters[:-1]]
 
 
 def _rules(sections, inputs, outputs, n_rules, and_method):
@@ -294,12 +290,10 @@ def _grid_rows(inputs, antecedents):
 
 def _is_scattered(inputs, antecedents):
     """Whether all rules look at the same inputs, by terms of their own and of one family."""
-    premises = np.flatnonzero(antecedents.any(axis=0))
-    families = {inputs[j].terms[k - 1][0] for j in premises for k in antecedents[:, j] if k > 0}
-    n_rules = len(antecedents)
+    used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
+    families = {one.terms[k - 1][0] for one, own in used for k in own if k > 0}
     return len(families) == 1 and all(
-        antecedents[:, j].min() > 0 and np.unique(antecedents[:, j]).size == n_rules
-        for j in premises
+        own.min() > 0 and np.unique(own).size == own.size for _, own in used
     )
 
 
