@@ -353,13 +353,13 @@ def test_scalers_folded_in_and_json_keep_the_deviation(slopes):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda p: p.pop("noise"), '"posterior" is'),
+        (lambda p: p.pop("noise"), "posterior has no 'noise'"),
         (lambda p: p.update(noise=[0.1, 0.2]), "posterior.noise: .* not a list of 1"),
-        (lambda p: p.update(inputs=[0, 0]), "is not an input, or not for the first time"),
+        (lambda p: p.update(inputs=[0, 0]), "has an input twice"),
         (lambda p: p["consequents"].pop(), "not a triangle of 12 rows"),
         (lambda p: p["consequents"][3].pop(), r"posterior.consequents\[3\]: .* list of 4"),
-        (lambda p: p["premises"].pop(), "posterior.premises has 7 rows, not 0 or 8"),
-        (lambda p: p["cross"][0][0].insert(0, 1.0), "posterior.cross\\[0\\]\\[0\\]: .* list of 12"),
+        (lambda p: p["premises"].pop(), "posterior.premises: .* is not a list of 8"),
+        (lambda p: p["cross"][0][0].insert(0, 1.0), r"posterior.cross\[0\]\[0\]: .* list of 12"),
         (lambda p: p["cross"][0][0].__setitem__(0, "1"), "is not a number of size up to"),
     ],
 )

@@ -1,12 +1,12 @@
 """How an input of a model comes from a column of the user's table, through steps that scale it.
 
 A scaler maps every column alone, x = offset + scale z with a positive scale. A OneHotEncoder makes
-indicators of a column: 1 where it holds a category, 0 elsewhere. They are inputs of the folded
-model in the place of the column; the encoder itself says what a row's indicators are.
+indicators of a column, which are inputs of the folded model in its place.
 """
 
 from collections import UserList
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from sklearn.compose import ColumnTransformer
@@ -159,7 +159,8 @@ def _offset_and_scale(label, scaler, n_columns):
     kind = type(scaler)
     if getattr(scaler, "clip", False):
         _refuse(label, scaler, "clip=True bends it at the edge; out_of_bounds='clip' does the same")
-    offset, scale = None, None
+    offset: Any = None
+    scale: Any = None
     if kind is StandardScaler:
         offset, scale = (scaler.mean_ if scaler.with_mean else None), scaler.scale_
     elif kind is RobustScaler:
@@ -170,11 +171,8 @@ def _offset_and_scale(label, scaler, n_columns):
         offset, scale = -scaler.min_ / scaler.scale_, 1.0 / scaler.scale_
     elif kind is not FunctionTransformer or scaler.func or scaler.inverse_func:
         _refuse(label, scaler, "it does not map every column alone by a positive scale")
-    zeros, ones = np.zeros(n_columns), np.ones(n_columns)
-    return (
-        (zeros if offset is None else offset).tolist(),
-        (ones if scale is None else scale).tolist(),
-    )
+    offsets = [0.0] * n_columns if offset is None else offset.tolist()
+    return offsets, [1.0] * n_columns if scale is None else scale.tolist()
 
 
 def _refuse(label, step, reason):

@@ -11,11 +11,81 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent import RuleTableAntecedent
-from ..membership import Membership
+from ..membership import MEMBERSHIPS, Membership
 from ..model import TSKModel
-from ._constants import CONSTANTS_OF, KINKS_OF
 
-__all__ = ["Numbers", "TermTable", "rounded_within"]
+__all__ = ["FLOOR", "SMALLEST_LOG_SQUARE", "Numbers", "TermTable", "rounded_within"]
+
+# As in ``membership.profiles`` and ``membership.bell``.
+FLOOR = 1e-10
+SMALLEST_LOG_SQUARE = np.log(1e-300)
+
+# Constants of memberships out of theta (n_parameters, n_terms), whose location is about the
+# reference; those of one term are a row of what the functions stack.
+
+
+def _gaussian(theta):
+    location, log_width = theta
+    return [location, np.sqrt(0.5) * np.exp(-log_width)]
+
+
+def _bell(theta):
+    location, log_width, log_slope = theta
+    return [location, np.exp(-log_width), np.exp(log_slope)]
+
+
+def _two_sided_gaussian(theta):
+    location, log_left, log_right, log_plateau = theta
+    return [location, 0.5 * np.exp(log_plateau), np.exp(-log_left), np.exp(-log_right)]
+
+
+def _two_feet(theta):
+    """The feet, one over the lengths of the flanks, and the location, a triangle's corner."""
+    location, log_left, log_right, *log_plateau = theta
+    left, right = np.exp(log_left), np.exp(log_right)
+    half = 0.5 * np.exp(log_plateau[0]) if log_plateau else 0.0
+    return [location - half - left, location + half + right, 1.0 / left, 1.0 / right, location]
+
+
+def _one_foot(side):
+    def constants(theta):
+        shoulder, log_width = theta
+        width = np.exp(log_width)
+        return [shoulder + side * width, -side / width]
+
+    return constants
+
+
+def _sigmoid_difference(theta):
+    location, log_width, log_flank = theta
+    v = np.exp(log_width - log_flank)
+    return [location, np.exp(-log_flank), v, np.log(-np.expm1(-2.0 * v))]
+
+
+def _sigmoid_product(theta):
+    location, log_width, *log_flanks = theta
+    flanks = [np.exp(-log_flank) for log_flank in log_flanks]
+    return [location, *flanks, *(np.exp(log_width - log_flank) for log_flank in log_flanks)]
+
+
+_BY_NAME = {
+    "gaussian": _gaussian,
+    "bell": _bell,
+    "triangular": _two_feet,
+    "trapezoidal": lambda theta: _two_feet(theta)[:4],
+    "two_sided_gaussian": _two_sided_gaussian,
+    "pi_shaped": lambda theta: _two_feet(theta)[:4],
+    "s_shaped": _one_foot(-1.0),
+    "z_shaped": _one_foot(1.0),
+    "sigmoid_difference": _sigmoid_difference,
+    "sigmoid_product": _sigmoid_product,
+}
+
+# By the class, since another class may go by the same name.
+_CONSTANTS_OF = {MEMBERSHIPS[name]: constants for name, constants in _BY_NAME.items()}
+
+# Which constants are places where the slope jumps.
+_KINKS_OF = {MEMBERSHIPS["triangular"]: (0, 1, 4), MEMBERSHIPS["trapezoidal"]: (0, 1)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,19 +99,9 @@ class TermTable:
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """What is written: floating-point arrays of one type, and integers.
+    """What is written: floating-point arrays of one type, and integers."""
 
-    ``model`` is the model with its box as it is rounded: what is left between it and a function on
-    the numbers is the function's own rounding. ``counts`` has the terms per input of a grid, and is
-    None for other rule bases. ``rule_terms`` (n_rules, n_terms_per_rule) has positions of terms,
-    ``n_terms`` for none. ``coefficients`` (n_rules, n_outputs, 1 + n_slopes) are about ``offset``,
-    with slopes on the inputs ``slope_inputs``. ``reach`` is how far the tangent is followed in each
-    input, so that the sum of it in standard deviations is finite. ``output_limits``
-    (2, n_outputs) end a tangent at the largest number of the type if nowhere else, and are None
-    where outputs are not held. ``support`` has a row per rule for coverage, or is None: its share,
-    its radius, its centre, and its factor row by row up to the diagonal.
-    """
-
+    # With its box as it is rounded: from a function on the numbers it differs by rounding alone.
     model: TSKModel
     dtype: np.dtype
     low: np.ndarray
@@ -50,13 +110,19 @@ class Numbers:
     inverse_spread: np.ndarray
     terms: tuple[TermTable, ...]
     term_inputs: np.ndarray
+    # Terms per input of a grid.
     counts: tuple[int, ...] | None
+    # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
     rule_terms: np.ndarray
+    # Coefficients (n_rules, n_outputs, 1 + n_slopes) about it.
     offset: np.ndarray
     coefficients: np.ndarray
     slope_inputs: np.ndarray
+    # How far the tangent is followed in each input, so that the sum in deviations is finite.
     reach: np.ndarray
+    # (2, n_outputs); None where outputs are not held.
     output_limits: np.ndarray | None
+    # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
     support: np.ndarray | None
 
     @classmethod
@@ -164,10 +230,10 @@ def _term_tables(model, low, high, reference):
     start = 0
     for group in model.antecedent.groups:
         family, inputs = group.family, group.inputs
-        if family not in CONSTANTS_OF:
+        if family not in _CONSTANTS_OF:
             raise ValueError(
                 f"Memberships {family.name!r} cannot be exported; "
-                f"{', '.join(one.name for one in CONSTANTS_OF)} can."
+                f"{', '.join(one.name for one in _CONSTANTS_OF)} can."
             )
         exact = _constants_about(reference, group)
         constants = _rounded(exact, low.dtype, f"a constant of a {family.name} membership")
@@ -175,7 +241,7 @@ def _term_tables(model, low, high, reference):
         for edge in (low, high):
             sides = np.sign(_constants_about(edge, group)).astype(low.dtype)
             held = (edge - reference)[inputs]
-            for k in KINKS_OF.get(family, ()):
+            for k in _KINKS_OF.get(family, ()):
                 moved = np.where(sides[:, k], np.nextafter(held, held + sides[:, k]), held)
                 is_right = np.sign(constants[:, k] - held) == sides[:, k]
                 constants[:, k] = np.where(is_right, constants[:, k], moved)
@@ -186,7 +252,7 @@ def _term_tables(model, low, high, reference):
 def _constants_about(place, group):
     theta = group.theta.copy()
     theta[0] -= place[group.inputs]
-    return np.column_stack(CONSTANTS_OF[group.family](theta))
+    return np.column_stack(_CONSTANTS_OF[group.family](theta))
 
 
 def _consequents(model, reference):

@@ -28,9 +28,8 @@ def fold(estimator: Any) -> TSKModel:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator; a Pipeline that ends in one, with steps in front that treat every
-        column alone (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler, "passthrough",
-        column selections, a OneHotEncoder, a ColumnTransformer of these); a
+        An ANFIS estimator; a Pipeline that ends in one, with steps in front that scale every column
+        alone, select columns or encode them (OneHotEncoder), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
         GridSearchCV over these. A TSKModel is returned as it is.
 
@@ -38,16 +37,13 @@ def fold(estimator: Any) -> TSKModel:
     -------
     model : TSKModel
         Its inputs are the raw columns that reach the model, in the order of X, by their names in X
-        ("x0", "x1", ... where it has none). In the place of a column that is one-hot encoded are
-        its indicators ("fibre_PM"). Terms and rules keep their order. ``model.predict(X)``, with X
-        of these columns, is what ``estimator.predict(X)`` is, to rounding errors.
+        ("x0", "x1", ... where it has none), and in the place of one that is one-hot encoded its
+        indicators ("fibre_PM"). It predicts what ``estimator`` does, to rounding errors.
 
     Raises
     ------
-    ValueError
-        If a step cannot be folded; it is named.
-    TypeError
-        If ``estimator`` is no such estimator.
+    ValueError, TypeError
+        If a step cannot be folded, which is named; if ``estimator`` is no such estimator.
 
     Examples
     --------
@@ -72,21 +68,13 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`fold` takes it.
     X : array-like or DataFrame of shape (n_rows, n_features)
-        A table that ``estimator`` takes.
+        Checked: other columns than in training are refused, and numbers that are not finite.
 
     Returns
     -------
     model : TSKModel
     rows : ndarray of shape (n_rows, model.n_inputs)
-        Finite, in raw units.
-
-    Raises
-    ------
-    ValueError, TypeError
-        As :func:`fold` does; ValueError too where X has other columns than ``estimator`` was
-        trained on, or a value that is not finite.
 
     Examples
     --------
@@ -108,7 +96,6 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`fold` takes it.
 
     Returns
     -------
@@ -123,8 +110,8 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     >>> from skanfis.export import fold_with_reader
     >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
     >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
-    >>> [read(part).shape for part in (X[:5], X[5:])]
-    [(5, 1), (15, 1)]
+    >>> read(X[:5]).shape
+    (5, 1)
     """
     if isinstance(estimator, TSKModel):
         inputs = [Column(j) for j in range(estimator.n_inputs)]
@@ -139,20 +126,17 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     for label, step in steps:
         columns = columns_after(label, step, columns, names)
 
-    def name_of(column):
-        return names[column.source] if column.indicator is None else column.indicator.name
-
+    named = [names[c.source] if c.indicator is None else c.indicator.name for c in columns]
     keys = [column.key for column in columns]
-    for column in columns:
-        if keys.count(column.key) > 1:
+    for name, key in zip(named, keys, strict=True):
+        if keys.count(key) > 1:
             raise ValueError(
-                f"Column {name_of(column)!r} reaches the model {keys.count(column.key)} "
-                "times: its rules cannot be written with one membership per column. Let every "
-                "column reach it once."
+                f"Column {name!r} reaches the model {keys.count(key)} times: its rules cannot be "
+                "written with one membership per column. Let every column reach it once."
             )
-    order = np.array(sorted(range(len(columns)), key=lambda j: columns[j].key))
+    order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
     inputs = [columns[j] for j in order]
-    model = _with_raw_inputs(model, columns, order, list(map(name_of, inputs)))
+    model = _with_raw_inputs(model, columns, order, [named[j] for j in order])
     for label, transformer in reversed(_target_steps("", estimator)):
         model = _with_raw_target(model, label, transformer)
     return model, _reader(inputs, names, given is not None, model.input_names)
@@ -169,21 +153,15 @@ def last_step(estimator: Any) -> Any:
     Returns
     -------
     last : estimator
-        With a ``model_`` of rules.
-
-    Raises
-    ------
-    TypeError
-        If ``estimator`` does not end in an ANFIS estimator.
+        With a ``model_`` of rules; TypeError where there is none.
 
     Examples
     --------
-    >>> from sklearn.model_selection import GridSearchCV
+    >>> from sklearn.pipeline import make_pipeline
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import last_step
-    >>> search = GridSearchCV(ANFISRegressor(), {"n_mfs": [2]}, cv=2).fit(*make_jang_sinc())
-    >>> last_step(search).model_.n_rules
+    >>> last_step(make_pipeline(ANFISRegressor(n_mfs=2)).fit(*make_jang_sinc())).model_.n_rules
     4
     """
     label, last = _steps_of("", estimator)[-1]
@@ -197,21 +175,17 @@ def found_by_search(estimator: Any) -> Any:
     Parameters
     ----------
     estimator : estimator
-        A fitted search such as GridSearchCV, or any other.
+        A fitted search such as GridSearchCV, a search over searches, or any other.
 
     Returns
     -------
     found : estimator
-        Its ``best_estimator_``, of a search over searches that of the innermost.
 
     Examples
     --------
-    >>> from sklearn.model_selection import GridSearchCV
     >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import found_by_search
-    >>> search = GridSearchCV(ANFISRegressor(), {"n_mfs": [2]}, cv=2).fit(*make_jang_sinc())
-    >>> found_by_search(search).n_mfs
+    >>> found_by_search(ANFISRegressor(n_mfs=2)).n_mfs
     2
     """
     while hasattr(estimator, "best_estimator_"):
@@ -298,10 +272,15 @@ def _with_raw_inputs(model, columns, order, names):
         np.array([c.edge(z, side) for c, z in zip(columns, edges.tolist(), strict=True)])
         for edges, side in ((model.minimum, -1.0), (model.maximum, 1.0))
     )
+    place = np.argsort(order)
+    antecedents = {}
+    for name in ("antecedent", "initial_antecedent"):
+        moved = getattr(model, name).change_units(offset, scale)
+        groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
+        antecedents[name] = replace(moved, groups=groups)
     folded = replace(
         model,
-        antecedent=_with_raw_terms(model.antecedent, offset, scale, order),
-        initial_antecedent=_with_raw_terms(model.initial_antecedent, offset, scale, order),
+        **antecedents,
         coefficients=coefficients,
         reference=(offset + scale * model.reference)[order],
         spread=(scale * model.spread)[order],
@@ -315,14 +294,6 @@ def _with_raw_inputs(model, columns, order, names):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
         return replace(folded, term_names=default_term_names(folded.antecedent))
     return folded
-
-
-def _with_raw_terms(antecedent, offset, scale, order):
-    """The same terms and rules in raw units, each term on its input's new place."""
-    place = np.argsort(order)
-    moved = antecedent.change_units(offset, scale)
-    groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
-    return replace(moved, groups=groups)
 
 
 def _with_raw_target(model, label, transformer):

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..membership import MEMBERSHIPS
 from ..options import policy_of
-from ._constants import FLOOR, SMALLEST_LOG_SQUARE
-from ._numbers import Numbers
+from ._numbers import FLOOR, SMALLEST_LOG_SQUARE, Numbers
 
 __all__ = ["register_onnx_converter"]
 
@@ -23,19 +22,9 @@ _OLDEST_OPSET = 13
 def register_onnx_converter() -> None:
     """Teach skl2onnx to convert :class:`skanfis.ANFISRegressor`, alone or in a pipeline.
 
-    After one call, ``skl2onnx.to_onnx`` and ``skl2onnx.convert_sklearn`` know the estimator. Inputs
-    of type double give a graph in double precision, all others one in single precision. The policy
-    ``out_of_bounds`` becomes part of the graph, with ``max_extrapolation``; "raise" cannot, and is
-    refused with a ValueError. A row with an infinite number or none gives NaN.
-
-    Returns
-    -------
-    None
-
-    Raises
-    ------
-    ImportError
-        If skl2onnx is not installed.
+    Inputs of type double give a graph in double precision, all others one in single precision.
+    ``out_of_bounds`` becomes part of the graph, save "raise", which is refused with a ValueError; a
+    row that is not finite gives NaN. ImportError if skl2onnx is not installed.
 
     Examples
     --------
@@ -46,8 +35,7 @@ def register_onnx_converter() -> None:
     >>> from skanfis.export import register_onnx_converter
     >>> register_onnx_converter()
     >>> X, y = make_jang_sinc()
-    >>> onnx_model = skl2onnx.to_onnx(ANFISRegressor(n_mfs=4).fit(X, y), X[:1])
-    >>> onnx_model.graph.output[0].name
+    >>> skl2onnx.to_onnx(ANFISRegressor(n_mfs=4).fit(X, y), X[:1]).graph.output[0].name
     'variable'
     """
     try:
@@ -150,18 +138,14 @@ class _Value:
     exp = partialmethod(_node, "Exp")
     log = partialmethod(_node, "Log")
     abs = partialmethod(_node, "Abs")
-    # 1 / (1 + exp(-self)).
     sigmoid = partialmethod(_node, "Sigmoid")
-    # The smaller of the two, and the larger.
     at_most = partialmethod(_node, "Min")
     at_least = partialmethod(_node, "Max")
     # Of a comparison: one value where it holds, another where not.
     where = partialmethod(_node, "Where")
-    # Normalised exponentials along the columns.
     softmax = partialmethod(_node, "Softmax", axis=1)
 
     def columns(self, positions):
-        """Columns at these positions, in their order."""
         return self._node("Gather", np.asarray(positions, dtype=np.int64), axis=1)
 
     def reshape(self, *shape):
@@ -213,7 +197,7 @@ class _Formula:
         return y
 
     def _strengths(self, z, way_out):
-        """Strengths (n_rows, n_rules) and the change of their logarithms along the way out."""
+        """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
         if not numbers.n_terms:
             return None, None
@@ -251,7 +235,7 @@ class _Formula:
         return by_rule.sum(keep=False)
 
 
-# Families: of inputs x about the reference and the constants p of ``_constants``, functions that
+# Families: of inputs x about the reference and the constants p of ``_numbers``, functions that
 # give log mu and its derivative by x.
 
 
@@ -364,18 +348,16 @@ def _sigmoid_product(x, p):
     )
 
 
-_FORMULAS = {
-    MEMBERSHIPS[name]: formula
-    for name, formula in {
-        "gaussian": _gaussian,
-        "bell": _bell,
-        "triangular": _two_feet(_linear),
-        "trapezoidal": _two_feet(_linear),
-        "two_sided_gaussian": _two_sided_gaussian,
-        "pi_shaped": _two_feet(_spline),
-        "s_shaped": _one_foot,
-        "z_shaped": _one_foot,
-        "sigmoid_difference": _sigmoid_difference,
-        "sigmoid_product": _sigmoid_product,
-    }.items()
+_BY_NAME = {
+    "gaussian": _gaussian,
+    "bell": _bell,
+    "triangular": _two_feet(_linear),
+    "trapezoidal": _two_feet(_linear),
+    "two_sided_gaussian": _two_sided_gaussian,
+    "pi_shaped": _two_feet(_spline),
+    "s_shaped": _one_foot,
+    "z_shaped": _one_foot,
+    "sigmoid_difference": _sigmoid_difference,
+    "sigmoid_product": _sigmoid_product,
 }
+_FORMULAS = {MEMBERSHIPS[name]: formula for name, formula in _BY_NAME.items()}

@@ -6,12 +6,15 @@ from typing import Any
 
 from .._numbers import Numbers
 from ..folding import fold
-from ._arguments import check_arguments, read_limits, write_files
-from ._cost import CCost
-from ._dialect import Dialect
+from ._dialect import (
+    Dialect,
+    check_arguments,
+    read_limits,
+    write_files,
+)
 from ._header import header
 from ._self_test import known_answers, self_test
-from ._source import Source
+from ._source import CCost, Source
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -27,7 +30,6 @@ class CCode:
     header, source : str
         The text of the two files, in ASCII.
     cost : CCost
-        Arithmetic per evaluation, and memory.
 
     Examples
     --------
@@ -57,17 +59,14 @@ def export_c(
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
-    The function ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row
-    of raw inputs and returns a status. It uses constant tables and the functions ``exp`` and
-    ``log``, and for the coverage ``sqrt``: no heap, no state, no recursion, loops of bounded
-    length. Scalers of a pipeline are folded in.
+    ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row of raw inputs
+    and returns a status. It reads constant tables: no heap, no state, no recursion, bounded loops.
+    :doc:`/c_export` tells of the status, the self-test and rows outside the training data.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline of scalers that ends in one, a TransformedTargetRegressor
-        or a search over these. What it does with rows outside the training data is what the
-        function does: see Notes.
+        As :func:`fold` takes it; scalers are folded in.
     path : str or path-like, default=None
         Where to write, without a suffix: "out/gyro" makes out/gyro.h and out/gyro.c. None writes
         nothing.
@@ -77,18 +76,12 @@ def export_c(
     dtype : {"double", "float"}, default="double"
         Type of inputs, outputs, tables and arithmetic.
     std : {"c99", "c89"}, default="c99"
-        The oldest standard that a compiler must know. "c89" is for compilers of old signal
-        processors; it does without ``expf``.
+        The oldest standard that a compiler must know.
     min_coverage : float or None, default=0.1
         Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
-        leaves that out of status, code and tables, most of which it may take: the support of a rule
-        is 2 + n + n (n + 1) / 2 numbers for n inputs. It is left out too where the rules have never
-        seen data, as those read from a .fis file.
+        leaves that out, as do rules that have never seen data.
     saturate : Bounds or array-like of shape (n_outputs, 2), default=None
-        Limits between which every output is held, low and high: those that
-        :func:`skanfis.bounds.bounds` has proven for the box that is specified, or others. Within
-        proven limits nothing changes, until an input beyond the box, or a fault of the hardware,
-        would give more. None holds nothing.
+        Limits between which every output is held, such as :func:`skanfis.bounds.bounds` proves.
 
     Returns
     -------
@@ -98,22 +91,8 @@ def export_c(
     Raises
     ------
     ValueError
-        If a parameter is none of the above, if ``estimator`` has a step that cannot be folded in,
-        or if the model's numbers go beyond what "float" holds.
-
-    Notes
-    -----
-    The status is a sum of bits: ``NAME_OUT_OF_RANGE`` (1), ``NAME_NOT_FINITE`` (2),
-    ``NAME_UNCOVERED`` (4), ``NAME_NO_OUTPUT`` (8); zero says that all is well. A row outside the
-    range of the training data is answered by ``out_of_bounds`` of the estimator. "clip" and
-    "linear" give an answer, the latter within ``max_extrapolation`` of the estimator. "raise"
-    leaves y as it is, so that a controller which keeps y holds its last value. "nan" writes NaN, or
-    in C89, which has none, leaves y as it is. A row that is not finite gets no answer under any
-    policy.
-
-    With the macro ``NAME_SELF_TEST`` defined, ``int NAME_self_test(void)`` compares the function
-    with what Python predicts, and returns zero if all is well; with ``NAME_SELF_TEST_MAIN`` too,
-    the file is a program that exits with zero then.
+        If a parameter is none of the above, a step cannot be folded in, or the model's numbers go
+        beyond what "float" holds.
 
     Examples
     --------
@@ -139,9 +118,9 @@ def export_c(
     test = self_test(known_answers(numbers, min_coverage, limits), dialect)
     code = CCode(
         name,
-        header(model, numbers, dialect, source.cost, min_coverage, limits),
+        header(model, numbers, dialect, source.cost(), min_coverage, limits),
         source.text(f"{stem}.h") + test,
-        source.cost,
+        source.cost(),
     )
     write_files(code, path)
     return code

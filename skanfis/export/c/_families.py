@@ -1,28 +1,15 @@
 r"""Every family of memberships in C: log mu(x) and its derivative by x.
 
 In the templates x is an input about the reference and p the constants of a term, as in
-``_constants``; see ``_dialect`` for the other words.
+``_numbers``; see ``_dialect`` for the other words.
 
 log(1 + exp(-|u|)) stands where Python has log1p, which C89 lacks: it is as exact where it counts,
 since an absolute error of log mu is a relative one of the strengths.
 """
 
-from dataclasses import dataclass
-
 from ...membership import MEMBERSHIPS
 
-__all__ = ["BODIES", "HELPERS", "FamilyInC"]
-
-
-@dataclass(frozen=True)
-class FamilyInC:
-    """Bodies of functions of x and p, a term's constants, and the most that ``value`` takes."""
-
-    value: str
-    slope: str
-    exponentials: int = 0
-    logarithms: int = 0
-    multiplications: int = 0
+__all__ = ["BODIES", "COSTS", "HELPERS"]
 
 
 # Functions that bodies share. A flank with a foot is a function of s, which is zero at the foot and
@@ -105,15 +92,13 @@ static $real $name_spline_slope($real s)
 }
 
 
-def _two_feet(profile, multiplications, slope=None):
+def _two_feet(profile):
     value = """
     const $real left = (x - p[0]) * p[2];
     const $real right = (p[1] - x) * p[3];
     return $name_@(left < right ? left : right);
 """
-    slope = (
-        slope
-        or """
+    slope = """
     const $real left = (x - p[0]) * p[2];
     const $real right = (p[1] - x) * p[3];
     if (left < right) {
@@ -121,20 +106,18 @@ def _two_feet(profile, multiplications, slope=None):
     }
     return right < 1.0R ? -p[3] * $name_@_slope(right) : 0.0R;
 """
-    )
-    value, slope = value.replace("@", profile), slope.replace("@", profile)
-    return FamilyInC(value, slope, 1, 1, multiplications)
+    return value.replace("@", profile), slope.replace("@", profile)
 
 
 # An input that is held at the edge of the box may lie on a corner, where the slope is zero: by the
 # distances from the feet, the last bit would decide on which side.
 _TRIANGLE_SLOPE = """
     if (x < p[4]) {
-        return p[2] * $name_@_slope((x - p[0]) * p[2]);
+        return p[2] * $name_linear_slope((x - p[0]) * p[2]);
     }
-    return x > p[4] ? -p[3] * $name_@_slope((p[1] - x) * p[3]) : 0.0R;
+    return x > p[4] ? -p[3] * $name_linear_slope((p[1] - x) * p[3]) : 0.0R;
 """
-_ONE_FOOT = FamilyInC(
+_ONE_FOOT = (
     """
     return $name_spline((x - p[0]) * p[1]);
 """,
@@ -142,13 +125,11 @@ _ONE_FOOT = FamilyInC(
     const $real s = (x - p[0]) * p[1];
     return s < 1.0R ? p[1] * $name_spline_slope(s) : 0.0R;
 """,
-    exponentials=1,
-    logarithms=1,
-    multiplications=6,
 )
 
+# Bodies of functions of x and p: the value, and its derivative by x.
 _BY_NAME = {
-    "gaussian": FamilyInC(
+    "gaussian": (
         """
     const $real t = (x - p[0]) * p[1];
     return -t * t;
@@ -156,10 +137,9 @@ _BY_NAME = {
         """
     return -2.0R * (x - p[0]) * p[1] * p[1];
 """,
-        multiplications=2,
     ),
     # 2 log |u| has a floor, log(1e-300), as in Python: at the centre mu is one.
-    "bell": FamilyInC(
+    "bell": (
         """
     const $real u = (x - p[0]) * p[1];
     $real log_square = $smallest_log_square;
@@ -178,13 +158,10 @@ _BY_NAME = {
     }
     return -2.0R * p[2] * p[1] / u * $name_sigmoid(2.0R * p[2] * $LOG(u < 0.0R ? -u : u));
 """,
-        exponentials=1,
-        logarithms=2,
-        multiplications=3,
     ),
-    "triangular": _two_feet("linear", 5, _TRIANGLE_SLOPE),
-    "trapezoidal": _two_feet("linear", 5),
-    "two_sided_gaussian": FamilyInC(
+    "triangular": (_two_feet("linear")[0], _TRIANGLE_SLOPE),
+    "trapezoidal": _two_feet("linear"),
+    "two_sided_gaussian": (
         """
     const $real d = x - p[0];
     const $real beyond = (d < 0.0R ? -d : d) - p[1];
@@ -197,12 +174,11 @@ _BY_NAME = {
     const $real per_length = d < 0.0R ? -p[2] : p[3];
     return beyond > 0.0R ? -beyond * per_length * (d < 0.0R ? -per_length : per_length) : 0.0R;
 """,
-        multiplications=3,
     ),
-    "pi_shaped": _two_feet("spline", 7),
+    "pi_shaped": _two_feet("spline"),
     "s_shaped": _ONE_FOOT,
     "z_shaped": _ONE_FOOT,
-    "sigmoid_difference": FamilyInC(
+    "sigmoid_difference": (
         """
     const $real u = (x - p[0]) * p[1];
     return p[3] + $name_log_sigmoid(p[2] + u) + $name_log_sigmoid(p[2] - u);
@@ -211,11 +187,8 @@ _BY_NAME = {
     const $real u = (x - p[0]) * p[1];
     return p[1] * ($name_sigmoid(-p[2] - u) - $name_sigmoid(u - p[2]));
 """,
-        exponentials=2,
-        logarithms=2,
-        multiplications=1,
     ),
-    "sigmoid_product": FamilyInC(
+    "sigmoid_product": (
         """
     const $real d = x - p[0];
     return $name_log_sigmoid(p[3] + d * p[1]) + $name_log_sigmoid(p[4] - d * p[2]);
@@ -224,11 +197,22 @@ _BY_NAME = {
     const $real d = x - p[0];
     return p[1] * $name_sigmoid(-p[3] - d * p[1]) - p[2] * $name_sigmoid(d * p[2] - p[4]);
 """,
-        exponentials=2,
-        logarithms=2,
-        multiplications=2,
     ),
 }
 
 # By the class, since another class may go by the same name.
 BODIES = {MEMBERSHIPS[name]: in_c for name, in_c in _BY_NAME.items()}
+
+# Exponentials, logarithms and multiplications that a value takes at most.
+COSTS = {
+    "gaussian": (0, 0, 2),
+    "bell": (1, 2, 3),
+    "triangular": (1, 1, 5),
+    "trapezoidal": (1, 1, 5),
+    "two_sided_gaussian": (0, 0, 3),
+    "pi_shaped": (1, 1, 7),
+    "s_shaped": (1, 1, 6),
+    "z_shaped": (1, 1, 6),
+    "sigmoid_difference": (2, 2, 1),
+    "sigmoid_product": (2, 2, 2),
+}

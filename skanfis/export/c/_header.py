@@ -71,11 +71,8 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None):
         told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in ends)
         lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += _precision_lines(model, numbers)
-    lines += [
-        "",
-        policy_line(model, "Outside this range"),
-        "A row that is not finite gets no output either way.",
-    ]
+    lines += ["", policy_line(model, "Outside this range")]
+    lines.append("A row that is not finite gets no output either way.")
     if min_coverage is not None:
         lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
@@ -98,7 +95,6 @@ def cost_lines(cost, besides=""):
 
 
 def input_lines(names, low, high):
-    """The inputs, and their range."""
     return ["Inputs x, and their range in the training data:", *_ranges(names, low, high)]
 
 
@@ -136,7 +132,6 @@ def _precision_lines(model, numbers):
 
 
 def header_of(title, lines, dialect, n_inputs, n_outputs):
-    """The header with these lines in its first comment."""
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),

@@ -83,22 +83,16 @@ def self_test(answers, dialect):
     is_double = dialect.real == "double"
     allowed = "$name_test_tolerance[o]" + (" * $NAME_TEST_FACTOR" if is_double else "")
     template = _CODE.replace("$coarse", _COARSE if is_double else "").replace("$allowed", allowed)
-    return dialect.write(
-        template,
-        n=len(X),
-        x=literals(X),
-        y=literals(y),
-        status=literals(status),
-        tolerance=literals(tolerance),
-    )
+    tables = {"x": X, "y": y, "status": status, "tolerance": tolerance}
+    texts = {name: literals(values) for name, values in tables.items()}
+    return dialect.write(template, n=len(X), **texts)
 
 
 def known_answers(numbers, min_coverage, limits=None):
     """Rows, outputs, status and the tolerance of every output, of the model of the numbers.
 
-    Half of the rows lie in the box, the others up to half its width beyond; the first two are its
-    corners. Outputs are held between ``limits``, if there are any. Rows are left out where rounding
-    decides: on the coverage, or, in a gap between all terms, on the strongest rule.
+    Half of the rows lie in the box, the others up to half its width beyond. Rows are left out where
+    rounding decides: on the coverage, or, in a gap between all terms, on the strongest rule.
     """
     model = numbers.model
     policy = "linear" if model.out_of_bounds == "linear" else "clip"
@@ -128,12 +122,8 @@ def known_answers(numbers, min_coverage, limits=None):
     steady = (np.abs(outputs(Z + step) - y) <= 0.25 * tolerance).all(axis=1)
     chosen = np.flatnonzero(sure & steady if (sure & steady).any() else sure)[:ROWS]
     y[silent] = 0.0
-    return (
-        X[chosen],
-        y[chosen].astype(numbers.dtype),
-        status[chosen],
-        tolerance.astype(numbers.dtype),
-    )
+    y, tolerance = y[chosen].astype(numbers.dtype), tolerance.astype(numbers.dtype)
+    return X[chosen], y, status[chosen], tolerance
 
 
 def _largest_logarithm(model, X):

@@ -1,45 +1,67 @@
 """The .c file: constant tables, and the functions that read them.
 
-The order of work is that of ``skanfis.model``: hold the inputs in the box, log memberships,
-strengths by a softmax that subtracts the largest, consequents weighed by the strengths. A grid
-normalises each input by itself and multiplies the shares in nested loops, so that it takes one
-exponential per term, not per rule and input. The continuation "linear" is worked out only for rows
-outside the box: the derivative along the way back to the box, carried forward through the same
-loops. Coverage takes a quadratic form per rule: the strongest rule is asked first, then the others,
-until there is enough.
+The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
+multiplies shares in nested loops: one exponential per term, not per rule and input. "linear" is
+worked out only outside the box, by the derivative along the way back.
 """
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...policies import SILENT
-from ._cost import cost_of
+from . import _templates as templates
 from ._dialect import index_type, kept_lines
-from ._families import BODIES, HELPERS
-from ._templates import (
-    ADD_CHANGE,
-    ADD_RULE,
-    ADD_SUPPORT,
-    FINITE_INPUT,
-    FUNCTIONS,
-    PREDICT,
-    rejection,
-)
+from ._families import BODIES, COSTS, HELPERS
 
-__all__ = ["Source"]
+__all__ = ["CCost", "Source"]
 
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
 _MOST_LOOPS = 12
+# What there is nearly everywhere.
+_INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
+
+
+@dataclass(frozen=True)
+class CCost:
+    """What one evaluation inside the box takes, and the memory of the function.
+
+    Parameters
+    ----------
+    exponentials, logarithms : int
+        Calls of ``exp`` and ``log``, at most, coverage aside.
+    multiply_adds, divisions : int
+        Multiplications, most of them with an addition to follow; divisions.
+    table_bytes, stack_bytes : int
+        Constant tables, which may lie in read-only memory; arrays on the stack.
+    coverage_exponentials, coverage_square_roots, coverage_multiply_adds : int
+        What the coverage takes besides, at most. Where the strongest rule alone covers the row, it
+        is one quadratic form. Zero with ``min_coverage=None``.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_c
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> export_c(model, name="sinc").cost.exponentials  # 2 inputs of 4 terms, not 16 rules
+    8
+    """
+
+    exponentials: int
+    logarithms: int
+    multiply_adds: int
+    divisions: int
+    table_bytes: int
+    stack_bytes: int
+    coverage_exponentials: int = 0
+    coverage_square_roots: int = 0
+    coverage_multiply_adds: int = 0
 
 
 class Source:
-    """The functions and tables of a .c file, without its self-test.
-
-    ``policy`` is that of the model for rows outside the box, ``min_coverage`` the coverage below
-    which a row is uncovered, or None; ``limits`` are those between which outputs are held, or None;
-    ``is_part`` whether the main function is for others in the same file.
-    """
+    """The functions and tables of a .c file; ``is_part`` for others in the same file."""
 
     def __init__(self, numbers, dialect, policy, min_coverage, limits=None, is_part=False):
         self.numbers, self.dialect, self.policy = numbers, dialect, policy
@@ -78,10 +100,36 @@ class Source:
         }
         return {fact for fact, holds in facts.items() if holds}
 
-    @property
     def cost(self):
-        """What it takes, as a CCost."""
-        return cost_of(self)
+        """CCost of a row in the box."""
+        numbers, itemsize = self.numbers, self.numbers.dtype.itemsize
+        n_inputs = numbers.n_inputs
+        of_terms = np.array([0, 0, 0])
+        for terms in numbers.terms:
+            of_terms += len(terms.constants) * np.array(COSTS[terms.family.name])
+        exponentials, logarithms, multiply_adds = map(int, of_terms)
+        n_shares = numbers.n_terms if self.is_grid else numbers.n_rules
+        # Of a grid, products of shares: after two inputs, after three, ...
+        products = np.cumprod(numbers.counts or (), dtype=int)[1:].sum()
+        # The strongest rule is asked, then all that have data.
+        asked = 0 if "covers" not in self.facts else 1 + np.count_nonzero(numbers.support[:, 0])
+        main, tangent = self.arrays()
+        n_values = sum(main.values()) + ("linear" in self.facts) * sum(tangent.values())
+        return CCost(
+            exponentials=exponentials + n_shares,
+            logarithms=logarithms,
+            multiply_adds=int(multiply_adds + products + n_shares + numbers.coefficients.size),
+            divisions=len(numbers.counts) if self.is_grid else 1,
+            table_bytes=sum(
+                values.size * _INDEX_BYTES.get(kind, itemsize)
+                for values, kind in self.tables().values()
+            ),
+            stack_bytes=n_values * itemsize,
+            coverage_exponentials=int(asked),
+            coverage_square_roots=int(asked),
+            # The factor's triangle, its square, share and strength.
+            coverage_multiply_adds=int(asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5)),
+        )
 
     def text(self, include):
         """All of it; ``include`` is the name of the header."""
@@ -139,10 +187,8 @@ class Source:
         """Functions of the families in use, after those that they call."""
         functions = []
         for family in {terms.family: None for terms in self.numbers.terms}:
-            bodies = {"": BODIES[family].value}
-            if "linear" in self.facts:
-                bodies["_slope"] = BODIES[family].slope
-            for suffix, body in bodies.items():
+            suffixes = ["", "_slope"] if "linear" in self.facts else [""]
+            for suffix, body in zip(suffixes, BODIES[family], strict=False):
                 what = "Derivative of the logarithm" if suffix else "Logarithm"
                 head = f"/* {what} of a membership: {family.name}. */\n"
                 head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n"
@@ -178,28 +224,28 @@ class Source:
 
     def _helpers(self):
         return self._filled(
-            FUNCTIONS,
+            templates.FUNCTIONS,
             given=", ".join(f"const $real *{name}" for name in self._taken),
             coverage_indices=", ".join(["r", *self._loops]),
             tangent_indices=", ".join(["i"] * (self.numbers.n_terms > 0) + self._indices),
             tangent_arrays=_declared(self.arrays()[1]),
             strengths_slope=self._strengths("t", "s", "_slope"),
-            add_support=self._over_rules(ADD_SUPPORT),
-            add_changes=self._over_rules(ADD_CHANGE),
+            add_support=self._over_rules(templates.ADD_SUPPORT),
+            add_changes=self._over_rules(templates.ADD_CHANGE),
         )
 
     def _predict(self):
-        head = rejection(self.policy, self.dialect.std).lstrip() + "\n"
+        head = templates.rejection(self.policy, self.dialect.std).lstrip() + "\n"
         return head + self._filled(
-            PREDICT,
+            templates.PREDICT,
             linkage="static " if self.is_part else "",
-            finite_input=FINITE_INPUT.strip("\n"),
+            finite_input=templates.FINITE_INPUT.strip("\n"),
             taken=", ".join(self._taken),
             arrays=_declared(self.arrays()[0]),
             indices=", ".join(["i", *self._indices]),
             limit=self.dialect.number(self.min_coverage or 0.0),
             strengths_inside=self._strengths("l", "w", ""),
-            add_rules=self._over_rules(ADD_RULE),
+            add_rules=self._over_rules(templates.ADD_RULE),
         )
 
     def _filled(self, template, **parts):
