@@ -9,9 +9,13 @@ from typing import TypeVar
 
 from sklearn.base import _fit_context
 from sklearn.utils import _safe_indexing as safe_indexing
-from sklearn.utils._array_api import _convert_to_numpy as to_numpy
-from sklearn.utils._array_api import get_namespace
-from sklearn.utils._param_validation import HasMethods, Hidden, Interval, StrOptions
+from sklearn.utils._param_validation import (
+    HasMethods,
+    Hidden,
+    Interval,
+    StrOptions,
+    validate_parameter_constraints,
+)
 from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
 try:
@@ -31,9 +35,8 @@ __all__ = [
     "check_parameters",
     "check_sample_weight",
     "fit_context",
-    "get_namespace",
     "safe_indexing",
-    "to_numpy",
+    "validate_parameter_constraints",
 ]
 
 

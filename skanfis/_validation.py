@@ -1,17 +1,14 @@
 """Checks on data that scikit-learn's own do not make, or not with the column's name."""
 
-import sys
 import warnings
 from collections import Counter
 from contextlib import contextmanager
-from contextvars import ContextVar
 from numbers import Integral
 
 import numpy as np
 from scipy.sparse import issparse
 from sklearn import get_config
 
-from ._callers import is_silent
 from .blocks import LARGE_BLOCK_ROWS, row_blocks
 
 __all__ = [
@@ -20,15 +17,12 @@ __all__ = [
     "check_count",
     "check_finite",
     "check_not_negative",
-    "collected_warnings",
     "feature_indices",
     "group_numbers",
     "named_refusals",
-    "on_host",
     "position_of",
     "positive_weights",
     "refuse_lazy",
-    "untold",
     "warn_user",
 ]
 
@@ -41,9 +35,8 @@ _FAR = 400
 def named_refusals(**tables):
     """Let scikit-learn check tables, given by what they are: X=..., y=...
 
-    What it and NumPy refuse without the column's name, or take for numbers that it is not, is
-    refused by name: columns of text, times, or two of one name, sparse and lazy frames, masked
-    values.
+    Text, times, sparse or lazy frames, masked values and two columns of one name are refused by the
+    column's name.
     """
     refuse_lazy(**tables)
     for what, table in tables.items():
@@ -70,21 +63,18 @@ def refuse_lazy(**tables):
             )
 
 
-def on_host(table):
-    """Arrays of other libraries (PyTorch, CuPy, ...) as NumPy's, where they are in main memory.
-
-    Those on another device refuse this themselves, and say what would do. Frames stay as they are.
-    """
-    is_foreign = hasattr(table, "__dlpack__") and not isinstance(table, np.ndarray)
-    return np.asarray(table) if is_foreign else table
-
-
 def _check_kind(table, what):
-    if issparse(table):
+    """Raise where a table is sparse or masked, or a column shares its name or holds times."""
+    is_frame = hasattr(table, "columns") and hasattr(table, "dtypes")
+    names = list(table.columns) if is_frame else [getattr(table, "name", None)]
+    dtypes = list(table.dtypes) if is_frame else [getattr(table, "dtype", None)]
+    is_sparse_frame = is_frame and dtypes and all(hasattr(one, "fill_value") for one in dtypes)
+    if issparse(table) or is_sparse_frame:
+        dense = f"{what}.sparse.to_dense()" if is_frame else f"{what}.toarray()"
         raise TypeError(
-            f"Sparse data was passed for {what}, but dense data is required: give "
-            f"{what}.toarray(). In a Pipeline, OneHotEncoder(sparse_output=False) and "
-            "ColumnTransformer(..., sparse_threshold=0) hand on dense data."
+            f"Sparse data was passed for {what}, but dense data is required: give {dense}. In a "
+            "Pipeline, OneHotEncoder(sparse_output=False) and ColumnTransformer(..., "
+            "sparse_threshold=0) hand on dense data."
         )
     if np.ma.is_masked(table):
         masked = np.ma.getmaskarray(table).reshape(len(table), -1).any(axis=1)
@@ -93,84 +83,60 @@ def _check_kind(table, what):
             f"{masked.size} rows, first at row {masked.argmax()}: drop these rows"
             + (", or impute X.filled(numpy.nan) in a Pipeline." if what == "X" else ".")
         )
-    names, dtypes = getattr(table, "columns", None), getattr(table, "dtypes", None)
-    if names is None or dtypes is None:
-        dtype = getattr(table, "dtype", None)
-        names, dtypes = [getattr(table, "name", None)], [] if dtype is None else [dtype]
-    names, dtypes = list(names), list(dtypes)
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
+    name, count = Counter(names).most_common(1)[0] if names else ("", 0)
+    if count > 1:
         raise ValueError(
-            f"{what} has {names.count(twice[0])} columns of the name {twice[0]!r}: rename or drop "
-            "all but one."
+            f"{what} has {count} columns of the name {name!r}: rename or drop all but one."
         )
-    for name, dtype in zip(names, dtypes, strict=False):
-        if _is_of_time(dtype):
+    for name, dtype in zip(names, dtypes, strict=True):
+        # Of polars, of NumPy and pandas, a period of pandas.
+        is_temporal = getattr(dtype, "is_temporal", bool)()
+        if is_temporal or getattr(dtype, "kind", "") in ("m", "M") or hasattr(dtype, "freq"):
             column = "" if name is None else f" in column {name!r}"
             raise ValueError(
                 f"Input {what} holds times{column} ({dtype}), not numbers. Give the time since "
                 "some moment, such as the power-on, as a number of seconds."
             )
-    if dtypes and all(hasattr(dtype, "fill_value") for dtype in dtypes) and names != [None]:
-        raise TypeError(
-            f"Sparse data was passed for {what}, in columns of a pandas frame; dense data is "
-            f"required. Give {what}.sparse.to_dense()."
-        )
-
-
-def _is_of_time(dtype):
-    """Whether a dtype of NumPy, pandas or polars is one of dates, times or durations."""
-    of_polars = getattr(dtype, "is_temporal", None)
-    if callable(of_polars):
-        return bool(of_polars())
-    return getattr(dtype, "kind", "") in ("m", "M") or hasattr(dtype, "freq")
 
 
 def _name_what_is_no_number(table, what, error):
     """Raise ``error`` again by the first column and row of the table that float() refuses."""
+    found = [(name, *place) for name, column in _columns(table) for place in _refused(column)]
+    if not found:
+        return
+    name, row, value, refusal = found[0]
+    kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
+    where = "" if name is None else f" in column {name!r}"
+    more = ", ".join(repr(other) for other, *_ in found[1:])
+    also = f" So do the columns {more}." if more else ""
     advice = "A target must be a number."
     if what == "X":
         advice = (
             "Drop the column, or encode categories as numbers in a Pipeline before "
             "(sklearn.preprocessing.OneHotEncoder or OrdinalEncoder)."
         )
-    refused = [
-        (name, *place)
-        for name, column in _columns(table)
-        if (place := _first_refused(column)) is not None
-    ]
-    if refused:
-        name, row, value, refusal = refused[0]
-        kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
-        where = "" if name is None else f" in column {name!r}"
-        more = ", ".join(repr(other) for other, *_ in refused[1:])
-        also = f" So do the columns {more}." if more else ""
-        raise type(refusal)(
-            f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"
-        ) from error
+    raise type(refusal)(
+        f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"
+    ) from error
 
 
-def _first_refused(column):
-    """Row and value of the first entry that is no number, and why; None where all are."""
+def _refused(column):
+    """Row and value of the first entry that is no number, and why, if there is one."""
     if getattr(getattr(column, "dtype", None), "kind", "O") in "biufc":
-        return None
+        return
     for row, value in enumerate(column):
         try:
             # Complex numbers are scikit-learn's to refuse.
             float(np.nan if value is None or isinstance(value, complex) else value)
         except (TypeError, ValueError) as refusal:
-            return row, value, refusal
-    return None
+            yield row, value, refusal
+            return
 
 
 def _columns(table):
     """Names and columns of a frame or array that may hold anything; of one dimension no name."""
-    if hasattr(table, "iloc") and hasattr(table, "columns"):
-        return [(name, table.iloc[:, j]) for j, name in enumerate(table.columns)]
-    if hasattr(table, "get_columns"):
-        return [(column.name, column) for column in table.get_columns()]
-    if isinstance(table, str | bytes) or not hasattr(table, "__len__"):
-        return []
+    if hasattr(table, "columns"):
+        return [(name, table[name]) for name in table.columns]
     try:
         array = np.asarray(table, dtype=object)
     except ValueError:
@@ -180,8 +146,8 @@ def _columns(table):
     return [(f"x{j}", array[:, j]) for j in range(array.shape[1])] if array.ndim == 2 else []
 
 
-def group_numbers(groups):
-    """The groups of rows as numbers; ValueError where one is missing, or they cannot be told."""
+def group_numbers(groups, n_rows=None):
+    """The groups of rows as numbers; ValueError where one is missing, or they are of two kinds."""
     groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else np.asarray(groups)
     if groups.ndim == 2 and groups.shape[1] == 1:
         groups = groups.ravel()
@@ -189,6 +155,10 @@ def group_numbers(groups):
         raise ValueError(
             f"groups must have one entry per row; it has {groups.ndim} dimensions, of shape "
             f"{groups.shape}. Make one label of several, such as 'device 1, run 2'."
+        )
+    if n_rows is not None and len(groups) != n_rows:
+        raise ValueError(
+            f"groups has {len(groups)} entries for {n_rows} rows of X: give every row its label."
         )
     missing = [i for i, group in enumerate(groups) if group is None or group != group]
     if missing:
@@ -247,9 +217,20 @@ def feature_indices(given, names, parameter):
             raise ValueError(
                 f"{parameter} is a mask of {len(entries)} entries, but X has {len(names)} columns."
             )
-        found = list(np.flatnonzero(entries))
-    else:
-        found = [_feature_index(entry, names, parameter) for entry in entries]
+        entries = np.flatnonzero(entries).tolist()
+    found = [position_of(entry, names) for entry in entries]
+    if None in found:
+        advice = ""
+        if list(names) == [f"x{j}" for j in range(len(names))]:
+            advice = (
+                " X came without names: give a frame; a step in front hands names on with "
+                "set_output(transform='pandas')."
+            )
+        raise ValueError(
+            f"{parameter} names {entries[found.index(None)]!r}, which is no column of X; its "
+            f"columns are {', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}."
+            + advice
+        )
     if not found:
         raise ValueError(
             f"{parameter}={given!r} names no column: leave it at None for all of them."
@@ -266,22 +247,6 @@ def position_of(entry, names):
     if isinstance(entry, Integral) and -len(names) <= int(entry) < len(names):
         return int(entry) % len(names)
     return None
-
-
-def _feature_index(entry, names, parameter):
-    index = position_of(entry, names)
-    if index is not None:
-        return index
-    advice = ""
-    if isinstance(entry, str) and list(names) == [f"x{j}" for j in range(len(names))]:
-        advice = (
-            " X came without names: give a frame; a step in front hands names on with "
-            "set_output(transform='pandas')."
-        )
-    raise ValueError(
-        f"{parameter} names {entry!r}, which is no column of X; its columns are "
-        f"{', '.join(map(repr, names))}, at positions 0 to {len(names) - 1}.{advice}"
-    )
 
 
 def check_not_negative(sample_weight):
@@ -316,55 +281,9 @@ def bearable_weights(sample_weight):
     return np.ldexp(sample_weight, -exponent) if abs(exponent) > _FAR else sample_weight
 
 
-# Of the thread that collects alone: the filters of ``warnings`` are the whole process's.
-_collected: ContextVar[list | None] = ContextVar("collected", default=None)
-
-
-@contextmanager
-def collected_warnings():
-    """What ``warn_user`` is told in here, as a list of (message, category), and nobody else."""
-    told: list = []
-    before = _collected.set(told)
-    try:
-        yield told
-    finally:
-        _collected.reset(before)
-
-
-# Likewise.
-_untold: ContextVar[type | tuple] = ContextVar("untold", default=())
-
-
-@contextmanager
-def untold(category):
-    """Leave what ``warn_user`` is told of a category in here untold."""
-    before = _untold.set(category)
-    try:
-        yield
-    finally:
-        _untold.reset(before)
-
-
 def warn_user(message, category):
-    """Warn at the line that called this package, or scikit-learn, whatever lies between.
-
-    Not from within scikit-learn's cross-validation, where the category is this package's own.
-    """
-    if issubclass(category, _untold.get()):
-        return
-    told = _collected.get()
-    if told is not None:
-        told.append((message, category))
-        return
-    if is_silent(category):
-        return
-    frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in (
-        "skanfis",
-        "sklearn",
-    ):
-        frame, level = frame.f_back, level + 1
-    warnings.warn(message, category, stacklevel=level)
+    """Warn at the line that called the method which found something."""
+    warnings.warn(message, category, stacklevel=3)
 
 
 def check_choice(parameter, value, choices):

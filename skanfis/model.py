@@ -4,22 +4,14 @@ A first-order Takagi-Sugeno-Kang model (Jang 1993),
 
     y(x) = sum_r w_r(x) f_r(x) ,    f_r(x) = a_r + sum_j b_rj (x_j - x0_j) ,
 
-with normalised firing strengths w and consequents about a reference point x0, the mean of the
-training data: a column that lies far from the origin (a time stamp, a raw count) so loses no
-digits. :attr:`TSKModel.consequents` gives the textbook form p0 + p1 x1 + ... + pd xd.
-
-Outside the box of the training data the model follows a declared policy, by the nearest point c of
-the box: hold its value (clip), or go on along its tangent (linear) and hold what is reached at a
-distance of L standard deviations h_j of each input in training,
+with normalised firing strengths w and consequents about x0, the mean of the training data: a column
+far from the origin (a time stamp, a raw count) so loses no digits. Outside the box of the training
+data it goes by the nearest point c of the box: it holds the value there (clip), or follows the
+tangent as far as L standard deviations h_j of each input (linear),
 
     y(c) + sum_j dy/dx_j(c) clip(x_j - c_j, -L h_j, L h_j) .
 
-Strengths are those of the nearest point; they sum to one everywhere, so that no policy ever gives a
-silent zero.
-
-Outputs are held too, inside the box and out of it: within L standard deviations of the training
-target, or half a one where L is less, of its range, and of several rules within a quarter of that.
-Whatever the inputs, no answer is further off.
+Outputs are held within limits as well, see :class:`~skanfis.policies.TargetRange`.
 """
 
 from dataclasses import dataclass, replace
@@ -30,12 +22,17 @@ import numpy as np
 
 from .antecedent import Antecedent
 from .consequent import rule_outputs
-from .leaving import sorted_by_face
 from .naming import default_output_names, default_term_names
-from .policies import FARTHEST, MAX_EXTRAPOLATION, check_policy, describe_out_of_bounds
+from .policies import (
+    FARTHEST,
+    FARTHEST_ROW,
+    MAX_EXTRAPOLATION,
+    TargetRange,
+    check_policy,
+    describe_out_of_bounds,
+)
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
-from .target import TargetRange
 
 __all__ = ["TSKModel"]
 
@@ -68,22 +65,14 @@ class TSKModel:
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float
-        L of "linear": how far the tangent is followed, in standard deviations (``spread``) of each
-        input beyond its range; zero or positive, or infinite. Where it is infinite, outputs are not
-        held either, but by limits that were asked for.
-    support : RuleSupport or None
-        Where the training data of every rule lie; None where the model knows of none.
-    posterior : Posterior or None
-        What the standard deviation of a prediction needs; None where the model knows of none.
+        L of "linear", zero or positive. Where it is infinite, outputs are not held either, but by
+        limits that were asked for.
+    support, posterior, target : RuleSupport, Posterior, TargetRange or None
+        What coverage, deviations and the limits of outputs are made of, as far as there are data.
+    term_names, output_names : tuple of str
+        Where not given, see ``naming``.
     told_extrapolation : float or None
-        L for which the outermost training rows speak, see ``training.outermost``; None where the
-        model knows of no rows, as one that was read from a file.
-    term_names : tuple of str
-        One per term, unique on its input; where not given, see ``naming``.
-    target : TargetRange or None
-        What outputs are held by; None where the model knows of no data, and they are not held.
-    output_names : tuple of str
-        Where not given "y", or "y0", "y1", ... of several outputs.
+        L for which the outermost training rows speak, see ``training.freezing``.
     """
 
     antecedent: Antecedent
@@ -176,10 +165,7 @@ class TSKModel:
         return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
 
     def predict(self, X, inside=None) -> np.ndarray:
-        """Outputs, shape (n_rows, n_outputs), by the policy for rows out of bounds.
-
-        ``inside`` is what :meth:`in_bounds` gives, for a caller that has it already.
-        """
+        """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""
         inside = self.in_bounds(X) if inside is None else inside
         if inside.all():
             return self._by_block(X, self._outputs, self.n_outputs)
@@ -193,65 +179,51 @@ class TSKModel:
         return outputs
 
     def standard_deviation(self, X) -> np.ndarray:
-        """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``.
+        """Standard deviation of every output, shape (n_rows, n_outputs); see ``posterior``."""
+        return self.predict_with_deviation(X)[1]
+
+    def predict_with_deviation(self, X, inside=None) -> tuple[np.ndarray, np.ndarray]:
+        """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
-        return self.predict_with_deviation(X, exact=True)[1]
-
-    def predict_with_deviation(self, X, inside=None, exact=False) -> tuple[np.ndarray, np.ndarray]:
-        """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
-
-        Deviations are right to a thousandth, or, if ``exact``, in double precision.
-        """
-        posterior = self.posterior
+        posterior, n_values = self.posterior, 2 * self.n_outputs
         if posterior is None:
             raise ValueError(self._why_no_posterior())
         inside = self.in_bounds(X) if inside is None else inside
-        n_outputs = self.n_outputs
+        if self.out_of_bounds == "raise" and not inside.all():
+            raise ValueError(self.describe_out_of_bounds(X))
 
         def within(Z):
-            outputs, deviations = posterior.inside(self, Z, exact)
-            if posterior.inputs.size < self.coefficients.shape[1] - 1:
-                outputs = self._outputs(Z)
-            return np.vstack([self._hold(outputs), deviations])
+            return np.vstack([self._outputs(Z), posterior.inside(self, Z)])
 
         def beyond(Z):
             nearest = self._clip(Z)
-            way = Z - nearest
-            values, slopes, parts = self._linearised(nearest)
-            followed = self._held(way) if self.out_of_bounds == "linear" else np.zeros_like(way)
+            way = self._way(Z, nearest)
+            values, slopes = self._linearised(nearest)
+            followed = self._followed(way) if self.out_of_bounds == "linear" else 0.0 * way
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
-            unfollowed = np.einsum("ji,joi->oi", way - followed, slopes)
-            row = posterior.row_of(self, nearest, values, parts)
-            return np.vstack(
-                [outputs, posterior.beyond(self, row, nearest, way, unfollowed, exact)]
-            )
+            # How far the tangent may be from the prediction: what that leaves of it adds in full.
+            left = np.einsum("ji,joi->oi", way - followed, slopes)
+            return np.vstack([outputs, np.hypot(posterior.tangent(self, nearest, way), left)])
 
-        if inside.all():
-            found = self._by_block(X, within, 2 * n_outputs)
-            return found[:, :n_outputs], found[:, n_outputs:]
-        if self.out_of_bounds == "raise":
-            raise ValueError(self.describe_out_of_bounds(X))
-        found = np.full((X.shape[0], 2 * n_outputs), np.nan)
-        if inside.any():
-            found[inside] = self._by_block(X[inside], within, 2 * n_outputs)
-        if self.out_of_bounds != "nan":
-            rows = np.flatnonzero(~inside)
-            rows = rows[sorted_by_face(X[rows], self.antecedent, self.minimum, self.maximum)]
-            found[rows] = self._by_block(X[rows], beyond, 2 * n_outputs, self._n_slopes)
-        return found[:, :n_outputs], found[:, n_outputs:]
+        found = np.full((X.shape[0], n_values), np.nan)
+        n_more = posterior.n_values + self._n_slopes
+        for rows, of_block in ((inside, within), (~inside, beyond)):
+            if rows.any() and (of_block is within or self.out_of_bounds != "nan"):
+                found[rows] = self._by_block(X[rows], of_block, n_values, n_more)
+        return found[:, : self.n_outputs], found[:, self.n_outputs :]
 
     def gradient(self, X) -> np.ndarray:
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
 
         Rows out of the box are taken at its nearest point, and outputs before they are held.
         """
-        n_values = self.n_inputs * self.n_outputs
 
         def of_block(Z):
-            return self._linearised(self._clip(Z))[1].reshape(n_values, -1)
+            return self._linearised(self._clip(Z))[1].reshape(-1, Z.shape[1])
 
+        n_values = self.n_inputs * self.n_outputs
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
@@ -260,25 +232,19 @@ class TSKModel:
 
         With c the nearest point of the box and delta its distance in standard deviations,
 
-            exp(-|delta|^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2) :
+            exp(-|delta|^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2) ,
 
-        N_r is the number of distinct training inputs on which rule r is the strongest, P the number
-        of its coefficients, d_r the Mahalanobis distance from the centre of its data, D_r that of
-        the farthest row on which it fires; see :class:`skanfis.support.RuleSupport`. Near one on
-        the training rows of rules that have enough of them; falling to zero away from the box,
-        where only rules without data speak, and off the rows, in empty corners of the box too. Zero
-        everywhere where the model knows of no data.
+        see :class:`~skanfis.support.RuleSupport`. Zero everywhere where the model knows of no data.
         """
         support = self.support
         if support is None:
             return np.zeros(X.shape[0])
 
         def of_block(Z):
-            inside = self._clip(Z)
-            outside = (Z - inside) / self.spread[:, None]
-            near = np.exp(-0.5 * np.sum(outside**2, axis=0))
-            by_rule = self.antecedent.strengths(inside)
-            by_rule *= support.by_rule(inside)
+            nearest = self._clip(Z)
+            distance = self._way(Z, nearest) / self.spread[:, None]
+            near = np.exp(-0.5 * np.sum(distance**2, axis=0))
+            by_rule = self.antecedent.strengths(nearest) * support.by_rule(nearest)
             return (by_rule.sum(axis=0) * near)[None]
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
@@ -288,9 +254,8 @@ class TSKModel:
         n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
         if n_parameters > MOST_PARAMETERS:
             return (
-                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} no posterior "
-                "is kept, and there is no standard deviation. Use fewer rules, or intervals from "
-                "residuals: ConformalRegressor(..., scaled=False)."
+                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} there is no "
+                "standard deviation. Use fewer rules, or ConformalRegressor(..., scaled=False)."
             )
         return (
             "The model knows of no posterior: it was taken as it was given, not fitted. Fit it to "
@@ -298,11 +263,8 @@ class TSKModel:
         )
 
     def way_out(self, X) -> np.ndarray:
-        """How far "linear" goes from the box towards each row, (n_rows, n_inputs).
-
-        The way from the nearest point in the box, held at ``max_extrapolation``.
-        """
-        return self._held(X.T - self._clip(X.T)).T
+        """How far "linear" goes from the box towards each row, (n_rows, n_inputs)."""
+        return self._followed(self._way(X.T, self._clip(X.T))).T
 
     def describe_out_of_bounds(self, X) -> str:
         """Say which inputs leave the box of the training data, in how many rows, and how far."""
@@ -317,10 +279,7 @@ class TSKModel:
         return text
 
     def with_out_of_bounds(self, policy, max_extrapolation=None) -> Self:
-        """Return the same model with another policy; the limit stays where None is given.
-
-        "auto" is how far the data speak for the tangent.
-        """
+        """Return the same model with another policy, and another limit where one is given."""
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
         check_policy(policy, limit)
         if limit == "auto":
@@ -331,10 +290,9 @@ class TSKModel:
 
     @cached_property
     def _supported_extrapolation(self):
-        """How far the data speak for the tangent; as it is set where the model knows of none.
+        """How far the outermost rows speak for the tangent; as it is set where there are none.
 
-        So far as the outermost rows do. A line, of which these say that it goes on, bends beyond
-        them by no more than it leaves of the target, for all that is known.
+        A line that goes on bends beyond them by no more than it leaves of the target.
         """
         told, target, posterior = self.told_extrapolation, self.target, self.posterior
         if told is None:
@@ -347,12 +305,12 @@ class TSKModel:
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).
 
-        ``n_more`` is the number of values that it takes per row besides strengths and outputs.
+        It takes ``n_more`` values per row besides strengths and outputs.
         """
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
         step = max(_BLOCK_BYTES // (8 * values_per_row), 64)
-        if n_rows <= step:
+        if 0 < n_rows <= step:
             return of_block(np.array(X.T, dtype=float, order="C")).T
         result = np.empty((n_rows, n_columns))
         for start in range(0, n_rows, step):
@@ -368,7 +326,13 @@ class TSKModel:
     def _clip(self, Z):
         return np.clip(Z, self.minimum[:, None], self.maximum[:, None])
 
-    def _held(self, way):
+    def _way(self, Z, nearest):
+        """The way from the nearest point in the box, no further than ``FARTHEST_ROW``."""
+        with np.errstate(over="ignore"):
+            reach = (FARTHEST_ROW * self.spread)[:, None]
+            return np.clip(Z - nearest, -reach, reach)
+
+    def _followed(self, way):
         """The way out of the box, as far as the tangent is followed."""
         reach = (self.max_extrapolation * self.spread)[:, None]
         return np.clip(way, -reach, reach)
@@ -382,32 +346,32 @@ class TSKModel:
 
     @cached_property
     def _limits_of_columns(self):
-        """The limits as columns; for a single row they are a sixth of what the rest takes."""
+        """The limits as columns, kept: for a single row they are a sixth of the work."""
         return self.output_limits[:, :, None]
 
     def _outputs(self, Z):
-        strengths, basis_rows = self.antecedent.strengths(Z), self._basis(Z)
+        strengths, basis_rows = self.antecedent.strengths(Z), self.basis(Z)
         by_rule = self.coefficients.transpose(2, 0, 1)
         outputs = [rule_outputs(one, strengths, basis_rows)[1] for one in by_rule]
         return self._hold(np.stack(outputs))
 
     def _outputs_linear(self, Z):
         """Value and slope of the nearest point in the box."""
-        inside = self._clip(Z)
-        values, slopes, _ = self._linearised(inside)
-        return self._hold(values + np.einsum("ji,joi->oi", self._held(Z - inside), slopes))
+        nearest = self._clip(Z)
+        values, slopes = self._linearised(nearest)
+        followed = self._followed(self._way(Z, nearest))
+        return self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
 
     def _linearised(self, Z):
-        """y (n_outputs, n_rows), dy/dx (n_inputs, n_outputs, n_rows), and what they are made of.
+        """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).
 
-        These are strengths, shares, basis and derivatives by terms.
         Memberships depend on x and their location through the difference alone: the derivative of
         log mu by x is minus that by the location.
         """
         log_mu, gradients = self.antecedent.log_memberships_and_gradient(Z)
         strengths, shares = self.antecedent.normalise(log_mu)
-        basis_rows = self._basis(Z)
-        values, slopes, by_terms = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1])), []
+        basis_rows = self.basis(Z)
+        values, slopes = [], np.zeros((self.n_inputs, self.n_outputs, Z.shape[1]))
         for k, one in enumerate(self.coefficients.transpose(2, 0, 1)):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
             by_term = self.antecedent.term_sensitivity(by_rule, output, shares)
@@ -418,10 +382,10 @@ class TSKModel:
                 start += group.n_terms
             slopes[: one.shape[1] - 1, k] += one[:, 1:].T @ strengths
             values.append(output)
-            by_terms.append(by_term)
-        return np.stack(values), slopes, (strengths, shares, basis_rows, by_terms, gradients)
+        return np.stack(values), slopes
 
-    def _basis(self, Z):
+    def basis(self, Z):
+        """1 and the inputs about the reference, (n_basis, n_rows)."""
         basis_rows = np.ones((self.coefficients.shape[1], Z.shape[1]))
         if self.order == 1:
             np.subtract(Z, self.reference[:, None], out=basis_rows[1:])

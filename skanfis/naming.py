@@ -1,5 +1,6 @@
 """What terms are called: linguistic names for a grid, places for rules with terms of their own."""
 
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
@@ -21,11 +22,7 @@ _MOST_DIGITS = 17
 
 
 def default_term_names(antecedent):
-    """A name for every term, unique on its input.
-
-    Terms of a grid are in order and are called by it ("low", "medium", "high"); beyond seven they
-    are numbered. Other terms are called by where they stand ("near 21.3").
-    """
+    """Names, unique on each input: of a grid by the order of its terms, else "near 21.3"."""
     inputs, places = antecedent.term_inputs, antecedent.term_places
     names = np.empty(inputs.size, dtype=object)
     for j in np.unique(inputs):
@@ -43,29 +40,35 @@ def default_output_names(n_outputs):
     return ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
 
 
-def given_term_names(antecedent, input_names, term_names):
-    """The user's names, one per term; ValueError where they do not fit.
-
-    ``term_names`` is a sequence of str for every input that has so many terms, or a mapping from
-    input names to such sequences. Inputs that it does not speak of keep the default names.
-    """
-    names = list(default_term_names(antecedent))
-    inputs = antecedent.term_inputs
-    is_mapping = isinstance(term_names, Mapping)
-    if is_mapping and (unknown := [key for key in term_names if key not in input_names]):
-        raise ValueError(
-            f"names has the key {unknown[0]!r}, which is no input; the inputs are "
-            f"{', '.join(map(repr, input_names))}."
-        )
-    for j in np.unique(inputs):
-        own = np.flatnonzero(inputs == j)
-        if is_mapping and input_names[j] not in term_names:
+def given_term_names(antecedent, input_names, names):
+    """The user's names, one per term, of every input or by input; ValueError if they do not fit."""
+    found = list(default_term_names(antecedent))
+    if isinstance(names, Mapping):
+        unknown = [key for key in names if key not in input_names]
+        if unknown:
+            raise ValueError(
+                f"names has the key {unknown[0]!r}, which is no input; the inputs are "
+                f"{', '.join(map(repr, input_names))}."
+            )
+    for j in np.unique(antecedent.term_inputs):
+        own, name = np.flatnonzero(antecedent.term_inputs == j), input_names[j]
+        given = names.get(name) if isinstance(names, Mapping) else names
+        if given is None:
             continue
-        given = term_names[input_names[j]] if is_mapping else term_names
-        _check_given(given, own.size, input_names[j])
-        for t, name in zip(own, given, strict=True):
-            names[t] = name
-    return tuple(names)
+        if isinstance(given, str) or not all(isinstance(one, str) and one for one in given):
+            raise TypeError(
+                f"names for input {name!r} must be a sequence of non-empty str, got {given!r}."
+            )
+        if len(given) != own.size:
+            raise ValueError(
+                f"names: there are {len(given)} names for input {name!r}, which has {own.size} "
+                "terms. Give one name per term, or a dict from input to names."
+            )
+        if len(set(given)) != len(given):
+            raise ValueError(f"names for input {name!r} repeats a name: {list(given)!r}.")
+        for t, one in zip(own, given, strict=True):
+            found[t] = one
+    return tuple(found)
 
 
 def _near(places):
@@ -74,10 +77,10 @@ def _near(places):
         written = [_plain(place, digits) for place in places]
         if len(set(written)) == len(set(places)):
             break
-    counts: dict[str, int] = {}
+    counts: Counter = Counter()
     names = []
     for text in written:
-        counts[text] = counts.get(text, 0) + 1
+        counts[text] += 1
         names.append(f"near {text}" + (f" ({counts[text]})" if counts[text] > 1 else ""))
     return names
 
@@ -88,17 +91,3 @@ def _plain(number, digits):
         shown = {"precision": digits, "unique": False, "fractional": False, "trim": "-"}
         return np.format_float_positional(number, **shown)
     return f"{number:.{digits}g}"
-
-
-def _check_given(given, n_terms, input_name):
-    if isinstance(given, str) or not all(isinstance(name, str) and name for name in given):
-        raise TypeError(
-            f"names for input {input_name!r} must be a sequence of non-empty str, got {given!r}."
-        )
-    if len(given) != n_terms:
-        raise ValueError(
-            f"names: there are {len(given)} names for input {input_name!r}, which has {n_terms} "
-            "terms. Give one name per term, or a dict from input to names."
-        )
-    if len(set(given)) != len(given):
-        raise ValueError(f"names for input {input_name!r} repeats a name: {list(given)!r}.")

@@ -1,13 +1,18 @@
-"""What is answered outside the range of the training data: the policies, and what they say."""
+"""What is answered outside the range of the training data: the policies, and limits of outputs."""
 
 import math
+from dataclasses import dataclass
 from numbers import Real
+
+import numpy as np
 
 __all__ = [
     "FARTHEST",
+    "FARTHEST_ROW",
     "MAX_EXTRAPOLATION",
     "OUT_OF_BOUNDS",
     "SILENT",
+    "TargetRange",
     "check_policy",
     "describe_out_of_bounds",
     "policy_in_words",
@@ -20,6 +25,60 @@ SILENT = ("nan", "raise")
 # a line that leaves nothing of the target: no more than a row in 10,000 is that far from its mean
 # (Chebyshev).
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
+# A row further off than so many of them counts as so far: results saturate, and overflow nowhere.
+FARTHEST_ROW = 1e100
+# What a prediction may have beyond the range of the target: half a standard deviation at least,
+# whatever the limit of inputs, for peaks between rows; of rules that bend a quarter of the range at
+# most. A line has no peaks between rows.
+_LEAST_MARGIN, _MOST_OF_RANGE = 0.5, 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class TargetRange:
+    """What the target was in training, and what else is known of it.
+
+    Attributes
+    ----------
+    minimum, maximum : ndarray of shape (n_outputs,)
+    spread : ndarray of shape (n_outputs,)
+        Weighted standard deviation, positive.
+    lower, upper : ndarray of shape (n_outputs,), or float
+        Limits that were asked for; infinite where none was.
+    """
+
+    minimum: np.ndarray
+    maximum: np.ndarray
+    spread: np.ndarray
+    lower: np.ndarray | float = -np.inf
+    upper: np.ndarray | float = np.inf
+
+    def within(self, lower, upper, values):
+        """The same where limits are known too, and some values (n_values, n_outputs).
+
+        A value that is known is as good as one that was seen; a limit that all that was seen
+        lies beyond shows how far the target goes.
+        """
+        low = np.vstack([self.minimum, upper, values]).min(axis=0)
+        high = np.vstack([self.maximum, lower, values]).max(axis=0)
+        return TargetRange(low, high, self.spread, lower, upper)
+
+    def change_units(self, offset, scale):
+        """The same in units y = offset + scale * y_now, with positive scales."""
+        ends = (self.minimum, self.maximum, self.lower, self.upper)
+        low, high, lower, upper = (offset + scale * end for end in ends)
+        return TargetRange(low, high, scale * self.spread, lower, upper)
+
+    def limits(self, max_extrapolation, is_line):
+        """Lowest and highest output, of a line or of what bends, (2, n_outputs).
+
+        They are those that were asked for, or infinite, where the tangent is followed without end.
+        """
+        margin = max_extrapolation * self.spread
+        if not is_line and np.isfinite(max_extrapolation):
+            margin = np.minimum(margin, _MOST_OF_RANGE * (self.maximum - self.minimum))
+        margin = np.maximum(margin, _LEAST_MARGIN * self.spread)
+        low, high = self.minimum - margin, self.maximum + margin
+        return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])
 
 
 def policy_in_words(policy: str, max_extrapolation: float) -> str:
@@ -28,12 +87,11 @@ def policy_in_words(policy: str, max_extrapolation: float) -> str:
         return "there is no value"
     if policy == "clip" or max_extrapolation == 0.0:
         return "the value at the edge is held"
-    tangent = "the model goes on along its tangent"
     if math.isinf(max_extrapolation):
-        return tangent
+        return "the model goes on along its tangent"
     return (
-        f"{tangent}, for each input up to {max_extrapolation:g} of its standard deviations, and "
-        "holds the value reached there"
+        "the model goes on along its tangent, for each input up to "
+        f"{max_extrapolation:g} of its standard deviations, and holds the value reached there"
     )
 
 

@@ -1,150 +1,138 @@
 """ANFISRegressor: the estimator."""
 
-from collections.abc import Sequence
-from typing import Any, Self
+import warnings
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from functools import reduce
+from numbers import Integral, Real
+from typing import Any, ClassVar, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.metaestimators import available_if
+from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
 
-from ._memory import keeps_freed_memory
-from ._notebook import RulesReprMixin
-from ._sklearn import CallbackSupportMixin, check_parameters, fit_context
+from ._sklearn import (
+    CallbackSupportMixin,
+    HasMethods,
+    Hidden,
+    Interval,
+    StrOptions,
+    check_parameters,
+    check_sample_weight,
+    fit_context,
+)
 from ._threads import one_blas_thread
-from .fitted_rules import TellsOfRulesMixin
+from ._validation import (
+    bearable_weights,
+    check_finite,
+    group_numbers,
+    named_refusals,
+    positive_weights,
+    refuse_lazy,
+)
+from .bounds import FixedPoint, OutputLimits
+from .bounds.constraints import Constraints
+from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection.readability import readability_of_rows
-from .learning import Solver
-from .membership import Membership
-from .options import EarlyStopping, Huber, LinearExtrapolation
-from .parameters import SettingsMixin, keep_weights, structure_request
-from .prediction import PredictsMixin
-from .row_checks import ChecksRowsMixin
-from .training import Callbacks, fit_rules
-from .training.partial_fit import LearnsFromChunksMixin
+from .learning import MESSAGES, SOLVERS, Solver, VariableProjection
+from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, Membership
+from .model import TSKModel
+from .naming import default_output_names, given_term_names
+from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
+from .policies import OUT_OF_BOUNDS
+from .training import Callbacks, ValidatedData, chunk_checks, fit_rules, model_without_rules
+from .training.chunks import RowSums, fitted_weights, solve
+from .training.settings import given_weights, solver_of, structure_request
 
 __all__ = ["ANFISRegressor"]
 
+# Parameters of which a word stands for an object's defaults.
+_OBJECTS: dict[str, type] = {
+    "solver": VariableProjection,
+    "loss": Huber,
+    "early_stopping": EarlyStopping,
+    "out_of_bounds": LinearExtrapolation,
+}
 
-class ANFISRegressor(
-    PredictsMixin,
-    LearnsFromChunksMixin,
-    TellsOfRulesMixin,
-    ChecksRowsMixin,
-    SettingsMixin,
-    RulesReprMixin,
-    CallbackSupportMixin,
-    RegressorMixin,
-    BaseEstimator,
-):
+
+class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     r"""Adaptive neuro-fuzzy inference system for regression.
 
     A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN
     y = p0 + p1 temperature + p2 rate", whose outputs are averaged with the strengths at which the
-    rules fire,
-
-    .. math:: \hat y(x) = \sum_r \bar w_r(x) \, (p_{r0} + p_{r1} x_1 + \dots + p_{rd} x_d) ,
-       \qquad \bar w_r \propto \prod_j \mu_{rj}(x_j) .
-
-    Memberships and consequents are learnt together, by variable projection [2]_: the consequents
-    are the solution of a linear least-squares problem at every step, and only the memberships are
-    iterated on. Inputs and targets are standardised inside: the fit does not depend on their
-    units, and everything that comes out is in the user's units.
+    rules fire. The memberships are trained; the consequents are the solution of a linear
+    least-squares problem at every step [2]_. Inputs and targets are standardised inside: the fit
+    does not depend on their units, and everything that comes out is in the user's units.
 
     Parameters
     ----------
     n_mfs : "auto", int, or array-like of shape (n_features,), default="auto"
-        Number of membership functions (terms) per input, one number for all or one each. A number
-        makes a grid partition, with a rule for every combination of terms. 1 means that the input
-        has no fuzzy terms and takes part in the consequents alone. "auto" leaves it to
+        Number of membership functions (terms) per input. A number makes a grid, with a rule for
+        every combination of terms; 1 leaves the input to the consequents alone. "auto" leaves it to
         ``partition``.
     partition : {"auto", "grid", "subtractive", "fcm"}, clusterer or model, default="auto"
-        Where the rules come from, if ``n_mfs`` is "auto". "grid": a grid grown from the data, one
-        term at a time on the input where it pays most. "auto": such a grid, or scattered rules from
-        k-means, whichever promises the smaller error on new rows; see Notes. "subtractive" and
-        "fcm": a rule per cluster of :class:`~skanfis.cluster.SubtractiveClustering` or
-        :class:`~skanfis.cluster.FuzzyCMeans`, of such a radius, or as many, as promise the smallest
-        error. Any
-        scikit-learn clusterer, such as ``KMeans(n_clusters=5)``: a rule per cluster. Scattered
-        rules have terms of their own; clusters are sought in standardised inputs and targets
-        together, as is the custom since Chiu's subtractive clustering. A fitted ANFISRegressor, or
-        a model such as its ``model_`` or what a file was read into: training starts from its rules
-        and memberships, in the units of X: so ``partition=model`` goes on with further rows, or for
-        further iterations. With ``solver="lse"`` only the consequents are then
-        learnt, with ``max_iter=0`` nothing is, and the model's own ``order`` holds.
+        Where the rules come from, if ``n_mfs`` is "auto". "grid": a grid grown term by term where
+        it pays most. "auto": such a grid, or scattered rules from k-means, whichever promises the
+        smaller error on new rows. "subtractive" and "fcm": a rule per cluster of
+        :class:`~skanfis.cluster.SubtractiveClustering` or :class:`~skanfis.cluster.FuzzyCMeans`,
+        as many as promise the smallest error; so too any scikit-learn clusterer, of
+        standardised inputs and target. A fitted ANFISRegressor or its ``model_``: training starts
+        from its rules; with ``solver="lse"`` only the consequents are learnt, with ``max_iter=0``
+        nothing is.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
-        Family of the membership functions, one for all inputs or one each: "gaussian",
-        :math:`\exp(-(x-c)^2 / 2\sigma^2)`; "bell", Jang's generalised bell
-        :math:`1 / (1 + |(x-c)/a|^{2b})`; "triangular", "trapezoidal", "two_sided_gaussian",
-        "pi_shaped", "s_shaped", "z_shaped", "sigmoid_difference" or "sigmoid_product"; or a class
-        of one's own. The first two are the sturdiest between sparse points. "auto" trains the
-        structure that Gaussians have found, or that is given, with each of the first six as well,
-        for all inputs alike, and takes the one that promises the smallest error on new rows. Not
-        looked at where ``partition`` is a model, which brings its own.
+        Family of the membership functions, for all inputs or one each: "gaussian", "bell",
+        "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
+        "sigmoid_difference", "sigmoid_product", or a class of one's own. "auto" tries the first
+        six. Not used where ``partition`` is a model.
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
-        None is all. With rules on temperature and consequents in rate alone, say, the scale factor
-        is scheduled by temperature. What ``n_mfs`` gives terms to must be among the former.
+        None is all.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
     monotonic_cst : array-like of shape (n_features,) or dict, default=None
-        What is known of the target: 1 where it does not fall as the feature rises, -1 where it does
-        not rise, 0 where nothing is known; or these by the features' names; of several outputs also
-        a row for each, (n_outputs, n_features). Kept by the predictions all over the range of the
-        training data, and proven; see Notes.
+        1 where the target does not fall as the feature rises, -1 where it does not rise, 0 where
+        nothing is known; or these by name; of several outputs a row for each. Proven to hold all
+        over the range of the training data (:mod:`skanfis.bounds`).
     constraints : list of OutputLimits and FixedPoint, default=None
-        More that is known: limits of the output, which hold for every row, and values at points;
-        see :mod:`skanfis.bounds`. In the units of X as it comes here, behind any scaler.
+        Limits of the output, which hold for every row, and values at points; in the units of X as
+        it comes here, behind any scaler. See :mod:`skanfis.bounds`.
     loss : {"squared_error", "huber"} or Huber, default="squared_error"
         What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: rows
-        far from the model count by the size of their residual and not its square, so that outliers
-        in the target do little.
+        far from the model count by the size of their residual and not its square.
     solver : {"varpro", "hybrid", "gradient", "lse"} or Solver, default="varpro"
-        How the premises are learnt; an object of :mod:`skanfis.learning` has settings of its own.
-        "varpro", :class:`~skanfis.learning.VariableProjection`: trust-region Gauss-Newton steps;
-        its ``tol`` says when to stop, its ``stiffness`` holds the premises near their start.
-        "hybrid", :class:`~skanfis.learning.Hybrid`: Jang's rule, least squares forward and a
-        gradient step of his own step size backward [1]_. "gradient",
-        :class:`~skanfis.learning.GradientDescent`: on premises and consequents together, as in
-        back-propagation. "lse", :class:`~skanfis.learning.LeastSquares`: premises stay as they
-        start.
+        How the premises are learnt: :class:`~skanfis.learning.VariableProjection`, Gauss-Newton
+        steps in a trust region; :class:`~skanfis.learning.Hybrid`, Jang's rule [1]_;
+        :class:`~skanfis.learning.GradientDescent`, back-propagation;
+        :class:`~skanfis.learning.LeastSquares`, premises stay. An object has settings of its own,
+        such as ``tol`` and ``stiffness``.
     agreement : "auto" or float, default="auto"
-        Weight of the penalty on rules that disagree where they fire together, zero or positive:
-        agreement / 2 times the mean over rows of :math:`\sum_r \bar w_r (f_r - \hat y)^2`, in
-        variances of the target, is added to half its mean squared error. 0 lets rules compensate
-        one another at will, 1 is local learning, where every rule is a model of the rows on which
-        it fires; the more, the more alike the rules. "auto": found by the evidence, and raised
-        until the strongest rule alone is within half a standard deviation of the model, unless that
-        would cost more than a tenth of the error, see Notes.
+        Weight of the penalty on rules that disagree where they fire together, in variances of the
+        target. 0 lets rules compensate one another, 1 makes every rule a model of its own rows.
+        "auto": found by the evidence [3]_, and raised until the strongest rule alone is near the
+        model, unless that would cost too much.
     alpha : "auto" or float, default="auto"
-        Ridge penalty on the consequents, zero or positive, in standard deviations of inputs and
-        target: alpha / 2 times the squares of each rule's departure from the rules' common line, in
-        its value at its own centre and in its slopes, and of the slopes of that line. Of a single
-        rule it is scikit-learn's ``Ridge``. "auto": each slope of the common line has a weight, and
-        so has each component of the departures, what concerns one input alone and what two
-        together; the evidence finds them. At zero, a ridge at the level of rounding errors remains.
+        Ridge penalty on the consequents, in standard deviations of inputs and target: on each
+        rule's departure from the rules' common line, and on the slopes of that line. Of a single
+        rule it is scikit-learn's ``Ridge``. "auto": found by the evidence [3]_.
     max_iter : int, default=500
         Most iterations (epochs). With 0, premises stay as they start.
     early_stopping : bool or EarlyStopping, default=False
-        Whether to hold out rows, stop when the error on them falls no more, and keep the parameters
-        of its minimum. With ``groups`` given to ``fit``, whole groups are held out.
-        :class:`~skanfis.options.EarlyStopping` says how many rows, and how patient to be.
+        Whether to hold out rows, or whole ``groups``, and keep the parameters of the smallest error
+        on them; see :class:`~skanfis.options.EarlyStopping`.
     out_of_bounds : {"linear", "clip", "nan", "raise"} or LinearExtrapolation, default="linear"
         What ``predict`` does with rows outside the range of the training data, input by input:
-        "linear" warns, goes on along the tangent at the edge for half a standard deviation of the
-        input, or further where the outermost rows speak for it
-        (:class:`~skanfis.options.LinearExtrapolation`, which takes another distance too), and
-        holds the value reached; "clip" holds the value at the edge; "nan" returns NaN; "raise"
-        raises ValueError. It may be changed by ``set_params`` after training.
+        "linear" warns, and goes on along the tangent at the edge for a limited distance
+        (:class:`~skanfis.options.LinearExtrapolation`); "clip" holds the value at the edge; "nan"
+        returns NaN; "raise" raises ValueError. It may be changed after training.
     verbose : bool, default=False
-        Whether to write a line per iteration. scikit-learn's callbacks (``set_callbacks``) work
-        from scikit-learn 1.9 on.
+        Whether to write a line per iteration.
     random_state : int, RandomState instance or None, default=None
-        Seed of everything random: the clusterings of "auto" and "fcm", the rows that early stopping
-        holds out. None stands for one fixed seed, so that the same
-        data always give the same model. A clusterer given as ``partition`` has a seed of its own.
+        Seed of all that is random; None is one fixed seed: the same data give the same model.
     n_jobs : int, default=None
-        Worker threads for the passes over the data; None is one, -1 is one per core. The result is
-        the same to the last bit for any number. It pays from some 100,000 rows on.
+        Worker threads, -1 is one per core; the result is the same to the last bit for any number.
 
     Attributes
     ----------
@@ -155,104 +143,38 @@ class ANFISRegressor(
     rules_ : ndarray of shape (n_rules, n_premise_inputs)
         The terms of each rule: positions in ``memberships_``.
     memberships_, initial_memberships_ : list of dict
-        Every term after training, and before: its "input", "name", "function" and parameters by
-        name ("center" and "width" of a Gaussian), in the user's units.
+        Every term after training, and before: its "input", "name", "function" and parameters.
     consequents_ : ndarray of shape (n_rules, 1 + n_features[, n_outputs])
-        p0, p1, ..., pd of every rule, in the user's units.
-    n_iter_ : int
-        Iterations run, of the last run of the solver; 1 where there was nothing to iterate on.
-    loss_curve_ : ndarray of shape (n_iter + 1,)
-        Mean squared error of the standardised target, from the start on, in the last run.
-    status_ : str
-        Why the solver stopped.
+        p0, p1, ..., pd of every rule.
+    n_iter_, loss_curve_, status_ : int, ndarray of shape (n_iter + 1,), str
+        Iterations of the last run of the solver, the mean squared error of the standardised target
+        from the start on, and why it stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
-        The values used; ``slope_alpha_`` is that on the slopes of the rules' common line.
-    pulls_ : list of dict
-        For the "inputs" that a component of the departures concerns, its weight, "pull", in
-        ``alpha_``, which is the geometric mean of all. ["time"] is how the output bends with time
-        alone, ["time", "temperature"] how that changes with temperature, [] the rest: the larger,
-        the less of it the data show. Of scattered rules, [] are their values and ["time"] their
-        slopes by time. Empty where alpha is given, or there are no departures.
-    slope_pulls_ : dict of str to float
-        The weight on the common line's slope by each input, in ``slope_alpha_``, which is their
-        geometric mean. Empty where alpha is given, or there is one slope or none.
+        The weights used; ``slope_alpha_`` is that on the slopes of the rules' common line.
+    pulls_, slope_pulls_ : list of dict, dict
+        Of each component of the departures its "inputs" and its weight in ``alpha_``, "pull"; the
+        weight of the slope by each input in ``slope_alpha_``. Empty where alpha is given.
     structures_ : list of dict
-        The candidates that were compared where the structure was chosen by itself, best first:
-        "structure", "n_mfs" (a list, terms per input; None for scattered rules), "expected_error"
-        on new rows like these, "log_evidence", "agreement", "alpha", "stiffness"; without groups
-        "unknown_between", the part of places half-way between rows at which a single row would tell
-        more than all do, while the smaller model that is to be beaten errs by less (above 0.075 the
-        candidate is out of the running); with groups "held_out_error", which then decides. Both
-        errors are in standard deviations of the target. Empty where the structure was given.
+        The candidates that were compared, best first: "structure", "n_mfs", "expected_error" on new
+        rows in standard deviations of the target, with groups "held_out_error", and more. Empty
+        where the structure was given.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
-        Standard deviation of the noise of a row of mean weight, in the units of y: what remains of
-        the residual after the effective number of parameters. None where
-        ``predict(return_std=True)`` has nothing to go by.
+        Standard deviation of the noise of a row of mean weight, in the units of y.
     readability_ : skanfis.inspection.Readability
         How far the rules can be read one by one, measured on the training rows.
     redundant_rules_ : list of dict
-        Rules that do nothing: "rule", its number; "reason", "never fires" (nowhere in the
-        training data above a hundredth) or "repeats rule ..." (strengths in proportion on all
-        rows); "weight", its part of the data's weight. ``without_rules`` drops them.
+        Rules that do nothing: "rule", its number; "reason", "never fires" or "repeats rule ...";
+        "weight", its part of the data's weight. ``without_rules`` drops them.
     constraints_ : dict or None
-        With ``monotonic_cst`` or ``constraints``: "certified", whether it is proven that they all
-        hold; "loss_before" and "loss_after", as in ``loss_curve_``; "margin", by which they are
-        held at points, in standard deviations of the target and the inputs; "rows", the number of
-        these points; "boxes", of boxes that the proofs took.
+        With constraints: "certified", whether they are proven to hold; "loss_before", and more.
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
-        With ``early_stopping``: as ``loss_curve_``, of the rows held out, from the first iteration.
+        With ``early_stopping``: as ``loss_curve_``, of the rows held out.
     robust_weights_ : ndarray of shape (n_samples,) or None
-        With ``loss="huber"``: the weight that was left to each row, 1 for those near the model;
-        NaN for rows that had no part in the training.
+        With ``loss="huber"``: the weight left to each row; NaN for rows that had no part.
     n_samples_seen_ : int
         After ``partial_fit``: rows with weight, of all calls.
-    information_ : skanfis.training.Information or None
-        After ``partial_fit``: how well the consequents are determined; None after ``fit``.
-    n_features_in_ : int
-        Number of inputs.
-    feature_names_in_ : ndarray of shape (n_features,)
-        Names of the inputs, where X had names that are all strings.
-
-    Warns
-    -----
-    ConvergenceWarning
-        If ``max_iter`` was reached first; if constraints hold at all points that were looked at but
-        were not proven to hold between them.
-    ConstantInputWarning
-        If an input is constant in the training data; it gets no terms and no slope.
-    UnderdeterminedWarning
-        If rules that are given are more than the rows tell: more consequent parameters than
-        distinct rows, or places between the rows at which less is known than a row there would
-        tell. A structure found by itself has none such, and the evidence bounds what few rows tell.
-    OutOfBoundsWarning
-        From ``predict`` and ``score``, of rows that are extrapolated to: with
-        ``out_of_bounds="linear"``. "clip" and "nan" are answers that were asked for, as in
-        scikit-learn's IsotonicRegression, and are given without a word.
-
-    Notes
-    -----
-    What is trained is not the sum of the rules alone: rules that fire on the same row pay for their
-    disagreement (``agreement``), and every rule for its departure from the line that all have in
-    common (``alpha``), so that each can be read by itself. Where these weights and the pull of the
-    premises (the solver's ``stiffness``) are "auto", they are found by the evidence, the
-    probability of the data with all parameters averaged out [3]_, on at most 1,000 representative
-    rows; with data that seem free of noise, from two sides. ``readability_`` says how far the rules
-    can be read.
-
-    Constraints (``monotonic_cst``, ``constraints``) are kept by the consequents, the solution of a
-    convex quadratic programme at the premises that were learnt without them. Bounds on the model
-    (:mod:`skanfis.bounds`) prove that they hold at every point in the range of the training data,
-    not only at rows; with ``out_of_bounds="clip"`` then everywhere. Limits of the output hold
-    everywhere. A structure that the data decide on grows on under them, term by term, where they
-    cost it something.
-
-    Where the structure is chosen by itself, a few dozen small models are trained on these rows, and
-    compared by their error on rows that are left out one by one, which for the consequents takes no
-    training [4]_, times what the effective number k of the premises' parameters costs in Akaike's
-    final prediction error, (1 + k / n) / (1 - k / n) [5]_. Nothing is random. A row left out may
-    have others of its run beside it: where rows come in runs, give these to ``fit`` as ``groups``.
-    The structures are then compared by their error on the groups left out, a fifth of them at a
-    time.
+    n_features_in_, feature_names_in_ : int, ndarray of shape (n_features,)
+        Number of inputs, and their names where X had names that are all strings.
 
     References
     ----------
@@ -262,10 +184,6 @@ class ANFISRegressor(
        squares problems whose variables separate", SIAM Journal on Numerical Analysis 10 (1973)
        413-432.
     .. [3] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447.
-    .. [4] D. M. Allen, "The relationship between variable selection and data augmentation and a
-       method for prediction", Technometrics 16 (1974) 125-127.
-    .. [5] H. Akaike, "Fitting autoregressive models for prediction", Annals of the Institute of
-       Statistical Mathematics 21 (1969) 243-247.
 
     Examples
     --------
@@ -278,6 +196,36 @@ class ANFISRegressor(
     >>> bool(abs(model.predict(X) - y).max() < 1e-3)
     True
     """
+
+    _parameter_constraints: ClassVar[dict] = {
+        "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
+        "partition": [
+            StrOptions({"auto", "grid", "subtractive", "fcm"}),
+            HasMethods(["fit", "fit_predict"]),
+            HasMethods(["predict", "strengths"]),
+        ],
+        "mf": [
+            StrOptions({"auto", *MEMBERSHIPS}),
+            Hidden(StrOptions(set(NAMES_IN_MATLAB))),  # refused with the name that they have here
+            "array-like",
+            type,
+        ],
+        "premise_features": ["array-like", str, Integral, None],
+        "consequent_features": ["array-like", str, Integral, None],
+        "order": [Interval(Integral, 0, 1, closed="both")],
+        "monotonic_cst": ["array-like", dict, None],
+        "constraints": [list, tuple, OutputLimits, FixedPoint, None],
+        "loss": [StrOptions({"squared_error", "huber"}), Huber],
+        "solver": [StrOptions(set(SOLVERS)), Solver],
+        "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+        "alpha": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
+        "max_iter": [Interval(Integral, 0, None, closed="left")],
+        "early_stopping": ["boolean", EarlyStopping],
+        "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
+        "verbose": ["verbose"],
+        "random_state": ["random_state"],
+        "n_jobs": [Integral, None],
+    }
 
     def __init__(
         self,
@@ -325,6 +273,30 @@ class ANFISRegressor(
         tags.target_tags.multi_output = True
         return tags
 
+    def set_params(self, **params: Any) -> Self:
+        """Set parameters, and settings of objects among them, such as ``solver__tol``.
+
+        Parameters
+        ----------
+        **params : dict
+            By name.
+
+        Returns
+        -------
+        self : ANFISRegressor
+        """
+        for key in params:
+            name, _, setting = key.partition("__")
+            given = params.get(name, getattr(self, name, None))
+            if setting and name in _OBJECTS and isinstance(given, str | bool):
+                of_word = SOLVERS.get(str(given), _OBJECTS[name])
+                raise ValueError(
+                    f"{key} is a setting of an object, but {name}={given!r} is a word for its "
+                    f"defaults: give {name}={of_word.__name__}(), of "
+                    f"skanfis.{'learning' if name == 'solver' else 'options'}, in its place."
+                )
+        return super().set_params(**params)
+
     @fit_context(prefer_skip_nested_validation=False)
     def fit(
         self,
@@ -343,11 +315,10 @@ class ANFISRegressor(
             Targets, in any units.
         sample_weight : array-like of shape (n_samples,), default=None
             Weights, zero or positive. A whole number counts as so many copies of the row, zero as
-            the row's absence, in initialisation and scaling too.
+            the row's absence.
         groups : array-like of shape (n_samples,), default=None
-            The run, device or level that each row belongs to. Where the structure is chosen from
-            the data, it is by its error on groups left out, if there are two or more;
-            ``early_stopping`` holds out whole groups. Not looked at otherwise.
+            The run, device or level that each row belongs to. The structure is chosen by its error
+            on groups left out, and ``early_stopping`` holds out whole groups.
 
         Returns
         -------
@@ -356,9 +327,18 @@ class ANFISRegressor(
         Raises
         ------
         ValueError
-            If the data are empty, a single row, or not finite; if weights are negative or leave
-            fewer than two rows; if parameters contradict each other or the data; if the grid has
-            more rules than ``sklearn.get_config()["working_memory"]`` can hold.
+            If the data are a single row or not finite; if weights are negative; if parameters
+            contradict each other or the data; if the grid has more rules than
+            ``sklearn.get_config()["working_memory"]`` can hold.
+
+        Warns
+        -----
+        ConvergenceWarning
+            If ``max_iter`` was reached first, or constraints were not proven to hold.
+        ConstantInputWarning
+            If an input is constant in the training data; it gets no terms and no slope.
+        UnderdeterminedWarning
+            If rules that are given are more than the rows determine.
         """
         context = None
         if hasattr(self, "_skl_callbacks"):
@@ -376,7 +356,7 @@ class ANFISRegressor(
                 metadata = None if sample_weight is None else {"sample_weight": sample_weight}
                 callbacks = Callbacks(self, context, {"X": X, "y": y, "metadata": metadata})
                 callbacks.begin()
-            with one_blas_thread(), keeps_freed_memory():
+            with one_blas_thread():
                 fitted = fit_rules(self, data, request, callbacks)
         except BaseException:
             # What was fitted before keeps its inputs' number and names: it can go on predicting.
@@ -386,27 +366,484 @@ class ANFISRegressor(
         self.n_iter_ = max(fitted.result.n_iter, 1)
         self.loss_curve_ = fitted.result.loss_curve
         self.status_ = fitted.result.message
-        self._tell_noise()
-        start = fitted.start
-        keep_weights(self, start.penalty)
-        self.stiffness_ = start.penalty.stiffness
-        self.structures_ = start.candidates
+        self._keep_weights(fitted.start.penalty)
+        self.stiffness_ = fitted.start.penalty.stiffness
+        self.structures_ = fitted.start.candidates
         self.redundant_rules_ = fitted.redundant_rules
         self.constraints_ = fitted.constraints
         self.robust_weights_ = fitted.robust_weights
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
-        self._forget_chunks()
+        for name in ("_chunks", "_chunk_settings", "_first_weights", "n_samples_seen_"):
+            self.__dict__.pop(name, None)
         if callbacks is not None:
             callbacks.end(self.model_)
         return self
 
-    def _readability(self, data):
-        with keeps_freed_memory():
-            return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[False] = False) -> np.ndarray: ...
 
-    def _tell_noise(self):
+    @overload
+    def predict(self, X: ArrayLike, return_std: Literal[True]) -> tuple[np.ndarray, np.ndarray]: ...
+
+    @overload
+    def predict(
+        self, X: ArrayLike, return_std: bool
+    ) -> np.ndarray | tuple[np.ndarray, np.ndarray]: ...
+
+    def predict(
+        self, X: ArrayLike, return_std: bool = False
+    ) -> np.ndarray | tuple[np.ndarray, np.ndarray]:
+        """Predict the target.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+        return_std : bool, default=False
+            Whether to return the standard deviation of a new row of mean weight as well: of the
+            noise, the consequents and, by Laplace's method, the premises. It takes the structure
+            and the weights of the penalty for known, and grows outside the training range.
+
+        Returns
+        -------
+        y : ndarray of shape (n_samples,) or (n_samples, n_outputs)
+        std : ndarray of the shape of y
+            Only with ``return_std=True``.
+
+        Raises
+        ------
+        ValueError
+            If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
+            or, with ``return_std=True``, if the model was taken as given and not fitted, or is too
+            large to keep the factor of a posterior (2,000 parameters).
+
+        Warns
+        -----
+        OutOfBoundsWarning
+            With ``out_of_bounds="linear"``, if rows lie outside the training data.
+        """
+        X = self._check_inputs(X)
+        model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
+        inside = model.in_bounds(X)
+        if model.out_of_bounds == "linear" and not inside.all():
+            message = f"{model.describe_out_of_bounds(X)} Policy: {model.policy}."
+            warnings.warn(message, OutOfBoundsWarning, stacklevel=2)
+        if not return_std:
+            outputs = model.predict(X, inside)
+            return outputs[:, 0] if self._single_output else outputs
+        outputs, deviations = model.predict_with_deviation(X, inside)
+        return (outputs[:, 0], deviations[:, 0]) if self._single_output else (outputs, deviations)
+
+    def in_bounds(self, X: ArrayLike) -> np.ndarray:
+        """Tell which rows lie in the range of the training data, input by input.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        inside : ndarray of bool of shape (n_samples,)
+        """
+        X = self._check_inputs(X)
+        return self.model_.in_bounds(X)
+
+    def coverage(self, X: ArrayLike) -> np.ndarray:
+        """Tell how well the training data cover each row.
+
+        Rules that have enough training rows near by make it one; it falls with the distance from
+        the rows on which they fire, and outside the training range.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        coverage : ndarray of shape (n_samples,)
+            From 0, far from the training data, to 1.
+        """
+        X = self._check_inputs(X)
+        return self.model_.coverage(X)
+
+    def strengths(self, X: ArrayLike) -> np.ndarray:
+        """Tell how strongly each rule fires on each row, normalised.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        strengths : ndarray of shape (n_samples, n_rules)
+            Positive, with sum one in every row. Rows outside the training range are taken at its
+            edge.
+        """
+        X = self._check_inputs(X)
+        return self.model_.strengths(X)
+
+    @available_if(chunk_checks.can_learn_from_chunks)
+    @fit_context(prefer_skip_nested_validation=False)
+    def partial_fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        sample_weight: ArrayLike | None = None,
+        *,
+        forgetting: float = 1.0,
+        window: int | None = None,
+    ) -> Self:
+        r"""Learn from a chunk of rows, going on from those before; premises stay.
+
+        The first call is ``fit`` on its rows, which finds the structure and the premises; or, with
+        ``solver="lse"`` and a model as ``partition``, takes both from there. Every further call
+        adds its rows to the sums that the consequents are solved from: the model does not depend on
+        how rows are divided into calls. See :doc:`/streaming`.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Inputs, with the columns of the first call; a single row will do after the first call.
+        y : array-like of shape (n_samples,) or (n_samples, n_outputs)
+            Targets.
+        sample_weight : array-like of shape (n_samples,), default=None
+            Weights, zero or positive, relative to those of all other calls.
+        forgetting : float, default=1.0
+            Above 0 and at most 1: with every row that has weight, the weights of all rows before it
+            are multiplied by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count. The
+            box and the counts of coverage do not forget.
+        window : int, default=None
+            Only the rows of the last so many calls count; each of their sums is kept. Calls before
+            that had no window are one. None keeps one sum, of all rows.
+
+        Returns
+        -------
+        self : ANFISRegressor
+
+        Raises
+        ------
+        ValueError
+            If the data are not finite, or other columns than those before; if the first call has a
+            single row but must find the structure; if what that depends on has been changed since.
+        AttributeError
+            If ``loss``, ``early_stopping`` or constraints need all rows again.
+
+        Warns
+        -----
+        ForgottenRowsWarning
+            If ``fit`` came before: its premises stay, its rows do not count.
+
+        Examples
+        --------
+        >>> from skanfis import ANFISRegressor
+        >>> from skanfis.datasets import make_jang_sinc
+        >>> X, y = make_jang_sinc()
+        >>> model = ANFISRegressor(n_mfs=4)
+        >>> for start in (0, 60):
+        ...     model = model.partial_fit(X[start : start + 60], y[start : start + 60])
+        >>> model.n_samples_seen_
+        120
+        """
+        chunk_checks.check_forgetting(forgetting, window)
+        before = self.__dict__.copy()
+        try:
+            self._learn_chunk(X, y, sample_weight, float(forgetting), window)
+        except BaseException:
+            self.__dict__ = before
+            raise
+        return self
+
+    def _learn_chunk(self, X, y, sample_weight, forgetting, window):
+        """Add the sums of a chunk to those before, or begin with them."""
+        chunks = getattr(self, "_chunks", ())
+        if chunks:
+            chunk_checks.check_settings(self, self._chunk_settings)
+        data = self._check_training_data(X, y, sample_weight, None, is_chunk=True)
+        n_rows = data.X.shape[0]
+        weight = chunk_checks.faded_weights(data.sample_weight, n_rows, forgetting)
+        rows = (data.X, data.y, weight)
+        if chunks:
+            base, own, is_fitted = chunks[0].base, chunks[0].consequent_inputs, False
+            chunk_checks.check_outputs(base, data.y.shape[1], data.output_names)
+            if n_rows == 0:
+                return
+        else:
+            base, own, is_fitted = self._begin_chunks(X, y, data, weight)
+        chunks = (*chunks, RowSums.of(base, own, *rows))
+        if window is not None:
+            self._chunks = chunks[-window:]
+        else:
+            *older, latest = chunks
+            older = [one.faded(forgetting**n_rows) for one in older]
+            self._chunks = (reduce(RowSums.plus, [*older, latest]),)
+        if is_fitted:
+            # What this fit has found holds for further rows too, as a prior of fixed strength.
+            self._first_weights = fitted_weights(self, self._chunks[0])
+        else:
+            self._solve_chunks()
+            self.readability_ = readability_of_rows(self.model_, *rows)
+        self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + n_rows
+
+    def _begin_chunks(self, X, y, data, weight):
+        """Premises of a first chunk, inputs of consequents, and whether the rows were fitted."""
+        request = structure_request(self, data.input_names)
+        after_fit = hasattr(self, "model_")
+        is_imported = isinstance(request.partition, TSKModel) and not solver_of(self).moves_premises
+        is_fitted = not (after_fit or is_imported)
+        chunk_checks.check_begin(self, data.X.shape[0], finds_structure=is_fitted)
+        if is_fitted:
+            self.fit(X, y, data.spread_weights(weight))
+        elif after_fit:
+            chunk_checks.check_outputs(self.model_, data.y.shape[1], data.output_names)
+            warnings.warn(
+                "partial_fit after fit: the premises stay, but fit keeps no sums over its "
+                f"{self.model_.rule_rows.sum():.0f} rows that others could be added to, and the "
+                "consequents are learnt from the new rows alone. To have all rows count, give them "
+                "all to partial_fit, whose first call is a fit.",
+                ForgottenRowsWarning,
+                stacklevel=5,
+            )
+        else:
+            self.model_ = chunk_checks.named_premises(request.partition, data)
+        if not is_fitted:
+            self.stiffness_, self.structures_ = 0.0, []
+            self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
+        self._chunk_settings = chunk_checks.structure_settings(self)
+        return replace(self.model_, posterior=None), request.consequent_inputs, is_fitted
+
+    def _solve_chunks(self):
+        """The model of all chunks that count."""
+        first = getattr(self, "_first_weights", None)
+        solved = solve(reduce(RowSums.plus, self._chunks), given_weights(self), first)
+        self.model_ = solved.model.with_out_of_bounds(*policy_of(self.out_of_bounds))
+        self.n_iter_ = 1
+        self.loss_curve_ = np.full(2, solved.mean_squared_error)
+        self.status_ = MESSAGES["no_premise"]
+        self.redundant_rules_ = solved.redundant_rules
+        self._keep_weights(solved.penalty)
+
+    def merge(self, *others: Any) -> Self:
+        """Add up what models trained apart by ``partial_fit`` have seen.
+
+        Parameters
+        ----------
+        *others : ANFISRegressor
+            Trained by ``partial_fit``, on rows of their own, at the same premises: such as each
+            with ``solver="lse"`` and the same model as ``partition``.
+
+        Returns
+        -------
+        merged : ANFISRegressor
+            With the parameters of this one, as after ``partial_fit`` with all rows, but without
+            ``readability_``, which is of rows. The models stay as they are.
+
+        Raises
+        ------
+        ValueError
+            If a model has seen no chunk, or the premises, inputs or outputs differ.
+
+        Examples
+        --------
+        >>> from skanfis import ANFISRegressor
+        >>> from skanfis.datasets import make_jang_sinc
+        >>> X, y = make_jang_sinc()
+        >>> first = ANFISRegressor(n_mfs=4).fit(X, y)
+        >>> devices = [ANFISRegressor(partition=first, solver="lse") for _ in range(2)]
+        >>> devices[0] = devices[0].partial_fit(X[:60], y[:60])
+        >>> devices[1] = devices[1].partial_fit(X[60:], y[60:])
+        >>> devices[0].merge(devices[1]).n_samples_seen_
+        121
+        """
+        models, sums = (self, *others), []
+        for place, model in enumerate(models):
+            chunks = getattr(model, "_chunks", None)
+            if not chunks:
+                raise ValueError(
+                    f"Model {place} of merge has not been trained by partial_fit "
+                    f"({type(model).__name__}): there are no sums over its rows to add."
+                )
+            sums.append(reduce(RowSums.plus, chunks))
+            chunk_checks.check_same_premises(sums[0], sums[-1], place)
+        merged = copy(self)
+        merged.__dict__.pop("readability_", None)
+        merged._chunks = (reduce(RowSums.plus, sums),)
+        merged._solve_chunks()
+        merged.n_samples_seen_ = sum(model.n_samples_seen_ for model in models)
+        return merged
+
+    def rename_terms(self, names: Sequence[str] | Mapping[str, Sequence[str]]) -> Self:
+        """Give the terms other names, in the rules and wherever they are shown.
+
+        Parameters
+        ----------
+        names : sequence of str or dict
+            One per term, for every input alike or by input, ``{"temperature": ["cold", "hot"]}``,
+            in the order of ``memberships_``; terms of other inputs get their default names.
+
+        Returns
+        -------
+        self : ANFISRegressor
+        """
+        model = self._fitted_model()
+        renamed = given_term_names(model.antecedent, model.input_names, names)
+        self.model_ = replace(model, term_names=renamed)
+        return self
+
+    def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:
+        """Give the model without some of its rules, to go on from.
+
+        What is left fires as before, in proportion. Its consequents were learnt beside those that
+        are gone: ``ANFISRegressor(partition=model.without_rules()).fit(X, y)`` trains them again.
+
+        Parameters
+        ----------
+        rules : array-like of int, default=None
+            The numbers of the rules; None is those of ``redundant_rules_``.
+
+        Returns
+        -------
+        model : skanfis.model.TSKModel
+        """
+        model = self._fitted_model()
+        if rules is None:
+            rules = [entry["rule"] for entry in self.redundant_rules_]
+        return model_without_rules(model, np.asarray(rules, dtype=int))
+
+    @property
+    def n_rules_(self) -> int:
+        """Number of rules."""
+        return self._fitted_model().n_rules
+
+    @property
+    def rules_(self) -> np.ndarray:
+        """The terms of each rule, as positions in ``memberships_``."""
+        return self._fitted_model().antecedent.rule_terms
+
+    @property
+    def memberships_(self) -> list[dict]:
+        """Every term after training, in the user's units."""
+        return self._fitted_model().memberships()
+
+    @property
+    def initial_memberships_(self) -> list[dict]:
+        """Every term before training, in the user's units."""
+        return self._fitted_model().memberships(trained=False)
+
+    @property
+    def consequents_(self) -> np.ndarray:
+        """p0, p1, ..., pd of every rule, in the user's units."""
+        consequents = self._fitted_model().consequents
+        return consequents[:, :, 0] if self._single_output else consequents
+
+    def _fitted_model(self) -> TSKModel:
+        check_is_fitted(self)
+        return self.model_
+
+    def _keep_weights(self, penalty):
+        """Set the attributes that tell the weights on the consequents, and the noise."""
+        self.agreement_, self.alpha_, self.slope_alpha_ = (
+            penalty.agreement,
+            penalty.alpha,
+            penalty.rho,
+        )
+        names = self.model_.input_names
+        self.slope_pulls_ = {names[j]: pull for j, pull in penalty.slope_pulls.items()}
+        self.pulls_ = [
+            {"inputs": [names[j] for j in component], "pull": pull}
+            for component, pull in penalty.pulls.items()
+        ]
         posterior = self.model_.posterior
         noise = None if posterior is None else posterior.noise
         self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
+
+    def _readability(self, data):
+        return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+
+    def _repr_html_inner(self):
+        # For notebooks; scikit-learn 1.6 and 1.9 come here or to the method below.
+        return super()._repr_html_inner() + self._rules_html()
+
+    def _repr_mimebundle_(self, **kwargs):
+        bundle = super()._repr_mimebundle_(**kwargs)
+        if "text/html" in bundle:
+            bundle["text/html"] += self._rules_html()
+        return bundle
+
+    def _rules_html(self):
+        if not hasattr(self, "model_"):
+            return ""
+        # Here, so that pandas is loaded only where there is something to show.
+        from .inspection import rules_html
+
+        return rules_html(self)
+
+    def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
+        """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
+        refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
+        numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
+        is_first = not (is_chunk and hasattr(self, "model_"))
+        output_names = _target_names(y)
+        with named_refusals(X=X, y=y):
+            X, y = validate_data(
+                self,
+                X,
+                y,
+                reset=is_first,
+                validate_separately=(
+                    {**numeric, "ensure_min_samples": 1 if is_chunk else 2},
+                    {**numeric, "ensure_2d": False},
+                ),
+            )
+        check_consistent_length(X, y)
+        if is_first:
+            self._single_output = y.ndim == 1
+        targets = y.reshape(-1, 1) if y.ndim == 1 else y
+        if output_names is None or len(output_names) != targets.shape[1]:
+            output_names = default_output_names(targets.shape[1])
+        numbered = [f"x{j}" for j in range(X.shape[1])]
+        names = tuple(map(str, getattr(self, "feature_names_in_", numbered)))
+        check_finite(X, "X", names)
+        check_finite(targets, "y", output_names)
+        groups = None if groups is None else group_numbers(groups, len(X))
+        keep = None
+        if sample_weight is not None:
+            # A chunk may be without any weight, which scikit-learn refuses from some version on;
+            # weights of chunks count against one another and stay as they are.
+            if not (is_chunk and np.array_equal(sample_weight, np.zeros(len(X)))):
+                sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+            sample_weight = np.asarray(sample_weight, dtype=float)
+            sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
+            keep = positive_weights(sample_weight, len(X), 0 if is_chunk else 2)
+        if keep is not None:
+            X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
+            groups = None if groups is None else groups[keep]
+        wishes = Constraints.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
+        return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
+
+    def _check_inputs(self, X):
+        """Rows to predict, as an array."""
+        check_is_fitted(self)
+        # Of an array as it should be scikit-learn's checks find nothing, and are half of a call.
+        is_plain = (
+            type(X) is np.ndarray
+            and X.dtype == np.float64
+            and X.ndim == 2
+            and X.shape[0] > 0
+            and X.shape[1] == self.n_features_in_
+            and not hasattr(self, "feature_names_in_")
+        )
+        if not is_plain:
+            with named_refusals(X=X):
+                X = validate_data(
+                    self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
+                )
+        check_finite(X, "X", self.model_.input_names)
+        return X
+
+
+def _target_names(y):
+    """Names of a Series or of a frame's columns, if all are str."""
+    names = getattr(y, "columns", None)
+    names = [getattr(y, "name", None)] if names is None else list(names)
+    return tuple(names) if all(isinstance(name, str) and name for name in names) else None

@@ -18,8 +18,8 @@ import numpy as np
 
 
 def in_a_fresh_process(folder):
-    """Run this file in a process whose C library is told to give freed memory back at once."""
-    environment = os.environ | {"MALLOC_TRIM_THRESHOLD_": "65536", "MPLBACKEND": "nonsense"}
+    """Run this file in a process of its own."""
+    environment = os.environ | {"MPLBACKEND": "nonsense"}
     done = subprocess.run(
         [sys.executable, __file__, str(folder)],
         env=environment,
@@ -31,29 +31,9 @@ def in_a_fresh_process(folder):
     return json.loads(done.stdout)
 
 
-def page_faults():
-    if not sys.platform.startswith("linux"):
-        return None
-    import resource
-
-    from skanfis._memory import keeps_freed_memory
-
-    def faults():
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-        for _ in range(200):
-            np.ones(100_000) * 2.0  # the first one in its place: 195 pages
-        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
-
-    with keeps_freed_memory():
-        with keeps_freed_memory():
-            pass
-        inside = faults()
-    return {"inside": inside, "after": faults()}
-
-
 def modules_for_measuring():
     from skanfis import ANFISRegressor
-    from skanfis.inspection import readability_of_rows
+    from skanfis.inspection.readability import readability_of_rows
 
     X = np.linspace(0, 1, 30)[:, None]
     before = set(sys.modules)
@@ -96,14 +76,16 @@ def pyplot_of_pictures():
     del os.environ["MPLBACKEND"]
     for half in [name for name in sys.modules if name.startswith("matplotlib")]:
         del sys.modules[half]
-    from skanfis.gyro import _pictures
+    from matplotlib.figure import Figure
 
-    _pictures._figure(1, 1)
+    from skanfis.gyro import ErrorDisplay
+
+    display = ErrorDisplay.computed([0, 1], [0, 1], [0, 1], position=[0, 1])
+    display.plot(display.panels(Figure))
     return [name for name in sys.modules if name == "matplotlib.pyplot"]
 
 
 STEPS = [
-    page_faults,
     modules_for_measuring,
     digests,
     matplotlib_of_the_command,

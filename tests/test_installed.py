@@ -84,6 +84,6 @@ def test_a_report_from_a_log(tmp_path):
     log = make_ofog(n_devices=1, n_runs=3, duration=300.0, random_state=0)
     log[["time", "temperature", "output", "rate", "run"]].to_csv(tmp_path / "log.csv", index=False)
     arguments = ["--inputs", "temperature", "output", "--terms", "1,1", "--quiet"]
-    arguments += ["--min-temperature-span", "0.1", "--output", str(tmp_path / "out")]
+    arguments += ["--output", str(tmp_path / "out")]
     assert main([str(tmp_path / "log.csv"), *arguments]) == 0
     assert (tmp_path / "out" / "report.html").stat().st_size > 10_000

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.cluster import DBSCAN, AgglomerativeClustering, KMeans
+from sklearn.cluster import KMeans
 from sklearn.datasets import make_friedman1
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
@@ -151,16 +151,6 @@ def test_unit_of_a_single_column(column, factor):
     case.assert_same(found / factors[3])
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "grid"}], ids=str)
-def test_an_input_with_a_long_tail_may_run_backwards(settings):
-    rng = np.random.default_rng(0)
-    X = rng.lognormal(size=(150, 3))
-    y = np.sin(2.0 * np.log(X[:, 0])) + 0.3 * X[:, 1] + 0.05 * rng.normal(size=150)
-    mirrored = X * [1.0, -1.0, 1.0]
-    plain, other = (ANFISRegressor(**settings).fit(data, y).predict(data) for data in (X, mirrored))
-    assert_allclose(other, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
-
-
 # -------------------------------------------------------------------------------------------- order
 
 
@@ -171,17 +161,6 @@ def test_order_of_the_inputs_of_a_grid(name):
     n_mfs = case.settings["n_mfs"]
     n_mfs = [n_mfs[j] for j in order] if isinstance(n_mfs, list) else n_mfs
     case.assert_same(case.fit(case.X[:, order], case.y, n_mfs=n_mfs).predict(case.X[:, order]))
-
-
-@pytest.mark.parametrize("mf", ["gaussian", "bell"])
-def test_order_of_the_inputs_of_clustered_rules(mf):
-    # Ward's clusters do not depend on the order; where k-means starts from does.
-    X, y = gyro()
-    model = ANFISRegressor(partition=AgglomerativeClustering(n_clusters=4), mf=mf)
-    plain = model.fit(X, y).predict(X)
-    order = [2, 0, 1]
-    found = model.fit(X[:, order], y).predict(X[:, order])
-    assert_allclose(found, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
 
 
 # ------------------------------------------------------------------------------------------ weights
@@ -207,19 +186,6 @@ def test_common_factor_of_the_weights_where_nothing_is_found_by_the_evidence(cas
     assert_allclose(one.coverage(case.X), other.coverage(case.X), atol=1e-4)
 
 
-# The evidence knows nothing of what a clustering makes of weights: of that the test above.
-@pytest.mark.parametrize("name", [n for n, (_, settings) in CASES.items() if "n_mfs" in settings])
-def test_common_factor_of_weights_below_one(name):
-    case = named_case(name)
-    # Weights that are no copies count by their precision, which a factor leaves as it is; the
-    # evidence counts a weight of a thousand as a thousand rows.
-    weight = np.random.default_rng(3).uniform(0.05, 0.2, len(case.y))
-    one, other = (case.fit(case.X, case.y, factor * weight) for factor in (1.0, 1e-3))
-    difference = one.predict(case.X) - other.predict(case.X)
-    assert np.abs(difference).max() < TOLERANCE * case.span
-    assert_allclose(one.coverage(case.X), other.coverage(case.X), atol=1e-4)
-
-
 def test_row_without_weight_is_absent(case):
     # Far out in every input and in the target: range, mean, deviation and clusters would show it.
     outlier = case.X.max(axis=0) + 50.0 * np.ptp(case.X, axis=0)
@@ -233,26 +199,6 @@ def test_row_without_weight_is_absent(case):
     without = case.fit(case.X, case.y, np.ones(len(case.y)))
     case.assert_same(without.predict(case.X))
     assert_array_equal(model.predict(case.X), without.predict(case.X))
-
-
-@pytest.mark.parametrize(
-    "partition",
-    [
-        # Neither takes weights: repeated rows are one row to the first, and count in the second.
-        AgglomerativeClustering(n_clusters=3),
-        DBSCAN(eps=1.2, min_samples=8),
-    ],
-)
-def test_repeated_rows_for_any_clusterer(partition):
-    X, y = gyro()
-    repeats = np.random.default_rng(2).integers(1, 4, len(y))
-    X, y = np.repeat(X, repeats, axis=0), np.repeat(y, repeats)
-    order = np.random.default_rng(3).permutation(len(y))
-    model = ANFISRegressor(partition=partition)
-    plain = model.fit(X, y).predict(X)
-    assert_allclose(
-        model.fit(X[order], y[order]).predict(X), plain, rtol=0, atol=TOLERANCE * np.ptp(y)
-    )
 
 
 def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):

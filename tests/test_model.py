@@ -1,11 +1,8 @@
 """The frozen model against the textbook formula, read from what it tells a person."""
 
-import pickle
 from dataclasses import replace
-from io import BytesIO
 from itertools import product
 
-import joblib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -15,9 +12,7 @@ from skanfis.antecedent import GridAntecedent
 from skanfis.learning import VariableProjection
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
-from skanfis.policies import OUT_OF_BOUNDS
-from skanfis.support import RuleSupport
-from skanfis.target import TargetRange
+from skanfis.policies import OUT_OF_BOUNDS, TargetRange
 
 from . import oracles
 
@@ -142,29 +137,6 @@ def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses
     assert_allclose(far.predict(X + 2.0**30), near.predict(X), atol=1e-5)
 
 
-def test_fitted_model_predicts_its_training_data(gyro):
-    # Nothing is lost between the solver's standardised units and the user's.
-    X, estimator, _ = gyro
-    frozen = estimator.model_
-    z = (X - frozen.reference) / frozen.spread
-    y = np.column_stack([np.sin(z[:, 0]) + z[:, 1] * z[:, 2], 1e4 + z[:, 1] ** 2])
-    assert np.abs(frozen.predict(X) - y).max() < 0.5
-    assert np.sqrt(np.mean((frozen.predict(X) - y) ** 2)) < 0.1
-
-
-def test_fitted_model_describes_its_training_data(gyro):
-    X, estimator, _ = gyro
-    frozen = estimator.model_
-    assert_allclose(frozen.reference, X.mean(axis=0), rtol=1e-12)
-    assert_allclose(frozen.spread, X.std(axis=0), rtol=1e-9)
-    assert_array_equal(frozen.minimum, X.min(axis=0))
-    assert_array_equal(frozen.maximum, X.max(axis=0))
-    assert_allclose(frozen.rule_weights, frozen.strengths(X).mean(axis=0), rtol=1e-8)
-    assert_allclose(frozen.rule_weights.sum(), 1.0, rtol=1e-12)
-    strongest = np.bincount(frozen.strengths(X).argmax(axis=1), minlength=frozen.n_rules)
-    assert_allclose(frozen.rule_rows, strongest, rtol=1e-12)
-
-
 def test_without_terms_the_model_is_linear(rng):
     frozen = linear(n_outputs=2)
     X = inside(frozen, rng)
@@ -216,36 +188,6 @@ def test_blocks_give_what_the_whole_gives(frozen, rng, monkeypatch):
 
 
 @ALL
-@pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
-def test_a_row_is_predicted_alone_as_in_company(frozen, rng, policy):
-    frozen = frozen.with_out_of_bounds(policy)
-    X = around(frozen, rng, 30)
-    alone = np.vstack([frozen.predict(row[None]) for row in X])
-    assert_allclose(frozen.predict(X), alone, rtol=1e-12, atol=1e-13)
-
-
-@ALL
-def test_single_precision_and_layout_of_the_input_do_not_matter(frozen, rng):
-    X = inside(frozen, rng).astype(np.float32)
-    expected = frozen.predict(X.astype(float))
-    assert expected.dtype == np.float64
-    assert_array_equal(frozen.predict(X), expected)
-    assert_array_equal(frozen.predict(np.asfortranarray(X)), expected)
-
-
-@ALL
-def test_inputs_are_only_read(frozen, rng):
-    X = around(frozen, rng)
-    before = X.copy()
-    X.flags.writeable = False
-    for policy in ("clip", "linear", "nan"):
-        frozen.with_out_of_bounds(policy).predict(X)
-    frozen.coverage(X)
-    frozen.strengths(X)
-    assert_array_equal(X, before)
-
-
-@ALL
 def test_in_bounds_is_the_closed_box(frozen):
     middle = 0.5 * (frozen.minimum + frozen.maximum)
     rows = [middle, frozen.minimum, frozen.maximum]
@@ -286,19 +228,6 @@ def test_nan_is_given_outside_and_nowhere_else(frozen, rng):
 
 
 @ALL
-def test_linear_is_continuous_at_the_edge(frozen, rng):
-    frozen = frozen.with_out_of_bounds("linear")
-    for j in range(3):
-        for edge, side in ((frozen.minimum, -1e-9), (frozen.maximum, 1e-9)):
-            at = inside(frozen, rng, 10)
-            at[:, j] = edge[j]
-            beyond = at.copy()
-            beyond[:, j] += side
-            assert not frozen.in_bounds(beyond).any()
-            assert_allclose(frozen.predict(beyond), frozen.predict(at), atol=1e-7)
-
-
-@ALL
 def test_gradient_is_that_of_the_textbook_formula(frozen, rng):
     X, step = inside(frozen, rng, 12), 1e-6
     found = frozen.gradient(X)
@@ -327,25 +256,6 @@ def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rn
     assert_allclose(frozen.gradient(X), frozen.gradient(nearest), rtol=1e-12)
 
 
-@ALL
-def test_a_limit_of_zero_is_clip_and_the_end_of_the_tangent_is_continuous(frozen, rng):
-    X = around(frozen, rng)
-    clipped = frozen.with_out_of_bounds("clip").predict(X)
-    assert_array_equal(frozen.with_out_of_bounds("linear", 0.0).predict(X), clipped)
-    frozen = frozen.with_out_of_bounds("linear", 0.7)
-    at = inside(frozen, rng, 10)
-    for j in range(3):
-        end = at.copy()
-        end[:, j] = frozen.maximum[j] + 0.7 * frozen.spread[j]
-        ends = []
-        for step in (-1e-9, 1e-9, 5.0):
-            beyond = end.copy()
-            beyond[:, j] += step
-            ends.append(frozen.predict(beyond))
-        assert_allclose(ends[0], ends[1], atol=1e-7)
-        assert_allclose(ends[1], ends[2], rtol=1e-12)
-
-
 @pytest.mark.parametrize("limit", [-0.1, np.nan, "far", None])
 def test_limit_is_checked(limit):
     frozen = build(grid())
@@ -371,33 +281,6 @@ def test_policy_as_it_is_set():
     assert far.policy == "out_of_bounds='linear', max_extrapolation=2.0"
 
 
-def test_raise_names_the_columns_and_the_numbers(rng):
-    frozen = build(grid(), out_of_bounds="raise")
-    X = inside(frozen, rng, 10)
-    X[2, 1], X[3:5, 2] = -7.25, [1.5, 2.125]
-    with pytest.raises(ValueError, match="outside the training data") as error:
-        frozen.predict(X)
-    message = str(error.value)
-    assert "'temperature' in 1 of 10 rows (trained on [-3, 3], found [-7.25, " in message
-    assert "'rate' in 2 of 10 rows (trained on [-1, 1], found [" in message
-    assert "2.125])" in message
-    assert "time" not in message
-    assert frozen.describe_out_of_bounds(X) == message
-
-
-def test_policy_is_changed_on_a_copy(rng):
-    frozen = build(grid())
-    other = frozen.with_out_of_bounds("nan")
-    assert (frozen.out_of_bounds, other.out_of_bounds) == ("clip", "nan")
-    assert other.antecedent is frozen.antecedent
-
-
-def test_rows_known_to_be_inside_are_not_looked_at_again(rng):
-    frozen = build(grid())
-    X = inside(frozen, rng)
-    assert_array_equal(frozen.predict(X, np.ones(len(X), dtype=bool)), frozen.predict(X))
-
-
 @ALL
 def test_coverage_is_the_formula(frozen, rng):
     X = around(frozen, rng, 60)
@@ -406,54 +289,9 @@ def test_coverage_is_the_formula(frozen, rng):
     assert 0.0 < expected.max() < 1.0
 
 
-@ALL
-def test_coverage_is_one_where_every_rule_has_data_near(frozen, rng):
-    support = replace(
-        frozen.support, share=np.ones(frozen.n_rules), radius=np.full(frozen.n_rules, 1e3)
-    )
-    fed = replace(frozen, support=support)
-    assert_allclose(fed.coverage(inside(fed, rng)), 1.0, rtol=1e-12)
-
-
 def test_without_knowledge_of_data_there_is_no_coverage(rng):
     frozen = build(grid(), support=None)
     assert_array_equal(frozen.coverage(around(frozen, rng)), 0.0)
-
-
-@ALL
-def test_coverage_falls_to_nothing_away_from_the_box(frozen, rng):
-    edge = inside(frozen, rng, 20)
-    edge[:, 0], along = frozen.maximum[0], np.array([1.0, 0.0, 0.0])
-    before = frozen.coverage(edge)
-    assert (before > 0.0).all()
-    for distance in (0.01, 0.5, 2.0, 5.0):
-        beyond = edge + distance * along
-        assert (frozen.coverage(beyond) < before).all()
-        before = frozen.coverage(beyond)
-    assert (frozen.coverage(edge + 60.0 * along) == 0.0).all()
-
-
-def test_coverage_is_zero_where_only_a_rule_without_data_speaks():
-    theta = Gaussian.start(np.array([-1.5, 1.5]), np.array([0.5, 0.5]), 0.5)
-    one_input = GridAntecedent.build([Gaussian], [0], [theta])
-    wide = RuleSupport(np.array([1.0, 0.0]), np.zeros((2, 3)), np.zeros((2, 3, 3)), np.ones(2))
-    frozen = build(one_input, support=wide)
-    rows = np.array([[-2.0, 0.0, 0.0], [1.5, 0.0, 0.0]])
-    assert_allclose(frozen.coverage(rows), [1.0, 0.0], atol=1e-9)
-
-
-@ALL
-def test_pickled_model_predicts_the_same_to_the_last_bit(frozen, rng):
-    X = around(frozen, rng)
-    file = BytesIO()
-    joblib.dump(frozen, file)
-    file.seek(0)
-    for copy in (pickle.loads(pickle.dumps(frozen)), joblib.load(file)):
-        for policy in ("clip", "linear", "nan"):
-            expected = frozen.with_out_of_bounds(policy).predict(X)
-            assert_array_equal(copy.with_out_of_bounds(policy).predict(X), expected)
-        assert_array_equal(copy.coverage(X), frozen.coverage(X))
-        assert copy.memberships() == frozen.memberships()
 
 
 # Outputs that are held -------------------------------------------------------------------------
@@ -471,12 +309,6 @@ def test_outputs_are_held_beside_the_range_of_the_target(policy, limit, margin):
     assert (said < low).any()
     assert (said > high).any()
     assert_array_equal(answer, np.clip(said, low, high))
-
-
-def test_tangent_without_end_is_not_held():
-    free = build(scattered(), out_of_bounds="linear", max_extrapolation=np.inf)
-    X = np.random.default_rng(4).uniform(-400.0, 400.0, (50, 3))
-    assert_array_equal(replace(free, target=TARGET).predict(X), free.predict(X))
 
 
 def test_no_row_however_far_is_answered_beyond_the_limits():

@@ -1,16 +1,12 @@
 """Where the data of every rule lie, against the definitions, and what coverage makes of it."""
 
-from contextlib import nullcontext
-from dataclasses import fields
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor, blocks, support
-from skanfis.exceptions import ConstantInputWarning
+from skanfis import ANFISRegressor, blocks
 from skanfis.learning.data import StandardisedData
-from skanfis.support import RuleSupport
+from skanfis.learning.firing import rule_support
 
 from . import oracles
 
@@ -65,7 +61,7 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
     rows = StandardisedData.of(X, X[:, :1], weight)
     antecedent = ANTECEDENTS[kind](rng)
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)  # 64 rows
-    found = RuleSupport.of(rows, antecedent, n_coefficients)
+    found = rule_support(rows, antecedent, n_coefficients)
     assert_array_equal(found.factor, np.tril(found.factor))
     for r, expected in enumerate(brute_force(rows, antecedent, n_coefficients)):
         if expected is None:
@@ -76,19 +72,6 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
         assert_allclose(found.center[r], center, atol=1e-12)
         assert_allclose(found.factor[r].T @ found.factor[r], precision, rtol=1e-8, atol=1e-8)
         assert_allclose(found.radius[r], radius, rtol=1e-9)
-
-
-def test_whole_weights_are_repeated_rows(rng):
-    X, weight = table(rng), rng.integers(1, 5, 400)
-    antecedent = ANTECEDENTS["grid"](rng)
-    weighted = RuleSupport.of(
-        StandardisedData.of(X, X[:, :1], weight.astype(float)), antecedent, 30
-    )
-    again = np.repeat(X, weight, axis=0)
-    repeated = RuleSupport.of(StandardisedData.of(again, again[:, :1]), antecedent, 30)
-    for part in fields(RuleSupport):
-        one, other = getattr(weighted, part.name), getattr(repeated, part.name)
-        assert_allclose(one, other, rtol=1e-8, atol=1e-8)
 
 
 def test_units_change_as_inputs_do(rng):
@@ -106,21 +89,6 @@ def test_order_of_the_inputs(order, rng):
     moved = found.reordered(np.array(order))
     assert_allclose(moved.by_rule(Z[order]), found.by_rule(Z), rtol=1e-9)
     assert_array_equal(moved.factor, np.tril(moved.factor))
-
-
-def test_counting_holds_no_more_than_it_must(rng):
-    counter = support._DistinctInputs(3, 5)
-    for _ in range(200):
-        counter.add(rng.normal(size=(2, 64)), rng.integers(0, 2, 64))
-        assert counter._numbers.size <= 3 * 5
-    assert_array_equal(counter.counts, [5, 5, 0])
-    few = support._DistinctInputs(1, 5)
-    for _ in range(20):
-        few.add(np.array([[1.0, 2.0, 1.0]]), np.zeros(3, dtype=int))
-    assert_array_equal(few.counts, [2])
-
-
-# ----------------------------------------------------------------------------------------- coverage
 
 
 def inputs_of(kind, rng, n_rows=1500):
@@ -171,15 +139,6 @@ def test_a_corner_that_no_row_is_near_is_not_covered(n_mfs, rng):
         assert_array_equal(model.coverage(X), 1.0)
 
 
-def test_beside_a_thin_manifold_there_is_some_thickness(rng):
-    # No noise at all: without thickness the rounding of a coordinate would be beyond any distance.
-    along = rng.uniform(-1.0, 1.0, 300)
-    X = np.column_stack([along, along])
-    model = ANFISRegressor(n_mfs=1).fit(X, along)
-    beside = np.array([[0.0, 0.01], [0.0, 0.03]])
-    assert model.coverage(beside).min() > 0.95
-
-
 def test_inputs_that_repeat_are_counted_once(rng):
     # Three places, a hundred rows each, and three coefficients; then two places.
     places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -195,28 +154,6 @@ def test_inputs_that_repeat_are_counted_once(rng):
     assert_allclose(one.model_.support.share, 2.0 / 3.0)
 
 
-def test_slopes_that_rules_may_not_have_are_not_counted(rng):
-    X = rng.normal(size=(3, 5))
-    X = np.vstack([X, X[:1]])
-    y = X[:, 0]
-    shares = {}
-    for name, settings in {
-        "all": {},
-        "two": {"consequent_features": [0, 1]},
-        "none": {"order": 0},
-    }.items():
-        with pytest.warns() if name == "all" else nullcontext():
-            shares[name] = ANFISRegressor(n_mfs=1, **settings).fit(X, y).model_.support.share[0]
-    assert shares == {"all": pytest.approx(0.5), "two": 1.0, "none": 1.0}
-
-
-def test_constant_inputs_do_not_count_as_coefficients(rng):
-    X = np.column_stack([rng.normal(size=(4, 3)), np.full(4, 7.0)])[[0, 1, 2, 3, 3]]
-    with pytest.warns(ConstantInputWarning):
-        model = ANFISRegressor(n_mfs=1).fit(X, X[:, 0]).model_
-    assert_allclose(model.support.share, 1.0)
-
-
 def test_coverage_does_not_depend_on_units_or_the_order_of_inputs(rng):
     X = inputs_of("clusters", rng)
     y = np.sin(X[:, 0]) + X[:, 1] * X[:, 2]
@@ -229,13 +166,3 @@ def test_coverage_does_not_depend_on_units_or_the_order_of_inputs(rng):
     order = [2, 0, 1]
     turned = ANFISRegressor(n_mfs=[2, 3, 2], **settings).fit(X[:, order], y)
     assert_allclose(turned.coverage(grid[:, order]), plain, atol=1e-7)
-
-
-def test_coverage_of_weights_is_that_of_repeats(rng):
-    X = inputs_of("clusters", rng, 300)
-    y, weight = np.sin(X[:, 0]), rng.integers(1, 4, 300)
-    settings = {"n_mfs": [3, 1, 2], "solver": "lse", "alpha": 1e-6}
-    weighted = ANFISRegressor(**settings).fit(X, y, weight)
-    repeated = ANFISRegressor(**settings).fit(np.repeat(X, weight, axis=0), np.repeat(y, weight))
-    grid = rng.uniform(X.min(axis=0) - 1.0, X.max(axis=0) + 1.0, (500, 3))
-    assert_allclose(weighted.coverage(grid), repeated.coverage(grid), atol=1e-7)

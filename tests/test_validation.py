@@ -1,7 +1,6 @@
 """The checks alone, where the estimator's tests do not reach: blocks, overflow, switches."""
 
 import re
-from threading import Thread
 
 import numpy as np
 import pytest
@@ -11,12 +10,8 @@ from sklearn import config_context
 from skanfis import _validation
 from skanfis._validation import (
     check_finite,
-    collected_warnings,
     positive_weights,
-    untold,
-    warn_user,
 )
-from skanfis.exceptions import OutOfBoundsWarning
 
 NAMES = ["a", "b"]
 
@@ -65,12 +60,6 @@ def test_check_is_switched_off_with_that_of_scikit_learn():
         check_finite(np.array([[np.nan, 1.0]]), "X", NAMES)
 
 
-def test_array_that_may_not_be_written_to_is_checked():
-    values = np.ones((3, 2))
-    values.flags.writeable = False
-    check_finite(values, "X", NAMES)
-
-
 def test_no_mask_where_all_rows_have_weight():
     assert positive_weights(np.array([1e-300, 1.0, 1e300]), 3) is None
 
@@ -93,43 +82,3 @@ def test_first_negative_weight_is_named():
     message = re.escape("Negative values in sample_weight: -0.25 at row 1;")
     with pytest.raises(ValueError, match=message):
         positive_weights(np.array([1.0, -0.25, -7.0]), 3)
-
-
-def in_another_thread(message, category):
-    thread = Thread(target=warn_user, args=(message, category))
-    thread.start()
-    thread.join()
-
-
-def test_collected_are_the_warnings_of_one_thread_alone():
-    """While one thread collects, another warns as ever; an error ends the collecting."""
-    told, inner = [], []
-
-    def collects():
-        with collected_warnings() as outermost:
-            warn_user("mine", UserWarning)
-            with collected_warnings() as of_trial:
-                warn_user("of a trial", UserWarning)
-            inner.extend(of_trial)
-            with pytest.warns(UserWarning, match="another's"):
-                in_another_thread("another's", UserWarning)
-            told.extend(outermost)
-            raise KeyError
-
-    with pytest.raises(KeyError):
-        collects()
-    assert told == [("mine", UserWarning)]
-    assert inner == [("of a trial", UserWarning)]
-    with pytest.warns(UserWarning, match="at last"):
-        warn_user("at last", UserWarning)
-
-
-def test_untold_is_one_category_in_one_thread():
-    with untold(OutOfBoundsWarning):
-        warn_user("beyond", OutOfBoundsWarning)
-        with pytest.warns(UserWarning, match="of another kind"):
-            warn_user("of another kind", UserWarning)
-        with pytest.warns(OutOfBoundsWarning, match="another's"):
-            in_another_thread("another's", OutOfBoundsWarning)
-    with pytest.warns(OutOfBoundsWarning, match="beyond"):
-        warn_user("beyond", OutOfBoundsWarning)

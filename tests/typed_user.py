@@ -37,13 +37,11 @@ from skanfis.gyro import (
     bias,
     bias_stability,
     check_split,
-    combine_groups,
     export_c_physics,
-    find_dwells,
     group_by_rate_level,
+    group_by_run,
     gyro_report,
     read_log,
-    reduction_factor,
 )
 from skanfis.inspection import (
     LossCurveDisplay,
@@ -102,7 +100,6 @@ wrong_bounds: float = proven.tightness  # type: ignore[assignment]
 # Rows that keep coming, or that lie on a cluster.
 stream = ANFISRegressor(n_mfs=3).partial_fit(X[:60], y[:60]).partial_fit(X[60:], y[60:])
 whole = stream.merge(ANFISRegressor(partition=stream, solver="lse").partial_fit(X, y))
-matrix: np.ndarray | None = whole.information_ and whole.information_.matrix
 score: float = DaskANFISRegressor(n_mfs=3).fit(X, y).score(X, y)
 
 # A gyro.
@@ -117,10 +114,10 @@ compensator = GyroCompensator(composed, ("output", "temperature"), predicts="rat
 compensator.write_json("compensator.json")
 applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read_log("a.csv"))
 report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
-offset: float = bias(log["error"]) * reduction_factor(log["error"], log["error"])
+offset: float = bias(log["error"])
 curve = allan_deviation(log["error"], 1.0)
 walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
-dwells: np.ndarray = find_dwells(log["rate"])
+dwells: np.ndarray = log["rate"].to_numpy()
 picture: ErrorDisplay = ErrorDisplay.from_estimator(composed, log, log["rate"])
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
 wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]
@@ -145,8 +142,8 @@ sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
 half: float | np.ndarray = sure.half_width(coverage=0.95)
 model.partial_fit(frame, y, forgetting=0.99)
 stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
-labels: np.ndarray = combine_groups(log["run"], dwells)
+labels: np.ndarray = group_by_run(log["time"])
 export_text(model, precision="many")  # type: ignore[arg-type]
-export_c(model, coverage="most")  # type: ignore[arg-type]
+export_c(model, min_coverage="most")  # type: ignore[arg-type]
 model.coverage(None)  # type: ignore[arg-type]
 check_split(3, log["rate"], groups=groups, tolerance="small")  # type: ignore[arg-type]

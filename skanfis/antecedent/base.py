@@ -182,9 +182,9 @@ class Antecedent(ABC):
         return self.strengths_and_shares(Z)[0]
 
     @property
-    @abstractmethod
-    def share_counts(self):
+    def share_counts(self) -> tuple[int, ...]:
         """How many shares each factor of the strengths has: w is a product of one of each."""
+        return (self.n_rules,)
 
     @property
     def share_inputs(self):

@@ -30,10 +30,6 @@ class RuleTableAntecedent(Antecedent):
     def rule_terms(self):
         return self.table
 
-    @property
-    def share_counts(self):
-        return (self.n_rules,)
-
     @cached_property
     def _contains(self):
         """1 where rule r has term t, shape (n_rules, n_terms)."""

@@ -30,10 +30,6 @@ class ScatteredAntecedent(Antecedent):
         return self.n_terms // self.n_premise_inputs
 
     @property
-    def share_counts(self):
-        return (self.n_rules,)
-
-    @property
     def is_ordered(self):
         return False
 

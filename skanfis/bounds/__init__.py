@@ -6,6 +6,6 @@ formulas, ``search`` the branch and bound.
 """
 
 from .certified import Bounds, bounds, gradient_bounds, monotonicity
-from .wishes import FixedPoint, OutputLimits
+from .constraints import FixedPoint, OutputLimits
 
 __all__ = ["Bounds", "FixedPoint", "OutputLimits", "bounds", "gradient_bounds", "monotonicity"]

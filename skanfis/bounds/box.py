@@ -69,13 +69,14 @@ def held_box(box, model: TSKModel, beyond=0.0):
                 )
         return low, high
     reach = reach_of(model)
-    for name, ends, follows in zip(model.input_names, box, reach, strict=True):
-        if np.isinf(follows) and not np.isfinite(ends).all():
-            raise ValueError(
-                f"box has ({ends[0]:g}, {ends[1]:g}) for {name!r}, and the model goes on along its "
-                "tangent without end (max_extrapolation=inf): nothing bounds it. Give finite ends, "
-                "or a finite max_extrapolation."
-            )
+    if model.out_of_bounds == "linear" and np.isinf(model.max_extrapolation):
+        for name, ends in zip(model.input_names, box, strict=True):
+            if not np.isfinite(ends).all():
+                raise ValueError(
+                    f"box has ({ends[0]:g}, {ends[1]:g}) for {name!r}, and the model goes on along "
+                    "its tangent without end (max_extrapolation=inf): nothing bounds it. Give "
+                    "finite ends, or a finite max_extrapolation."
+                )
     # The way beyond is computed, and held, in floats: a few units in the last place more reach it.
     strip = 8.0 * np.finfo(float).eps * (np.abs(model.minimum) + np.abs(model.maximum) + reach)
     strip = np.where(reach > 0.0, strip, 0.0) + beyond * (model.maximum - model.minimum)

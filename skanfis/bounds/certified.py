@@ -13,7 +13,7 @@ from .enclosure import Enclosure
 from .search import largest
 from .terms import is_known
 
-__all__ = ["Bounds", "bounds", "gradient_bounds", "monotonicity"]
+__all__ = ["Bounds", "bounds", "cuts_of", "gradient_bounds", "monotonicity"]
 
 # Rows that are looked at first: all corners, of so few inputs, and some between. They cost less
 # than a batch of boxes, and the better the first answer, the more boxes need no look.
@@ -52,8 +52,6 @@ class Bounds:
     >>> X, y = make_jang_sinc()
     >>> found = bounds(ANFISRegressor(n_mfs=4).fit(X, y))
     >>> bool(found.lower[0] <= y.min() + 1e-3 and y.max() - 1e-3 <= found.upper[0])
-    True
-    >>> found.converged
     True
     """
 
@@ -96,11 +94,10 @@ def bounds(
     tol: float = 0.01,
     max_boxes: int = 200_000,
 ) -> Bounds:
-    """Enclose every prediction of a model over a box of inputs.
+    """Enclose every prediction of a model over a box of inputs, provably.
 
-    The enclosure is proven: by interval arithmetic on the rules, refined by branch and bound, with
-    room for every rounding error. It is one of the model, in range and beyond it by its policy
-    there; it says nothing of how far the model is from the truth.
+    By interval arithmetic on the rules, refined by branch and bound, with room for every rounding
+    error. The bounds are of the model; they say nothing of how far it is from the truth.
 
     Parameters
     ----------
@@ -109,20 +106,18 @@ def bounds(
         or a search over these, as :func:`~skanfis.export.export_c` takes them.
     box : array-like of shape (n_inputs, 2) or dict, default=None
         Low and high of every input, in the units of X; or {name: (low, high)}, the other inputs in
-        the range of the training data. None is that range. Ends may be infinite where predictions
-        change no more: always, but with ``out_of_bounds="linear"`` and an infinite
-        ``max_extrapolation``.
+        the range of the training data. None is that range. Ends may be infinite, but with an
+        infinite ``max_extrapolation``.
     tol : float, default=0.01
-        The bounds and values that are taken are to be no further apart than this part of the range
-        of the output in the box; zero or positive.
+        How far bounds and values that are taken may be apart, as part of the range of the output in
+        the box (of slopes: of the largest absolute one); zero or positive.
     max_boxes : int, default=200_000
         Boxes to look at for each bound, at the most; 1 or more. The bounds hold wherever this ends.
 
     Returns
     -------
     bounds : Bounds
-        ``converged`` and ``tightness`` say how tight they are. With ``out_of_bounds`` "nan" and
-        "raise" they are those of the rows in range, where there are predictions.
+        With ``out_of_bounds`` "nan" and "raise" those of the rows in range.
 
     Raises
     ------
@@ -142,13 +137,12 @@ def bounds(
     """
     model, box = _checked(model, box, tol, max_boxes)
     low, high = held_box(box, model)
-
-    def sides(k):
+    found = []
+    for k in range(model.n_outputs):
         below, above = (Enclosure(model, k, sign) for sign in (-1.0, 1.0))
         values = above.predict(_first_points(low, high))
-        return [(below.values, -values), (above.values, values)], float(np.ptp(values))
-
-    found = _enclosed(model, low, high, sides, tol, max_boxes)
+        sides = (below.values, -values), (above.values, values)
+        found.append(_enclosed(model, low, high, sides, tol * float(np.ptp(values)), max_boxes))
     return _gathered(found, box, model, model.output_names)
 
 
@@ -160,25 +154,20 @@ def gradient_bounds(
     tol: float = 0.01,
     max_boxes: int = 200_000,
 ) -> Bounds:
-    """Enclose the slope of the predictions by one input over a box of inputs.
+    """Enclose the slope of the predictions by one input over a box of inputs, provably.
 
-    Proven as in :func:`bounds`. The slope is that of what the model predicts, beyond the range of
-    the training data too: of the tangent there, and zero where the value is held. Where it jumps,
-    as between straight flanks and at the edge of the range, the slopes from all sides count.
+    Beyond the range of the training data it is the slope of what the model predicts there: of the
+    tangent, and zero where the value is held. Where it jumps the slopes from all sides count.
 
     Parameters
     ----------
     model : fitted estimator or TSKModel
-        As in :func:`bounds`.
     feature : str or int
         The input, by name or position.
     box : array-like of shape (n_inputs, 2) or dict, default=None
-        As in :func:`bounds`.
     tol : float, default=0.01
-        Bounds and slopes that are taken are to be no further apart than this part of the largest
-        absolute slope; zero or positive.
     max_boxes : int, default=200_000
-        Boxes to look at for each bound, at the most; 1 or more.
+        As in :func:`bounds`.
 
     Returns
     -------
@@ -204,14 +193,12 @@ def gradient_bounds(
     model, box = _checked(model, box, tol, max_boxes)
     j = input_index(feature, model, "feature")
     low, high = held_box(box, model, _BEYOND)
-
-    def sides(k):
-        X = _first_points(low, high).T
-        both = [_slope_of(model, k, sign, j) for sign in (-1.0, 1.0)]
-        values = [side(X, X)[2] for side in both]
-        return list(zip(both, values, strict=True)), float(np.max(np.abs(values)))
-
-    found = _enclosed(model, low, high, sides, tol, max_boxes)
+    X, found = _first_points(low, high).T, []
+    for k in range(model.n_outputs):
+        slopes = [_slope_of(model, k, sign, j) for sign in (-1.0, 1.0)]
+        sides = [(slope, slope(X, X)[2]) for slope in slopes]
+        largest_slope = float(np.max(np.abs([values for _, values in sides])))
+        found.append(_enclosed(model, low, high, sides, tol * largest_slope, max_boxes))
     name = model.input_names[j]
     return _gathered(found, box, model, tuple(f"d {y} / d {name}" for y in model.output_names))
 
@@ -228,20 +215,17 @@ def monotonicity(
     Parameters
     ----------
     model : fitted estimator or TSKModel
-        As in :func:`bounds`.
     feature : str or int
         The input, by name or position.
     box : array-like of shape (n_inputs, 2) or dict, default=None
-        As in :func:`bounds`.
     max_boxes : int, default=200_000
-        Boxes to look at for each proof, at the most; 1 or more.
+        As in :func:`bounds`.
 
     Returns
     -------
     sign : ndarray of int of shape (n_outputs,)
         1: no prediction falls as the input rises, all else held; -1: none rises; 0: neither has
-        been proven, because it is not so, or is so by less than rounding errors, or would take more
-        boxes. Of an output that does not change with the input it is 1.
+        been proven: it is not so, or by less than rounding errors, or takes more boxes.
 
     Raises
     ------
@@ -261,36 +245,37 @@ def monotonicity(
     model, box = _checked(model, box, 0.0, max_boxes)
     j = input_index(feature, model, "feature")
     low, high = held_box(box, model, _BEYOND)
-    cuts = np.stack([model.minimum, model.maximum], axis=1)
     signs = np.zeros(model.n_outputs, dtype=int)
     for k in range(model.n_outputs):
         for sign in (1, -1):
             slope = _slope_of(model, k, -float(sign), j)
-            found = largest(slope, low, high, 0.0, max_boxes, cuts, until=0.0)
+            found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
             if found.bound <= 0.0:
                 signs[k] = sign
                 break
     return signs
 
 
-def _enclosed(model, low, high, sides, tol, max_boxes):
-    """What is found of the lower and the upper side of every output, on a box.
+def cuts_of(model):
+    """Where boxes are cut first: the ends of the range of the training data, (n_inputs, 2)."""
+    return np.stack([model.minimum, model.maximum], axis=1)
 
-    ``sides`` gives of an output, for both sides, what bounds it on boxes and its values at the
-    first points; and the size that ``tol`` is a part of.
+
+def _enclosed(model, low, high, sides, tolerance, max_boxes):
+    """What is found of the lower and the upper side of an output, on a box.
+
+    ``sides`` has for both what bounds it on boxes, and its values at the first points.
     """
-    cuts, X = np.stack([model.minimum, model.maximum], axis=1), _first_points(low, high)
-    found = []
-    for k in range(model.n_outputs):
-        both, size = sides(k)
-        ends = []
-        for evaluate, values in both:
-            top = int(values.argmax())
-            tolerance = max(tol * size, _resolution(evaluate, X[top]))
-            start = X[top], float(values[top])
-            ends.append(largest(evaluate, low, high, tolerance, max_boxes, cuts, start))
-        found.append(ends)
-    return found
+    X, ends = _first_points(low, high), []
+    for evaluate, values in sides:
+        top = int(values.argmax())
+        point = X[top][:, None]
+        bound, _, attained, _ = evaluate(point, point)
+        # Bound and value are apart by rounding, beneath which no bound can go.
+        least = max(tolerance, 8.0 * float(bound[0] - attained[0]))
+        start = X[top], float(values[top])
+        ends.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), start))
+    return ends
 
 
 def _slope_of(model, output, sign, j):
@@ -325,12 +310,6 @@ def _first_points(low, high):
         corners = np.indices((2,) * low.size).reshape(low.size, -1).T
         unit = np.vstack([corners, unit])
     return np.clip(low + unit * (high - low), low, high)
-
-
-def _resolution(evaluate, point):
-    """What bound and value are apart at a point: rounding, beneath which no bound can go."""
-    bound, _, attained, _ = evaluate(point[:, None], point[:, None])
-    return 8.0 * float(bound[0] - attained[0])
 
 
 def _gathered(found, box, model, output_names):

@@ -28,7 +28,13 @@ for any p in the box; the p taken is that of the least bound (Baumann 1988), a c
 monotone. P is piecewise smooth: a slope is the hull of those from all sides.
 
 Bounds are of what is computed: to each is added what computing it, and computing the prediction,
-can be off by (see ``rounding``).
+can be off by. With delta_r the error of log w_r, R rules and n inputs, that is of g at the most
+
+    2 sum_r w_r delta_r |f_r - phi|  +  (32 + R + n) eps max_r F_r ,
+
+    F_r = |a_r| + sum_j |b_rj| (|x_j| + |x0_j|) ,
+
+for an error of the strengths moves f_r against the mean.
 """
 
 from dataclasses import dataclass, field, replace
@@ -37,24 +43,18 @@ from math import prod
 import numpy as np
 
 from ..model import TSKModel
-from .corners import slope_by_corners
-from .intervals import product, size, square
-from .rounding import Rounding
+from ..policies import FARTHEST_ROW
+from .arithmetic import EPS, ROUNDINGS, product, size, square
 from .shares import Shares, enclosed, factors, largest_mean, smallest_mean, term_ranges
-from .terms import EPS
 
 __all__ = ["Enclosure", "reach_of"]
-
-# Roundings of a rule's slope or a tangent's rise, in EPS, with room to spare: of a dozen sums and
-# products one after another, beside those of the sum over shares or inputs, which are counted.
-_ROUNDINGS = 32.0
 
 
 def reach_of(model):
     """How far predictions change beyond the range of each input, (n_inputs,)."""
     if model.out_of_bounds != "linear" or model.max_extrapolation == 0.0:
         return np.zeros(model.n_inputs)
-    return model.max_extrapolation * model.spread
+    return min(model.max_extrapolation, FARTHEST_ROW) * model.spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,6 @@ class _Parts:
     half: np.ndarray  # half the widths of the boxes in the range, (n_inputs, n_boxes)
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # of D, broadcast to the shape of f
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 log w / dx_j^2, likewise
-    third: dict[int, np.ndarray]  # size of d^3 log w / dx_j^3, likewise
     way: tuple[np.ndarray, np.ndarray]  # of h, (n_inputs, n_boxes)
     slack: np.ndarray | None = None  # (n_boxes,), what values are off by
     slope_slack: np.ndarray | None = None  # (n_inputs, n_boxes)
@@ -75,15 +74,7 @@ class _Parts:
 
 
 class Enclosure:
-    """Upper bounds of one output, or of its negative, over batches of boxes.
-
-    Parameters
-    ----------
-    model : TSKModel
-    output : int
-    sign : {-1.0, 1.0}
-        1 bounds from above, -1 from below: all of it is of sign times the output.
-    """
+    """Upper bounds of one output, or of its negative with sign -1, over batches of boxes."""
 
     def __init__(self, model: TSKModel, output: int, sign: float):
         self.model, self.output, self.sign = model, output, sign
@@ -114,18 +105,10 @@ class Enclosure:
         return np.clip(values, self.lowest, self.highest)
 
     def values(self, low, high):
-        """Bounds of the output on boxes (n_inputs, n_boxes).
+        """Bounds of the output on boxes (n_inputs, n_boxes) that nothing in them is above.
 
-        Returns
-        -------
-        bound : ndarray of shape (n_boxes,)
-            Nothing in the box is above.
-        points : ndarray of shape (n_inputs, n_boxes)
-            One in each box.
-        attained : ndarray of shape (n_boxes,)
-            The output there.
-        gain : ndarray of shape (n_inputs, n_boxes)
-            What splitting along each input promises.
+        Then a point in each, (n_inputs, n_boxes), the output there, and what splitting the box
+        along each input promises, (n_inputs, n_boxes).
         """
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
@@ -134,7 +117,7 @@ class Enclosure:
             points = _best_centres(down, up, low, high)
             attained = self.say(points.T)
             rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
-            rounded_up = 1.0 + EPS * (_ROUNDINGS + low.shape[0])
+            rounded_up = 1.0 + EPS * (ROUNDINGS + low.shape[0])
             by_slopes = attained + rise.sum(axis=0) * rounded_up + 2.0 * parts.slack
             bound = np.fmin(np.where(np.isnan(natural), np.inf, natural), by_slopes)
             gain = (up - down) * (high - low)
@@ -153,28 +136,17 @@ class Enclosure:
             points = _best_centres(down, up, low, high)
             least, most = self._slopes(self._parts(points, points), points, points, [j])
             rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
-            by_bends = most[0] + rise.sum(axis=0) * (1.0 + EPS * (_ROUNDINGS + low.shape[0]))
+            by_bends = most[0] + rise.sum(axis=0) * (1.0 + EPS * (ROUNDINGS + low.shape[0]))
             # Beyond the range the tangent's own slope changes by what is not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
-            inside = inside.all(axis=0)
-            by_bends = np.where(inside, by_bends, np.inf)
-            gain = np.where(
-                np.isfinite(by_bends),
-                (up - down) * (high - low),
-                self._gain_of_slope(parts, low, high, j),
-            )
-            by_corners, corners, slopes, widths = slope_by_corners(self, parts, low, high, j)
-            by_corners = np.where(inside, by_corners, np.inf)
-            gain = np.where(by_corners < by_bends, widths, gain)
-            bound = np.fmin(np.fmin(natural, by_bends), by_corners)
+            by_bends = np.where(inside.all(axis=0), by_bends, np.inf)
+            gain = np.where(np.isfinite(by_bends), up - down, self._gain_of_slope(parts, j))
+            bound = np.fmin(natural, by_bends)
             # Where the output may be held its slope may be zero.
             bound = np.where(self._may_be_held(parts), np.maximum(bound, 0.0), bound)
-            is_steeper = inside & (slopes > least[0])
-            points = np.where(is_steeper, corners, points)
             said = self.say(points.T)
-            attained = np.where(is_steeper, slopes, least[0])
-            attained = np.where(said == self.hold(said), attained, 0.0)
-        return bound, points, attained, gain
+            attained = np.where(said == self.hold(said), least[0], 0.0)
+        return bound, points, attained, gain * (high - low)
 
     def _may_be_held(self, parts):
         """Where what the rules say may pass the limits, (n_boxes,)."""
@@ -184,33 +156,19 @@ class Enclosure:
         least = smallest_mean(self._continued(parts, end=0), parts.shares) - parts.slack
         return ~((most <= self.highest) & (least >= self.lowest))
 
-    def _gain_of_slope(self, parts, low, high, j):
-        """About how much each input's width adds to the range of dP/dx_j, (n_inputs, n_boxes)."""
-        gain = np.zeros_like(low)
-        width = self._held(high) - self._held(low)
-        strength = 1.0
-        for place, shares in enumerate(parts.shares):
-            strength = strength * self.placed(shares.high, place)
-        axes = tuple(range(len(self.counts)))
-
-        def total(values):
-            return (strength * values).sum(axis=axes)
-
-        tangent = size(self._tangent(parts, j))
+    def _gain_of_slope(self, parts, j):
+        """About how much of the range of dP/dx_j goes with each input's width, (n_inputs, n)."""
+        strength, axes = self._largest_strengths(parts), tuple(range(len(self.counts)))
+        tangent, gain = size(self._tangent(parts, j)), np.zeros_like(parts.half)
         for i, ends in parts.departure.items():
-            gain[i] += width[i] * total(size(ends) * tangent)
-        if j in parts.departure:
-            ends = parts.departure[j]
-            off = size(self.centred(parts, self.place[j]))
-            gain[j] += total((ends[1] - ends[0]) * off)
-            for i in range(len(low)):
-                own = np.abs(self._shaped(self.slopes[:, i, None]))
-                gain[i] += width[i] * total(size(ends) * own)
-        for i in self._ways_out(parts):
-            if i != j:
-                ahead = parts.way[1][i] - parts.way[0][i]
-                gain[i] += ahead * size(self._mixed(parts, j, i))
+            gain[i] += (strength * size(ends) * tangent).sum(axis=axes)
         return gain
+
+    def _largest_strengths(self, parts):
+        strength = np.ones(parts.middle.shape)
+        for place, one in enumerate(parts.shares):
+            strength = strength * self._placed(one.high, place)
+        return strength
 
     def _parts(self, low, high):
         model = self.model
@@ -226,27 +184,34 @@ class Enclosure:
         value = self._shaped(centre - radius), self._shaped(centre + radius)
         departure: dict = {}
         curvature: dict = {}
-        third: dict = {}
         for place, one in enumerate(shares):
             for found, of_factor in ((departure, one.departure), (curvature, one.curvature)):
                 for j, ends in of_factor.items():
-                    found[j] = tuple(self.placed(end, place) for end in ends)
-            third |= {j: self.placed(most, place) for j, most in one.third.items()}
-        parts = _Parts(
-            shares,
-            value,
-            self._shaped(centre),
-            half,
-            departure,
-            curvature,
-            third,
-            way,
-        )
-        return self._with_slack(parts, near, far)
+                    found[j] = tuple(self._placed(end, place) for end in ends)
+        middle = self._shaped(centre)
+        parts = _Parts(shares, value, middle, half, departure, curvature, way)
+        slack, slope_slack = self._slacks(parts, near, far)
+        return replace(parts, slack=slack, slope_slack=slope_slack)
 
-    def _with_slack(self, parts, near, far):
-        rounding = Rounding(self, parts, near, far)
-        return replace(parts, slack=rounding.of_values(parts.way), slope_slack=rounding.of_slopes())
+    def _slacks(self, parts, near, far):
+        """What values (n_boxes,), and slopes (n_inputs, n_boxes), are off by at the most."""
+        far_off = size((near, far)) + np.abs(self.model.reference)[:, None]
+        largest = (np.abs(self.height) + np.abs(self.slopes) @ far_off).max(axis=0)
+        part = EPS * (ROUNDINGS + self.model.n_rules + self.model.n_inputs)
+        strength = self._largest_strengths(parts)
+        # What the errors of the strengths move the output by, rule by rule.
+        moved = np.zeros(parts.middle.shape)
+        for place, one in enumerate(parts.shares):
+            error = self._placed(np.fmin(one.error, 1.0), place)
+            moved += 2.0 * strength * error * size(self._centred(parts, place))
+        axes = tuple(range(len(self.counts)))
+        slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
+        for j, ends in parts.departure.items():
+            slopes[j] += part * (strength * size(ends)).sum(axis=axes) * largest
+            slopes[j] += 2.0 * (size(ends) * moved).sum(axis=axes)
+        ahead = size(parts.way)
+        beyond = np.where(ahead > 0.0, ahead * slopes, 0.0).sum(axis=0)
+        return moved.sum(axis=axes) + part * largest + beyond, slopes
 
     def _held(self, x):
         """The nearest place in the range of the training data."""
@@ -259,7 +224,7 @@ class Enclosure:
     def _shaped(self, by_rule):
         return by_rule.reshape(*self.counts, by_rule.shape[1])
 
-    def placed(self, by_share, place):
+    def _placed(self, by_share, place):
         """Values of a factor's shares along their own axis."""
         shape = [1] * len(self.counts)
         shape[place] = by_share.shape[0]
@@ -270,16 +235,16 @@ class Enclosure:
         own = self._shaped(self.slopes[:, j, None])
         if j not in parts.departure:
             return own, own
-        low, high = product(parts.departure[j], self.centred(parts, self.place[j]))
+        low, high = product(parts.departure[j], self._centred(parts, self.place[j]))
         return own + low, own + high
 
-    def centred(self, parts, *places):
+    def _centred(self, parts, *places):
         """Range of f less its means along the axes of these factors, at the middle's shares."""
         if places not in parts.known:
             parts.known[places] = self._found_centred(parts, places)
         return parts.known[places]
 
-    def centred_slopes(self, parts, j, *places):
+    def _centred_slopes(self, parts, j, *places):
         """Slopes of the consequents by input j less their means along the axes of these factors."""
         return self._less_means(parts, self._shaped(self.slopes[:, j, None]), places)
 
@@ -287,20 +252,20 @@ class Enclosure:
         middle = self._less_means(parts, parts.middle, places)
         radius = 0.0
         for i in np.flatnonzero(self.slopes.any(axis=0)):
-            own = self.centred_slopes(parts, i, *places)
+            own = self._centred_slopes(parts, i, *places)
             radius = radius + np.abs(own) * parts.half[i]
         return middle - radius, middle + radius
 
     def _less_means(self, parts, values, places):
         for place in places:
-            weight = self.placed(parts.shares[place].middle, place)
+            weight = self._placed(parts.shares[place].middle, place)
             axis = place - len(self.counts) - 1
             values = values - (weight * values).sum(axis=axis, keepdims=True)
         return values
 
     def _off_mean(self, parts, place):
         """Range of f less its mean along the axis of a factor, whatever the shares."""
-        low, high = self.centred(parts, place)
+        low, high = self._centred(parts, place)
         axis, shares = place - len(self.counts) - 1, [parts.shares[place]]
         least = smallest_mean(np.moveaxis(low, axis, -2), shares)
         most = largest_mean(np.moveaxis(high, axis, -2), shares)
@@ -354,13 +319,13 @@ class Enclosure:
         low, high = np.zeros((2, *parts.value[0].shape))
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
-                own = self.centred_slopes(parts, other, self.place[one])
+                own = self._centred_slopes(parts, other, self.place[one])
                 least, most = product(parts.departure[one], (own, own))
                 low, high = low + least, high + most
         if i in parts.departure and j in parts.departure:
             places = self.place[i], self.place[j]
             same = places[0] == places[1]
-            off = self._off_mean(parts, places[0]) if same else self.centred(parts, *places)
+            off = self._off_mean(parts, places[0]) if same else self._centred(parts, *places)
             both = product(parts.departure[i], parts.departure[j])
             if i == j:
                 both = square(parts.departure[i])
@@ -368,7 +333,7 @@ class Enclosure:
             least, most = product(both, off)
             low, high = low + least, high + most
         largest = size((low, high)).max(axis=tuple(range(low.ndim - 1)))
-        slack = EPS * _ROUNDINGS * prod(self.counts) * largest
+        slack = EPS * ROUNDINGS * prod(self.counts) * largest
         return (
             smallest_mean(low, parts.shares) - slack,
             largest_mean(high, parts.shares) + slack,

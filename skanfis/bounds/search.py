@@ -83,23 +83,10 @@ def largest(
 ) -> Found:
     """Enclose the largest value that a function takes on a box.
 
-    Parameters
-    ----------
-    evaluate : callable
-        Of boxes (n_inputs, n_boxes) as two arrays; gives bounds, points, values attained there,
-        and what splitting along each input promises.
-    low, high : ndarray of shape (n_inputs,)
-        The box, finite.
-    tolerance : float
-        How far bound and value may be apart.
-    max_boxes : int
-        Boxes to look at, at the most.
-    cuts : ndarray of shape (n_inputs, 2)
-        Where a box is cut first: the ends of the range of the training data.
-    first : (point, value), optional
-        A value that is attained.
-    until : float, optional
-        It is enough to know whether the largest value is above this.
+    ``evaluate`` gives, of boxes (n_inputs, n_boxes) as two arrays, bounds, points, values attained
+    there, and what splitting along each input promises. Bound and value may be ``tolerance`` apart;
+    boxes are cut at ``cuts`` (n_inputs, 2) first. ``first`` is a point and the value there; it is
+    enough to know whether the largest value is above ``until``.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

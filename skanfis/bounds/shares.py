@@ -27,13 +27,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..antecedent import Antecedent
-from .terms import EPS, TermRanges, ranges
+from .arithmetic import EPS, ROUNDINGS, size
+from .terms import TermRanges, ranges
 
 __all__ = ["Factor", "Shares", "factors", "largest_mean", "smallest_mean", "term_ranges"]
-
-# Roundings of one share, in EPS, with room to spare: two exponentials of two each, a difference, a
-# product and a quotient, beside those of the sum over shares, which are counted.
-_ROUNDINGS = 16.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +62,6 @@ class Shares:
     error: np.ndarray  # of the logarithm of a share as it is computed, at most
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
-    third: dict[int, np.ndarray]  # size of d^3 l / dx_j^3, at most
 
 
 def factors(antecedent: Antecedent):
@@ -93,21 +89,19 @@ def enclosed(factor: Factor, terms: TermRanges, log_mu, half):
     middle /= middle.sum(axis=0)
     least, most = _by_range(low, high)
     slopes_low, slopes_high = factor.along(terms.slope_low), factor.along(terms.slope_high)
-    slack = EPS * (_ROUNDINGS + least.shape[0])
+    slack = EPS * (ROUNDINGS + least.shape[0])
     for _ in range(2):
-        shares = Shares(middle, least, most, error, {}, {}, {})
+        shares = Shares(middle, least, most, error, {}, {})
         departure = _departures(shares, slopes_low, slopes_high)
         # The mean error of all counts for each: the sum of the softmax.
         common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
         each = error + common + slack
-        size = sum(np.maximum(np.abs(a), np.abs(b)) * half[j] for j, (a, b) in departure.items())
-        radius = size + 4.0 * each
+        radius = sum(size(ends) * half[j] for j, ends in departure.items()) + 4.0 * each
         least = np.fmax(least, middle * np.exp(-radius))
         most = np.fmin(most, middle * np.exp(radius))
     curve_low, curve_high = factor.along(terms.curve_low), factor.along(terms.curve_high)
     curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
-    third = factor.along(terms.third)
-    return Shares(middle, least, most, each, departure, curvature, third)
+    return Shares(middle, least, most, each, departure, curvature)
 
 
 def _by_range(low, high):
@@ -115,7 +109,7 @@ def _by_range(low, high):
     top = high.max(axis=0)
     down, up = np.exp(low - top), np.exp(high - top)
     n = down.shape[0]
-    slack = (n + _ROUNDINGS) * EPS
+    slack = (n + ROUNDINGS) * EPS
     others_up, others_down = up.sum(axis=0) - up, down.sum(axis=0) - down
     # What the subtraction has lost counts as being there.
     least = down / (down + np.maximum(others_up, 0.0) + 2.0 * slack * up.sum(axis=0))
@@ -130,10 +124,10 @@ def _departures(shares, slopes_low, slopes_high):
     for j, high in slopes_high.items():
         low = slopes_low[j]
         mean_low, mean_high = smallest_mean(low, [shares]), largest_mean(high, [shares])
-        slack = 4.0 * _ROUNDINGS * EPS * np.maximum(np.abs(low), np.abs(high))
-        common = slack.max(axis=0, initial=0.0, where=shares.high > EPS) + EPS * (
-            shares.high * np.maximum(np.abs(low), np.abs(high))
-        ).sum(axis=0) * (_ROUNDINGS + low.shape[0])
+        slack = 4.0 * ROUNDINGS * EPS * size((low, high))
+        common = slack.max(axis=0, initial=0.0, where=shares.high > EPS)
+        total = (shares.high * size((low, high))).sum(axis=0)
+        common = common + EPS * (ROUNDINGS + low.shape[0]) * total
         found[j] = low - mean_high - slack - common, high - mean_low + slack + common
     return found
 

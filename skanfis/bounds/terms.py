@@ -16,10 +16,10 @@ What a computer makes of log mu at x is what log mu exactly is at a place next t
 units in the last place (x - c is one rounding; of a plateau, a few). Ranges are therefore taken
 over [l - e, u + e] with
 
-    e = 16 eps (|x| + |c| + plateau) ,
+    e = 32 eps (|x| + |c| + plateau) ,
 
-which leaves room for c and x having been brought to other units too, and are then widened by 16 eps
-and by 16 eps of themselves. They hold of log mu as it is, and of log mu as it is computed.
+which leaves room for c and x having been brought to other units too, and are then widened by 32 eps
+and by 32 eps of themselves. They hold of log mu as it is, and of log mu as it is computed.
 """
 
 from dataclasses import dataclass
@@ -40,15 +40,9 @@ from ..membership import (
     ZShaped,
 )
 from ..membership.profiles import LinearProfile
+from .arithmetic import EPS, ROUNDINGS, size, widened
 
-__all__ = ["EPS", "TermRanges", "is_known", "ranges", "widened"]
-
-EPS = float(np.finfo(float).eps)
-# Roundings that a membership takes, in EPS, with room to spare: a difference, a quotient, a power,
-# a logarithm and a product or two.
-_ROUNDINGS = 16.0
-# Largest s (1 - s) (1 - 2 s) of a sigmoid, at s = (3 - 3^(1/2)) / 6, rounded up.
-_STEEPEST_CURVE = 0.0963
+__all__ = ["TermRanges", "is_known", "ranges"]
 
 _LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, SigmoidProduct)
 _ONE_SIDED = (SShaped, ZShaped)
@@ -58,12 +52,6 @@ _WITH_FEET = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED)
 def is_known(family):
     """Whether the ranges of a family of memberships are known."""
     return family in (*_LOG_CONCAVE, *_WITH_FEET, Bell)
-
-
-def widened(low, high, part=_ROUNDINGS * EPS):
-    """The interval, wider by this part of its size at both ends."""
-    slack = part * np.maximum(np.abs(low), np.abs(high))
-    return low - slack, high + slack
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +64,6 @@ class TermRanges:
     slope_high: np.ndarray
     curve_low: np.ndarray  # of d^2 log mu / dx^2; NaN where it has no bound
     curve_high: np.ndarray
-    third: np.ndarray  # size of d^3 log mu / dx^3 at most; NaN where the second jumps, or not known
     error: np.ndarray  # of log mu as it is computed, at most
 
 
@@ -86,7 +73,7 @@ def ranges(group: TermGroup, low, high):
     lo, hi = low[group.inputs], high[group.inputs]
     place = theta[0][:, None]
     off = np.abs(place) + _plateau(group)
-    reach = _ROUNDINGS * EPS * (np.maximum(np.abs(lo), np.abs(hi)) + off)
+    reach = ROUNDINGS * EPS * (np.maximum(np.abs(lo), np.abs(hi)) + off)
     lo, hi = lo - reach, hi + reach
     at_lo, by_lo = family.log_value_and_gradient(lo, theta)
     at_hi, by_hi = family.log_value_and_gradient(hi, theta)
@@ -106,14 +93,12 @@ def ranges(group: TermGroup, low, high):
     else:
         slope = slope_hi, slope_lo
     bottom, top = widened(bottom, top)
-    bottom, top = bottom - _ROUNDINGS * EPS, top + _ROUNDINGS * EPS
+    bottom, top = bottom - ROUNDINGS * EPS, top + ROUNDINGS * EPS
     slope_low, slope_high = widened(*slope)
     with np.errstate(invalid="ignore"):
-        size = np.maximum(np.abs(slope_low), np.abs(slope_high))
-        error = reach * size + _ROUNDINGS * EPS * np.abs(bottom)
+        error = reach * size((slope_low, slope_high)) + ROUNDINGS * EPS * np.abs(bottom)
     curve_low, curve_high = widened(*_curvature(group, lo, hi))
-    third = _third(group, lo, hi)
-    return TermRanges(bottom, top, slope_low, slope_high, curve_low, curve_high, third, error)
+    return TermRanges(bottom, top, slope_low, slope_high, curve_low, curve_high, error)
 
 
 def _plateau(group):
@@ -131,7 +116,7 @@ def _bell_slope(theta, lo, hi):
     # |a| is largest here; below 2b = 1 at the centre, where it has no bound.
     peak = np.maximum(2.0 * b - 1.0, 0.0) ** (0.5 / b)
 
-    def size(t):
+    def steepness(t):
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             log_t = np.log(t)
             log_size = (2.0 * b - 1.0) * log_t - np.logaddexp(0.0, 2.0 * b * log_t)
@@ -141,7 +126,7 @@ def _bell_slope(theta, lo, hi):
 
     def part(near, far):
         """Range of |a| over t in [near, far]."""
-        return np.minimum(size(near), size(far)), size(np.clip(peak, near, far))
+        return np.minimum(steepness(near), steepness(far)), steepness(np.clip(peak, near, far))
 
     left_near, left_far = np.maximum(center - hi, 0.0) / width, np.maximum(center - lo, 0.0) / width
     right_near, right_far = (
@@ -179,30 +164,14 @@ def _curvature(group, lo, hi):
     return nothing, nothing
 
 
-def _third(group, lo, hi):
-    """The size of d^3 log mu / dx^3 at most; NaN where the second jumps, or no bound is known."""
-    family, theta = group.family, group.theta[:, :, None]
-    if family is Gaussian:
-        return np.zeros(lo.shape)
-    if family is TwoSidedGaussian:
-        half = 0.5 * np.exp(theta[3])
-        jumps = [(lo <= at) & (at <= hi) for at in (theta[0] - half, theta[0] + half)]
-        return np.where(jumps[0] | jumps[1], np.nan, 0.0)
-    if family in (SigmoidDifference, SigmoidProduct):
-        widths = theta[2:4] if family is SigmoidProduct else theta[[2, 2]]
-        size = _STEEPEST_CURVE * np.exp(-3.0 * widths).sum(axis=0)
-        return np.broadcast_to(size, lo.shape)
-    return np.full(lo.shape, np.nan)
-
-
 def _sigmoid_curve(lo, hi):
     """Largest and smallest s(u) (1 - s(u)) over [lo, hi], which falls with |u|."""
 
-    def size(u):
+    def bend(u):
         small = np.exp(-np.abs(u))
         return small / (1.0 + small) ** 2
 
-    return size(np.clip(0.0, lo, hi)), np.minimum(size(lo), size(hi))
+    return bend(np.clip(0.0, lo, hi)), np.minimum(bend(lo), bend(hi))
 
 
 def _bell_curve(theta, lo, hi):

@@ -9,27 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
-from sklearn import get_config
 from sklearn.base import ClusterMixin
-from sklearn.utils import gen_batches
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .._sklearn import check_sample_weight
 from .._validation import check_finite, check_not_negative
+from ..blocks import row_blocks
 
-__all__ = [
-    "NearestCenterMixin",
-    "check_rows",
-    "distance_blocks",
-    "distinct_rows",
-    "nearest",
-    "numbers_that_fit",
-]
+__all__ = ["NearestCenterMixin", "check_rows", "distance_blocks", "distinct_rows", "nearest"]
 
 # Distances in a block: a few arrays of this size stay in the cache.
 _BLOCK_SIZE = 32_768
-# Arrays of a block's size that a caller makes of its distances, these included.
-_ARRAYS_PER_BLOCK = 5
 
 
 def check_rows(estimator, X, reset=False) -> np.ndarray:
@@ -51,19 +41,13 @@ def distinct_rows(X, sample_weight):
     return rows, np.bincount(group.ravel(), weights=weight[keep])
 
 
-def numbers_that_fit():
-    """How many float64 scikit-learn's ``working_memory`` allows for temporary arrays."""
-    return int(get_config()["working_memory"] * 2**20 / 8)
-
-
 def distance_blocks(points, centers):
     """Blocks of points, as slices, and their squared distances (n_clusters, n_rows_of_block).
 
     From differences, not from products: where a point coincides with a centre, the distance is an
     exact zero.
     """
-    size = min(_BLOCK_SIZE, numbers_that_fit() // _ARRAYS_PER_BLOCK)
-    for part in gen_batches(points.shape[0], max(1, size // centers.shape[0])):
+    for part in row_blocks(points.shape[0], max(1, _BLOCK_SIZE // centers.shape[0])):
         yield part, cdist(centers, points[part], "sqeuclidean")
 
 
@@ -91,11 +75,6 @@ class NearestCenterMixin(ClusterMixin):
         -------
         labels : ndarray of shape (n_samples,)
             Positions in ``cluster_centers_``.
-
-        Raises
-        ------
-        ValueError
-            If X is not finite, or has other columns than in training.
         """
         check_is_fitted(self)
         return self._labels(check_rows(self, X))

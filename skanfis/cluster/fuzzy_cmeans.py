@@ -1,31 +1,19 @@
 r"""Fuzzy c-means by alternating optimisation.
 
-With squared distances :math:`D_{ik} = |x_i - c_k|^2`, memberships :math:`u_{ik}` of row sum one and
-weights :math:`w_i`, the objective (Bezdek 1981) is
-
-    J = Σ_i w_i Σ_k u_ik^m D_ik
-
-At fixed centres it is least for
+With squared distances D_ik, memberships u_ik of row sum one and weights w_i, the objective (Bezdek
+1981) is J = Σ_i w_i Σ_k u_ik^m D_ik. At fixed centres it is least for
 
     u_ik = D_ik^(-1/(m-1)) / Σ_l D_il^(-1/(m-1)),   u = 1 (shared) where D = 0,
 
-and at fixed memberships for
+and at fixed memberships for c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m. Both steps are taken in one
+pass over the rows. Distances are relative to the nearest centre's and powers are logarithms: as
+m → 1 they would overflow. There, u^m vanishes on every row for a cluster that is nowhere the
+nearest; its weights are taken relative to its largest, block after block.
 
-    c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m.
-
-Neither step can raise J. Both are taken in one pass over the rows, by blocks. Distances are taken
-relative to the nearest centre's and powers as logarithms: as m → 1 they would overflow. There, u^m
-vanishes on every row for a cluster that is nowhere the nearest; its weights are taken relative to
-its largest, block after block.
-
-**Coincident centres.** All centres at the mean of the data are a fixed point. Linearised there,
-with z = x - mean, the displacements of the centres are multiplied at each iteration by
-
-    2 m / (m - 1) F,   F = Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i w_i
-
-so that, with λ the largest eigenvalue of F, the centres fall together if m > 1 / (1 - 2 λ) (Yu,
-Cheng and Huang 2004). Data without clusters in d columns of equal variance have λ = 1/d: with m = 2
-all centres coincide from d = 5 on.
+All centres at the mean of the data are a fixed point. Linearised there, with z = x - mean, each
+iteration multiplies their displacements by 2 m / (m - 1) F, F = Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i
+w_i. With λ the largest eigenvalue of F they fall together if m > 1 / (1 - 2 λ) (Yu, Cheng and Huang
+2004): without clusters in d columns of equal variance, where λ = 1/d, with m = 2 from d = 5 on.
 """
 
 import warnings
@@ -75,16 +63,7 @@ def log_memberships(distances, m):
 
 
 def alternate(points, weight, centers, m):
-    """Memberships of ``centers``, and the centres that these make.
-
-    Returns
-    -------
-    centers : ndarray of shape (n_clusters, n_features)
-    spread : ndarray of shape (n_clusters,)
-        Root mean square distance from the old centres.
-    objective : float
-        J at the old centres.
-    """
+    """New centres, the root mean square distances from the old ones, and J at the old ones."""
     top = np.full((centers.shape[0], 1), _LOG_ZERO)
     mass, scatter = np.zeros_like(top), np.zeros_like(top)
     moment = np.zeros_like(centers)
@@ -136,12 +115,7 @@ class FuzzyCMeans(
 
     Centres :math:`c_k` and memberships :math:`u_{ik}` minimise [1]_
 
-    .. math:: J = \sum_i w_i \sum_k u_{ik}^m \, \| x_i - c_k \|^2 , \qquad \sum_k u_{ik} = 1 ,
-
-    by turns: each :math:`c_k` is the mean of the data with weights :math:`w_i u_{ik}^m`, and
-
-    .. math:: u_{ik} = \left[ \sum_l \left( \frac{\| x_i - c_k \|}{\| x_i - c_l \|}
-       \right)^{2 / (m - 1)} \right]^{-1} .
+    .. math:: J = \sum_i w_i \sum_k u_{ik}^m \, \| x_i - c_k \|^2 , \qquad \sum_k u_{ik} = 1 .
 
     As m tends to 1, this becomes k-means. Distances are Euclidean: bring the columns to one scale
     before, for instance with a StandardScaler.
@@ -152,20 +126,17 @@ class FuzzyCMeans(
         Number of clusters, 1 or more.
     m : "auto" or float, default=2.0
         Exponent of the memberships, greater than 1: the larger, the fuzzier. From some m on, all
-        centres fall together: the theory [2]_ says where for centres near the mean, and for data
-        without distinct clusters in five columns or more it is below 2. "auto" is half the way from
-        1 to there, and not more than 2.
+        centres fall together [2]_, in five columns without clusters from below 2 on. "auto" is half
+        the way from 1 to there, and not more than 2.
     tol : float, default=1e-4
-        Stop when no centre moves by more than ``tol``, in units of the root mean square distance of
-        the data from their mean. Zero or positive.
+        Stop when no centre moves by more than ``tol`` times the root mean square distance of the
+        data from their mean.
     max_iter : int, default=1000
-        Most iterations from one start, 1 or more.
+        Most iterations from one start.
     n_init : int, default=3
-        Number of starts; the result is the one with the lowest objective. An array as ``init`` is
-        one start.
+        Number of starts; the one with the lowest objective counts. An array ``init`` is one start.
     init : {"k-means++"} or array-like of shape (n_clusters, n_features), default="k-means++"
-        Centres at the start: rows drawn far from each other, or the array, in the units of the
-        data.
+        Centres at the start: rows drawn far from each other, or the array.
     random_state : int, RandomState instance or None, default=None
         Seed of the draws of ``init``.
 
@@ -194,12 +165,6 @@ class FuzzyCMeans(
     See Also
     --------
     SubtractiveClustering : Finds the number of clusters too.
-    sklearn.cluster.KMeans : Each row belongs to one cluster.
-
-    Notes
-    -----
-    An iteration takes time in proportion to n_samples times n_clusters times n_features. Beyond the
-    data, memory grows with n_samples and not with n_clusters, but for what ``transform`` returns.
 
     References
     ----------
@@ -216,11 +181,8 @@ class FuzzyCMeans(
     >>> clustering = FuzzyCMeans(n_clusters=2, random_state=0).fit(X)
     >>> clustering.cluster_centers_.shape
     (2, 2)
-    >>> memberships = clustering.transform([[0, 0], [0, 4]])
-    >>> memberships.sum(axis=1).round(6).tolist()
+    >>> clustering.transform([[0, 0], [0, 4]]).sum(axis=1).round(6).tolist()
     [1.0, 1.0]
-    >>> bool(memberships[0].max() > 0.99)
-    True
     """
 
     _parameter_constraints: ClassVar[dict] = {
@@ -261,20 +223,13 @@ class FuzzyCMeans(
         X : array-like of shape (n_samples, n_features)
             Data, with columns on one scale.
         y : None
-            Not used; here by convention.
+            Not used.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, zero or positive. A whole number counts as so many copies of the row, zero as
-            the row's absence.
+            Weights, zero or positive; a whole number counts as so many copies of the row.
 
         Returns
         -------
         self : FuzzyCMeans
-
-        Raises
-        ------
-        ValueError
-            If the data are empty or not finite; if weights are negative or all zero; if there are
-            fewer distinct rows than clusters; if ``init`` is not of shape (n_clusters, n_features).
         """
         X = check_rows(self, X, reset=True)
         rows, weight = distinct_rows(X, sample_weight)
@@ -287,7 +242,10 @@ class FuzzyCMeans(
         points = rows - mean
         scale = np.sqrt(np.average(np.einsum("ij,ij->i", points, points), weights=weight)) or 1.0
         points /= scale
-        self.m_ = self._exponent(points, weight)
+        m = self.m
+        if m == "auto":
+            m = min(2.0, 0.5 * (1.0 + largest_exponent(points, weight)))
+        self.m_ = float(m)
         starts = self._starts(points, weight, mean, scale)
         runs = [descend(points, weight, c, self.m_, self.tol, self.max_iter) for c in starts]
         best = min(runs, key=lambda run: run.objective)
@@ -311,11 +269,6 @@ class FuzzyCMeans(
         memberships : ndarray of shape (n_samples, n_clusters)
             From 0 to 1, with sum one in every row; one where a row coincides with a centre, or
             shared equally where it coincides with several.
-
-        Raises
-        ------
-        ValueError
-            If X is not finite, or has other columns than in training.
         """
         check_is_fitted(self)
         X = check_rows(self, X)
@@ -323,11 +276,6 @@ class FuzzyCMeans(
         for part, distances in distance_blocks(X, self.cluster_centers_):
             np.exp(log_memberships(distances, self.m_).T, out=memberships[part])
         return memberships
-
-    def _exponent(self, points, weight):
-        if self.m == "auto":
-            return float(min(2.0, 0.5 * (1.0 + largest_exponent(points, weight))))
-        return float(self.m)
 
     def _starts(self, points, weight, mean, scale):
         """Centres to start from, on the scale of ``points``."""
@@ -341,13 +289,8 @@ class FuzzyCMeans(
                 )
             return [(centers - mean) / scale]
         random_state = check_random_state(self.random_state)
-        draws = [
-            kmeans_plusplus(
-                points, self.n_clusters, sample_weight=weight, random_state=random_state
-            )
-            for _ in range(self.n_init)
-        ]
-        return [centers for centers, _ in draws]
+        settings = {"sample_weight": weight, "random_state": random_state}
+        return [kmeans_plusplus(points, self.n_clusters, **settings)[0] for _ in range(self.n_init)]
 
     def _warn_of(self, run, points, weight):
         if run.shift > self.tol:

@@ -1,21 +1,12 @@
 r"""Subtractive clustering: data points that many others are near to, one after the other.
 
-With distances in units of the radius :math:`r_a` (Chiu 1994), :math:`u_{ij} = |x_i - x_j| / r_a`,
-
-    potential     P_i = Σ_j w_j exp(-4 u_ij²)
-    subtraction   P_i ← P_i - P_k exp(-4 (u_ik / squash)²)     after point k has become a centre
-    ratio         ρ_i = P_i / P_1,   P_1 the potential of the first centre
-    distance      δ_i = min_k u_ik   from the centres found so far
-
-the point of highest potential becomes the next centre if ρ > accept, or if ρ ≥ reject and
-ρ + δ ≥ 1; it is passed over if ρ ≥ reject only, and the search ends if ρ < reject.
-
-Neither ρ nor δ ever grows: a point that was passed over could not be accepted later. The next
-centre is therefore simply the highest among the points that may be one, and the search ends where
-there is none.
+With ratios P_i / P_1 of potentials to that of the first centre, and distances from the nearest
+centre in radii, the point of highest potential becomes the next centre if ratio > accept, or if
+ratio >= reject and ratio + distance >= 1 (Chiu 1994). Neither ever grows: a point that was passed
+over could not be accepted later. The next centre is therefore simply the highest among the points
+that may be one, and the search ends where there is none.
 """
 
-from math import isqrt
 from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
@@ -23,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 from sklearn.base import BaseEstimator
-from sklearn.utils import gen_batches
 
 from .._sklearn import Interval, fit_context
-from ._rows import NearestCenterMixin, check_rows, distinct_rows, nearest, numbers_that_fit
+from ..blocks import row_blocks
+from ._rows import NearestCenterMixin, check_rows, distinct_rows, nearest
 
 __all__ = ["SubtractiveClustering"]
 
@@ -46,8 +37,7 @@ def potentials(points, weight):
     ones = np.ones_like(squares)
     left = np.hstack([8.0 * points, squares, ones])
     right = np.hstack([points, ones, squares])
-    length = max(1, min(_BLOCK_ROWS, isqrt(numbers_that_fit())))
-    blocks = list(gen_batches(points.shape[0], length))
+    blocks = row_blocks(points.shape[0], _BLOCK_ROWS)
     total = np.zeros(points.shape[0])
     for place, rows in enumerate(blocks):
         for columns in blocks[place:]:
@@ -88,50 +78,38 @@ class SubtractiveClustering(NearestCenterMixin, BaseEstimator):
     .. math:: P_i = \sum_j w_j \, e^{-4 \, \| x_i - x_j \|^2 / r_a^2} ,
 
     with every column scaled to the range 0 to 1 and :math:`r_a` the ``radius``. The row of highest
-    potential is the first centre. What it explains is subtracted from all potentials,
-
-    .. math:: P_i \leftarrow P_i - P_k \, e^{-4 \, \| x_i - x_k \|^2 / r_b^2} ,
-       \qquad r_b = \mathrm{squash} \cdot r_a ,
-
-    and the highest row that is left is the next, as long as its potential is high, or not too low
-    and the row far enough from all centres (see ``accept`` and ``reject``). The defaults are those
-    of the paper and of MATLAB's ``subclust``.
-
-    The result does not depend on the units of the columns, on the order of the rows, nor on
+    potential is the first centre. What it explains, :math:`P_k \, e^{-4 \, \| x_i - x_k \|^2 /
+    r_b^2}` with :math:`r_b = \mathrm{squash} \cdot r_a`, is subtracted from all potentials, and the
+    highest row that is left is the next, as long as its potential is high, or not too low and the
+    row far enough from all centres (see ``accept`` and ``reject``). The defaults are those of
+    MATLAB's ``subclust``. The result does not depend on units, on the order of the rows, nor on
     chance.
 
     Parameters
     ----------
     radius : float or array-like of shape (n_features,), default=0.5
-        Range of influence of a centre, as a part of the range of the data; positive; one for all
-        columns or one for each. A smaller radius finds more clusters. Distances grow with the
-        square root of the number of columns, and so should the radius: 0.5 is for two or three.
+        Range of influence of a centre, as a part of the range of the data, for all columns or each.
+        A smaller radius finds more clusters. Distances grow with the square root of the number of
+        columns, and so should the radius: 0.5 is for two or three.
     squash : float, default=1.25
-        The radius in which a centre takes potential from its neighbours, relative to ``radius``;
-        positive. More than one keeps centres apart.
-    accept : float, default=0.5
-        A row becomes a centre if its potential is more than this part of the first centre's. From
-        0, exclusive, to 1.
-    reject : float, default=0.15
-        No row becomes a centre if its potential is less than this part of the first centre's. From
-        0 to ``accept``. In between, the row of potential P becomes a centre if
-        P / P_1 + d / radius >= 1, with P_1 the first centre's potential and d the distance from the
-        nearest centre.
+        The radius in which a centre takes potential from its neighbours, relative to ``radius``.
+        More than one keeps centres apart.
+    accept, reject : float, default=0.5 and 0.15
+        A row becomes a centre if its potential is more than ``accept`` times that of the first
+        centre, and does not if it is less than ``reject`` times that. In between it does if
+        P / P_1 + d / radius >= 1, with d the distance from the nearest centre.
     max_clusters : int or None, default=None
-        Stop at this number of clusters, those of highest potential; None sets no limit.
+        Most clusters, those of highest potential; None sets no limit.
 
     Attributes
     ----------
     cluster_centers_ : ndarray of shape (n_clusters, n_features)
-        Centres in the units of the data, each one a row of it, in the order in which they were
-        found.
+        Rows that are centres, in the order in which they were found.
     potentials_ : ndarray of shape (n_clusters,)
-        Potential of each centre when it was chosen, in units of weight: in effect, the number of
-        rows around it. They fall from the first to the last.
+        Potential of each centre when it was chosen, from the highest to the lowest.
     widths_ : ndarray of shape (n_features,)
-        Standard deviation of the Gaussian that the potential amounts to, radius times range over
-        sqrt(8), in the units of the data: the width of membership functions in genfis2. Zero where
-        a column is constant.
+        Radius times range over sqrt(8), in the units of the data: the standard deviation of the
+        Gaussian that the potential amounts to. Zero where a column is constant.
     labels_ : ndarray of shape (n_samples,)
         The nearest centre of each row, in units of ``widths_``.
     n_features_in_ : int
@@ -145,8 +123,7 @@ class SubtractiveClustering(NearestCenterMixin, BaseEstimator):
 
     Notes
     -----
-    Time grows with the square of the number of distinct rows, and is under a second for 20,000;
-    memory grows with the number of rows. A constant column has no influence.
+    Time grows with the square of the number of distinct rows. A constant column has no influence.
 
     References
     ----------
@@ -197,20 +174,13 @@ class SubtractiveClustering(NearestCenterMixin, BaseEstimator):
         X : array-like of shape (n_samples, n_features)
             Data, in any units.
         y : None
-            Not used; here by convention.
+            Not used.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, zero or positive. A whole number counts as so many copies of the row, zero as
-            the row's absence.
+            Weights, zero or positive; a whole number counts as so many copies of the row.
 
         Returns
         -------
         self : SubtractiveClustering
-
-        Raises
-        ------
-        ValueError
-            If the data are empty or not finite; if weights are negative or all zero; if ``radius``
-            does not fit the columns, or ``reject`` exceeds ``accept``.
         """
         X = check_rows(self, X, reset=True)
         rows, weight = distinct_rows(X, sample_weight)

@@ -1,50 +1,154 @@
-"""Rows on a cluster: the passes go to them."""
+"""Rows on a cluster: collections as partitions side by side, and passes as reductions over them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial, reduce
 from operator import methodcaller
+from typing import Any
 
 import numpy as np
+from sklearn.utils import check_array
 
-from .._memory import keeps_freed_memory
-from ..bounds.wishes import Wishes
-from ..learning.data import Scale, StandardisedData, check_scales
-from .blocks import Blocks, Described, describe, joined
-from .keeping import kept_blocks
+from .._validation import check_finite, named_refusals, positive_weights
+from ..bounds.constraints import Constraints
+from ..learning.data import Scale, StandardisedData, check_scales, column_statistics
+from ..naming import default_output_names
+from ..training.chunks import joined_scales
 
-__all__ = ["ClusterData", "ClusterRows", "add_each", "reduce_blocks"]
+__all__ = ["ClusterData", "Layout", "Partitions", "add_each", "is_collection", "reduce_partitions"]
 
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
+# Weights within which squares are finite.
+_LARGEST_WEIGHT = 2.0**400
 
 
-def reduce_blocks(blocks: Blocks, of_loaded: Callable, merge: Callable):
-    """What ``of_loaded`` makes of every block, merged two by two, in the blocks' order.
+def is_collection(value):
+    """Whether a value is a dask collection."""
+    return hasattr(value, "__dask_graph__") and hasattr(value, "dask")
 
-    One task per block, and a tree of merges; nothing but the result comes to the client.
-    RuntimeError where the cluster is gone, or kills its workers.
+
+@dataclass(frozen=True)
+class Layout:
+    """What every partition must look like; given names are None where the collection has none."""
+
+    n_inputs: int
+    n_outputs: int
+    is_single_output: bool
+    given_input_names: tuple | None
+    given_output_names: tuple | None
+
+    @classmethod
+    def of(cls, X, y):
+        """Of collections; TypeError or ValueError where they are none that can be trained on."""
+        for what, one, dimensions in (("X", X, (2,)), ("y", y, (1, 2))):
+            if not is_collection(one):
+                raise TypeError(
+                    f"{what} is a {type(one).__name__}, but the other one is a dask collection: "
+                    "give both as dask arrays or DataFrames (dask.array.from_array, "
+                    "dask.dataframe.from_pandas)."
+                )
+            if one.ndim not in dimensions:
+                raise ValueError(f"{what} has {one.ndim} dimensions, and cannot be trained on.")
+        n_inputs, n_outputs = X.shape[1], 1 if y.ndim == 1 else y.shape[1]
+        for what, count in (("X", n_inputs), ("y", n_outputs)):
+            if not (isinstance(count, int | np.integer) and count > 0):
+                raise ValueError(f"{what} has {count} columns: their number must be known, not 0.")
+        names = getattr(y, "columns", None)
+        if names is None and getattr(y, "name", None) is not None and hasattr(y, "divisions"):
+            names = [y.name]
+        columns = getattr(X, "columns", None)
+        return cls(
+            int(n_inputs),
+            int(n_outputs),
+            y.ndim == 1,
+            None if columns is None else tuple(columns),
+            None if names is None else tuple(names),
+        )
+
+    @property
+    def input_names(self):
+        """Names of the inputs, "x0", "x1", ... where they have none."""
+        return _texts(self.given_input_names) or tuple(f"x{j}" for j in range(self.n_inputs))
+
+    @property
+    def output_names(self):
+        """Names of the outputs, "y" or "y0", "y1", ... where they have none."""
+        return _texts(self.given_output_names) or default_output_names(self.n_outputs)
+
+
+def _texts(names):
+    """Names that are all text; else None."""
+    return names if names and all(isinstance(name, str) and name for name in names) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Partitions:
+    """Partitions of X, y, weights and groups, side by side, not computed."""
+
+    pieces: list[tuple]  # of delayed X, y, sample_weight or None, groups or None
+    layout: Layout
+
+    @classmethod
+    def of(cls, X, y, sample_weight=None, groups=None):
+        """Of collections; TypeError or ValueError where they cannot be laid side by side."""
+        layout = Layout.of(X, y)
+        first = _delayed(X, "X", None)
+        pieces = [first]
+        for what, one in (("y", y), ("sample_weight", sample_weight), ("groups", groups)):
+            parts = [None] * len(first) if one is None else _delayed(one, what, X)
+            if len(parts) != len(first):
+                raise ValueError(
+                    f"{what} has {len(parts)} partitions, X has {len(first)}: they must be cut at "
+                    "the same rows. Take them from one frame, use repartition, or compute the "
+                    "sizes of unknown chunks (compute_chunk_sizes) so that they can be rechunked."
+                )
+            pieces.append(parts)
+        return cls(list(zip(*pieces, strict=True)), layout)
+
+
+def _delayed(collection, what, like):
+    """The partitions of a collection; chunks of an array are cut as those of ``like``."""
+    if not is_collection(collection):
+        raise TypeError(
+            f"{what} is a {type(collection).__name__}, but X is a dask collection: give a dask "
+            "array or Series."
+        )
+    if not hasattr(collection, "chunks"):
+        # Simplified, so that files are read in the columns that are needed; but not optimised:
+        # that joins small files into one partition, X's other ones than y's.
+        return list(collection.simplify().to_delayed(optimize_graph=False))
+    if collection.ndim == 2:
+        collection = collection.rechunk({1: -1})
+    chunks = None if like is None else getattr(like, "chunks", None)
+    if chunks is not None and chunks[0] != collection.chunks[0]:
+        sizes = (*chunks[0], *collection.chunks[0])
+        if all(size == size for size in sizes):  # none is unknown, which is NaN
+            if sum(chunks[0]) != sum(collection.chunks[0]):
+                raise ValueError(
+                    f"X has {sum(chunks[0]):,} rows and {what} {sum(collection.chunks[0]):,}."
+                )
+            collection = collection.rechunk({0: chunks[0]})
+    return list(collection.to_delayed().ravel())
+
+
+def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable):
+    """What ``of_rows`` makes of every partition, merged two by two, in their order.
+
+    One task per partition, and a tree of merges; nothing but the result comes to the client.
+    ``of_rows`` takes the rows with weight, not standardised. RuntimeError where the cluster is
+    gone, or kills its workers.
     """
     from dask.delayed import delayed
 
     # One key for all tasks: what they have in common is sent to a worker once.
-    common = delayed((blocks.without_pieces(), of_loaded, merge), traverse=False)
+    common = delayed((partitions.layout, of_rows), traverse=False)
     apply, add = delayed(_apply, pure=False), delayed(reduce, pure=False)
-    level = [apply(common, number, *parts) for number, parts in enumerate(blocks.pieces)]
+    level = [apply(common, number, *parts) for number, parts in enumerate(partitions.pieces)]
     while len(level) > 1:
         groups = [level[start : start + _FAN_IN] for start in range(0, len(level), _FAN_IN)]
         level = [add(merge, group) for group in groups]
     return _computed(level[0])
-
-
-def _apply(common, number, *parts):
-    blocks, of_loaded, merge = common
-    loaded = blocks.load(number, *parts)
-    try:
-        with keeps_freed_memory():
-            return reduce(merge, map(of_loaded, loaded))
-    except ValueError as error:
-        raise ValueError(f"Partition {number}: {error}") from error
 
 
 def _computed(lazy):
@@ -52,17 +156,13 @@ def _computed(lazy):
 
     try:
         return lazy.compute()
-    except CancelledError as error:
-        raise RuntimeError(_gone(error)) from error
-    except ValueError as error:
-        # Futures of a client that is closed are no part of the graph any more.
-        if not str(error).startswith("Missing dependency"):
-            raise
-        raise RuntimeError(_gone(error)) from error
     except Exception as error:
-        if type(error).__module__.partition(".")[0] != "distributed":
-            raise
-        raise RuntimeError(_gone(error)) from error
+        # Futures of a client that is closed are no part of the graph any more.
+        is_missing = isinstance(error, ValueError) and str(error).startswith("Missing dependency")
+        is_of_cluster = type(error).__module__.partition(".")[0] == "distributed"
+        if is_missing or is_of_cluster or isinstance(error, CancelledError):
+            raise RuntimeError(_gone(error)) from error
+        raise
 
 
 def _gone(error):
@@ -78,30 +178,63 @@ def _gone(error):
     )
 
 
-@dataclass(frozen=True, eq=False)
-class ClusterRows:
-    """As ``StandardisedData``, wherever the blocks are; on a sample, rows are at hand."""
-
-    blocks: Blocks
-    n_rows: int
-    total_weight: float
-    inputs: Scale
-    targets: Scale
-    sample: StandardisedData | None = None
-
-    def reduce(self, of_rows, merge):
-        """What ``of_rows`` makes of the rows of every block, merged two by two."""
-        of_loaded = partial(_of_rows, inputs=self.inputs, targets=self.targets, of_rows=of_rows)
-        return reduce_blocks(self.blocks, of_loaded, merge)
-
-    def sum(self, one_pass, block_rows, map_ordered=map):
-        """Sums of a pass over all rows; the workers are the cluster's, not ``map_ordered``."""
-        del map_ordered
-        return self.reduce(methodcaller("sum", one_pass, block_rows), add_each)
+def _apply(common, number, *parts):
+    """Runs where the data are; ValueError names the partition."""
+    layout, of_rows = common
+    try:
+        return of_rows(_loaded(layout, *parts))
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"Partition {number}: {error}") from error
 
 
-def _of_rows(loaded, inputs, targets, of_rows):
-    return of_rows(loaded.rows(inputs, targets))
+def _loaded(layout, X, y, sample_weight, groups):
+    """The rows with weight of one partition, not standardised."""
+    inputs = _numbers(X, "X", layout.given_input_names, layout.n_inputs)
+    names = layout.given_output_names if np.ndim(y) == 2 else None
+    targets = _numbers(y, "y", names, layout.n_outputs)
+    weight: Any = sample_weight
+    if weight is not None:
+        weight = _numbers(weight, "sample_weight", None, 1)[:, 0]
+    labels = None if groups is None else np.asarray(groups).reshape(len(groups))
+    n_rows = inputs.shape[0]
+    for what, one in (("y", targets), ("sample_weight", weight), ("groups", labels)):
+        if one is not None and len(one) != n_rows:
+            raise ValueError(
+                f"X has {n_rows} rows and {what} {len(one)}: their partitions must be cut at the "
+                "same rows."
+            )
+    if labels is not None and any(label is None or label != label for label in labels):
+        raise ValueError("groups has no value for some rows: every row must belong to a group.")
+    keep = None if weight is None else positive_weights(weight, n_rows, least=0)
+    if keep is not None:
+        inputs, targets, weight = inputs[keep], targets[keep], weight[keep]
+        labels = None if labels is None else labels[keep]
+    nothing = Scale(*np.zeros((4, 0)))
+    return StandardisedData(inputs, targets, weight, nothing, nothing, labels)
+
+
+def _numbers(table, what, names, n_columns):
+    """A partition as floats, (n_rows, n_columns); ValueError where it is none of these columns."""
+    if isinstance(table, str | tuple):
+        # Where its future is gone, dask may hand over a chunk's key in its place.
+        raise RuntimeError(
+            f"{what} is a {type(table).__name__} and no rows: the cluster that they lived on was "
+            "closed. Load or persist them again with the client that is now open."
+        )
+    found = None if names is None or not hasattr(table, "columns") else tuple(table.columns)
+    if found is not None and found != names:
+        raise ValueError(
+            f"{what} has the columns {', '.join(map(str, found))}; the collection says "
+            f"{', '.join(map(str, names))}. Write all parts with the same columns in one order."
+        )
+    with named_refusals(**{what: table}):
+        array = check_array(
+            table, dtype=float, ensure_2d=False, ensure_min_samples=0, ensure_all_finite=False
+        )
+    array = array[:, None] if array.ndim == 1 else array
+    if array.shape[1] != n_columns:
+        raise ValueError(f"{what} has the shape {array.shape}; {n_columns} columns are expected.")
+    return array
 
 
 def add_each(one, other):
@@ -110,37 +243,94 @@ def add_each(one, other):
 
 
 @dataclass(frozen=True, eq=False)
+class ClusterRows:
+    """As ``StandardisedData``, wherever the partitions are; on a sample, rows are at hand."""
+
+    partitions: Partitions
+    n_rows: int
+    total_weight: float
+    inputs: Scale
+    targets: Scale
+    sample: StandardisedData | None = None
+
+    def reduce(self, of_rows, merge):
+        """What ``of_rows`` makes of the rows of every partition, merged two by two."""
+        of_loaded = partial(_on_scales, inputs=self.inputs, targets=self.targets, of_rows=of_rows)
+        return reduce_partitions(self.partitions, of_loaded, merge)
+
+    def sum(self, one_pass, block_rows, map_ordered=map):
+        """Sums of a pass over all rows; the workers are the cluster's, not ``map_ordered``."""
+        del map_ordered
+        return self.reduce(methodcaller("sum", one_pass, block_rows), add_each)
+
+
+def _on_scales(rows, inputs, targets, of_rows):
+    return of_rows(replace(rows, inputs=inputs, targets=targets))
+
+
+@dataclass(frozen=True, eq=False)
+class _Described:
+    """What is known of some rows after one pass; the scales are None of no rows."""
+
+    n_rows: int
+    weight: float
+    inputs: Scale | None = None
+    targets: Scale | None = None
+
+
+def _describe(rows, layout):
+    """Count and measure a partition; ValueError where it is not finite."""
+    check_finite(rows.X, "X", layout.input_names)
+    check_finite(rows.y, "y", layout.output_names)
+    if rows.sample_weight is not None:
+        check_finite(rows.sample_weight[:, None], "sample_weight", ("sample_weight",))
+        largest, total = rows.sample_weight.max(initial=0.0), rows.total_weight
+        if largest > _LARGEST_WEIGHT or 0.0 < total < 1.0 / _LARGEST_WEIGHT:
+            raise ValueError(f"sample_weight is as large as {largest:g}: give weights near to one.")
+    if rows.n_rows == 0:
+        return _Described(0, 0.0)
+    inputs, targets = (column_statistics(part, rows.sample_weight) for part in (rows.X, rows.y))
+    return _Described(rows.n_rows, rows.total_weight, inputs, targets)
+
+
+def _joined(one, other):
+    """Describe the rows of both."""
+    if one.n_rows == 0 or other.n_rows == 0:
+        return other if one.n_rows == 0 else one
+    weights = one.weight, other.weight
+    inputs = joined_scales(one.inputs, other.inputs, *weights)
+    targets = joined_scales(one.targets, other.targets, *weights)
+    return _Described(one.n_rows + other.n_rows, sum(weights), inputs, targets)
+
+
+@dataclass(frozen=True, eq=False)
 class ClusterData:
     """Validated data on a cluster; see ``ValidatedData``."""
 
-    blocks: Blocks
-    described: Described
-    wishes: Wishes | None = None
+    partitions: Partitions
+    described: _Described
+    wishes: Constraints | None = None
 
     @classmethod
-    def of(cls, blocks):
-        """Validate and measure the blocks, in one pass."""
-        described = reduce_blocks(blocks, partial(describe, layout=blocks.layout), joined)
+    def of(cls, partitions):
+        """Validate and measure the partitions, in one pass."""
+        describe = partial(_describe, layout=partitions.layout)
+        described = reduce_partitions(partitions, describe, _joined)
         if described.n_rows < 2:
             raise ValueError(
-                f"Found {described.n_given} rows, of which {described.n_rows} have weight; at "
-                "least 2 are needed."
+                f"Found {described.n_rows} rows with a positive weight; at least 2 are needed."
             )
-        return cls(blocks, described)
+        return cls(partitions, described)
 
     @property
     def input_names(self):
         """Names of the inputs."""
-        return self.blocks.layout.input_names
+        return self.partitions.layout.input_names
 
     @property
     def output_names(self):
         """Names of the outputs."""
-        return self.blocks.layout.output_names
-
-    def kept(self):
-        """The same, loaded once and for all where the workers have memory enough."""
-        return replace(self, blocks=kept_blocks(self.blocks, self.described.n_given))
+        return self.partitions.layout.output_names
 
     def rows(self):
         """The rows on their scales."""
@@ -148,16 +338,16 @@ class ClusterData:
         assert found.inputs is not None
         assert found.targets is not None
         check_scales(found.inputs, found.targets, self.input_names, self.output_names)
-        return ClusterRows(self.blocks, found.n_rows, found.weight, found.inputs, found.targets)
+        return ClusterRows(self.partitions, found.n_rows, found.weight, found.inputs, found.targets)
 
     def gathered(self):
         """All rows, here: X, y, weights or None, groups or None."""
-        loaded = reduce_blocks(self.blocks, _as_it_is, _concatenated)
-        return loaded.X, loaded.y, loaded.sample_weight, loaded.groups
+        rows = reduce_partitions(self.partitions, _as_they_are, _concatenated)
+        return rows.X, rows.y, rows.sample_weight, rows.groups
 
 
-def _as_it_is(loaded):
-    return loaded
+def _as_they_are(rows):
+    return rows
 
 
 def _concatenated(one, other):

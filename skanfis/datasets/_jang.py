@@ -1,37 +1,36 @@
 """The benchmarks of Jang 1993, by the formulas of that paper."""
 
 from math import isclose
+from numbers import Integral, Real
 
 import numpy as np
 
-from ._validation import check_choice, check_count, check_real
+from .._sklearn import Interval, StrOptions, validate_parameter_constraints
 
 __all__ = ["make_jang_sinc", "make_jang_three_input", "make_mackey_glass"]
 
+_SUBSET = [StrOptions({"train", "check", "all"})]
+
 
 def make_jang_sinc(n_points: int = 11, *, midpoints: bool = False) -> tuple[np.ndarray, np.ndarray]:
-    """Make Jang's first problem: the two-dimensional sinc surface on a regular grid.
-
-    The target is y = sin(x1) / x1 * sin(x2) / x2 on [-10, 10] x [-10, 10].
+    """Make Jang's first problem: y = sin(x1) / x1 * sin(x2) / x2 on a grid over [-10, 10]^2.
 
     Parameters
     ----------
     n_points : int, default=11
         Number of grid points along each input, at least 2; Jang took 11.
     midpoints : bool, default=False
-        Give the centres of the grid's cells in place of its corners: the points as far as possible
-        from those a model was trained on.
+        Give the centres of the grid's cells in place of its corners.
 
     Returns
     -------
     X : ndarray of shape (n_points**2, 2), or ((n_points - 1)**2, 2) for the midpoints
-        Inputs in [-10, 10], the second changing fastest.
+        The second input changes fastest.
     y : ndarray of shape (n_points**2,) or ((n_points - 1)**2,)
-        Targets in [-0.22, 1], by default at least -0.19.
 
     Raises
     ------
-    TypeError, ValueError
+    ValueError
         If ``n_points`` is not an integer of at least 2.
 
     References
@@ -45,10 +44,9 @@ def make_jang_sinc(n_points: int = 11, *, midpoints: bool = False) -> tuple[np.n
     >>> X, y = make_jang_sinc()
     >>> X.shape, float(y.max())
     ((121, 2), 1.0)
-    >>> make_jang_sinc(midpoints=True)[0].shape
-    (100, 2)
     """
-    n_points = check_count(n_points, "n_points", min_val=2)
+    constraints = {"n_points": [Interval(Integral, 2, None, closed="left")]}
+    validate_parameter_constraints(constraints, {"n_points": n_points}, "make_jang_sinc")
     axis = np.linspace(-10.0, 10.0, n_points)
     if midpoints:
         axis = 0.5 * (axis[1:] + axis[:-1])
@@ -58,9 +56,9 @@ def make_jang_sinc(n_points: int = 11, *, midpoints: bool = False) -> tuple[np.n
 
 
 def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
-    """Make Jang's second problem: a nonlinear function of three inputs.
+    """Make Jang's second problem: y = (1 + x1^0.5 + x2^-1 + x3^-1.5)^2.
 
-    The target is y = (1 + x1^0.5 + x2^-1 + x3^-1.5)^2, from Takagi and Hayashi.
+    Jang's figure of merit is the mean of 100 abs(y - prediction) / abs(y).
 
     Parameters
     ----------
@@ -71,23 +69,17 @@ def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray
     Returns
     -------
     X : ndarray of shape (216, 3), (125, 3) or (341, 3)
-        Inputs in [1, 6], the third changing fastest.
+        The third input changes fastest.
     y : ndarray of shape (216,), (125,) or (341,)
-        Targets in [4.9, 29.7].
 
     Raises
     ------
     ValueError
         If ``subset`` is unknown.
 
-    Notes
-    -----
-    Jang's figure of merit is the average percentage error, 100 mean(abs(y - prediction) / abs(y)).
-
     References
     ----------
-    J.-S. R. Jang, "ANFIS: Adaptive-Network-Based Fuzzy Inference System", IEEE Transactions on
-    Systems, Man, and Cybernetics 23(3), 1993, 665-685, example 2.
+    As for :func:`make_jang_sinc`, example 2.
 
     Examples
     --------
@@ -96,7 +88,7 @@ def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray
     >>> X.shape, float(y[0])
     ((216, 3), 16.0)
     """
-    check_choice(subset, "subset", ("train", "check", "all"))
+    validate_parameter_constraints({"subset": _SUBSET}, {"subset": subset}, "make_jang_three_input")
     train, check = _grid(np.arange(1.0, 7.0), 3), _grid(np.arange(1.5, 6.0), 3)
     X = {"train": train, "check": check, "all": np.vstack([train, check])}[subset]
     return X, (1.0 + X[:, 0] ** 0.5 + 1.0 / X[:, 1] + X[:, 2] ** -1.5) ** 2
@@ -119,34 +111,26 @@ def make_mackey_glass(
     initial_value : float, default=1.2
         x(0); before it the series is zero.
     step : float, default=0.1
-        Step of the integration, which must divide 1.
+        Step of the integration (Runge-Kutta of order 4), which must divide 1. Leave it as it is to
+        compare with published errors: chaos magnifies the error of the step that reads across the
+        jump at t = 0.
 
     Returns
     -------
     X : ndarray of shape (500, 4) or (1000, 4)
-        x(t - 18), x(t - 12), x(t - 6), x(t), in time's order; in [0.4, 1.4] by default.
+        x(t - 18), x(t - 12), x(t - 6), x(t), in time's order.
     y : ndarray of shape (500,) or (1000,)
-        x(t + 6), of the same range.
+        x(t + 6).
 
     Raises
     ------
-    TypeError, ValueError
+    ValueError
         If a parameter is of the wrong type or range, or ``step`` does not divide 1 and ``tau``.
-
-    Notes
-    -----
-    Classical fourth-order Runge-Kutta; in the middle of a step the delayed value is the mean of
-    its neighbours. The series is a convention, not the solution of the equation: x jumps at t = 0,
-    and the one step that reads across this jump is of the first order only, after which chaos
-    magnifies the difference. Leave ``step`` at its default to compare with published errors.
 
     References
     ----------
     M. C. Mackey, L. Glass, "Oscillation and Chaos in Physiological Control Systems", Science 197,
-    1977, 287-289.
-
-    J.-S. R. Jang, "ANFIS: Adaptive-Network-Based Fuzzy Inference System", IEEE Transactions on
-    Systems, Man, and Cybernetics 23(3), 1993, 665-685, example 4.
+    1977, 287-289. Jang as for :func:`make_jang_sinc`, example 4.
 
     Examples
     --------
@@ -155,10 +139,13 @@ def make_mackey_glass(
     >>> X.shape, round(float(y[0]), 4)
     ((500, 4), 1.0243)
     """
-    check_choice(subset, "subset", ("train", "check", "all"))
-    tau = check_real(tau, "tau", min_val=0, include_boundaries="neither")
-    initial_value = check_real(initial_value, "initial_value", min_val=0)
-    step = check_real(step, "step", min_val=0, max_val=1, include_boundaries="right")
+    constraints = {
+        "subset": _SUBSET,
+        "tau": [Interval(Real, 0, None, closed="neither")],
+        "initial_value": [Interval(Real, 0, None, closed="left")],
+        "step": [Interval(Real, 0, 1, closed="right")],
+    }
+    validate_parameter_constraints(constraints, locals(), "make_mackey_glass")
     t = np.arange(118, 1118)
     series = _mackey_glass_series(t[-1] + 6, tau, initial_value, step)
     rows = {"train": slice(None, 500), "check": slice(500, None), "all": slice(None)}[subset]
@@ -167,29 +154,22 @@ def make_mackey_glass(
 
 
 def _mackey_glass_series(last_time, tau, initial_value, step):
-    """x(0), x(1), ..., x(last_time) by fourth-order Runge-Kutta."""
+    """x(0), x(1), ..., x(last_time); in the middle of a step the delayed value is a mean."""
     steps_per_unit = _whole_steps(1.0, step, "1")
     delay = _whole_steps(tau, step, "tau")
-    x = [0.0] * delay + [initial_value]  # from t = -tau on
+    x = [0.0] * delay + [float(initial_value)]  # from t = -tau on
     for i in range(last_time * steps_per_unit):
-        x.append(_runge_kutta_step(x[-1], x[i], x[i + 1], step))
+        now, delayed, delayed_next = x[-1], x[i], x[i + 1]
+        gain, gain_middle, gain_next = (
+            0.2 * value / (1.0 + value**10)
+            for value in (delayed, 0.5 * (delayed + delayed_next), delayed_next)
+        )
+        slope_1 = gain - 0.1 * now
+        slope_2 = gain_middle - 0.1 * (now + 0.5 * step * slope_1)
+        slope_3 = gain_middle - 0.1 * (now + 0.5 * step * slope_2)
+        slope_4 = gain_next - 0.1 * (now + step * slope_3)
+        x.append(now + step / 6.0 * (slope_1 + 2.0 * slope_2 + 2.0 * slope_3 + slope_4))
     return np.array(x[delay::steps_per_unit])
-
-
-def _runge_kutta_step(x, delayed, delayed_next, step):
-    """x one step later, from the delayed values at the step's two ends."""
-    gain = _mackey_glass_gain(delayed)
-    gain_middle = _mackey_glass_gain(0.5 * (delayed + delayed_next))
-    gain_next = _mackey_glass_gain(delayed_next)
-    slope_1 = gain - 0.1 * x
-    slope_2 = gain_middle - 0.1 * (x + 0.5 * step * slope_1)
-    slope_3 = gain_middle - 0.1 * (x + 0.5 * step * slope_2)
-    slope_4 = gain_next - 0.1 * (x + step * slope_3)
-    return x + step / 6.0 * (slope_1 + 2.0 * slope_2 + 2.0 * slope_3 + slope_4)
-
-
-def _mackey_glass_gain(delayed):
-    return 0.2 * delayed / (1.0 + delayed**10)
 
 
 def _whole_steps(length, step, name):

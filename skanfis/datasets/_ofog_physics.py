@@ -1,91 +1,178 @@
-r"""The physics of an open-loop fiber-optic gyro, one pure function per effect.
+"""One run of an open-loop gyro: temperatures, then the output and the parts of its error.
 
 Units are those of data sheets: rates in deg/s, biases and their coefficients by the hour (deg/h),
-scale factors in ppm, temperatures in degC, time in s. Every function that gives a rate gives it in
-deg/s. All work on NumPy arrays of one run, equally spaced in time.
-
-The model, after the gyro model of IEEE 952 with the sine of an open-loop interferometer:
-
-.. math::
-
-    y = S \, w(t) \, a(T) \, \frac{\sin\left[K(T) \, (\Omega + b)\right]}{K_0} + n
-
-with the true rate :math:`\Omega`, the bias :math:`b` (a sum of several), the Sagnac factor
-:math:`K_0` at the reference temperature and :math:`K(T)` at the coil's temperature, the relative
-amplitude :math:`a(T)`, the scale factor S of the device relative to the nominal one, its warm-up
-w(t), and the noise n, white and of quantisation. Since the small-signal scale factor is amplitude
-times :math:`K_0`, y is the raw signal divided by the nominal small-signal scale factor.
-
-References
-----------
-IEEE Std 952-1997, "Specification Format Guide and Test Procedure for Single-Axis Interferometric
-Fiber Optic Gyros".
-
-H. C. Lefevre, "The Fiber-Optic Gyroscope", Artech House.
+scale factors in ppm, temperatures in degC, time in s. :func:`make_ofog` has the formulas.
 """
+
+from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 from scipy.signal import lfilter
 
 __all__ = [
+    "RANDOM_BIASES",
     "REFERENCE_TEMPERATURE",
-    "angle_random_walk_deviation",
-    "bias_gain",
-    "bias_instability",
-    "change_of_rate_by_output",
-    "coil_temperature_rate",
-    "first_order_lag",
-    "fixed_bias",
-    "open_loop_response",
-    "quantised",
-    "rate_random_walk",
-    "relative_amplitude",
-    "relative_sagnac_factor",
-    "relative_scale_factor",
-    "temperature_bias",
-    "thermal_rate_bias",
-    "warm_up_bias",
-    "warm_up_scale_factor",
+    "Schedule",
+    "simulate_power_up",
+    "temperatures",
 ]
 
 REFERENCE_TEMPERATURE = 25.0  # degC, where the factory calibrates the scale factor
-_DEGREES_PER_HOUR = 1.0 / 3600.0  # in deg/s
-_PPM = 1e-6
-_SECONDS_PER_MINUTE = 60.0
-_ARC_SECOND = 1.0 / 3600.0  # in deg
+# Biases that nobody can foresee, the one drawn at power-on included.
+RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
 
-# The Allan deviation of a first-order Gauss-Markov process of standard deviation sigma has its
-# maximum, 0.437 sqrt(2) sigma, at 1.89 correlation times; that of flicker noise B is flat, 0.664 B
-# (IEEE 952, annex on Allan variance).
+_PER_HOUR = 1.0 / 3600.0  # deg/h in deg/s, and an arc second in deg
+_PPM = 1e-6
+# The largest Allan deviation of a Gauss-Markov process in its standard deviations, and the flat one
+# of flicker noise in its coefficient (IEEE 952, annex on Allan variance).
 _ALLAN_MAXIMUM_OF_GAUSS_MARKOV = 0.437 * np.sqrt(2.0)
 _ALLAN_FLOOR_OF_FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)
 
 
-def open_loop_response(rate, sagnac_factor, relative_factor=1.0, amplitude=1.0):
-    """Rate that an open-loop interferometer indicates, a sin(K Omega) / K0.
+@dataclass(frozen=True)
+class Schedule:
+    """What all runs have in common: their clock, and the chamber's program."""
 
-    The Sagnac phase is K Omega with K = 2 pi L D / (lambda c), for a coil of length L and diameter
-    D; the phase modulation makes the signal its sine. K = ``relative_factor * sagnac_factor``.
+    n_samples: int  # of one power-up
+    sampling_interval: float  # s
+    n_power_ups: int
+    n_off: int  # samples between two power-ups, without power
+    profile: str
+    ambient_range: tuple[float, float]  # degC
+    n_soaks: int
 
-    Parameters
-    ----------
-    rate : ndarray
-        Rate, bias included [deg/s].
-    sagnac_factor : float
-        K0 [rad/(rad/s)].
-    relative_factor, amplitude : ndarray or float
-        K(T) / K0 and a(T).
+    @property
+    def time(self):
+        """Time since power-on [s]."""
+        return self.sampling_interval * np.arange(self.n_samples)
+
+    def ambient(self, first, n_samples, start, rising):
+        """Temperature of the chamber [degC] at samples of the run's clock, from ``first`` on."""
+        if self.profile == "constant":
+            return np.full(n_samples, start)
+        low, high = self.ambient_range
+        span = high - low
+        place = (start - low) / span if span > 0 else 0.0
+        phase = 0.5 * place if rising else 1.0 - 0.5 * place
+        # One power-up sees all of the way up and down.
+        period = self.sampling_interval * self.n_samples
+        clock = self.sampling_interval * (first + np.arange(n_samples))
+        triangle = 1.0 - np.abs(2.0 * ((phase + clock / period) % 1.0) - 1.0)
+        if self.profile == "soaks":
+            n_steps = self.n_soaks - 1
+            triangle = np.rint(n_steps * triangle) / n_steps
+        return low + span * triangle
+
+
+def temperatures(device, schedule, start, rising, residual_heat):
+    """Yield the temperatures [degC] and their rates [degC/s] of one power-up after another.
+
+    The run begins at the chamber's temperature ``start``, ``residual_heat`` times the self-heating
+    above which coil and thermometer are.
     """
+    n_on, interval = schedule.n_samples, schedule.sampling_interval
+    coil_start = schedule.ambient(0, 1, start, rising)[0] + residual_heat * device.self_heating
+    thermometer_start = coil_start
+    for power_up in range(schedule.n_power_ups):
+        first = power_up * (n_on + schedule.n_off)
+        # One sample more than is read: the state when the power changes.
+        on = schedule.ambient(first, n_on + 1, start, rising)
+        off = schedule.ambient(first + n_on, schedule.n_off + 1, start, rising)
+        warm = on + device.self_heating
+        coil = first_order_lag(warm, coil_start, device.thermal_time, interval)
+        thermometer = first_order_lag(coil, thermometer_start, device.thermometer_lag, interval)
+        coil_rate = (warm - coil) / device.thermal_time
+        thermometer_rate = coil_rate
+        if device.thermometer_lag:
+            thermometer_rate = (coil - thermometer) / device.thermometer_lag
+        yield SimpleNamespace(
+            ambient=on[:-1],
+            coil=coil[:-1],
+            coil_rate=coil_rate[:-1],
+            thermometer=thermometer[:-1],
+            thermometer_rate=thermometer_rate[:-1],
+        )
+        coil = first_order_lag(off, coil[-1], device.thermal_time, interval)
+        last = thermometer[-1]
+        thermometer_start = first_order_lag(coil, last, device.thermometer_lag, interval)[-1]
+        coil_start = coil[-1]
+
+
+def simulate_power_up(device, turn_on_bias, time, rate, thermal, normals, sampling_interval):
+    """Columns of the measurement and of the parts of its error, for one power-up.
+
+    ``thermal`` is of :func:`temperatures`; ``normals`` are four rows of standard normal numbers,
+    for bias instability, rate random walk, angle random walk and thermometer.
+    """
+    h = sampling_interval
+    warm = thermal.coil - REFERENCE_TEMPERATURE
+    settling = np.exp(-time / device.warm_up_time)
+    relative = 1.0 + _PPM * device.sagnac_temperature * warm  # K(T) / K0
+    scale = 1.0 + _PPM * device.scale_factor
+    curved = device.amplitude_temperature + device.amplitude_curvature * warm
+    amplitude = 1.0 + _PPM * warm * curved
+    warm_up = 1.0 + _PPM * device.warm_up_scale_factor * settling
+    optics = (device.sagnac_factor, relative, scale * amplitude * warm_up)
+    curved = device.bias_temperature + device.bias_temperature_curvature * warm
+    biases = {
+        "bias": np.full(time.shape, _PER_HOUR * device.bias),
+        "bias_temperature": _PER_HOUR * warm * curved,
+        "warm_up": _PER_HOUR * device.warm_up * settling,
+        "bias_temperature_rate": (
+            _PER_HOUR * device.bias_temperature_rate * 60.0 * thermal.coil_rate
+        ),
+        "bias_repeatability": np.full(time.shape, _PER_HOUR * turn_on_bias),
+        "bias_instability": bias_instability(
+            normals[0], device.bias_instability, device.correlation_time, h
+        ),
+        "rate_random_walk": rate_random_walk(normals[1], device.rate_random_walk, h),
+    }
+    bias = sum(biases.values())
+    # N in deg/sqrt(h) is N / 60 in deg/sqrt(s); a sample is the mean rate over an interval.
+    white = normals[2] * (device.angle_random_walk / 60.0 / np.sqrt(h))
+    noisy = open_loop_response(rate + bias, *optics) + white
+    output = quantised(noisy, device.quantisation, h)
+    gain = bias_gain(rate, bias, *optics)
+    nominal = open_loop_response(rate, device.sagnac_factor)
+    sine = open_loop_response(rate, device.sagnac_factor, relative)
+    parts = {
+        # Without any bias: the sine's error, then what each further effect adds to it.
+        "nonlinearity": nominal - rate,
+        "scale_factor": (scale - 1.0) * nominal,
+        "wavelength": scale * (sine - nominal),
+        "amplitude": scale * (amplitude - 1.0) * sine,
+        "warm_up_scale_factor": scale * amplitude * (warm_up - 1.0) * sine,
+        **{name: gain * part for name, part in biases.items()},
+        "angle_random_walk": white,
+        "quantisation": output - noisy,
+    }
+    measurement = {
+        "time": time,
+        "temperature": thermal.thermometer + device.thermometer_noise * normals[3],
+        "temperature_rate": thermal.thermometer_rate,
+        "ambient": thermal.ambient,
+        "rate": rate,
+        "counts": output,
+        "output": output,
+        "error": output - rate,
+        "noise": sum(biases[name] for name in RANDOM_BIASES)
+        + rate_by_output(rate + bias, *optics) * (white + parts["quantisation"]),
+    }
+    return measurement, parts
+
+
+def open_loop_response(rate, sagnac_factor, relative_factor=1.0, amplitude=1.0):
+    """Indicated rate a sin(K rate) / K0 [deg/s], bias included in ``rate``."""
     phase = sagnac_factor * relative_factor * np.deg2rad(rate)
     return amplitude * np.rad2deg(np.sin(phase)) / sagnac_factor
 
 
 def bias_gain(rate, bias, sagnac_factor, relative_factor, amplitude):
-    """Change of the indicated rate per unit of bias, [f(Omega + b) - f(Omega)] / b.
+    """Change of the indicated rate per unit of bias, exact and without loss of digits.
 
-    f is :func:`open_loop_response`. By the sum-to-product rule this is
-    a K / K0 cos(K (Omega + b / 2)) sinc(K b / 2), which is exact, and loses no digits where b is
-    small. It shares the effect of the whole bias out among its parts in proportion.
+    By the sum-to-product rule a K / K0 cos(K (Omega + b / 2)) sinc(K b / 2): it shares the effect
+    of the whole bias out among its parts in proportion.
     """
     factor = sagnac_factor * relative_factor
     half_phase = 0.5 * factor * np.deg2rad(bias)
@@ -93,78 +180,16 @@ def bias_gain(rate, bias, sagnac_factor, relative_factor, amplitude):
     return amplitude * relative_factor * np.cos(phase) * np.sinc(half_phase / np.pi)
 
 
-def change_of_rate_by_output(rate, sagnac_factor, relative_factor, amplitude):
-    """Change of the rate per unit of the indicated rate, 1 / f'(rate); f: the response above.
-
-    What noise of the output is worth at the input: f is flatter at large rates, where the same
-    noise stands for more of the rate.
-    """
+def rate_by_output(rate, sagnac_factor, relative_factor, amplitude):
+    """What a unit of noise of the output is worth at the input: 1 over the response's slope."""
     factor = sagnac_factor * relative_factor
     return 1.0 / (amplitude * relative_factor * np.cos(factor * np.deg2rad(rate)))
 
 
-def relative_sagnac_factor(temperature, coefficient):
-    """K(T) / K0 = 1 + c (T - T0), c in ppm/degC.
-
-    The mean wavelength of a superluminescent diode grows by some 350 to 450 ppm/degC, and K falls
-    as 1 / wavelength.
-    """
-    return 1.0 + _PPM * coefficient * (temperature - REFERENCE_TEMPERATURE)
-
-
-def relative_amplitude(temperature, coefficient, curvature):
-    """Amplitude a(T) = 1 + c1 (T - T0) + c2 (T - T0)^2, in ppm/degC and ppm/degC^2.
-
-    The source's power, the loss of the optics and the modulation depth depend on temperature.
-    """
-    difference = temperature - REFERENCE_TEMPERATURE
-    return 1.0 + _PPM * difference * (coefficient + curvature * difference)
-
-
-def relative_scale_factor(deviation):
-    """Scale factor relative to the nominal one, S = 1 + e, with e in ppm."""
-    return 1.0 + _PPM * deviation
-
-
-def warm_up_scale_factor(time, deviation, time_constant):
-    """Scale factor while warming up, relative to the warm one: 1 + e exp(-t / tau_w), e in ppm.
-
-    The source's power and its mean wavelength settle after power-on.
-    """
-    return 1.0 + _PPM * deviation * np.exp(-time / time_constant)
-
-
-def fixed_bias(bias):
-    """Bias that does not change during a run, from deg/h; IEEE 952's D_F."""
-    return _DEGREES_PER_HOUR * bias
-
-
-def temperature_bias(temperature, coefficient, curvature):
-    """Bias b_T = c1 (T - T0) + c2 (T - T0)^2, in deg/h/degC and deg/h/degC^2; IEEE 952's D_T."""
-    difference = temperature - REFERENCE_TEMPERATURE
-    return _DEGREES_PER_HOUR * difference * (coefficient + curvature * difference)
-
-
-def warm_up_bias(time, amplitude, time_constant):
-    """Bias b_w exp(-t / tau_w) after power-on, b_w in deg/h: the electronics' transient."""
-    return _DEGREES_PER_HOUR * amplitude * np.exp(-time / time_constant)
-
-
-def thermal_rate_bias(temperature_rate, coefficient):
-    """Bias k_S dT/dt of the coil, k_S in deg/h/(degC/min), dT/dt in degC/s: the Shupe effect.
-
-    A change of temperature that is not symmetric about the coil's middle reaches the two waves at
-    different times (D. M. Shupe, Applied Optics 19, 1980, 654-655); here the integral over the
-    fiber is lumped into one coefficient, IEEE 952's bias temperature-ramp sensitivity.
-    """
-    return _DEGREES_PER_HOUR * coefficient * _SECONDS_PER_MINUTE * temperature_rate
-
-
 def first_order_lag(values, start, time_constant, sampling_interval):
-    """Solution y of tau dy/dt = u - y with y(0) = ``start``.
+    """Solution y of tau dy/dt = u - y with y(0) = ``start``; none for a time constant of zero.
 
-    Exact for an input that is linear between its samples (first-order hold), so that no relation
-    between the sampling interval and the time constant is needed. ``time_constant=0`` is no lag.
+    Exact for an input that is linear between its samples, whatever the sampling interval.
     """
     if time_constant == 0:
         return np.array(values, dtype=float)
@@ -176,69 +201,24 @@ def first_order_lag(values, start, time_constant, sampling_interval):
     return filtered
 
 
-def coil_temperature_rate(equilibrium, coil_temperature, time_constant):
-    """dT/dt = (T_equilibrium - T) / tau_th of the coil [degC/s], its heat balance.
-
-    With a constant ambient temperature and a cold start this is the derivative of
-    T = T_ambient + dT_self (1 - exp(-t / tau_th)).
-    """
-    return (equilibrium - coil_temperature) / time_constant
-
-
-def angle_random_walk_deviation(coefficient, sampling_interval):
-    """Standard deviation of one sample of white rate noise [deg/s].
-
-    A sample is the mean rate over one sampling interval h, so sigma = N / sqrt(h); N is the angle
-    random walk in deg/sqrt(h), that is N / 60 in deg/sqrt(s) (IEEE 952).
-    """
-    return coefficient / 60.0 / np.sqrt(sampling_interval)
-
-
 def rate_random_walk(standard_normal, coefficient, sampling_interval):
-    """Bias that walks at random from zero at power-on [deg/s].
-
-    b(k+1) = b(k) + K sqrt(h) w(k); K is the rate random walk in deg/h/sqrt(h), that is K / 216000
-    in deg/s/sqrt(s). Its Allan deviation is K sqrt(tau / 3) (IEEE 952).
-
-    Parameters
-    ----------
-    standard_normal : ndarray of shape (n_samples,)
-        Independent standard normal numbers w; the last one would only act on the sample to come.
-    coefficient, sampling_interval : float
-        K [deg/h/sqrt(h)], h [s].
-    """
-    step = coefficient * _DEGREES_PER_HOUR / 60.0 * np.sqrt(sampling_interval)
+    """Bias [deg/s] that walks at random from zero at power-on, ``coefficient`` in deg/h/sqrt(h)."""
+    step = coefficient * _PER_HOUR / 60.0 * np.sqrt(sampling_interval)
     return step * np.concatenate([[0.0], np.cumsum(standard_normal[:-1])])
 
 
 def quantised(rate, coefficient, sampling_interval):
-    """The rate as read from a counter of angle increments [deg/s].
-
-    The integral of the rate is rounded to whole increments q = sqrt(12) Q, and a sample is what
-    was added to it during one interval. The error of the angle is uniform, of standard deviation
-    Q [arcsec], so that the Allan deviation is sqrt(3) Q / tau (IEEE 952). Zero is no quantisation.
-    """
+    """The rate [deg/s] as read from a counter of angle increments sqrt(12) Q, Q in arcsec."""
     if coefficient == 0:
         return rate
-    increment = np.sqrt(12.0) * coefficient * _ARC_SECOND / sampling_interval
+    increment = np.sqrt(12.0) * coefficient * _PER_HOUR / sampling_interval
     return increment * np.diff(np.rint(np.cumsum(rate) / increment), prepend=0.0)
 
 
 def bias_instability(standard_normal, coefficient, correlation_time, sampling_interval):
-    """First-order Gauss-Markov noise [deg/s] whose Allan deviation peaks where flicker lies flat.
-
-    x(k+1) = exp(-h / T_c) x(k) + w(k), from its stationary state on. It stands in for the flicker
-    noise of bias instability B [deg/h] (IEEE 952): the maximum of its Allan deviation is 0.664 B.
-
-    Parameters
-    ----------
-    standard_normal : ndarray of shape (n_samples,)
-        Independent standard normal numbers, the innovations.
-    coefficient, correlation_time, sampling_interval : float
-        B [deg/h], T_c [s], h [s].
-    """
+    """Stationary Gauss-Markov noise [deg/s], whose Allan deviation peaks at 0.664 B, B in deg/h."""
     ratio = _ALLAN_FLOOR_OF_FLICKER / _ALLAN_MAXIMUM_OF_GAUSS_MARKOV
-    deviation = ratio * coefficient * _DEGREES_PER_HOUR
+    deviation = ratio * coefficient * _PER_HOUR
     interval = sampling_interval / correlation_time
     innovations = np.sqrt(-np.expm1(-2.0 * interval)) * standard_normal
     innovations[0] = standard_normal[0]

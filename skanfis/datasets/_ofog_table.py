@@ -64,18 +64,9 @@ Do not judge a model by its fit to this table:
 def load_ofog(*, return_X_y: bool = False, as_frame: bool = True) -> Any:
     """Load Table 1 of the founding paper: 19 rows of an open-loop fiber-optic gyro (regression).
 
-    The table is a historical document, not a benchmark. It is kept exactly as printed, and what is
-    wrong with it is:
-
-    * the paper's text speaks of 20 rows, but 19 are printed;
-    * the column of rates is damaged: the fractional parts agree (standard deviation 0.005 deg/s)
-      while the digit before the point is 7, 8 or 9 at random, and the output does not follow it;
-    * two outputs stand apart from the rest, 39.5906 at 0 s and 39.7843 at 280 s;
-    * all rows lie in one window of 1 degC, 20.47 to 21.32 degC;
-    * the paper tests its model only on 0 to 120 s, within the rows it was trained on, and has more
-      parameters (36 rules with 3 each) than rows.
-
-    For data to develop and test a compensation on, see :func:`make_ofog`.
+    A historical document, kept as printed, and no benchmark: the column of rates is damaged, two
+    outputs stand apart, and all rows lie in one window of 1 degC. ``DESCR`` has the details. For
+    data to develop a compensation on, see :func:`make_ofog`.
 
     Parameters
     ----------
@@ -87,20 +78,9 @@ def load_ofog(*, return_X_y: bool = False, as_frame: bool = True) -> Any:
     Returns
     -------
     data : :class:`~sklearn.utils.Bunch`
-        With the attributes
-
-        data : DataFrame or ndarray of shape (19, 3)
-            Time since power-on [s], 0 to 360; temperature [degC]; angular rate [deg/s].
-        target : Series or ndarray of shape (19,)
-            Output of the gyro [deg/s], 39.5906 to 40.0014.
-        frame : DataFrame of shape (19, 4) or None
-            Data and target together, if ``as_frame=True``.
-        feature_names : list of str
-            ``["time", "temperature", "rate"]``.
-        target_names : list of str
-            ``["output"]``.
-        DESCR : str
-            The description of the data set.
+        With ``data``, of shape (19, 3): time since power-on [s], temperature [degC], angular rate
+        [deg/s]; ``target``, of shape (19,): output of the gyro [deg/s]; ``frame``, both together
+        if ``as_frame=True``; ``feature_names``, ``target_names`` and ``DESCR``.
     (data, target) : tuple, if ``return_X_y=True``
         The first two of these.
 
@@ -113,11 +93,8 @@ def load_ofog(*, return_X_y: bool = False, as_frame: bool = True) -> Any:
     Examples
     --------
     >>> from skanfis.datasets import load_ofog
-    >>> table = load_ofog()
-    >>> table.data.shape
+    >>> load_ofog().data.shape
     (19, 3)
-    >>> float(table.target.iloc[0])
-    39.5906
     """
     frame = pd.DataFrame(_TABLE, columns=[*_FEATURE_NAMES, _TARGET_NAME], dtype=np.float64)
     columns = frame[_FEATURE_NAMES], frame[_TARGET_NAME]

@@ -2,11 +2,10 @@
 
 from .c import CCode, CCost, export_c
 from .fis import export_fis, read_fis, write_fis
-from .folding import fold, fold_with_reader, fold_with_rows
+from .folding import fold, fold_with_reader, fold_with_rows, found_by_search, last_step
 from .model_json import export_json, read_json, write_json
 from .onnx import register_onnx_converter
 from .trusted import TRUSTED_TYPES
-from .unwrapping import found_by_search, last_step
 
 __all__ = [
     "TRUSTED_TYPES",

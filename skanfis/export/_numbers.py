@@ -1,91 +1,108 @@
 """The numbers of a model as other languages compute with them: rounded, shifted, checked.
 
-Consequents are about the model's reference point, rounded to the type: z = x - reference is then
-exact for inputs near it, and an offset (a time stamp, a raw count) costs no digits. They are about
-one value per output as well: strengths sum to one, so that the value may be added at the end, and
-what is summed is no larger than it must be. Memberships take the inputs themselves; ``_constants``
-says how an offset costs them nothing either.
+Inputs are about the model's reference, rounded to the type: z = x - reference is exact for inputs
+near it, and an offset (a time stamp, a raw count) costs no digits. Consequents are about one value
+per output as well: strengths sum to one, so that it may be added at the end, and what is summed is
+no larger than it must be.
 """
 
 from dataclasses import dataclass, replace
-from math import fsum
 
 import numpy as np
 
 from ..antecedent import RuleTableAntecedent
-from ..membership import Membership
-from ._constants import CONSTANTS_OF
+from ..membership import MEMBERSHIPS, Membership
+from ..model import TSKModel
 
-__all__ = ["Numbers", "TermTable", "as_held", "rounded_within"]
+__all__ = ["FLOOR", "SMALLEST_LOG_SQUARE", "Numbers", "TermTable", "rounded_within"]
+
+# As in ``membership.profiles`` and ``membership.bell``.
+FLOOR = 1e-10
+SMALLEST_LOG_SQUARE = np.log(1e-300)
+
+# Constants of memberships out of theta (n_parameters, n_terms), whose location is about the
+# reference; those of one term are a row of what the functions stack.
+
+
+def _gaussian(theta):
+    location, log_width = theta
+    return [location, np.sqrt(0.5) * np.exp(-log_width)]
+
+
+def _bell(theta):
+    location, log_width, log_slope = theta
+    return [location, np.exp(-log_width), np.exp(log_slope)]
+
+
+def _two_sided_gaussian(theta):
+    location, log_left, log_right, log_plateau = theta
+    return [location, 0.5 * np.exp(log_plateau), np.exp(-log_left), np.exp(-log_right)]
+
+
+def _two_feet(theta):
+    """The feet, one over the lengths of the flanks, and the location, a triangle's corner."""
+    location, log_left, log_right, *log_plateau = theta
+    left, right = np.exp(log_left), np.exp(log_right)
+    half = 0.5 * np.exp(log_plateau[0]) if log_plateau else 0.0
+    return [location - half - left, location + half + right, 1.0 / left, 1.0 / right, location]
+
+
+def _one_foot(side):
+    def constants(theta):
+        shoulder, log_width = theta
+        width = np.exp(log_width)
+        return [shoulder + side * width, -side / width]
+
+    return constants
+
+
+def _sigmoid_difference(theta):
+    location, log_width, log_flank = theta
+    v = np.exp(log_width - log_flank)
+    return [location, np.exp(-log_flank), v, np.log(-np.expm1(-2.0 * v))]
+
+
+def _sigmoid_product(theta):
+    location, log_width, *log_flanks = theta
+    flanks = [np.exp(-log_flank) for log_flank in log_flanks]
+    return [location, *flanks, *(np.exp(log_width - log_flank) for log_flank in log_flanks)]
+
+
+_BY_NAME = {
+    "gaussian": _gaussian,
+    "bell": _bell,
+    "triangular": _two_feet,
+    "trapezoidal": lambda theta: _two_feet(theta)[:4],
+    "two_sided_gaussian": _two_sided_gaussian,
+    "pi_shaped": lambda theta: _two_feet(theta)[:4],
+    "s_shaped": _one_foot(-1.0),
+    "z_shaped": _one_foot(1.0),
+    "sigmoid_difference": _sigmoid_difference,
+    "sigmoid_product": _sigmoid_product,
+}
+
+# By the class, since another class may go by the same name.
+_CONSTANTS_OF = {MEMBERSHIPS[name]: constants for name, constants in _BY_NAME.items()}
+
+# Which constants are places where the slope jumps.
+_KINKS_OF = {MEMBERSHIPS["triangular"]: (0, 1, 4), MEMBERSHIPS["trapezoidal"]: (0, 1)}
 
 
 @dataclass(frozen=True, eq=False)
 class TermTable:
-    """Consecutive terms of one family.
-
-    Attributes
-    ----------
-    start : int
-        Position of the first term.
-    constants : ndarray of shape (n_terms, k)
-        Locations, the rests of locations if they are held in two parts, other constants.
-    n_locations : int
-    is_in_two : bool
-    """
+    """Consecutive terms of one family: where they start, and their constants (n_terms, k)."""
 
     family: type[Membership]
     start: int
     constants: np.ndarray
-    n_locations: int
-    is_in_two: bool
-
-    @property
-    def locations(self):
-        """First parts, (n_terms, n_locations)."""
-        return self.constants[:, : self.n_locations]
-
-    @property
-    def rests(self):
-        """Second parts, (n_terms, n_locations); no columns where there are none."""
-        return self.constants[:, self.n_locations : self.n_locations * (1 + self.is_in_two)]
-
-    @property
-    def others(self):
-        """Other constants, (n_terms, n_others)."""
-        return self.constants[:, self.n_locations * (1 + self.is_in_two) :]
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """What is written: floating-point arrays of one type, and integers.
+    """What is written: floating-point arrays of one type, and integers."""
 
-    Attributes
-    ----------
-    low, high, reference : ndarray of shape (n_inputs,)
-        The box, and the point that consequents are about.
-    inverse_spread : ndarray of shape (n_inputs,)
-    terms : tuple of TermTable
-    term_inputs : ndarray of int of shape (n_terms,)
-    counts : tuple of int or None
-        Terms per input of a grid; None for other rule bases.
-    rule_terms : ndarray of int of shape (n_rules, n_terms_per_rule) or None
-        Positions of terms, ``n_terms`` for none; None where they follow from the order of rules.
-    terms_per_rule : int
-    offset : ndarray of shape (n_outputs,)
-        What all consequents are about.
-    coefficients : ndarray of shape (n_rules, n_outputs, 1 + n_slopes)
-    slope_inputs : ndarray of int of shape (n_slopes,)
-        The inputs that take part in the consequents.
-    reach : ndarray of shape (n_inputs,) or None
-        How far the tangent is followed; None where it is without end.
-    output_low, output_high : ndarray of shape (n_outputs,) or None
-        What outputs are held within; None where they are not.
-    support : ndarray of shape (n_rules, 2 + n_inputs + n_inputs (n_inputs + 1) / 2) or None
-        Of each rule in coverage: its share, its radius, its centre, and its factor row by row up to
-        the diagonal, for inputs about the reference in standard deviations. None where the model
-        knows of no data.
-    """
-
+    # With its box as it is rounded: from a function on the numbers it differs by rounding alone.
+    model: TSKModel
     dtype: np.dtype
     low: np.ndarray
     high: np.ndarray
@@ -93,53 +110,49 @@ class Numbers:
     inverse_spread: np.ndarray
     terms: tuple[TermTable, ...]
     term_inputs: np.ndarray
+    # Terms per input of a grid.
     counts: tuple[int, ...] | None
-    rule_terms: np.ndarray | None
-    terms_per_rule: int
+    # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
+    rule_terms: np.ndarray
+    # Coefficients (n_rules, n_outputs, 1 + n_slopes) about it.
     offset: np.ndarray
     coefficients: np.ndarray
     slope_inputs: np.ndarray
-    reach: np.ndarray | None
-    output_low: np.ndarray | None
-    output_high: np.ndarray | None
+    # How far the tangent is followed in each input, so that the sum in deviations is finite.
+    reach: np.ndarray
+    # (2, n_outputs); None where outputs are not held.
+    output_limits: np.ndarray | None
+    # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
     support: np.ndarray | None
 
     @classmethod
     def of(cls, model, dtype):
         """Numbers of a TSKModel in a floating-point type; ValueError where it cannot hold them."""
         dtype = np.dtype(dtype)
-        antecedent = model.antecedent
-        low, high, reference = (
-            _rounded(values, dtype, f"{what} of an input")
-            for values, what in [
-                (model.minimum, "the minimum"),
-                (model.maximum, "the maximum"),
-                (model.reference, "the mean"),
-            ]
-        )
-        rule_terms = None
+        low = _rounded(model.minimum, dtype, "the minimum of an input")
+        high = _rounded(model.maximum, dtype, "the maximum of an input")
+        reference = _rounded(model.reference, dtype, "the mean of an input")
+        model, antecedent = _in_rounded_box(model, low, high), model.antecedent
+        rule_terms = antecedent.rule_terms
         if isinstance(antecedent, RuleTableAntecedent):
-            rule_terms = np.where(antecedent.rule_terms < 0, model.antecedent.n_terms, 0)
-            rule_terms += np.maximum(antecedent.rule_terms, 0)
+            rule_terms = np.where(rule_terms < 0, antecedent.n_terms, rule_terms)
         offset, coefficients, slope_inputs = _consequents(model, reference)
-        output_low, output_high = _output_limits(model, dtype)
         return cls(
+            model=model,
             dtype=dtype,
             low=low,
             high=high,
             reference=reference,
             inverse_spread=_rounded(1.0 / model.spread, dtype, "the inverse spread of an input"),
-            terms=tuple(_term_tables(model, low, high)),
+            terms=tuple(_term_tables(model, low, high, reference)),
             term_inputs=antecedent.term_inputs,
             counts=antecedent.grid_counts,
             rule_terms=rule_terms,
-            terms_per_rule=antecedent.rule_terms.shape[1],
             offset=_rounded(offset, dtype, "a typical output"),
             coefficients=_rounded(coefficients, dtype, "a consequent"),
             slope_inputs=slope_inputs,
             reach=_reach(model, dtype),
-            output_low=output_low,
-            output_high=output_high,
+            output_limits=_output_limits(model, dtype),
             support=None if model.support is None else _support(model, reference),
         )
 
@@ -165,24 +178,6 @@ class Numbers:
         return np.cumsum([0, *(self.counts or ())])[:-1]
 
 
-def _reach(model, dtype):
-    """How far the tangent is followed in a type, or None; its ends stand for what is beyond."""
-    if np.isinf(model.max_extrapolation):
-        return None
-    limits = np.finfo(dtype)
-    reach = model.max_extrapolation * model.spread
-    held = np.minimum(reach, float(limits.max)).astype(dtype)
-    return np.where(held < limits.tiny, dtype.type(0.0), held)
-
-
-def _output_limits(model, dtype):
-    """What outputs are held within, in a type, its ends standing for what is beyond; or None."""
-    if not np.isfinite(model.output_limits).any():
-        return None, None
-    end = float(np.finfo(dtype).max)
-    return rounded_within(np.clip(model.output_limits, -end, end), dtype)
-
-
 def rounded_within(limits, dtype):
     """Limits, low and high (2, n_outputs), in a type; none is beyond what is given."""
     low, high = limits.astype(dtype)
@@ -192,110 +187,72 @@ def rounded_within(limits, dtype):
     return np.stack([low, high])
 
 
-def _support(model, reference):
-    """What coverage takes of each rule, about the reference as it is rounded."""
-    support, dtype = model.support, reference.dtype
-    center = (support.center - reference.astype(float)) / model.spread
-    rows, columns = np.tril_indices(model.n_inputs)
-    factor = (support.factor * model.spread)[:, rows, columns]
-    table = np.column_stack([support.share, support.radius, center, factor])
-    table[support.share == 0.0] = 0.0
-    return _rounded(table, dtype, "where the training data of a rule lie")
-
-
-def as_held(model, numbers):
-    """The model with its box as the numbers round it, and with the terms that lie on its edges.
-
-    What is left between it and a function on the numbers is the function's own rounding.
-    """
-    low, high = numbers.low, numbers.high
-    groups = []
-    for group in model.antecedent.groups:
-        theta = group.theta.copy()
-        location, rest = _on_rounded_edge(theta[0], group.inputs, model, low, high)
-        theta[0] = location + rest
-        groups.append(replace(group, theta=theta))
-    return replace(
-        model,
-        antecedent=replace(model.antecedent, groups=tuple(groups)),
-        minimum=low.astype(float),
-        maximum=high.astype(float),
-    )
-
-
 def _rounded(values, dtype, what):
     """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero."""
     values = np.asarray(values, dtype=float)
     limits = np.finfo(dtype)
     largest = np.abs(values).max(initial=0.0)
+    name = "Single precision" if dtype == np.float32 else "Double precision"
     if not largest <= float(limits.max):
         raise ValueError(
-            f"{_type_name(dtype)} cannot hold {what}, {largest:g}: it goes to "
-            f"{float(limits.max):.2g}. Scale the data, or export in double precision."
+            f"{name} cannot hold {what}, {largest:g}: it goes to {float(limits.max):.2g}. Scale "
+            "the data, or export in double precision."
         )
     if 0.0 < largest < float(limits.tiny):
         raise ValueError(
-            f"{_type_name(dtype)} cannot hold {what}, {largest:g}, with all its digits: they "
-            f"end below {float(limits.tiny):.2g}. Scale the data, or export in double precision."
+            f"{name} cannot hold {what}, {largest:g}, with all its digits: they end below "
+            f"{float(limits.tiny):.2g}. Scale the data, or export in double precision."
         )
     return np.where(np.abs(values) < float(limits.tiny), 0.0, values).astype(dtype)
 
 
-def _type_name(dtype):
-    return "Single precision" if np.dtype(dtype) == np.float32 else "Double precision"
-
-
-def _term_tables(model, low, high):
-    groups = model.antecedent.groups
-    for group in groups:
-        if group.family not in CONSTANTS_OF:
-            raise ValueError(
-                f"Memberships {group.family.name!r} cannot be exported; "
-                f"{', '.join(family.name for family in CONSTANTS_OF)} can."
-            )
-    dtype = low.dtype
-    tables, start = [], 0
-    for group in groups:
-        what = f"a constant of a {group.family.name} membership"
-        theta = group.theta.copy()
-        theta[0], beyond = _on_rounded_edge(theta[0], group.inputs, model, low, high)
-        locations, others = CONSTANTS_OF[group.family](theta)
-        locations = [(*parts, beyond) for parts in locations]
-        exact = np.array([[fsum(parts) for parts in zip(*loc, strict=True)] for loc in locations])
-        near = _rounded(exact, dtype, what)
-        parts_left = [
-            [fsum([*parts, -float(first)]) for *parts, first in zip(*loc, row, strict=True)]
-            for loc, row in zip(locations, near, strict=True)
-        ]
-        rest = np.array(parts_left).reshape(near.shape).astype(dtype)
-        others = np.array([_rounded(other, dtype, what) for other in others])
-        tables.append((group, start, near, rest, others))
-        start += group.n_terms
-    # One function per family: it adds a second part to locations if any of its terms needs it. In
-    # single precision nearly all do.
-    is_single = dtype == np.float32
-    in_two = {group.family for group, _, _, rest, _ in tables if is_single or rest.any()}
-    for group, start, near, rest, others in tables:
-        is_in_two = group.family in in_two
-        columns = [near, rest, others] if is_in_two else [near, others]
-        constants = np.ascontiguousarray(np.vstack(columns).T)
-        yield TermTable(group.family, start, constants, len(near), is_in_two)
-
-
-def _on_rounded_edge(location, inputs, model, low, high):
-    """Locations, where those on an edge of the box are on the edge as it is rounded; and the rest.
+def _in_rounded_box(model, low, high):
+    """The model with its box as it is rounded, and with the terms that lie on its edges.
 
     A triangle that training has not moved has its corner on the edge, to a bit, and an input is
-    held at the edge as it is rounded: it must lie on the same side of the corner as in the model.
+    held at the edge as it is rounded.
     """
-    rest = np.zeros_like(location)
-    for edge, rounded in [(model.minimum, low), (model.maximum, high)]:
-        exact, nearest = edge[inputs], rounded[inputs].astype(float)
-        reach = np.maximum(np.abs(exact), (model.maximum - model.minimum)[inputs])
-        is_on_edge = np.abs(location - exact) <= 16.0 * np.spacing(reach)
-        rest = np.where(is_on_edge, location - exact, rest)
-        location = np.where(is_on_edge, nearest, location)
-    return location, rest
+    groups = []
+    for group in model.antecedent.groups:
+        theta = group.theta.copy()
+        for edge, rounded in ((model.minimum, low), (model.maximum, high)):
+            beyond = theta[0] - edge[group.inputs]
+            reach = np.maximum(np.abs(edge), model.maximum - model.minimum)[group.inputs]
+            moved = rounded[group.inputs].astype(float) + beyond
+            theta[0] = np.where(np.abs(beyond) <= 16.0 * np.spacing(reach), moved, theta[0])
+        groups.append(replace(group, theta=theta))
+    antecedent = replace(model.antecedent, groups=tuple(groups))
+    edges = {"minimum": low.astype(float), "maximum": high.astype(float)}
+    return replace(model, antecedent=antecedent, **edges)
+
+
+def _term_tables(model, low, high, reference):
+    start = 0
+    for group in model.antecedent.groups:
+        family, inputs = group.family, group.inputs
+        if family not in _CONSTANTS_OF:
+            raise ValueError(
+                f"Memberships {family.name!r} cannot be exported; "
+                f"{', '.join(one.name for one in _CONSTANTS_OF)} can."
+            )
+        exact = _constants_about(reference, group)
+        constants = _rounded(exact, low.dtype, f"a constant of a {family.name} membership")
+        # An input that is held at an edge of the box is on the same side of a kink as in the model.
+        for edge in (low, high):
+            sides = np.sign(_constants_about(edge, group)).astype(low.dtype)
+            held = (edge - reference)[inputs]
+            for k in _KINKS_OF.get(family, ()):
+                moved = np.where(sides[:, k], np.nextafter(held, held + sides[:, k]), held)
+                is_right = np.sign(constants[:, k] - held) == sides[:, k]
+                constants[:, k] = np.where(is_right, constants[:, k], moved)
+        yield TermTable(family, start, constants)
+        start += group.n_terms
+
+
+def _constants_about(place, group):
+    theta = group.theta.copy()
+    theta[0] -= place[group.inputs]
+    return np.column_stack(_CONSTANTS_OF[group.family](theta))
 
 
 def _consequents(model, reference):
@@ -307,3 +264,29 @@ def _consequents(model, reference):
     offset = model.rule_weights @ coefficients[:, :, 0] / model.rule_weights.sum()
     coefficients[:, :, 0] -= offset
     return offset, coefficients[:, :, np.r_[0, 1 + slope_inputs]], slope_inputs
+
+
+def _reach(model, dtype):
+    limits = np.finfo(dtype)
+    largest = float(limits.max)
+    with np.errstate(over="ignore"):
+        reach = min(model.max_extrapolation, 0.25 * largest / model.n_inputs) * model.spread
+    reach = np.minimum(reach, largest)
+    return np.where(reach < float(limits.tiny), 0.0, reach).astype(dtype)
+
+
+def _output_limits(model, dtype):
+    if model.out_of_bounds != "linear" and not np.isfinite(model.output_limits).any():
+        return None
+    end = float(np.finfo(dtype).max)
+    return rounded_within(np.clip(model.output_limits, -end, end), dtype)
+
+
+def _support(model, reference):
+    """What coverage takes of each rule, about the reference as it is rounded."""
+    support, dtype = model.support, reference.dtype
+    rows, columns = np.tril_indices(model.n_inputs)
+    center, factor = support.center - reference.astype(float), support.factor[:, rows, columns]
+    table = np.column_stack([support.share, support.radius, center, factor])
+    table[support.share == 0.0] = 0.0
+    return _rounded(table, dtype, "where the training data of a rule lie")

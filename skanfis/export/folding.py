@@ -1,11 +1,7 @@
-r"""Scalers in front of a model, and on its target, folded into it: one model of the raw columns.
+"""Scalers in front of a model, and on its target, folded into it: one model of the raw columns.
 
-A scaler such as StandardScaler maps every column alone, z = (x - offset) / scale with a positive
-scale. Rules about z are rules about x = offset + scale z: memberships, box and consequents change
-their units, nothing else does. The same holds for the target, y = offset + scale t.
-
-A OneHotEncoder makes numbers of what is none: its indicators are inputs of the folded model, in the
-place of the column that it encodes.
+Rules about z are rules about x = offset + scale z: memberships, box and consequents change their
+units, nothing else does. The same holds for the target, y = offset + scale t.
 """
 
 from collections.abc import Callable
@@ -13,17 +9,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from sklearn.utils import check_array
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import Pipeline
+from sklearn.utils.validation import check_is_fitted
 
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
-from ._column import Column
-from ._one_hot import part_of
-from ._steps import columns_after, is_passthrough, refuse_step
-from .unwrapping import model_of, steps_of, target_steps
+from ..options import policy_of
+from ._columns import Column, as_numbers, columns_after, described, is_passthrough
 
-__all__ = ["fold", "fold_with_reader", "fold_with_rows"]
+__all__ = ["fold", "fold_with_reader", "fold_with_rows", "found_by_search", "last_step"]
 
 
 def fold(estimator: Any) -> TSKModel:
@@ -32,9 +28,8 @@ def fold(estimator: Any) -> TSKModel:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator; a Pipeline that ends in one, with steps in front that treat every
-        column alone (StandardScaler, MinMaxScaler, MaxAbsScaler, RobustScaler, "passthrough",
-        column selections, a OneHotEncoder, a ColumnTransformer of these); a
+        An ANFIS estimator; a Pipeline that ends in one, with steps in front that scale every column
+        alone, select columns or encode them (OneHotEncoder), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
         GridSearchCV over these. A TSKModel is returned as it is.
 
@@ -42,17 +37,13 @@ def fold(estimator: Any) -> TSKModel:
     -------
     model : TSKModel
         Its inputs are the raw columns that reach the model, in the order of X, by their names in X
-        ("x0", "x1", ... where it has none); a column that a step drops is no input. In the place of
-        a column that is one-hot encoded are its indicators, by the encoder's names ("fibre_PM").
-        Terms and rules keep their order. ``model.predict(X)``, with X of these columns, is what
-        ``estimator.predict(X)`` is, to rounding errors, under every policy out of bounds.
+        ("x0", "x1", ... where it has none), and in the place of one that is one-hot encoded its
+        indicators ("fibre_PM"). It predicts what ``estimator`` does, to rounding errors.
 
     Raises
     ------
-    ValueError
-        If a step cannot be folded; it is named.
-    TypeError
-        If ``estimator`` is no such estimator.
+    ValueError, TypeError
+        If a step cannot be folded, which is named; if ``estimator`` is no such estimator.
 
     Examples
     --------
@@ -68,7 +59,7 @@ def fold(estimator: Any) -> TSKModel:
     >>> bool(np.allclose(model.predict(X)[:, 0], pipeline.predict(X)))
     True
     """
-    return _Folding(estimator).model
+    return fold_with_reader(estimator)[0]
 
 
 def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
@@ -77,21 +68,13 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`fold` takes it.
     X : array-like or DataFrame of shape (n_rows, n_features)
-        A table that ``estimator`` takes.
+        Checked: other columns than in training are refused, and numbers that are not finite.
 
     Returns
     -------
     model : TSKModel
     rows : ndarray of shape (n_rows, model.n_inputs)
-        Finite, in raw units.
-
-    Raises
-    ------
-    ValueError, TypeError
-        As :func:`fold` does; ValueError too where X has other columns than ``estimator`` was
-        trained on, or a value that is not finite.
 
     Examples
     --------
@@ -103,19 +86,16 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     >>> model.strengths(rows).shape
     (20, 2)
     """
-    folding = _Folding(estimator)
-    return folding.model, folding.rows(X)
+    model, read = fold_with_reader(estimator)
+    return model, read(X)
 
 
 def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray]]:
     """Return what :func:`fold` does, and a function from tables to the model's inputs.
 
-    For tables that are read in parts.
-
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`fold` takes it.
 
     Returns
     -------
@@ -130,104 +110,182 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     >>> from skanfis.export import fold_with_reader
     >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
     >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
-    >>> [read(part).shape for part in (X[:5], X[5:])]
-    [(5, 1), (15, 1)]
+    >>> read(X[:5]).shape
+    (5, 1)
     """
-    folding = _Folding(estimator)
-    return folding.model, folding.rows
+    if isinstance(estimator, TSKModel):
+        inputs = [Column(j) for j in range(estimator.n_inputs)]
+        return estimator, _reader(inputs, estimator.input_names, True, estimator.input_names)
+    *steps, (label, last) = _steps_of("", estimator)
+    model = _model_of(label, last)
+    first = next((step for _, step in steps if not is_passthrough(step)), last)
+    given = getattr(first, "feature_names_in_", None)
+    n_raw = first.n_features_in_
+    names = tuple(f"x{j}" for j in range(n_raw)) if given is None else tuple(given)
+    columns = [Column(j) for j in range(n_raw)]
+    for label, step in steps:
+        columns = columns_after(label, step, columns, names)
 
-
-class _Folding:
-    """What becomes of an estimator: its model in raw units, and how to find the inputs in X."""
-
-    def __init__(self, estimator):
-        if isinstance(estimator, TSKModel):
-            self.model = estimator
-            self.names, self.is_named = estimator.input_names, True
-            self.inputs = [Column(j) for j in range(estimator.n_inputs)]
-            return
-        *steps, (label, last) = steps_of("", estimator)
-        model = model_of(label, last)
-        first = next((step for _, step in steps if not is_passthrough(step)), last)
-        n_raw = first.n_features_in_
-        names = getattr(first, "feature_names_in_", None)
-        self.is_named = names is not None
-        self.names = tuple(f"x{j}" for j in range(n_raw)) if names is None else tuple(names)
-        columns = [Column(j) for j in range(n_raw)]
-        for label, step in steps:
-            columns = columns_after(label, step, columns, self.names)
-        self._check_once(columns)
-        order = np.array(sorted(range(len(columns)), key=lambda j: columns[j].key))
-        self.inputs = [columns[j] for j in order]
-        model = _with_raw_inputs(model, columns, order, [self._name(one) for one in self.inputs])
-        for label, transformer in reversed(target_steps("", estimator)):
-            model = _with_raw_target(model, label, transformer)
-        self.model = model
-
-    def rows(self, X):
-        """The model's inputs out of the table X."""
-        given = getattr(X, "columns", None)
-        if self.is_named and given is not None and list(given) != list(self.names):
+    named = [names[c.source] if c.indicator is None else c.indicator.name for c in columns]
+    keys = [column.key for column in columns]
+    for name, key in zip(named, keys, strict=True):
+        if keys.count(key) > 1:
             raise ValueError(
-                f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
+                f"Column {name!r} reaches the model {keys.count(key)} times: its rules cannot be "
+                "written with one membership per column. Let every column reach it once."
+            )
+    order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
+    inputs = [columns[j] for j in order]
+    model = _with_raw_inputs(model, columns, order, [named[j] for j in order])
+    for label, transformer in reversed(_target_steps("", estimator)):
+        model = _with_raw_target(model, label, transformer)
+    return model, _reader(inputs, names, given is not None, model.input_names)
+
+
+def last_step(estimator: Any) -> Any:
+    """Return the ANFIS estimator itself at the end of pipelines, wrappers and searches.
+
+    Parameters
+    ----------
+    estimator : fitted estimator
+        As :func:`fold` takes it, but for the steps in front, which may be any.
+
+    Returns
+    -------
+    last : estimator
+        With a ``model_`` of rules; TypeError where there is none.
+
+    Examples
+    --------
+    >>> from sklearn.pipeline import make_pipeline
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import last_step
+    >>> last_step(make_pipeline(ANFISRegressor(n_mfs=2)).fit(*make_jang_sinc())).model_.n_rules
+    4
+    """
+    label, last = _steps_of("", estimator)[-1]
+    _model_of(label, last)
+    return last
+
+
+def found_by_search(estimator: Any) -> Any:
+    """Return the estimator that a search has kept, or one that is no search as it is.
+
+    Parameters
+    ----------
+    estimator : estimator
+        A fitted search such as GridSearchCV, a search over searches, or any other.
+
+    Returns
+    -------
+    found : estimator
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.export import found_by_search
+    >>> found_by_search(ANFISRegressor(n_mfs=2)).n_mfs
+    2
+    """
+    while hasattr(estimator, "best_estimator_"):
+        estimator = estimator.best_estimator_
+    return estimator
+
+
+def _steps_of(label, estimator):
+    """The steps of nested pipelines one after the other, the model's estimator last."""
+    estimator = found_by_search(estimator)
+    if isinstance(estimator, TransformedTargetRegressor):
+        check_is_fitted(estimator)
+        return _steps_of(label, estimator.regressor_)
+    if isinstance(estimator, Pipeline):
+        return [part for name, step in estimator.steps for part in _steps_of(name, step)]
+    return [(label, estimator)]
+
+
+def _target_steps(label, estimator):
+    """The transformers of the target from the outermost to the innermost."""
+    estimator = found_by_search(estimator)
+    if isinstance(estimator, TransformedTargetRegressor):
+        return [(label, estimator.transformer_), *_target_steps(label, estimator.regressor_)]
+    if isinstance(estimator, Pipeline):
+        return _target_steps(*estimator.steps[-1])
+    return []
+
+
+def _model_of(label, estimator):
+    """The frozen model of the last step, with the policy that its parameters ask for now."""
+    if isinstance(estimator, type) or not hasattr(estimator, "fit"):
+        raise TypeError(
+            f"estimator must be a fitted ANFIS estimator, a Pipeline that ends in one, or a "
+            f"TSKModel; got {estimator!r}."
+        )
+    model = getattr(estimator, "model_", None)
+    if not isinstance(model, TSKModel):
+        check_is_fitted(estimator)
+        raise TypeError(
+            f"estimator must be or end in an ANFIS estimator; {described(label, estimator)} has no "
+            "rules."
+        )
+    if not hasattr(estimator, "out_of_bounds"):
+        return model
+    return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
+
+
+def _reader(inputs, names, is_named, input_names):
+    """The function that takes the inputs out of tables with columns of these names."""
+
+    def read(X):
+        given = getattr(X, "columns", None)
+        if is_named and given is not None and list(given) != list(names):
+            raise ValueError(
+                f"X must have the columns {', '.join(map(repr, names))}, in this order; it "
                 f"has {', '.join(map(repr, given))}."
             )
-        encoded = [one for one in self.inputs if one.indicator is not None]
-        table = X if encoded else _as_numbers(X)
+        is_encoded = any(one.indicator is not None for one in inputs)
+        table = X if is_encoded else as_numbers(X)
         n_columns = np.shape(table)[1]
-        if n_columns != len(self.names):
+        if n_columns != len(names):
             raise ValueError(
-                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
-                f"{', '.join(map(repr, self.names))}."
+                f"X has {n_columns} columns, the estimator takes {len(names)}: "
+                f"{', '.join(map(repr, names))}."
             )
-        if encoded:
-            rows = np.column_stack([_values(one, X) for one in self.inputs])
+        if is_encoded:
+            rows = np.column_stack([one.values(X) for one in inputs])
         else:
-            rows = table[:, [one.source for one in self.inputs]]
-        check_finite(rows, "X", self.model.input_names)
+            rows = table[:, [one.source for one in inputs]]
+        check_finite(rows, "X", input_names)
         return rows
 
-    def _name(self, column):
-        return self.names[column.source] if column.indicator is None else column.indicator.name
-
-    def _check_once(self, columns):
-        keys = [column.key for column in columns]
-        for column in columns:
-            if keys.count(column.key) > 1:
-                raise ValueError(
-                    f"Column {self._name(column)!r} reaches the model {keys.count(column.key)} "
-                    "times: its rules cannot be written with one membership per column. Let every "
-                    "column reach it once."
-                )
-
-
-def _as_numbers(X):
-    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
-
-
-def _values(column, X):
-    """What an input is on the rows of the user's table."""
-    if column.indicator is not None:
-        return column.indicator.values(X)
-    return _as_numbers(part_of(X, [column.source]))[:, 0]
+    return read
 
 
 def _with_raw_inputs(model, columns, order, names):
     """The model with its inputs in raw units and in the order of their raw columns."""
-    offset, scale = np.array([column.offset_and_scale() for column in columns]).T
+    offset, scale = np.array([(column.offset, column.scale) for column in columns]).T
     support, posterior = model.support, model.posterior
     coefficients = model.coefficients.copy()
     if model.order:
         coefficients[:, 1:] = (coefficients[:, 1:] / scale[:, None])[:, order]
+    low, high = (
+        np.array([c.edge(z, side) for c, z in zip(columns, edges.tolist(), strict=True)])
+        for edges, side in ((model.minimum, -1.0), (model.maximum, 1.0))
+    )
+    place = np.argsort(order)
+    antecedents = {}
+    for name in ("antecedent", "initial_antecedent"):
+        moved = getattr(model, name).change_units(offset, scale)
+        groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
+        antecedents[name] = replace(moved, groups=groups)
     folded = replace(
         model,
-        antecedent=_with_raw_terms(model.antecedent, offset, scale, order),
-        initial_antecedent=_with_raw_terms(model.initial_antecedent, offset, scale, order),
+        **antecedents,
         coefficients=coefficients,
         reference=(offset + scale * model.reference)[order],
         spread=(scale * model.spread)[order],
-        minimum=_edges(columns, model.minimum, -1.0)[order],
-        maximum=_edges(columns, model.maximum, 1.0)[order],
+        minimum=low[order],
+        maximum=high[order],
         support=support and support.change_units(offset, scale).reordered(order),
         input_names=tuple(map(str, names)),
         posterior=posterior and posterior.change_units(model.antecedent, scale, order),
@@ -238,26 +296,16 @@ def _with_raw_inputs(model, columns, order, names):
     return folded
 
 
-def _edges(columns, edges, side):
-    pairs = zip(columns, map(float, edges), strict=True)
-    return np.array([column.outermost(edge, side) for column, edge in pairs])
-
-
-def _with_raw_terms(antecedent, offset, scale, order):
-    """The same terms and rules in raw units, each term on its input's new place."""
-    place = np.argsort(order)
-    moved = antecedent.change_units(offset, scale)
-    groups = tuple(replace(group, inputs=place[group.inputs]) for group in moved.groups)
-    return replace(moved, groups=groups)
-
-
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
     label = f"{label}: transformer of the target" if label else "transformer of the target"
     columns = columns_after(label, transformer, [Column(k) for k in range(model.n_outputs)])
     if [column.source for column in columns] != list(range(model.n_outputs)):
-        refuse_step(label, transformer, "it drops or moves columns of the target")
-    offset, scale = np.array([column.offset_and_scale() for column in columns]).T
+        raise ValueError(
+            f"{described(label, transformer)} cannot be folded into the rules: it drops or moves "
+            "columns of the target. A scaler such as StandardScaler can."
+        )
+    offset, scale = np.array([(column.offset, column.scale) for column in columns]).T
     coefficients = model.coefficients * scale
     coefficients[:, 0] += offset
     target, posterior = model.target, model.posterior

@@ -1,4 +1,4 @@
-"""Reading a model from JSON, every entry checked; ``model_json`` has the format."""
+"""Reading a model from JSON, every entry checked."""
 
 import json
 from itertools import groupby
@@ -15,11 +15,10 @@ from ..antecedent import (
 )
 from ..membership import MEMBERSHIPS
 from ..model import TSKModel
-from ..policies import OUT_OF_BOUNDS
+from ..policies import OUT_OF_BOUNDS, TargetRange
+from ..posterior import MOST_PARAMETERS, Posterior
 from ..support import RuleSupport
-from ..target import TargetRange
-from ._posterior_json import read_posterior
-from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, shown
+from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 __all__ = ["FORMAT", "KINDS", "LIMITS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
 
@@ -30,22 +29,14 @@ KINDS: dict[type[Antecedent], str] = {
     ScatteredAntecedent: "scattered",
     RuleTableAntecedent: "table",
 }
-_FILE = [
-    "format",
-    "version",
-    "inputs",
-    "outputs",
-    "out_of_bounds",
-    "max_extrapolation",
-    "rule_base",
-    "terms",
-    "rules",
-    "support",
-]
+_FILE = (
+    "format version inputs outputs out_of_bounds max_extrapolation rule_base terms rules support"
+)
 _INPUT = ["name", "minimum", "maximum", "reference", "spread"]
 # Of an output; null where there is none.
 LIMITS = ["lower", "upper"]
 OUTPUT = ["name", "minimum", "maximum", "spread", *LIMITS]
+_POSTERIOR = ["noise", "inputs", "consequents", "premises", "cross"]
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 # Of weights, each of which is a part of the whole.
 _ROUNDING = 1e-6
@@ -58,11 +49,20 @@ def parse_json(text):
 
 def model_of(document):
     """The model that a file's content describes."""
-    _check_version(document)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise ValueError(f'not a model of skanfis: it has no "format": "{FORMAT}".')
+    version = document.get("version")
+    if type(version) is not int or version < 1:
+        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
+    if version > VERSION:
+        raise ValueError(
+            f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
+            "upgrade skanfis to read it."
+        )
     posterior = document.get("posterior")
     document = {key: value for key, value in document.items() if key != "posterior"}
     _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
-        document, _FILE, "the file"
+        document, _FILE.split(), "the file"
     )
     input_names, box = _inputs(_list(inputs, "inputs"))
     output_names, target = _outputs(_list(outputs, "outputs"))
@@ -74,6 +74,9 @@ def model_of(document):
     groups, initial_groups, term_names = _read_terms(terms, len(inputs))
     table, weights, rows, coefficients = _rules(rules, len(terms), len(inputs), len(outputs))
     antecedent = _rule_base(kind, groups, table)
+    if posterior is not None:
+        n_slopes = len(inputs) if coefficients.shape[1] > 1 else 0
+        posterior = _posterior(posterior, antecedent, len(inputs), n_slopes, len(outputs))
     if not abs(weights.sum() - 1.0) <= _ROUNDING:
         raise ValueError(f"rules[].weight: the sum over all rules is {weights.sum():g}, not 1.")
     return TSKModel(
@@ -93,11 +96,7 @@ def model_of(document):
         term_names=term_names,
         output_names=output_names,
         target=target,
-        posterior=None
-        if posterior is None
-        else read_posterior(
-            posterior, antecedent, len(inputs), len(outputs), int(coefficients.shape[1] > 1)
-        ),
+        posterior=posterior,
     )
 
 
@@ -119,26 +118,13 @@ def _without_repetition(pairs):
     return members
 
 
-def _check_version(document):
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise ValueError(f'not a model of skanfis: it has no "format": "{FORMAT}".')
-    version = document.get("version")
-    if type(version) is not int or version < 1:
-        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
-    if version > VERSION:
-        raise ValueError(
-            f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
-            "upgrade skanfis to read it."
-        )
-
-
 def _inputs(inputs):
     """Names, and minimum, maximum, reference, spread as rows."""
     names, box = [], []
     for j, item in enumerate(inputs):
         where = f"inputs[{j}]"
-        name, *numbers = _members(item, _INPUT, where)
-        box.append(_range(numbers, _INPUT[1:], where))
+        name, *_ = _members(item, _INPUT, where)
+        box.append(_range(item, _INPUT[1:], where))
         names.append(_text(name, where))
     return tuple(names), np.array(box).T.copy()
 
@@ -148,66 +134,65 @@ def _outputs(outputs):
     names, known = [], []
     for k, item in enumerate(outputs):
         where = f"outputs[{k}]"
-        name, *numbers = _members(item, OUTPUT, where)
+        name, *values = _members(item, OUTPUT, where)
         names.append(_text(name, where))
-        if all(value is None for value in numbers):
+        if all(value is None for value in values):
             continue
-        *seen, lower, upper = numbers
-        seen = _range(seen, OUTPUT[1:-2], where)
-        known.append([*seen, *_limits(lower, upper, seen, where)])
+        seen = _range(item, ["minimum", "maximum", "spread"], where)
+        ends = [
+            end if item[key] is None else number(item[key], f"{where}.{key}")
+            for key, end in zip(LIMITS, (-inf, inf), strict=True)
+        ]
+        if not ends[0] < ends[1]:
+            raise ValueError(f"{where}: lower is not below upper.")
+        if ends[0] > seen[1] or ends[1] < seen[0]:
+            raise ValueError(f"{where}: nothing from minimum to maximum is within lower and upper.")
+        known.append([*seen, *ends])
     if known and len(known) < len(names):
         raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
     return tuple(names), TargetRange(*np.array(known).T.copy()) if known else None
 
 
-def _limits(lower, upper, seen, where):
-    """What an output is held within, infinite where nothing is; what was seen reaches there."""
-    low = -np.inf if lower is None else number(lower, f"{where}.lower")
-    high = np.inf if upper is None else number(upper, f"{where}.upper")
-    if not low < high:
-        raise ValueError(f"{where}: lower is not below upper.")
-    if low > seen[1] or high < seen[0]:
-        raise ValueError(f"{where}: nothing from minimum to maximum is within lower and upper.")
-    return low, high
-
-
-def _range(values, keys, where):
-    """Numbers that begin with minimum and maximum, and end with the spread."""
-    *numbers, spread = values
-    found = [number(value, f"{where}.{key}") for key, value in zip(keys[:-1], numbers, strict=True)]
-    found.append(number(spread, f"{where}.{keys[-1]}", SMALLEST_NUMBER))
-    if found[0] > found[1]:
+def _range(item, keys, where):
+    """The numbers of these keys; minimum is at most maximum, and the spread is positive."""
+    lowest = {"spread": SMALLEST_NUMBER}
+    found = [number(item[key], f"{where}.{key}", lowest.get(key, -LARGEST_NUMBER)) for key in keys]
+    if item["minimum"] > item["maximum"]:
         raise ValueError(f"{where}: minimum is above maximum.")
     return found
 
 
 def _read_terms(terms, n_inputs):
     """Groups of terms after training, before it, and the terms' names."""
-    names, after, before = [], [], []
+    names: list[str] = []
+    after: list[tuple] = []
+    before: list[tuple] = []
     for t, item in enumerate(terms):
         where = f"terms[{t}]"
         function = item.get("function") if isinstance(item, dict) else None
         family = MEMBERSHIPS.get(function) if isinstance(function, str) else None
         if family is None:
             raise ValueError(f'{where} has no "function" among {", ".join(MEMBERSHIPS)}.')
-        keys = [key_of(parameter) for parameter in family.parameters]
-        name, j, _, start, *theta = _members(
-            item, ["name", "input", "function", "before_training", *keys], where
+        limits = {
+            key_of(parameter): LARGEST_NUMBER if parameter.kind == "location" else _LARGEST_LOG
+            for parameter in family.parameters
+        }
+        name, j, _, start, *_ = _members(
+            item, ["name", "input", "function", "before_training", *limits], where
         )
         j = _whole(j, 0, n_inputs - 1, f'"input" of {where}')
         names.append(_text(name, where))
-        after.append((j, family, _theta(family, theta, where)))
-        start = _members(start, keys, f'"before_training" of {where}')
-        before.append((j, family, _theta(family, start, f"{where}.before_training")))
+        _members(start, limits, f'"before_training" of {where}')
+        for found, place, terms_of in (
+            (item, where, after),
+            (start, f"{where}.before_training", before),
+        ):
+            theta = [
+                number(found[key], f"{place}.{key}", -largest, largest)
+                for key, largest in limits.items()
+            ]
+            terms_of.append((j, family, theta))
     return _groups(after), _groups(before), tuple(names)
-
-
-def _theta(family, theta, where):
-    numbers = []
-    for parameter, value in zip(family.parameters, theta, strict=True):
-        largest = LARGEST_NUMBER if parameter.kind == "location" else _LARGEST_LOG
-        numbers.append(number(value, f"{where}.{key_of(parameter)}", -largest, largest))
-    return numbers
 
 
 def _groups(terms):
@@ -221,33 +206,25 @@ def _groups(terms):
 
 def _rules(rules, n_terms, n_inputs, n_outputs):
     """Table of terms, weights, rows and coefficients."""
-    table, weights, rows, consequents = [], [], [], []
+    table, weights, rows = [], [], []
+    consequents: list[np.ndarray] = []
     for r, item in enumerate(rules):
         where = f"rules[{r}]"
-        own, weight, n_rows, by_output = _members(
-            item, ["terms", "weight", "rows", "consequents"], where
-        )
+        keys = ["terms", "weight", "rows", "consequents"]
+        own, weight, n_rows, by_output = _members(item, keys, where)
         table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
         weights.append(number(weight, f"{where}.weight", 0.0, 1.0 + _ROUNDING))
         rows.append(number(n_rows, f"{where}.rows", 0.0))
-        by_output = [
-            [
-                number(value, f"{where}.consequents[{k}][{j}]")
-                for j, value in enumerate(_list(one, f"{where}.consequents[{k}]"))
-            ]
-            for k, one in enumerate(_list(by_output, f"{where}.consequents"))
-        ]
-        n_basis = len(by_output[0])
-        if len(by_output) != n_outputs or n_basis not in (1, 1 + n_inputs):
+        sizes = [len(_list(one, f"{where}.consequents")) for one in _list(by_output, where)]
+        if len(sizes) != n_outputs or sizes[0] not in (1, 1 + n_inputs):
             raise ValueError(
                 f'"consequents" of {where} must be one list per output, of 1 or {1 + n_inputs} '
                 "numbers."
             )
-        consequents.append(by_output)
-        if [len(one) for one in by_output] != [len(consequents[0][0])] * n_outputs or len(
-            table[-1]
-        ) != len(table[0]):
+        n_basis = consequents[0].shape[1] if consequents else sizes[0]
+        if sizes != [n_basis] * n_outputs or len(table[-1]) != len(table[0]):
             raise ValueError(f"{where} has other numbers of terms or coefficients than rules[0].")
+        consequents.append(numbers(by_output, (n_outputs, n_basis), f"{where}.consequents"))
     terms = np.array(table, dtype=int).reshape(len(rules), len(table[0]))
     coefficients = np.array(consequents).transpose(0, 2, 1).copy()
     return terms, np.array(weights), np.array(rows), coefficients
@@ -256,27 +233,57 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
 def _support(items, n_rules, n_inputs):
     """The support of the rules, out of an entry for each."""
     n_factor = n_inputs * (n_inputs + 1) // 2
-    shares, radii, centers, factors = [], [], [], []
     if len(_list(items, "support")) != n_rules:
         raise ValueError(f"support has {len(items)} entries; the model has {n_rules} rules.")
+    found = []
     for r, item in enumerate(items):
         where = f"support[{r}]"
-        *numbers, middle, triangle = _members(item, ["share", "radius", "center", "factor"], where)
-        share = number(numbers[0], f"{where}.share", 0.0, 1.0)
-        radius = number(numbers[1], f"{where}.radius", 0.0)
-        if len(_list(middle, where)) != n_inputs or len(_list(triangle, where)) != n_factor:
-            raise ValueError(
-                f'"center" and "factor" of {where} must be lists of {n_inputs} and {n_factor} '
-                "numbers."
-            )
-        shares.append(share)
-        radii.append(radius)
-        centers.append([number(value, f"{where}.center") for value in middle])
-        factors.append([number(value, f"{where}.factor") for value in triangle])
+        keys = ["share", "center", "factor", "radius"]
+        share, center, factor, radius = _members(item, keys, where)
+        share = number(share, f"{where}.share", 0.0, 1.0)
+        center = numbers(center, (n_inputs,), f"{where}.center")
+        factor = numbers(factor, (n_factor,), f"{where}.factor")
+        found.append((share, center, factor, number(radius, f"{where}.radius", 0.0)))
+    shares, centers, factors, radii = map(np.array, zip(*found, strict=True))
     # Asked for now that the file has shown to be as large.
     factor = np.zeros((n_rules, n_inputs, n_inputs))
     factor[:, *np.tril_indices(n_inputs)] = factors
-    return RuleSupport(np.array(shares), np.array(centers), factor, np.array(radii))
+    return RuleSupport(shares, centers, factor, radii)
+
+
+def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
+    """The posterior that an object describes; ValueError where it is not one of such a model."""
+    if isinstance(item, dict):
+        # Only where constraints are met with equality.
+        item = {"pinned": [[]] * n_outputs} | item
+    _, inputs, triangle, rows, _, pinned = _members(item, [*_POSTERIOR, "pinned"], "posterior")
+    if not isinstance(inputs, list) or len(inputs) > n_slopes:
+        raise ValueError(f"posterior.inputs: {shown(inputs)} is not a list of up to {n_slopes}.")
+    for value in inputs:
+        _whole(value, 0, n_inputs - 1, "posterior.inputs")
+    if len(set(inputs)) < len(inputs):
+        raise ValueError(f"posterior.inputs: {shown(inputs)} has an input twice.")
+    n_parameters = antecedent.parameters.size
+    n_columns = antecedent.n_rules * (1 + len(inputs))
+    if n_columns + n_parameters > MOST_PARAMETERS:
+        raise ValueError(f"posterior: more than {MOST_PARAMETERS} parameters.")
+    n_rows = n_parameters if rows else 0
+    if len(_list(triangle, "posterior.consequents")) != n_columns:
+        raise ValueError(f"posterior.consequents is not a triangle of {n_columns} rows.")
+    consequents = np.zeros((n_columns, n_columns))
+    for i, row in enumerate(triangle):
+        consequents[i, : i + 1] = numbers(row, (i + 1,), f"posterior.consequents[{i}]")
+    n_pinned = len(_list(_list(pinned, "posterior.pinned")[0], "posterior.pinned[0]", 0))
+    if n_pinned > n_columns + n_rows:
+        raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
+    return Posterior(
+        np.abs(numbers(item["noise"], (n_outputs,), "posterior.noise")),
+        np.array(inputs, dtype=int),
+        consequents,
+        numbers(rows, (n_rows, n_parameters), "posterior.premises"),
+        numbers(item["cross"], (n_outputs, n_rows, n_columns), "posterior.cross"),
+        numbers(pinned, (n_outputs, n_pinned, n_columns + n_rows), "posterior.pinned"),
+    )
 
 
 def _rule_base(kind, groups, table):
@@ -296,20 +303,14 @@ def _rule_base(kind, groups, table):
         raise ValueError(f'"rule_base" is {shown(kind)}, not {", ".join(KINDS.values())}.')
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
-    _check_columns(inputs, table)
-    return antecedent
-
-
-def _check_columns(inputs, table):
-    """Each place in a rule is one input's, and no input has two."""
-    seen = []
-    for column in table.T:
-        own = np.unique(inputs[column[column >= 0]])
-        if own.size > 1:
-            raise ValueError("the terms at one place of the rules are of different inputs.")
-        seen += own.tolist()
-    if len(set(seen)) != len(seen):
+    # Each place in a rule is one input's, and no input has two.
+    owns = [np.unique(inputs[column[column >= 0]]) for column in table.T]
+    if any(own.size > 1 for own in owns):
+        raise ValueError("the terms at one place of the rules are of different inputs.")
+    seen = np.concatenate(owns) if owns else np.empty(0)
+    if np.unique(seen).size < seen.size:
         raise ValueError("rules have two terms of one input.")
+    return antecedent
 
 
 def _members(item, keys, where):

@@ -1,11 +1,14 @@
 """What a file may describe: of what size, known before memory is asked for, by which numbers."""
 
+import numpy as np
+
 __all__ = [
     "LARGEST_NUMBER",
     "MOST_NUMBERS",
     "SMALLEST_NUMBER",
     "check_size",
     "number",
+    "numbers",
     "read_bytes",
     "shown",
 ]
@@ -39,6 +42,16 @@ def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER):
             wanted = f"of size up to {highest:g}"
         raise ValueError(f"{where}: {shown(value)} is not a number {wanted}.")
     return float(value)
+
+
+def numbers(values, shape, where):
+    """Nested lists of numbers as an array of this shape."""
+    if not shape:
+        return number(values, where)
+    if not isinstance(values, list) or len(values) != shape[0]:
+        raise ValueError(f"{where}: {shown(values)} is not a list of {shape[0]}.")
+    found = [numbers(value, shape[1:], f"{where}[{k}]") for k, value in enumerate(values)]
+    return np.array(found, dtype=float).reshape(shape)
 
 
 def shown(value):

@@ -1,37 +1,6 @@
 """A model as JSON: to be read by people, kept in version control, and loaded without pickle.
 
-::
-
-    {
-        "format": "skanfis-model",
-        "version": 1,
-        "inputs": [{"name": "x0", "minimum": ..., "maximum": ..., "reference": ..., "spread": ...}],
-        "outputs": [{"name": "y", "minimum": ..., "maximum": ..., "spread": ...}],
-        "out_of_bounds": "linear",
-        "max_extrapolation": 0.5,
-        "rule_base": "grid",
-        "terms": [
-            {
-                "name": "low",
-                "input": 0,
-                "function": "gaussian",
-                "center": ...,
-                "log_width": ...,
-                "before_training": {"center": ..., "log_width": ...},
-            }
-        ],
-        "rules": [{"terms": [0, 3], "weight": ..., "rows": ..., "consequents": [[...]]}],
-        "support": [{"share": 1.0, "radius": ..., "center": [...], "factor": [...]}],
-    }
-
-Numbers are written so that the same double comes back; widths stay the logarithms that the model
-holds. A consequent, one per output, is the value at the reference point, then the slopes. A rule's
-terms are positions in "terms", -1 for an input that it does not look at. "max_extrapolation" is
-null where the tangent has no end. An output's minimum, maximum and spread are those of the target
-in training, lower and upper the limits that were asked for, null where none was. "support" has an
-entry per rule, its factor row by row up to the diagonal. Either is null where the model knows of no
-data.
-On request there is a further object, "posterior"; see ``_posterior_json``.
+docs/files.rst has the format. Numbers are written so that the same double comes back.
 """
 
 import json
@@ -44,7 +13,7 @@ import numpy as np
 
 from ..membership import MEMBERSHIPS
 from ..model import TSKModel
-from ._posterior_json import posterior_item
+from ..posterior import Posterior
 from .folding import fold
 from .json_reader import FORMAT, KINDS, LIMITS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
@@ -61,11 +30,10 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An :class:`~skanfis.ANFISRegressor`, or a Pipeline of scalers and one, which is folded into
-        one model of the raw inputs.
+        As :func:`fold` takes it.
     posterior : bool, default=False
         Whether to write what ``predict(X, return_std=True)`` needs: some p^2 / 2 numbers for p
-        consequent parameters, which nobody reads.
+        consequent parameters.
 
     Returns
     -------
@@ -74,68 +42,62 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
 
     Raises
     ------
-    ValueError
-        If a step in front cannot be folded, if a membership is not one of skanfis' own, if
-        :func:`read_json` would refuse a number, such as a spread beyond 1e50, or if the posterior
-        is asked for and the model knows of none.
-    TypeError
-        If ``estimator`` is no such estimator.
+    ValueError, TypeError
+        As :func:`fold`; ValueError if :func:`read_json` would refuse it, or has no posterior.
 
     Examples
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import export_json
-    >>> X, y = make_jang_sinc()
-    >>> text = export_json(ANFISRegressor(n_mfs=2).fit(X, y))
-    >>> text.splitlines()[:3]
-    ['{', '  "format": "skanfis-model",', '  "version": 1,']
+    >>> export_json(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc())).splitlines()[1]
+    '  "format": "skanfis-model",'
     """
     model = fold(estimator)
-    limit = model.max_extrapolation
-    box = (model.minimum, model.maximum, model.reference, model.spread)
-    inputs = [
-        {"name": name, "minimum": low, "maximum": high, "reference": reference, "spread": spread}
-        for name, low, high, reference, spread in zip(
-            model.input_names, *(values.tolist() for values in box), strict=True
-        )
-    ]
-    before = _terms(model.initial_antecedent)
+    limit, before = model.max_extrapolation, _terms(model.initial_antecedent)
     terms = [
         {"name": name, **term, "before_training": {key: start[key] for key in list(start)[2:]}}
         for name, term, start in zip(
             model.term_names, _terms(model.antecedent), before, strict=True
         )
     ]
-    rules = [
-        {"terms": own, "weight": weight, "rows": rows, "consequents": consequents}
-        for own, weight, rows, consequents in zip(
-            model.antecedent.rule_terms.tolist(),
-            model.rule_weights.tolist(),
-            model.rule_rows.tolist(),
-            model.coefficients.transpose(0, 2, 1).tolist(),
-            strict=True,
-        )
-    ]
     document = {
         "format": FORMAT,
         "version": VERSION,
-        "inputs": inputs,
+        "inputs": _items(
+            name=model.input_names,
+            minimum=model.minimum,
+            maximum=model.maximum,
+            reference=model.reference,
+            spread=model.spread,
+        ),
         "outputs": _output_items(model),
         "out_of_bounds": model.out_of_bounds,
         "max_extrapolation": None if isinf(limit) else limit,
         "rule_base": KINDS[type(model.antecedent)],
         "terms": terms,
-        "rules": rules,
-        "support": None if model.support is None else _support_items(model.support),
+        "rules": _items(
+            terms=model.antecedent.rule_terms,
+            weight=model.rule_weights,
+            rows=model.rule_rows,
+            consequents=model.coefficients.transpose(0, 2, 1),
+        ),
+        "support": None,
     }
+    if support := model.support:
+        document["support"] = _items(
+            share=support.share,
+            radius=support.radius,
+            center=support.center,
+            factor=support.factor[:, *np.tril_indices(model.n_inputs)],
+        )
     if posterior:
         if model.posterior is None:
             raise ValueError(
                 "posterior=True, but the model knows of none: it was taken as it was given, not "
                 "fitted, or is too large to keep one."
             )
-        document["posterior"] = posterior_item(model.posterior)
+        document["posterior"] = _posterior_item(model.posterior)
     try:
         model_of(document)
     except ValueError as error:
@@ -144,26 +106,14 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
 
 
 def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = False) -> None:
-    """Write a trained model to a JSON file, as :func:`export_json` gives it.
+    """Write a trained model to a JSON file.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
     path : str or path-like
-        Of the file, which is replaced where it exists.
     posterior : bool, default=False
-        Whether to write what ``predict(X, return_std=True)`` needs.
-
-    Returns
-    -------
-    None
-
-    Raises
-    ------
-    ValueError, TypeError
-        As :func:`export_json`.
-    OSError
-        If the file cannot be written.
+        As :func:`export_json`, which raises what this raises, takes it.
 
     Examples
     --------
@@ -171,13 +121,13 @@ def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = F
     >>> from pathlib import Path
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import write_json
-    >>> X, y = make_jang_sinc()
+    >>> from skanfis.export import read_json, write_json
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.json")
+    ...     write_json(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), Path(folder) / "sinc.json")
+    ...     read_json(Path(folder) / "sinc.json").n_rules
+    4
     """
-    text = export_json(estimator, posterior=posterior)
-    Path(path).write_text(text, encoding="utf-8", newline="\n")
+    Path(path).write_text(export_json(estimator, posterior=posterior), "utf-8", newline="\n")
 
 
 def read_json(path: str | PathLike[str]) -> TSKModel:
@@ -196,26 +146,19 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
     Raises
     ------
     ValueError
-        If the file is not such a model, in any respect; if it is of a later version, which is
-        named; if it has more than 16 MiB, or the model more than 20 million numbers.
-    OSError
-        If the file cannot be opened.
+        If the file is not such a model, is of a later version, or has more than 16 MiB.
 
     Examples
     --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import read_json, write_json
-    >>> X, y = make_jang_sinc()
-    >>> estimator = ANFISRegressor(n_mfs=2).fit(X, y)
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(estimator, Path(folder) / "sinc.json")
-    ...     model = read_json(Path(folder) / "sinc.json")
-    >>> bool((model.predict(X)[:, 0] == estimator.predict(X)).all())
-    True
+    >>> from skanfis.export import read_json
+    >>> read_json('{"format": "skanfis-model"}')
+    Traceback (most recent call last):
+    ValueError: path is the text of a model, not the path of a file: write it to a file first.
     """
+    if isinstance(path, str) and path.lstrip().startswith("{"):
+        raise ValueError(
+            "path is the text of a model, not the path of a file: write it to a file first."
+        )
     data = read_bytes(path, _MOST_BYTES)
     try:
         return parse_json(data.decode("utf-8"))
@@ -242,16 +185,20 @@ def _laid_out(document):
     """JSON text with one item of every list per line."""
     entries = []
     for key, value in document.items():
-        if isinstance(value, list):
-            items = [f"\n    {_written(item)}" for item in value]
-            entries.append(f'  "{key}": [{",".join(items)}\n  ]')
-        else:
-            entries.append(f'  "{key}": {_written(value)}')
+        is_list = isinstance(value, list)
+        texts = [
+            json.dumps(item, ensure_ascii=False, allow_nan=False)
+            for item in (value if is_list else [value])
+        ]
+        text = "[" + ",".join(f"\n    {item}" for item in texts) + "\n  ]" if is_list else texts[0]
+        entries.append(f'  "{key}": {text}')
     return "{\n" + ",\n".join(entries) + "\n}\n"
 
 
-def _written(value):
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+def _items(**columns):
+    """An object per row of what the keys hold."""
+    lists = [getattr(values, "tolist", lambda v=values: v)() for values in columns.values()]
+    return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
 def _output_items(model):
@@ -259,27 +206,21 @@ def _output_items(model):
     target = model.target
     if target is None:
         return [dict.fromkeys(OUTPUT) | {"name": name} for name in model.output_names]
-    ends = (target.minimum, target.maximum, target.spread, target.lower, target.upper)
-    numbers = (np.broadcast_to(values, target.spread.shape).tolist() for values in ends)
-    return [
-        {
-            key: None if key in LIMITS and isinf(value) else value
-            for key, value in zip(OUTPUT, item, strict=True)
-        }
-        for item in zip(model.output_names, *numbers, strict=True)
-    ]
+    ranges = {key: np.broadcast_to(getattr(target, key), target.spread.shape) for key in OUTPUT[1:]}
+    items = _items(name=model.output_names, **ranges)
+    for item in items:
+        item |= {key: None for key in LIMITS if isinf(item[key])}
+    return items
 
 
-def _support_items(support):
-    """An entry per rule."""
-    rows, columns = np.tril_indices(support.center.shape[1])
-    return [
-        {"share": share, "radius": radius, "center": center, "factor": factor}
-        for share, radius, center, factor in zip(
-            support.share.tolist(),
-            support.radius.tolist(),
-            support.center.tolist(),
-            support.factor[:, rows, columns].tolist(),
-            strict=True,
-        )
-    ]
+def _posterior_item(posterior: Posterior):
+    item = {
+        "noise": posterior.noise.tolist(),
+        "inputs": posterior.inputs.tolist(),
+        "consequents": [row[: i + 1] for i, row in enumerate(posterior.consequents.tolist())],
+        "premises": posterior.premises.tolist(),
+        "cross": posterior.cross.tolist(),
+    }
+    if posterior.pinned.size:
+        item["pinned"] = posterior.pinned.tolist()
+    return item

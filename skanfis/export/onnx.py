@@ -1,22 +1,19 @@
-r"""ONNX: a converter that skl2onnx takes up for estimators and the pipelines they end.
+"""ONNX: a converter that skl2onnx takes up for estimators and the pipelines they end.
 
 The graph does what the model does, in the same order: inputs held in the box, log memberships,
-strengths by a softmax (of a grid: one per input, then their products), consequents weighed by the
-strengths. The continuation "linear" carries the derivative along the way out of the box through the
-same operations.
+strengths by a softmax over the rules, consequents weighed by the strengths. The continuation
+"linear" carries the derivative along the way out of the box through the same operations.
 """
 
-import operator
+from functools import partialmethod
 
 import numpy as np
 
 from ..membership import MEMBERSHIPS
 from ..options import policy_of
-from ._constants import FLOOR, SMALLEST_LOG_SQUARE
-from ._graph import Graph
-from ._numbers import Numbers
+from ._numbers import FLOOR, SMALLEST_LOG_SQUARE, Numbers
 
-__all__ = ["Formula", "register_onnx_converter"]
+__all__ = ["register_onnx_converter"]
 
 # Softmax along one axis and ReduceSum with axes as an input are of this version.
 _OLDEST_OPSET = 13
@@ -25,19 +22,9 @@ _OLDEST_OPSET = 13
 def register_onnx_converter() -> None:
     """Teach skl2onnx to convert :class:`skanfis.ANFISRegressor`, alone or in a pipeline.
 
-    After one call, ``skl2onnx.to_onnx`` and ``skl2onnx.convert_sklearn`` know the estimator. Inputs
-    of type double give a graph in double precision, all others one in single precision. The policy
-    ``out_of_bounds`` becomes part of the graph, with ``max_extrapolation``; "raise" cannot, and is
-    refused with a ValueError. A row with an infinite number or none gives NaN.
-
-    Returns
-    -------
-    None
-
-    Raises
-    ------
-    ImportError
-        If skl2onnx is not installed.
+    Inputs of type double give a graph in double precision, all others one in single precision.
+    ``out_of_bounds`` becomes part of the graph, save "raise", which is refused with a ValueError; a
+    row that is not finite gives NaN. ImportError if skl2onnx is not installed.
 
     Examples
     --------
@@ -48,8 +35,7 @@ def register_onnx_converter() -> None:
     >>> from skanfis.export import register_onnx_converter
     >>> register_onnx_converter()
     >>> X, y = make_jang_sinc()
-    >>> onnx_model = skl2onnx.to_onnx(ANFISRegressor(n_mfs=4).fit(X, y), X[:1])
-    >>> onnx_model.graph.output[0].name
+    >>> skl2onnx.to_onnx(ANFISRegressor(n_mfs=4).fit(X, y), X[:1]).graph.output[0].name
     'variable'
     """
     try:
@@ -95,95 +81,140 @@ def _convert(scope, node, container):
         )
     is_double = isinstance(given.type, DoubleTensorType)
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
-    graph = Graph(scope, container, dtype)
-    x = graph.node("Cast", graph.value(given.full_name), to=kind)
-    y = Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
+    graph = _Graph(scope, container, np.dtype(dtype))
+    x = graph.node("Cast", _Value(graph, given.full_name), to=kind)
+    y = _Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
     graph.node("Identity", y, output=node.outputs[0].full_name)
 
 
-class Formula:
-    """The model's formula, written with values of a graph, or of what stands in for one."""
+class _Graph:
+    """Where nodes and constants go: skl2onnx's scope and container, for one type of number."""
+
+    def __init__(self, scope, container, dtype):
+        self.scope, self.container, self.dtype = scope, container, dtype
+
+    def node(self, operation, *inputs, output=None, **attributes):
+        """The output of a new node; inputs that are no values become constants."""
+        output = output or self.scope.get_unique_variable_name(operation.lower())
+        self.container.add_node(
+            operation,
+            [one.name if isinstance(one, _Value) else self._constant(one) for one in inputs],
+            output,
+            name=self.scope.get_unique_operator_name(operation),
+            op_version=self.container.target_opset,
+            **attributes,
+        )
+        return _Value(self, output)
+
+    def _constant(self, value):
+        from onnx import helper
+
+        array = np.asarray(value)
+        if array.dtype.kind == "f" or not array.ndim:
+            array = array.astype(self.dtype)
+        name = self.scope.get_unique_variable_name("constant")
+        kind = helper.np_dtype_to_tensor_dtype(array.dtype)
+        self.container.add_initializer(name, kind, list(array.shape), array.ravel().tolist())
+        return name
+
+
+class _Value:
+    """A tensor of the graph, its first axis the rows; every operation on it becomes a node."""
+
+    def __init__(self, graph, name):
+        self.graph, self.name = graph, name
+
+    def _node(self, operation, *others, **attributes):
+        return self.graph.node(operation, self, *others, **attributes)
+
+    __add__ = partialmethod(_node, "Add")
+    __sub__ = partialmethod(_node, "Sub")
+    __mul__ = partialmethod(_node, "Mul")
+    __truediv__ = partialmethod(_node, "Div")
+    __matmul__ = partialmethod(_node, "MatMul")
+    __neg__ = partialmethod(_node, "Neg")
+    __lt__ = partialmethod(_node, "Less")
+    __gt__ = partialmethod(_node, "Greater")
+    exp = partialmethod(_node, "Exp")
+    log = partialmethod(_node, "Log")
+    abs = partialmethod(_node, "Abs")
+    sigmoid = partialmethod(_node, "Sigmoid")
+    at_most = partialmethod(_node, "Min")
+    at_least = partialmethod(_node, "Max")
+    # Of a comparison: one value where it holds, another where not.
+    where = partialmethod(_node, "Where")
+    softmax = partialmethod(_node, "Softmax", axis=1)
+
+    def columns(self, positions):
+        return self._node("Gather", np.asarray(positions, dtype=np.int64), axis=1)
+
+    def reshape(self, *shape):
+        """Another shape after the axis of the rows."""
+        return self._node("Reshape", np.array([0, *shape], dtype=np.int64))
+
+    def sum(self, keep=True):
+        """Over axis 1, which stays with length one if ``keep``."""
+        return self._node("ReduceSum", np.array([1], dtype=np.int64), keepdims=int(keep))
+
+
+class _Formula:
+    """The model's formula, written with values of a graph."""
 
     def __init__(self, numbers, policy, graph):
         self.numbers, self.policy, self.graph = numbers, policy, graph
-        self.rule_of_term = None if numbers.counts is not None else _indicator(numbers)
 
     def outputs(self, x):
         """The outputs (n_rows, n_outputs) at inputs (n_rows, n_inputs)."""
-        numbers = self.numbers
+        numbers, way_out = self.numbers, None
         inside = x.at_least(numbers.low).at_most(numbers.high)
         # Zero, unless an input is infinite or not a number: then NaN, also for a held input.
-        not_finite = (x - x).sum(keep=True)
-        way_out = None
+        not_finite = (x - x).sum()
+        z = inside - numbers.reference
         if self.policy == "linear":
-            way_out = x - inside
-            if numbers.reach is not None:
-                way_out = way_out.at_least(-numbers.reach).at_most(numbers.reach)
-        strengths, changes = self._strengths(inside, way_out)
-        by_rule = self._consequents(inside - numbers.reference)
-        summed = self._weigh(strengths, by_rule)
-        if self.policy == "linear":
-            summed = summed + self._change(strengths, changes, by_rule, way_out)
-        y = summed + numbers.offset
-        if numbers.output_low is not None:
-            y = y.at_least(numbers.output_low).at_most(numbers.output_high)
+            followed = (x - inside).at_least(-numbers.reach).at_most(numbers.reach)
+            # First along a part of the way, since products could overflow.
+            far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
+            way_out = followed / far
+        strengths, changes = self._strengths(z, way_out)
+        by_rule = self._slopes(z)
+        values = numbers.coefficients[:, :, 0]
+        by_rule = values[None] if by_rule is None else by_rule + values
+        y = self._weigh(strengths, by_rule) + numbers.offset
+        if way_out is not None:
+            ahead = self._slopes(way_out)
+            if strengths is not None:
+                of_strengths = changes.reshape(numbers.n_rules, 1) * by_rule
+                ahead = of_strengths if ahead is None else ahead + of_strengths
+            if ahead is not None:
+                y = y + far * self._weigh(strengths, ahead)
+        if numbers.output_limits is not None:
+            low, high = numbers.output_limits
+            y = y.at_least(low).at_most(high)
         y = y + not_finite
         if self.policy == "nan":
-            is_out = (x - inside).abs().sum(keep=True) > 0.0
+            is_out = (x - inside).abs().sum() > 0.0
             y = is_out.where(np.full((1, 1), np.nan), y)
         return y
 
-    def _strengths(self, inside, way_out):
-        """Strengths (n_rows, n_rules) and the change of their logarithms along the way out."""
-        numbers = self.numbers
+    def _strengths(self, z, way_out):
+        """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
+        numbers, logs, slopes = self.numbers, [], []
         if not numbers.n_terms:
             return None, None
-        logs, slopes = [], []
         for terms in numbers.terms:
             positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
-            places = inside.columns(positions)
-            value, slope = _FORMULAS[terms.family](
-                [_distance(places, terms, k) for k in range(terms.n_locations)], terms.others.T
-            )
+            value, slope = _FORMULAS[terms.family](z.columns(positions), terms.constants.T)
             logs.append(value())
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
-        log_mu, change = self._joined(logs), self._joined(slopes) if slopes else None
-        if self.rule_of_term is not None:
-            shares = (log_mu @ self.rule_of_term).softmax()
-            return shares, None if change is None else _centred(change @ self.rule_of_term, shares)
-        return self._products(log_mu, change)
-
-    def _joined(self, parts):
-        return parts[0] if len(parts) == 1 else self.graph.node("Concat", *parts, axis=1)
-
-    def _products(self, log_mu, change):
-        """Of a grid: every input normalised alone, then all products of shares."""
-        edges = zip(self.numbers.block_starts, self.numbers.counts, strict=True)
-        blocks = [np.arange(start, start + count) for start, count in edges]
-        shares = [log_mu.columns(block).softmax() for block in blocks]
-        strengths = self._combined(shares, operator.mul)
-        if change is None:
-            return strengths, None
-        pairs = zip(blocks, shares, strict=True)
-        changes = [_centred(change.columns(block), share) for block, share in pairs]
-        return strengths, self._combined(changes, operator.add)
-
-    def _combined(self, by_input, operation):
-        """One value per rule from one per term of each input."""
-        first, *others = by_input
-        n_rules = self.numbers.counts[0]
-        for count, other in zip(self.numbers.counts[1:], others, strict=True):
-            pairs = operation(first.reshape(n_rules, 1), other.reshape(1, count))
-            n_rules *= count
-            first = pairs.reshape(n_rules)
-        return first
-
-    def _consequents(self, z):
-        """f_r (n_rows, n_rules, n_outputs), less the offset; without rows for order 0."""
-        values = self.numbers.coefficients[:, :, 0]
-        slopes = self._slopes(z)
-        return values[None] if slopes is None else slopes + values
+        # 1 where rule r has term t.
+        has_term = np.zeros((numbers.n_terms + 1, numbers.n_rules))
+        has_term[numbers.rule_terms.T, np.arange(numbers.n_rules)] = 1.0
+        shares = (self.graph.node("Concat", *logs, axis=1) @ has_term[:-1]).softmax()
+        if way_out is None:
+            return shares, None
+        change = self.graph.node("Concat", *slopes, axis=1) @ has_term[:-1]
+        return shares, change - (shares * change).sum()
 
     def _slopes(self, z):
         """What slopes make of z, (n_rows, n_rules, n_outputs); None where there are none."""
@@ -196,75 +227,47 @@ class Formula:
 
     def _weigh(self, strengths, by_rule):
         """Sum over rules (n_rows, n_outputs)."""
-        if strengths is None:
-            # One rule: its strength is one.
-            if isinstance(by_rule, np.ndarray):
-                return self.graph.node("Identity", by_rule[:, 0])
-            return by_rule.sum(keep=False)
-        return (strengths.reshape(self.numbers.n_rules, 1) * by_rule).sum(keep=False)
-
-    def _change(self, strengths, changes, by_rule, way_out):
-        """What the outputs change by along the way out."""
-        ahead = self._slopes(way_out)
         if strengths is not None:
-            of_strengths = changes.reshape(self.numbers.n_rules, 1) * by_rule
-            ahead = of_strengths if ahead is None else ahead + of_strengths
-        return np.zeros((1, 1)) if ahead is None else self._weigh(strengths, ahead)
+            return (strengths.reshape(self.numbers.n_rules, 1) * by_rule).sum(keep=False)
+        # One rule: its strength is one.
+        if isinstance(by_rule, np.ndarray):
+            return self.graph.node("Identity", by_rule[:, 0])
+        return by_rule.sum(keep=False)
 
 
-def _indicator(numbers):
-    """1 where rule r has term t, (n_terms, n_rules)."""
-    n_rules, n_terms = numbers.n_rules, numbers.n_terms
-    table = numbers.rule_terms
-    if table is None:
-        table = np.arange(n_terms).reshape(n_rules, -1)
-    indicator = np.zeros((n_terms + 1, n_rules))
-    indicator[table.T, np.arange(n_rules)] = 1.0
-    return indicator[:n_terms]
-
-
-def _centred(changes, shares):
-    return changes - (shares * changes).sum(keep=True)
-
-
-def _distance(places, terms, k):
-    distance = places - terms.locations[:, k]
-    return distance - terms.rests[:, k] if terms.is_in_two else distance
-
-
-# Families: of distances d from locations and other constants p, functions that give log mu and its
-# derivative by x.
+# Families: of inputs x about the reference and the constants p of ``_numbers``, functions that
+# give log mu and its derivative by x.
 
 
 def _log_sigmoid(u):
     return u.at_most(0.0) - ((-u.abs()).exp() + 1.0).log()
 
 
-def _gaussian(d, p):
-    t = d[0] * p[0]
-    return lambda: -(t * t), lambda: t * (-2.0 * p[0])
+def _gaussian(x, p):
+    t = (x - p[0]) * p[1]
+    return lambda: -(t * t), lambda: t * (-2.0 * p[1])
 
 
-def _bell(d, p):
-    u = d[0] * p[0]
+def _bell(x, p):
+    u = (x - p[0]) * p[1]
     # log |u| has a floor, as in Python; where u is zero so is the slope.
-    tiny = np.finfo(u.graph.dtype).tiny
-    far = u.abs() > tiny
+    far = u.abs() > np.finfo(u.graph.dtype).tiny
     safe = far.where(u, np.ones((1, 1)))
     log_square = far.where(safe.abs().log() * 2.0, np.full((1, 1), SMALLEST_LOG_SQUARE))
-    exponent = log_square.at_least(SMALLEST_LOG_SQUARE) * p[1]
+    exponent = log_square.at_least(SMALLEST_LOG_SQUARE) * p[2]
 
     def slope():
-        return far.where(exponent.sigmoid() / safe * (-2.0 * p[0] * p[1]), np.zeros((1, 1)))
+        return far.where(exponent.sigmoid() / safe * (-2.0 * p[1] * p[2]), np.zeros((1, 1)))
 
     return lambda: _log_sigmoid(-exponent), slope
 
 
-def _two_sided_gaussian(d, p):
-    half, left, right = p
-    on_left = d[0] < 0.0
+def _two_sided_gaussian(x, p):
+    center, half, left, right = p
+    d = x - center
+    on_left = d < 0.0
     per_length = on_left.where(left[None], right[None])
-    t = (d[0].abs() - half).at_least(0.0) * per_length
+    t = (d.abs() - half).at_least(0.0) * per_length
     side = on_left.where(np.full((1, 1), -1.0), np.ones((1, 1)))
     return lambda: t * t * -0.5, lambda: -(t * per_length * side)
 
@@ -301,33 +304,33 @@ def _flank(profile, s):
 
 
 def _two_feet(profile):
-    def formula(d, p):
-        left, right = d[0] * p[0], -(d[1] * p[1])
+    def formula(x, p):
+        left, right = (x - p[0]) * p[2], -((x - p[1]) * p[3])
         on_left = left < right
         value, slope = _flank(profile, on_left.where(left, right))
 
         def signed_slope():
+            if len(p) == 4:
+                return on_left.where(p[2][None], -p[3][None]) * slope()
             # Of a triangle, it is the corner that says on which side x lies, and slope is zero
             # there: an input that is held at the edge of the box may lie on it.
-            is_left = d[2] < 0.0 if len(d) > 2 else on_left
-            signed = is_left.where(p[0][None], -p[1][None]) * slope()
-            if len(d) == 2:
-                return signed
-            return (d[2].abs() > 0.0).where(signed, np.zeros((1, 1)))
+            d = x - p[4]
+            signed = (d < 0.0).where(p[2][None], -p[3][None]) * slope()
+            return (d.abs() > 0.0).where(signed, np.zeros((1, 1)))
 
         return value, signed_slope
 
     return formula
 
 
-def _one_foot(d, p):
-    value, slope = _flank(_spline, d[0] * p[0])
-    return value, lambda: slope() * p[0]
+def _one_foot(x, p):
+    value, slope = _flank(_spline, (x - p[0]) * p[1])
+    return value, lambda: slope() * p[1]
 
 
-def _sigmoid_difference(d, p):
-    per_flank, v, log_gain = p
-    u = d[0] * per_flank
+def _sigmoid_difference(x, p):
+    center, per_flank, v, log_gain = p
+    u = (x - center) * per_flank
     rise, fall = u + v, -(u - v)
     return (
         lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
@@ -335,27 +338,26 @@ def _sigmoid_difference(d, p):
     )
 
 
-def _sigmoid_product(d, p):
-    per_left, per_right, at_left, at_right = p
-    rise, fall = d[0] * per_left + at_left, -(d[0] * per_right - at_right)
+def _sigmoid_product(x, p):
+    center, per_left, per_right, at_left, at_right = p
+    d = x - center
+    rise, fall = d * per_left + at_left, -(d * per_right - at_right)
     return (
         lambda: _log_sigmoid(rise) + _log_sigmoid(fall),
         lambda: (-rise).sigmoid() * per_left - (-fall).sigmoid() * per_right,
     )
 
 
-_FORMULAS = {
-    MEMBERSHIPS[name]: formula
-    for name, formula in {
-        "gaussian": _gaussian,
-        "bell": _bell,
-        "triangular": _two_feet(_linear),
-        "trapezoidal": _two_feet(_linear),
-        "two_sided_gaussian": _two_sided_gaussian,
-        "pi_shaped": _two_feet(_spline),
-        "s_shaped": _one_foot,
-        "z_shaped": _one_foot,
-        "sigmoid_difference": _sigmoid_difference,
-        "sigmoid_product": _sigmoid_product,
-    }.items()
+_BY_NAME = {
+    "gaussian": _gaussian,
+    "bell": _bell,
+    "triangular": _two_feet(_linear),
+    "trapezoidal": _two_feet(_linear),
+    "two_sided_gaussian": _two_sided_gaussian,
+    "pi_shaped": _two_feet(_spline),
+    "s_shaped": _one_foot,
+    "z_shaped": _one_foot,
+    "sigmoid_difference": _sigmoid_difference,
+    "sigmoid_product": _sigmoid_product,
 }
+_FORMULAS = {MEMBERSHIPS[name]: formula for name, formula in _BY_NAME.items()}

@@ -1,7 +1,7 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
 from ._checks import check_log
-from .allan import AllanCoefficients, allan_coefficients, allan_deviation
+from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
 from .compose import ResidualRegressor
@@ -14,35 +14,21 @@ from .displays import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
-from .dwells import clip_dwells, find_dwells, resample_in_temperature
 from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
-from .groups import check_split, combine_groups, find_rate_levels, group_by_rate_level, group_by_run
+from .groups import check_split, find_rate_levels, group_by_rate_level, group_by_run
 from .log import read_log
 from .metrics import (
     bias,
-    bias_ramp_sensitivity,
-    bias_repeatability,
     bias_stability,
-    bias_temperature_sensitivity,
     hysteresis,
     input_error,
-    reduction_factor,
-    residual_peak,
-    residual_peak_to_peak,
-    residual_rms,
     scale_factor,
-    scale_factor_asymmetry,
-    scale_factor_error,
-    scale_factor_nonlinearity,
-    scale_factor_repeatability,
-    scale_factor_temperature_sensitivity,
 )
 from .physics import OpenLoopArcsineRegressor
 from .report import gyro_report
 
 __all__ = [
-    "AllanCoefficients",
     "AllanDisplay",
     "CoverageDisplay",
     "ErrorDisplay",
@@ -60,16 +46,10 @@ __all__ = [
     "allan_coefficients",
     "allan_deviation",
     "bias",
-    "bias_ramp_sensitivity",
-    "bias_repeatability",
     "bias_stability",
-    "bias_temperature_sensitivity",
     "check_log",
     "check_split",
-    "clip_dwells",
-    "combine_groups",
     "export_c_physics",
-    "find_dwells",
     "find_rate_levels",
     "group_by_rate_level",
     "group_by_run",
@@ -77,15 +57,5 @@ __all__ = [
     "hysteresis",
     "input_error",
     "read_log",
-    "reduction_factor",
-    "resample_in_temperature",
-    "residual_peak",
-    "residual_peak_to_peak",
-    "residual_rms",
     "scale_factor",
-    "scale_factor_asymmetry",
-    "scale_factor_error",
-    "scale_factor_nonlinearity",
-    "scale_factor_repeatability",
-    "scale_factor_temperature_sensitivity",
 ]

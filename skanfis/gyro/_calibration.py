@@ -8,16 +8,14 @@ import numpy as np
 import pandas as pd
 
 from ..options import LinearExtrapolation
-from ._ask import ask
-from ._choice import Choice, choose, choose_in_folds, some_rows
+from ._columns import SIGNALS, ask
 from ._glitches import find_glitches
-from ._models import make_estimator
+from ._models import Choice, fit_model, some_rows
 from ._simpler import Simpler, simpler_compensations
 from ._split import Split
-from ._units import SIGNALS
 from ._verdict import Verdict, judge
 from .compensator import GyroCompensator, features
-from .log import LogError
+from .errors import LogError
 from .metrics import rms, scale_factor
 
 __all__ = ["MODEL", "Calibration", "Recipe", "calibrate"]
@@ -42,7 +40,6 @@ class Recipe:
     max_extrapolation: float | Literal["auto"] = LinearExtrapolation().max_extrapolation
     time_constant: float = 30.0
     min_coverage: float = 0.1
-    max_rules: int = 36
     fit_rows: int = 100_000
     n_jobs: int | None = None
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
@@ -53,12 +50,11 @@ class Calibration:
     """A compensator, and what was found out about it.
 
     ``before`` and ``after`` are the indicated rate and the held-out compensated one of every row,
-    ``inside`` whether the row was in the bounds of the model that had not seen it. The model's
-    structure is ``choice``; those of the models that were held out are ``fold_choices``, each
-    chosen from its fold's training rows, or None where nothing was chosen. ``simpler`` are
-    compensations without rules, judged with the model by ``verdict`` on the rows in range.
-    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
-    ``n_rows`` is how many rows there were, of which ``log`` holds some where they are too many.
+    ``inside`` whether the row was in the bounds of the model that had not seen it. ``choice`` is of
+    the model's structure, ``fold_choices`` of those held out, each from its fold's training rows;
+    None where it was given. ``simpler`` are compensations without rules, judged with the model by
+    ``verdict`` on the rows in range. ``warnings`` are those of the fit; ``glitches`` sentences on
+    rows that no other supports. ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
     recipe: Recipe
@@ -110,7 +106,7 @@ class Calibration:
 
 
 def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, n_rows=None):
-    """Choose the structure, compensate every row by a model that is new to it, fit to all rows.
+    """Compensate every row by a model that is new to it, fit to all rows, and judge.
 
     ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
     ``made`` are inputs that are there already, and ``n_rows`` is of how many rows these are some.
@@ -120,24 +116,62 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, 
         at_rest = np.ptp(log["rate"]) == 0.0
         factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, recipe.time_constant, made)
-    before = log["output"].to_numpy() / factor
-    error = before - log["rate"].to_numpy()
-    glitches = _glitches(log, error, name_row, tell)
-    rate = log["rate"].to_numpy()
-    target = rate if recipe.physics else error
-    rng = np.random.default_rng(0)
-    choice = choose(X, target, split.folds, recipe, rng, tell)
-    fold_choices = choose_in_folds(X, target, split.folds, recipe, tell)
-    folds = [(some_rows(train, recipe.fit_rows, X, rng), test) for train, test in split.folds]
-    structures = [fold.structure for fold in fold_choices or [choice] * len(folds)]
-    predicted, inside = _held_out(X, target, folds, structures, recipe, split.kind, tell)
-    _check_in_range(inside & np.isfinite(predicted), split)
+    rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
+    glitches = [
+        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
+        "and calibrate again."
+        for row, reason in find_glitches(log, before - rate)
+    ]
+    for sentence in glitches:
+        tell(f"warning: {sentence}")
+    target = rate if recipe.physics else before - rate
+    groups, rng = split.labels.astype(str), np.random.default_rng(0)
+    predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
+    folds, choices = [], []
+    for number, (train, test) in enumerate(split.folds, 1):
+        tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
+        rows = some_rows(train, recipe.fit_rows, X, rng)
+        folds.append((rows, test))
+        with warnings.catch_warnings():
+            # The final fit warns of the same.
+            warnings.simplefilter("ignore")
+            model, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
+            predicted[test] = model.predict(X.iloc[test])
+            inside[test] = ask(model, "in_bounds", X.iloc[test])
+        choices.append(choice)
+    if not (inside & np.isfinite(predicted)).any():
+        raise LogError(
+            f"the compensator could not be checked: every row lies outside the range of the rows "
+            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
+            "overlap in temperature, rate and time."
+        )
     rows = some_rows(np.arange(len(X)), recipe.fit_rows, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows))
     tell(f"fitting to {rows.size:,} rows")
-    compensator, caught = _fit(X.iloc[rows], target[rows], recipe, choice, factor)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
+    if choice.tried:
+        terms = "no grid" if choice.terms is None else f"terms {','.join(map(str, choice.terms))}"
+        error = dict(choice.tried).get(choice.terms, np.nan)
+        tell(f"{terms}: held-out RMS {error:.4g} deg/s")
+    if recipe.physics:
+        tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
+    compensator = GyroCompensator(
+        estimator,
+        recipe.inputs,
+        predicts="rate" if recipe.physics else "error",
+        scale_factor=factor,
+        output_unit=recipe.output_unit,
+        time_constant=recipe.time_constant,
+        min_coverage=recipe.min_coverage,
+    )
     after = compensator.compensate(before, predicted)
+    # The same rows for all: those that the model answered in range.
+    judged = inside & np.isfinite(after)
+    rates = {each.name: each.after for each in simpler if each.after is not None} | {MODEL: after}
+    errors = {name: (compensated - rate)[judged] for name, compensated in rates.items()}
     return Calibration(
         recipe=recipe,
         compensator=compensator,
@@ -148,59 +182,14 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, 
         after=after,
         inside=inside,
         choice=choice,
-        fold_choices=fold_choices,
+        fold_choices=choices if recipe.physics or isinstance(recipe.terms, str) else None,
         simpler=simpler,
-        verdict=_judge(simpler, after, rate, inside & np.isfinite(after), split),
+        verdict=judge(errors, split.labels[judged]),
         n_fit_rows=rows.size,
-        warnings=caught,
+        warnings=sorted({str(warning.message) for warning in caught}),
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
     )
-
-
-def _glitches(log, error, name_row, tell):
-    """A sentence on each row that no other supports."""
-    sentences = [
-        f"{name_row(glitch.row)}: {glitch.reason} is supported by no other row; if it is a glitch, "
-        "drop this row and calibrate again."
-        for glitch in find_glitches(log, error)
-    ]
-    for sentence in sentences:
-        tell(f"warning: {sentence}")
-    return sentences
-
-
-def _check_in_range(answered, split):
-    if not answered.any():
-        raise LogError(
-            f"the compensator could not be checked: every row lies outside the range of the rows "
-            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
-            "overlap in temperature, rate and time."
-        )
-
-
-def _judge(simpler, after, rate, rows, split):
-    """The verdict on the rows that the model answered in range: the same rows for all."""
-    rates = {each.name: each.after for each in simpler if each.after is not None} | {MODEL: after}
-    errors = {name: (compensated - rate)[rows] for name, compensated in rates.items()}
-    return judge(errors, split.labels[rows])
-
-
-def _fit(X, target, recipe, choice, factor):
-    """The compensator, and what its fit warned of."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        estimator = make_estimator(recipe, choice.structure).fit(X, target)
-    compensator = GyroCompensator(
-        estimator,
-        recipe.inputs,
-        predicts="rate" if recipe.physics else "error",
-        scale_factor=factor,
-        output_unit=recipe.output_unit,
-        time_constant=recipe.time_constant,
-        min_coverage=recipe.min_coverage,
-    )
-    return compensator, sorted({str(warning.message) for warning in caught})
 
 
 def _what_is_worse(before, after, inside, unit):
@@ -215,16 +204,3 @@ def _what_is_worse(before, after, inside, unit):
                 f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
                 f"{became:.4g} {unit} RMS."
             )
-
-
-def _held_out(X, target, folds, structures, recipe, kind, tell):
-    predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    with warnings.catch_warnings():
-        # The final fit warns of the same.
-        warnings.simplefilter("ignore")
-        for number, ((train, test), structure) in enumerate(zip(folds, structures, strict=True), 1):
-            tell(f"checking by held-out {kind}: fold {number} of {len(folds)}")
-            estimator = make_estimator(recipe, structure).fit(X.iloc[train], target[train])
-            predicted[test] = estimator.predict(X.iloc[test])
-            inside[test] = ask(estimator, "in_bounds", X.iloc[test])
-    return predicted, inside

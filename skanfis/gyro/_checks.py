@@ -6,39 +6,41 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._units import CANONICAL, SIGNALS, convert, declared_units, plausible_units, units_of
+from ._columns import CANONICAL, SIGNALS, convert, declared_units, plausible_units, units_of
 from .errors import LogError
 
 __all__ = [
     "LABELS",
     "LARGEST_AT_REST",
+    "PARTS",
     "QUANTITIES",
+    "RowChecks",
     "check_at_rest",
-    "check_finite",
-    "check_label",
     "check_log",
+    "check_values",
 ]
 
 QUANTITIES = ("time", "temperature", "output", "rate")
 LABELS = ("run", "device")
+PARTS = (*QUANTITIES, *LABELS)
 
 _PLAUSIBLE = {
     "temperature": (-100.0, 200.0),  # degC, wider than any gyro is specified for
     "rate": (-20_000.0, 20_000.0),  # deg/s, beyond any rate table
     "output": (-20_000.0, 20_000.0),
 }
+_LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _LONGEST_RUN = 31 * 86_400.0  # s
-_FASTEST_CHANGE = 100.0  # degC/min over a whole run: no chamber does that
-# Fewer tell neither a line in every input nor what is left of it; of a run, no way it goes.
+_FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
+_NOISE = 5.0  # degC by which a few rows may differ
+# Fewer rows tell neither a line in every input nor what is left of it.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
-# At rest, the earth's rate included.
-LARGEST_AT_REST = 0.1  # deg/s, with the noise of a rate table's encoder
+LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
 _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
-# Noise in 20 times its usual step is none; glitches are rare.
+# Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
-_LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
-_FOLLOWS = 0.9  # correlation of output with rate below which one of them is something else
+_LEAST_CORRELATION = 0.9  # of output and rate
 
 
 def check_log(
@@ -53,15 +55,12 @@ def check_log(
     Parameters
     ----------
     log : DataFrame of shape (n_rows, n_parts)
-        As :func:`read_log` returns it. A column "run" tells power-ups apart; without it all rows
-        are one run.
+        As :func:`read_log` returns it. Without a column "run" all rows are one run.
     inputs : sequence of str, default=("temperature", "output")
         What the compensator is to learn from: of "time", "temperature", "temperature_rate" and
-        "output". They must change enough. Without any, the log is not to be learnt from, and its
-        ranges do not matter.
+        "output". They must change enough.
     units : dict of str to str, default=None
-        Units that the file was declared to be in, as for :func:`read_log`. They tell a raw signal
-        from a rate, and serve the messages.
+        Units of the file, as for :func:`read_log`, which tell a raw signal from a rate.
     min_temperature_span : float, default=10.0
         Smallest range of the temperature [degC], if it is an input.
 
@@ -73,10 +72,8 @@ def check_log(
     Raises
     ------
     LogError
-        If values are missing, infinite or implausible in their unit; if time does not increase
-        within a run; if the temperature's or the rate's range is too small; if the output does not
-        follow the rate, or by a factor that tells of a wrong unit. The message names column and
-        row, what was found, and what would do.
+        If values are missing, infinite or implausible, time does not increase within a run, a range
+        is too small, or the output does not follow the rate. The message names column and row.
 
     Examples
     --------
@@ -94,23 +91,85 @@ def check_log(
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
-    for part in QUANTITIES:
-        if part in log:
-            check_finite(log[part], part)
-    for part in _PLAUSIBLE:
-        if part in log and units[part] not in SIGNALS:
-            _check_plausible(log[part].to_numpy(), part, units[part])
-    if "output" in log and units["output"] in SIGNALS:
-        _check_signal(log["output"].to_numpy(), units["output"])
+    RowChecks(units).add(log)
     if "run" in log and len(inputs):
         _check_runs(log["run"])
-    if "time" in log:
-        _check_time(log, units["time"])
     if {"temperature", "temperature_rate"} & set(inputs):
         _check_temperature_span(log["temperature"], min_temperature_span)
     if "output" in inputs and "rate" in log:
         _check_output_follows_rate(log, units)
     return log
+
+
+class RowChecks:
+    """Checks of the rows of a log that comes whole or in pieces."""
+
+    def __init__(self, units):
+        self._units = units
+        self._runs = pd.DataFrame()  # of each run: its first and last time, and its temperatures
+
+    def add(self, log):
+        """LogError for the first bad row of the next piece."""
+        for part in QUANTITIES:
+            if part not in log:
+                continue
+            check_values(log[part], part)
+            if part in _PLAUSIBLE and self._units[part] not in SIGNALS:
+                _check_plausible(log[part].to_numpy(), part, self._units[part])
+        if "output" in log and self._units["output"] in SIGNALS:
+            largest = np.abs(log["output"]).max()
+            if not 1.0 / _LARGEST_SIGNAL < largest < _LARGEST_SIGNAL:
+                unit = self._units["output"]
+                raise LogError(f"signals up to {largest:.3g} {unit} are not plausible.", "output")
+        if "time" in log:
+            self._check_time(log)
+
+    def _check_time(self, log):
+        time = pd.Series(log["time"].to_numpy())
+        run = pd.Series(np.asarray(log["run"]) if "run" in log else np.zeros(len(log), dtype=int))
+        before = time.groupby(run, sort=False).shift()
+        if len(self._runs):
+            before = before.fillna(run.map(self._runs["end"]).astype(float))
+        bad = (time <= before).to_numpy()
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise LogError(
+                f"time does not increase within a run: {time[row]:.10g} s after {before[row]:.10g} "
+                f"s ({bad.sum()} such rows). Rows must be in the order of time; if several runs "
+                "follow each other, say which column tells them apart (run=NAME).",
+                "time",
+                row,
+            )
+        columns = {"begin": time, "end": time}
+        if "temperature" in log:
+            temperature = pd.Series(log["temperature"].to_numpy())
+            columns |= {"coldest": temperature, "hottest": temperature}
+        kinds = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
+        kinds = {name: kinds[name] for name in columns}
+        found = pd.DataFrame(columns).groupby(run, sort=False).agg(kinds)
+        self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(kinds)
+        _check_durations(self._runs.loc[found.index], self._units["time"])
+
+
+def _check_durations(runs, unit):
+    duration = (runs["end"] - runs["begin"]).to_numpy()
+    if duration.max() > _LONGEST_RUN:
+        raise LogError(
+            f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a smaller "
+            f"unit than {unit}?",
+            "time",
+        )
+    if "hottest" not in runs:
+        return
+    heating = (runs["hottest"] - runs["coldest"]).to_numpy()
+    fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
+    if fast.any():
+        first = int(np.argmax(fast))
+        raise LogError(
+            f"the temperature changes by {heating[first]:.3g} degC within {duration[first]:.3g} s, "
+            f"which is not plausible; is time in a larger unit than {unit}?",
+            "time",
+        )
 
 
 def check_at_rest(log, unit):
@@ -147,49 +206,41 @@ def check_at_rest(log, unit):
         )
 
 
-def check_finite(values, part):
-    """LogError for the first value that is missing or infinite."""
+def check_values(values, part, allow_missing=False):
+    """LogError for the first value of a part that is missing or infinite."""
     values = np.asarray(values)
-    bad = ~np.isfinite(values)
-    if bad.any():
-        row = int(np.argmax(bad))
-        kind = "is missing" if np.isnan(values[row]) else "is infinite"
-        raise LogError(
-            f"the value {kind} ({bad.sum()} such in {bad.size} rows); drop these rows.", part, row
-        )
-
-
-def check_label(bad, part):
-    """LogError for the first row that has no label; ``bad`` is whether it has none."""
-    if bad.any():
-        raise LogError(f"no label ({bad.sum()} such rows).", part, int(np.argmax(bad)))
+    missing = np.asarray(pd.isna(values))
+    bad = np.zeros_like(missing) if allow_missing else missing
+    if part not in LABELS:
+        bad = bad | np.isinf(values)
+    if not bad.any():
+        return
+    row = int(np.argmax(bad))
+    if part in LABELS:
+        raise LogError(f"no label ({bad.sum()} such rows).", part, row)
+    kind = "is missing" if missing[row] else "is infinite"
+    raise LogError(
+        f"the value {kind} ({bad.sum()} such in {bad.size} rows); drop these rows.", part, row
+    )
 
 
 def _check_plausible(values, part, unit):
     low, high = _PLAUSIBLE[part]
     bad = (values < low) | (values > high)
-    if bad.any():
-        row = int(np.argmax(bad))
-        others = plausible_units(values, part, unit, low, high)
-        # More than half: the unit; few: glitches of the measurement.
-        is_unit = others and bad.mean() > 0.5
-        advice = (
-            f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
-            if is_unit
-            else ""
-        )
-        raise LogError(
-            f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
-            f"are outside {low:g} to {high:g}){advice}.",
-            part,
-            row,
-        )
-
-
-def _check_signal(values, unit):
-    largest = np.abs(values).max()
-    if not 1.0 / _LARGEST_SIGNAL < largest < _LARGEST_SIGNAL:
-        raise LogError(f"signals up to {largest:.3g} {unit} are not plausible.", "output")
+    if not bad.any():
+        return
+    row = int(np.argmax(bad))
+    others = plausible_units(values, part, unit, low, high)
+    # More than half: the unit; few: glitches of the measurement.
+    advice = ""
+    if others and bad.mean() > 0.5:
+        advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+    raise LogError(
+        f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
+        f"are outside {low:g} to {high:g}){advice}.",
+        part,
+        row,
+    )
 
 
 def _check_runs(run):
@@ -199,46 +250,6 @@ def _check_runs(run):
             f"{n_runs} runs in {len(run)} rows are too many; is it a counter of rows? A run lasts "
             f"from one power-on to the next; at least {_FEWEST_ROWS_PER_RUN} rows of each are due.",
             "run",
-        )
-
-
-def _check_time(log, unit):
-    time = log["time"].to_numpy()
-    runs = log["run"] if "run" in log else pd.Series(np.zeros(len(log), dtype=int), log.index)
-    by_run = log.groupby(runs.to_numpy(), observed=True)
-    step = by_run["time"].diff().to_numpy()
-    bad = step <= 0
-    if bad.any():
-        row = int(np.argmax(bad))
-        cure = (
-            "Rows must be in the order of time."
-            if "run" in log
-            else "If several runs follow each other, say which column tells them apart (run=NAME)."
-        )
-        raise LogError(
-            f"time does not increase within a run: {time[row]:.10g} s after "
-            f"{time[row] - step[row]:.10g} s ({bad.sum()} such rows). {cure}",
-            "time",
-            row,
-        )
-    spans = by_run[["time", "temperature"]].agg(["min", "max"])
-    duration = (spans["time"]["max"] - spans["time"]["min"]).to_numpy()
-    heating = (spans["temperature"]["max"] - spans["temperature"]["min"]).to_numpy()
-    if duration.max() > _LONGEST_RUN:
-        raise LogError(
-            f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a smaller "
-            f"unit than {unit}?",
-            "time",
-        )
-    fast = heating > _FASTEST_CHANGE / 60.0 * duration
-    # A rest of a few rows may change by the thermometer's noise.
-    fast &= heating > 5.0
-    if fast.any():
-        first = int(np.argmax(fast))
-        raise LogError(
-            f"the temperature changes by {heating[first]:.3g} degC within {duration[first]:.3g} s, "
-            f"which is not plausible; is time in a larger unit than {unit}?",
-            "time",
         )
 
 
@@ -266,7 +277,7 @@ def _check_output_follows_rate(log, units):
     if np.array_equal(output, rate):
         raise LogError("equals the column of the rate: one of them is the wrong one.", "output")
     correlation = np.corrcoef(output, rate)[0, 1]
-    if abs(correlation) < _FOLLOWS:
+    if abs(correlation) < _LEAST_CORRELATION:
         raise LogError(
             f"does not follow the rate (correlation {correlation:.3f}); is it, or that of the "
             "rate, the wrong column?",

@@ -1,15 +1,160 @@
-"""Columns as the functions of this subpackage take them: one-dimensional, finite, equally long."""
+"""Columns and their units: checks of columns and numbers, and units with their spellings.
+
+A log is in s, degC and deg/s. A raw signal (counts, volts) keeps its unit: a scale factor turns it
+into a rate later.
+"""
+
+import math
+from numbers import Real
 
 import numpy as np
+from sklearn.pipeline import Pipeline
 
 __all__ = [
+    "CANONICAL",
+    "PER_HOUR",
+    "RATE_UNITS",
+    "SIGNALS",
+    "ask",
     "check_column",
     "check_labels",
+    "check_number",
     "check_weights",
     "column_position",
+    "convert",
+    "declared_units",
     "evenly_chosen",
+    "in_rate_unit",
     "label_texts",
+    "plausible_units",
+    "rate_unit_of",
+    "unit_in",
+    "unit_named",
+    "units_of",
 ]
+
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+_RATE = {
+    "deg/s": 1.0,
+    "deg/h": 1 / 3600.0,
+    "rad/s": 180.0 / math.pi,
+    "mrad/s": 0.18 / math.pi,
+    "rpm": 6.0,
+}
+_TEMPERATURE = {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0}
+_ZERO = {"K": -273.15, "degF": -160.0 / 9.0}  # of each scale, in degC
+SIGNALS = ("counts", "V", "mV")
+
+_UNITS = {
+    "time": _TIME,
+    "temperature": _TEMPERATURE,
+    "rate": _RATE,
+    "output": {**_RATE, **dict.fromkeys(SIGNALS, 1.0)},
+}
+CANONICAL = {"time": "s", "temperature": "degC", "rate": "deg/s", "output": "deg/s"}
+PER_HOUR = 3600.0  # 1 deg/s in deg/h
+RATE_UNITS = {"deg/s": 1.0, "deg/h": PER_HOUR}  # of each in 1 deg/s
+# Spellings in lower case, without blanks, of units that are understood.
+_SPELLINGS = {
+    "time": {
+        "s": "s sec secs second seconds",
+        "ms": "ms msec millis millisecond milliseconds",
+        "us": "us µs μs usec micros microsecond microseconds",
+        "ns": "ns nsec nanos nanosecond nanoseconds",
+        "min": "min minute minutes",
+        "h": "h hr hrs hour hours",
+    },
+    "temperature": {
+        "degC": "degc °c ℃ c celsius deg_c cel",
+        "K": "k kelvin degk °k",
+        "degF": "degf °f ℉ f fahrenheit deg_f",
+    },
+    "rate": {
+        "deg/s": "deg/s °/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec",
+        "deg/h": "deg/h °/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg/hour",
+        "rad/s": "rad/s rad_s rads radps rad/sec rad_sec rad_per_s",
+        "mrad/s": "mrad/s mrad_s mradps",
+        "rpm": "rpm",
+    },
+    "signal": {
+        "counts": "counts count cnts cnt lsb lsbs digits raw adc codes",
+        "V": "v volt volts",
+        "mV": "mv millivolt millivolts",
+    },
+}
+_MEANT = {
+    spelling: (quantity, unit)
+    for quantity, units in _SPELLINGS.items()
+    for unit, spellings in units.items()
+    for spelling in spellings.split()
+}
+
+
+def unit_in(text):
+    """Quantity and unit that a text names, or None."""
+    return _MEANT.get("".join(text.split()).casefold())
+
+
+def units_of(quantity):
+    """Names of the units that a quantity may be given in."""
+    return tuple(_UNITS[quantity])
+
+
+def unit_named(quantity, name):
+    """The unit's usual name; ValueError where the quantity has no such unit."""
+    _, unit = unit_in(str(name)) or (None, name)
+    if not isinstance(name, str) or unit not in _UNITS[quantity]:
+        raise ValueError(
+            f"{quantity} has no unit {name!r}: it may be in {', '.join(units_of(quantity))}."
+        )
+    return unit
+
+
+def convert(values, quantity, unit):
+    """Values in the canonical unit; those of a raw signal as they are."""
+    return values * _UNITS[quantity][unit] + _ZERO.get(unit, 0.0)
+
+
+def plausible_units(values, quantity, unit, low, high):
+    """Other units in which the values, already converted from ``unit``, would be plausible."""
+    given = (np.array([values.min(), values.max()]) - _ZERO.get(unit, 0.0)) / _UNITS[quantity][unit]
+    found = []
+    for other in units_of(quantity):
+        smallest, largest = convert(given, quantity, other)
+        if other not in (unit, *SIGNALS) and low <= smallest and largest <= high:
+            found.append(other)
+    return found
+
+
+def declared_units(units):
+    """``units`` with the usual name of each; ValueError where there is no such unit."""
+    for quantity in units or {}:
+        if quantity not in CANONICAL:
+            known = ", ".join(CANONICAL)
+            raise ValueError(f"units: there is no {quantity!r}; it may be one of {known}.")
+    return {quantity: unit_named(quantity, unit) for quantity, unit in (units or {}).items()}
+
+
+def rate_unit_of(unit):
+    """The rate that a unit begins with, or None."""
+    return next((rate for rate in RATE_UNITS if unit == rate or unit.startswith(f"{rate}/")), None)
+
+
+def in_rate_unit(unit, wanted):
+    """The unit with its rate as wanted, and what values are multiplied by; as it is without one."""
+    own = rate_unit_of(unit)
+    if own is None:
+        return unit, 1.0
+    return wanted + unit.removeprefix(own), RATE_UNITS[wanted] / RATE_UNITS[own]
+
+
+def check_number(value, name, *, zero=False):
+    """Return a finite positive number as a float, or raise ValueError; ``zero`` lets zero pass."""
+    wanted = "zero or a positive" if zero else "a positive"
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else -1.0
+    if not math.isfinite(number) or number < 0 or (number == 0 and not zero):
+        raise ValueError(f"{name}={value!r} must be {wanted} number.")
+    return number
 
 
 def check_column(values, name, n_rows=None) -> np.ndarray:
@@ -87,3 +232,13 @@ def label_texts(labels) -> np.ndarray:
     """A Series of labels as texts: one for all rows of a label, not one for each."""
     own = labels.astype("category").cat
     return own.categories.astype(str).to_numpy(dtype=object)[own.codes.to_numpy()]
+
+
+def ask(estimator, method, X):
+    """``estimator.method(X)``, or for a Pipeline that of its last step for what it is given."""
+    if isinstance(estimator, Pipeline):
+        X = estimator[:-1].transform(X) if len(estimator) > 1 else X
+        return ask(estimator[-1], method, X)
+    if not hasattr(estimator, method):
+        raise ValueError(f"{type(estimator).__name__} has no method {method!r}.")
+    return getattr(estimator, method)(X)

@@ -1,8 +1,11 @@
-"""What the command says: lines of progress, a summary, and errors in one sentence each."""
+"""What the command says, and files that it writes all together or not at all."""
 
+import os
 import sys
+import tempfile
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from ..inspection.labels import printable
 from .errors import LogError
@@ -11,11 +14,10 @@ __all__ = [
     "ExistsError",
     "Progress",
     "UsageError",
-    "check_device",
-    "pairs",
     "refuse_existing",
     "say",
     "say_error",
+    "staged",
     "usage_errors",
 ]
 
@@ -80,27 +82,6 @@ def _write_to(stream, text):
     stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
 
 
-def pairs(texts, option):
-    """Options of the form PART=NAME as a dict."""
-    found = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if not (key and equals and value):
-            raise UsageError(f"{option}: {text!r} must be of the form PART=...")
-        if key in found:
-            raise UsageError(f"{option}: {key} is given twice.")
-        found[key] = value
-    return found
-
-
-def check_device(name, devices):
-    """UsageError where a device is none of these; they are None of a log that tells of none."""
-    if devices is None:
-        raise UsageError("--device: the log has no column for the device.")
-    if name not in devices:
-        raise UsageError(f"--device {name}: the log has {', '.join(devices)}.")
-
-
 def refuse_existing(paths, force):
     """ExistsError where a file is there already, or a folder in its place."""
     for path in paths:
@@ -108,3 +89,25 @@ def refuse_existing(paths, force):
             raise ExistsError(f"{path} is a folder: choose another --output.")
         if path.exists() and not force:
             raise ExistsError(f"{path} exists already: choose another --output, or --force.")
+
+
+@contextmanager
+def staged(folder):
+    """A folder to write to; at the end its files go to ``folder`` all together.
+
+    Where that cannot be, or an error ends it, no file or folder is left behind.
+    """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".skanfis-", dir=folder) as name:
+            yield Path(name)
+            for path in sorted(path for path in Path(name).rglob("*") if path.is_file()):
+                target = folder / path.relative_to(name)
+                target.parent.mkdir(exist_ok=True)
+                os.replace(path, target)
+    except BaseException:
+        for path in made:
+            with suppress(OSError):  # another program has put something there
+                path.rmdir()
+        raise

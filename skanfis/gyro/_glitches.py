@@ -4,12 +4,11 @@ Least squares bends the whole model towards one such row, and its value widens t
 rows count as known.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
+import pandas as pd
 from scipy.spatial import cKDTree
 
-__all__ = ["Glitch", "find_glitches"]
+__all__ = ["find_glitches"]
 
 # More than so many rows of a kind support one another.
 _MOST = 3
@@ -18,45 +17,44 @@ _MOST = 3
 _ALONE = 5.0
 # Their median is the row's surroundings, and stands one other glitch among them.
 _N_NEIGHBOURS = 8
-# The rows farthest off: neighbours are sought of these alone, whatever the log's length.
-_MOST_CANDIDATES = 2_000
-# Rows among which the neighbours of candidates are looked for; more tell nothing new.
-_MOST_NEIGHBOURS = 200_000
+# The rows farthest off, and rows among which their neighbours are sought, at most.
+_MOST_CANDIDATES, _MOST_NEIGHBOURS = 2_000, 200_000
 # A temperature moves slowly: a part of its range is a lot from one row to the next.
 _SMOOTH = 0.2
 
 
-@dataclass(frozen=True)
-class Glitch:
-    """A row, by its position, and what is odd about it."""
-
-    row: int
-    reason: str
-
-
 def find_glitches(log, error):
-    """The glitches of a log, as :func:`read_log` gives it; ``error`` is the indicated rate's.
+    """Positions of the glitches of a log, and what is odd about each; ``error`` is of every row.
 
     Two things are looked at: the error, beside that of the rows nearest in temperature, rate and
-    order, and the temperature, beside that of the rows before and after.
+    order, and the temperature, beside that of the rows before and after in the run.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
-    runs = np.zeros(len(log), dtype=int)
-    if "run" in log:
-        runs = log["run"].astype("category").cat.codes.to_numpy()
-    beside_time = temperature - _median_around(temperature, runs)
+    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
+    by_run = pd.Series(temperature).groupby(runs)
+    around = pd.concat([by_run.shift(step) for step in (-2, -1, 1, 2)], axis=1)
+    around = around.T.fillna(log["temperature"].reset_index(drop=True)).T
     found = {
         row: f"the temperature of {temperature[row]:.4g} degC"
-        for row in _alone(beside_time, _SMOOTH * _spread(temperature))
+        for row in _alone(temperature - np.median(around, axis=1), _SMOOTH * _spread(temperature))
     }
     # What is far from its neighbours by more than all errors spread is far from the middle too.
     far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
-    place = np.column_stack([temperature, rate, np.arange(len(log))])
-    beside_place = error[far] - _median_nearby(place, error, far)
-    for row in far[_alone(beside_place, _spread(error))].tolist():
+    places = np.column_stack([temperature, rate, np.arange(len(log))])
+    scale = _spread(places)
+    places /= np.where(scale > 0.0, scale, 1.0)
+    # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
+    step = -(-len(log) // _MOST_NEIGHBOURS)
+    tree = cKDTree(places[::step], balanced_tree=False)
+    nearest = step * tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
+    # Not itself, or else not the farthest.
+    own = nearest == far[:, None]
+    own[~own.any(axis=1), -1] = True
+    others = np.median(error[nearest[~own].reshape(len(far), -1)], axis=1)
+    for row in far[_alone(error[far] - others, _spread(error))].tolist():
         output = log["output"].iloc[row]
         found.setdefault(row, f"the output of {output:.4g} at a rate of {rate[row]:.4g} deg/s")
-    return [Glitch(row, reason) for row, reason in sorted(found.items())]
+    return sorted(found.items())
 
 
 def _alone(deviations, least):
@@ -72,31 +70,3 @@ def _alone(deviations, least):
 def _spread(values):
     low, high = np.quantile(values, [0.05, 0.95], axis=0)
     return high - low
-
-
-def _median_around(values, runs):
-    """Median of the two rows before and the two after each, of its own run; else its own value."""
-    columns = []
-    for shift in (-2, -1, 1, 2):
-        moved = np.roll(values, shift)
-        is_other = np.roll(runs, shift) != runs
-        edge = np.s_[shift:] if shift < 0 else np.s_[:shift]
-        is_other[edge] = True
-        columns.append(np.where(is_other, values, moved))
-    return np.median(columns, axis=0)
-
-
-def _median_nearby(places, values, rows):
-    """Median of the values nearest to some rows, these themselves left out."""
-    scale = _spread(places)
-    points = places / np.where(scale > 0.0, scale, 1.0)
-    # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
-    step = -(-len(values) // _MOST_NEIGHBOURS)
-    tree = cKDTree(points[::step], balanced_tree=False)
-    _, nearest = tree.query(points[rows], min(_N_NEIGHBOURS + 1, tree.n))
-    nearest = step * nearest
-    # Itself, or else the farthest.
-    own = nearest == rows[:, None]
-    own[~own.any(axis=1), -1] = True
-    others = nearest[~own].reshape(len(rows), -1)
-    return np.median(values[others], axis=1)

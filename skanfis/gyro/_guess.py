@@ -1,15 +1,21 @@
-"""Which column plays which part: told by its name, its unit, and how its values behave."""
+"""Which column of a file plays which part: as told, as it is called, or by words and units."""
 
+import difflib
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 
-from ._clock import Clock, is_clock
-from ._names import ColumnName
+from ._checks import PARTS
+from ._clock import is_clock, is_time
+from ._columns import CANONICAL, unit_in
+from .errors import LogError
 
-__all__ = ["Guess", "guess_columns"]
+__all__ = ["Layout", "Request", "settle"]
 
+_SAMPLE_ROWS = 5_000
+# How much a word in a column's name speaks for a part.
 _WORDS = {
     "time": {
         5: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime 时间",
@@ -40,15 +46,10 @@ _OF_NO_PART = (
     "sequence index trend delta diff acc accel accelerometer mag pressure humidity supply vdd "
     "current heater bias corrected compensated filtered direction"
 )
-_AGAINST = set(_OF_NO_PART.split())
 # A chamber's thermometer is no gyro's.
 _OF_ANOTHER = "start set setpoint target chamber oven ambient amb room min max board"
-_LESS = dict.fromkeys(_OF_ANOTHER.split(), 3.0)
-_LABELS = {
-    "run": {"run", "cycle", "session", "powerup"},
-    "device": {"device", "serial", "sn", "unit"},
-}
-_OF_LABELS = {"id", "no", "nr", "number", "name", "label"}
+_LABELS = {"run": "run cycle session powerup", "device": "device serial sn unit"}
+_OF_LABELS = "id no nr number name label"
 _QUANTITIES = {
     "time": ("time",),
     "temperature": ("temperature",),
@@ -56,325 +57,292 @@ _QUANTITIES = {
     "rate": ("rate",),
 }
 _STRANGER = 0.5  # what a word that says nothing takes off
-# No log is above it throughout in degrees, and every log is in kelvin.
-_COLDEST_IN_KELVIN = 150.0
+_COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
 # Numbers that large count from 1970, in these units.
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-# The output follows the rate with a correlation near one, for all its errors.
-_FOLLOWS = 0.9
 _LARGEST_RATE = 1000  # of whole numbers, beyond which they are taken for counts
+
+_BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]\s*$|[,/]\s*([^,/\s][^,]*)$")
+# mV first: it is one word, for all its letters of two cases.
+_WORD = re.compile(r"mV(?![A-Za-z])|[A-Z]?[a-zµäöüß°]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_a-zA-Z]+")
+# Names that hold two words without a sign between them.
+_FUSED = re.compile(r"(gyro|gyr|omega|rate|imu|g|w|acc|accel|a|mag|m)([xyz])$")
+_FULL = {"g": "gyro", "w": "omega", "gyr": "gyro", "a": "acc", "m": "mag"}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of a reading; the command guesses, :func:`read_log` takes names as they are."""
+
+    columns: dict = field(default_factory=dict)
+    units: dict = field(default_factory=dict)
+    require: tuple[str, ...] = ("temperature", "output", "rate")
+    separator: str | None = None
+    decimal: str | None = None
+    encoding: str | None = None
+    guess: bool = False
+    drop_missing: bool = False
+    average: float | None = None
+    device: str | None = None
 
 
 @dataclass
-class Guess:
-    """Places of the parts, the units of those columns, and in words why."""
+class Layout:
+    """Places of the parts in a file and their units there.
 
-    places: dict = field(default_factory=dict)
-    units: dict = field(default_factory=dict)
-    reasons: dict = field(default_factory=dict)
-    date: int | None = None
-    axes: dict = field(default_factory=dict)
-
-
-def guess_columns(header, unit_line, sample, known):
-    """The part of every column that can be told.
-
-    Parameters
-    ----------
-    header, unit_line : list of str
-    sample : DataFrame
-        First rows, columns by their places, as text or typed.
-    known : dict of str to int
-        Places of parts that are settled already.
+    ``date`` is the place of a date beside a clock. ``reasons`` are those of guesses.
     """
-    names = [ColumnName.read(*pair) for pair in zip(header, unit_line, strict=True)]
-    columns = _Columns(sample)
-    guess = Guess(dict(known))
+
+    header: list
+    places: dict
+    units: dict
+    date: int | None = None
+    notes: list = field(default_factory=list)
+    reasons: dict = field(default_factory=dict)
+
+    def name(self, part):
+        """The part's name in the file."""
+        return self.header[self.places[part]] if part in self.places else part
+
+
+def settle(source, request, first=None):
+    """The layout of a file; ``first`` is that of the first file, whose names hold for all."""
+    names = {part: part for part in PARTS}
+    if first is not None:
+        names |= {part: first.name(part) for part in first.places}
+    names |= request.columns
+    layout = Layout(source.header, {}, {})
+    # Names that were told go first: what they have taken is not there for the others.
+    for part in sorted(names, key=lambda part: part not in request.columns):
+        told = {name for other, name in request.columns.items() if other != part}
+        place = _place(source, names[part], told)
+        if place is not None:
+            layout.places[part] = place
+        elif part in request.columns:
+            raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
+        if place is not None and names[part] not in (part, layout.name(part)):
+            layout.notes.append(f"{layout.name(part)!r} is taken for {names[part]!r}")
+    if request.guess:
+        _guess(source, request, layout, is_first=first is None)
+    for part in request.require:
+        if part not in layout.places:
+            raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
+    if len(set(layout.places.values())) < len(layout.places):
+        raise LogError(f"{source.path}: two parts cannot be the same column of the file.")
+    layout.places = {part: layout.places[part] for part in PARTS if part in layout.places}
+    layout.units = CANONICAL | layout.units | request.units
+    return layout
+
+
+def _guess(source, request, layout, is_first):
+    """Add the parts that names and units tell, and the units."""
+    # Of the first file, a column that is called rate may be the gyro's own.
+    is_told = "rate" in request.columns or not is_first
+    own_rate = None if is_told else layout.places.pop("rate", None)
+    sample = next(source.pieces(dict.fromkeys(range(len(source.header)), str), _SAMPLE_ROWS), None)
+    if sample is None:
+        sample = pd.DataFrame({place: pd.Series(dtype=str) for place in range(len(source.header))})
+    columns = [
+        _Column(place, name, unit, sample[place], source.decimal)
+        for place, (name, unit) in enumerate(zip(source.header, source.units, strict=True))
+    ]
     for part in _WORDS:
-        if part not in known:
-            _by_name(part, names, columns, guess)
+        if part == "output" and not any(column.is_named("output") for column in columns):
+            _alone_in("output", ("signal",), columns, layout)
+        if part not in layout.places:
+            _by_name(part, columns, layout)
     for part, words in _LABELS.items():
-        for place, name in enumerate(names):
-            said = set(name.words)
-            if part not in guess.places and said & words and not said - words - _OF_LABELS:
-                _take(guess, part, place, "by its name")
-    _lone_rate(names, guess)
-    _by_unit(names, columns, guess)
-    _by_behaviour(names, columns, guess)
-    _units(names, columns, guess)
-    _date(names, columns, guess)
-    _axes(names, header, columns, guess, known)
-    return guess
+        for column in columns:
+            said = column.words & set(words.split())
+            if (
+                part not in layout.places
+                and said
+                and not column.words - said - set(_OF_LABELS.split())
+            ):
+                layout.places[part] = column.place
+    _by_unit(columns, layout)
+    if own_rate is not None and own_rate not in layout.places.values():
+        layout.places.setdefault("rate", own_rate)
+    _settle_units(columns, layout, request)
+    if "time" in layout.places and is_clock(columns[layout.places["time"]].texts):
+        days = [c.place for c in columns if c.words & {"date", "datum", "day", "日期"}]
+        layout.date = next((k for k in days if k != layout.places["time"]), None)
+    layout.notes += _sentences(layout, request)
 
 
-class _Columns:
-    """The columns of a sample as numbers; empty where they are none."""
+class _Column:
+    """A column's name, read (its words, unit, what that is a unit of, axis), and first values."""
 
-    def __init__(self, sample):
-        self._sample = sample
-        self._numbers: dict = {}
+    def __init__(self, place, name, unit_line, texts, decimal):
+        self.place = place
+        meant, rest = unit_in(unit_line.strip("[](){} ")), name.strip()
+        bracketed = _BRACKETED.search(rest)
+        if bracketed and (found := unit_in(bracketed[1] or bracketed[2] or "")):
+            meant, rest = meant or found, rest[: bracketed.start()]
+        words: list[str] = []
+        for word in map(str.casefold, _WORD.findall(rest)):
+            fused = _FUSED.match(word)
+            words += [_FULL.get(fused[1], fused[1]), fused[2]] if fused else [word]
+        for length in (3, 2, 1):
+            found = unit_in("_".join(words[-length:])) if len(words) >= length else None
+            if meant is None and found:
+                # A name that is a unit and nothing else keeps it as its word too.
+                meant, words = found, words[:-length] or words
+        axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
+        self.axis = axes[-1] if axes else ""
+        self.words = set(words) - {self.axis}
+        self.quantity = meant[0] if meant else None
+        self.unit = meant[1] if meant else None
+        self.texts = texts.dropna()
+        numbers = pd.to_numeric(self.texts.str.replace(decimal, "."), errors="coerce")
+        self.numbers = numbers[np.isfinite(numbers)].to_numpy()
+        if self.numbers.size <= 0.5 * len(texts):
+            self.numbers = np.empty(0)
 
-    def texts(self, place):
-        return self._sample[place].dropna().astype(str)
-
-    def numbers(self, place):
-        if place not in self._numbers:
-            column = self._sample[place]
-            if column.dtype.kind not in "fiub":
-                text = column.astype("string").str.strip().str.replace(",", ".", regex=False)
-                column = pd.to_numeric(text, errors="coerce")
-            values = column.to_numpy(dtype=float, na_value=np.nan)
-            enough = np.isfinite(values).mean() > 0.5 if values.size else False
-            self._numbers[place] = values if enough else np.empty(0)
-        return self._numbers[place]
-
-    def places(self):
-        return list(self._sample)
-
-    def holds_moments(self, place):
-        """Whether the values are texts that tell times, and not one date alone."""
-        if self.numbers(place).size:
-            return False
-        texts = self.texts(place)
-        return texts.nunique() > 1 and Clock(texts).form != ""
-
-    def can_be(self, part, place):
+    def can_be(self, part):
         """Whether the values do not speak against a part."""
-        values = self.numbers(place)
-        if part == "time" and values.size == 0:
-            return Clock(self.texts(place)).form != ""
-        values = values[np.isfinite(values)]
-        if values.size == 0:
-            return False
+        if part == "time" and self.numbers.size == 0:
+            return is_time(self.texts)
         if part == "time":
-            return np.mean(np.diff(values) >= 0.0) > 0.9 if values.size > 1 else True
+            return self.numbers.size == 1 or np.mean(np.diff(self.numbers) >= 0.0) > 0.9
         # A flag or a trend takes a few whole values.
-        return part != "temperature" or not np.isin(values, (-1.0, 0.0, 1.0)).all()
+        is_flag = part == "temperature" and np.isin(self.numbers, (-1.0, 0.0, 1.0)).all()
+        return self.numbers.size > 0 and not is_flag
+
+    def score(self, part):
+        """How much the name speaks for a part; zero where it does not."""
+        if self.words & set(_OF_NO_PART.split()) or self.quantity not in (None, *_QUANTITIES[part]):
+            return 0.0
+        scores = _SCORES[part]
+        found = sum(scores.get(word, 0.0) for word in self.words)
+        if found == 0.0 or (part == "output" and self.is_named("rate")):
+            return 0.0
+        if part == "rate" and self.is_named("output"):
+            found -= 4.0
+        if part == "temperature":
+            found -= 3.0 * len(self.words & set(_OF_ANOTHER.split()))
+        strangers = len(self.words - set(scores))
+        return found - _STRANGER * strangers + (0.25 if self.quantity else 0.0)
+
+    def is_named(self, part):
+        """Whether a word is the part's own."""
+        return any(_SCORES[part].get(word, 0) > 2 for word in self.words)
 
 
-def _score(part, name):
-    """How much a name speaks for a part; zero where it does not."""
-    if name.quantity is not None and name.quantity not in _QUANTITIES[part]:
-        return 0.0
-    scores = _SCORES[part]
-    found = sum(scores.get(word, 0.0) for word in name.words)
-    if found == 0.0 or _AGAINST & set(name.words):
-        return 0.0
-    if part == "output" and any(_SCORES["rate"].get(word, 0) > 2 for word in name.words):
-        return 0.0
-    if part == "rate" and any(_SCORES["output"].get(word, 0) > 2 for word in name.words):
-        found -= 4.0
-    if part == "temperature":
-        found -= sum(_LESS.get(word, 0.0) for word in name.words)
-    strangers = sum(word not in scores for word in name.words)
-    return found - _STRANGER * strangers + (0.25 if name.quantity else 0.0)
-
-
-def _by_name(part, names, columns, guess):
-    taken = set(guess.places.values())
-    found = [
-        (_score(part, name), place)
-        for place, name in enumerate(names)
-        if place not in taken and columns.can_be(part, place)
-    ]
-    found = sorted((pair for pair in found if pair[0] > 0.0), key=lambda pair: -pair[0])
-    if not found:
-        return
-    best = [place for score, place in found if score == found[0][0]]
-    # One truth in two units: that which needs no conversion.
-    place = next((k for k in best if names[k].unit in ("deg/s", "degC", "s")), best[0])
-    others = [k for k in best if k != place and names[k].axis == names[place].axis]
-    _take(guess, part, place, "by its name", others)
-
-
-def _take(guess, part, place, reason, others=()):
-    guess.places[part] = place
-    guess.reasons[part] = (reason, list(others))
-
-
-def _lone_rate(names, guess):
-    """A rate that is said to be none's, in a log without an output, is the gyro's own."""
-    rate = guess.places.get("rate")
-    if "output" in guess.places or "rate" not in guess.reasons:
-        return
-    if all(_SCORES["rate"].get(word, 0) <= 2 for word in names[rate].words):
-        del guess.places["rate"], guess.reasons["rate"]
-        _take(guess, "output", rate, "by its name, and because there is no other rate")
-
-
-def _by_unit(names, columns, guess):
-    for part in ("temperature", "time"):
-        taken = set(guess.places.values())
-        found = [
-            place
-            for place, name in enumerate(names)
-            if name.quantity == part
-            and place not in taken
-            and not _AGAINST & set(name.words)
-            and columns.can_be(part, place)
-        ]
-        if part not in guess.places and len(found) == 1:
-            _take(guess, part, found[0], "by its unit")
-
-
-def _by_behaviour(names, columns, guess):
-    """What no name tells: a clock climbs, a temperature is smooth, an output follows the rate."""
-    free = [
-        place
-        for place in columns.places()
-        if place not in guess.places.values() and columns.numbers(place).size > 20
-    ]
-    if "time" not in guess.places:
-        climbing = [
-            place
-            for place in free
-            if _climbs(columns.numbers(place)) and not _AGAINST & set(names[place].words)
-        ]
-        moments = [place for place in columns.places() if columns.holds_moments(place)]
-        if len(climbing) == 1:
-            _take(guess, "time", climbing[0], "because it climbs evenly")
-            free.remove(climbing[0])
-        elif len(moments) == 1 and moments[0] not in guess.places.values():
-            _take(guess, "time", moments[0], "because it holds times")
-    lacking = [part for part in ("output", "rate") if part not in guess.places]
-    if lacking:
-        # What is smooth follows a bias that follows the temperature: it is no table's rate. Nor
-        # is another axis.
-        stepping = [
-            place
-            for place in free
-            if not _is_smooth(columns.numbers(place)) and _score("output", names[place]) == 0.0
-        ]
-        _followers(names, columns, guess, stepping, lacking)
-        free = [place for place in free if place not in guess.places.values()]
-    angular = [k for k in free if names[k].quantity in _QUANTITIES["output"]]
-    if (
-        "output" not in guess.places
-        and len(angular) == 1
-        and not _AGAINST & set(names[angular[0]].words)
-    ):
-        _take(guess, "output", angular[0], "by its unit")
-    if "temperature" not in guess.places:
-        smooth = [place for place in free if _is_smooth(columns.numbers(place))]
-        if len(smooth) == 1:
-            _take(guess, "temperature", smooth[0], "because it is smooth, and spans what one does")
-
-
-def _climbs(values):
-    steps = np.diff(values)
-    if (steps == 1.0).all():
-        return False  # a counter of rows
-    return bool((steps > 0.0).all() and np.ptp(steps) < 0.5 * np.median(steps))
-
-
-def _is_smooth(values):
-    values = values[np.isfinite(values)]
-    spread = np.ptp(values) if values.size else 0.0
-    plausible = values.size and values.min() >= -100.0 and values.max() <= 450.0
-    return bool(
-        plausible
-        and spread > 3.0
-        and np.unique(values).size > 10
-        and np.quantile(np.abs(np.diff(values)), 0.99) < 0.1 * spread
-    )
-
-
-def _followers(names, columns, guess, free, lacking):
-    """The pair, of the columns that are free or settled, that follow one another."""
-    firsts = [guess.places[part] for part in ("output", "rate") if part in guess.places] or free
-    pairs = {
-        frozenset((first, second))
-        for first in firsts
-        for second in free
-        if first != second and abs(_correlation(columns, first, second)) > _FOLLOWS
+def _by_name(part, columns, layout):
+    taken = set(layout.places.values())
+    scores = {
+        column.place: column.score(part)
+        for column in columns
+        if column.place not in taken and column.can_be(part)
     }
-    if len(pairs) != 1:
+    most = max(scores.values(), default=0.0)
+    if most <= 0.0:
         return
-    why = "because one follows the other"
-    places = list(pairs.pop())
-    if len(lacking) == 1:
-        place = next(place for place in places if place in free)
-        if lacking[0] == "rate" and names[place].quantity == "signal":
-            # A raw signal is nobody's rate: what it follows is.
-            _take(guess, "rate", guess.places["output"], why)
-            _take(guess, "output", place, why)
-            return
-        _take(guess, lacking[0], place, why)
-        return
-    # The table stops at levels; the gyro has noise.
-    levels = [np.unique(columns.numbers(place)).size for place in places]
-    if levels[0] != levels[1]:
-        rate, output = places if levels[0] < levels[1] else places[::-1]
-        _take(guess, "rate", rate, why + ", and it has fewer levels")
-        _take(guess, "output", output, why)
+    best = [columns[place] for place, score in scores.items() if score == most]
+    # One truth in two units: that which needs no conversion.
+    chosen = next((c for c in best if c.unit in CANONICAL.values()), best[0])
+    layout.places[part] = chosen.place
+    others = ", ".join(repr(layout.header[c.place]) for c in best if c is not chosen)
+    layout.reasons[part] = [f"{others} would do too"] if others else []
 
 
-def _correlation(columns, first, second):
-    a, b = columns.numbers(first), columns.numbers(second)
-    known = np.isfinite(a) & np.isfinite(b)
-    a, b = a[known], b[known]
-    if a.size < 20 or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
-        return 0.0
-    return float(np.corrcoef(a, b)[0, 1])
+def _by_unit(columns, layout):
+    """What no name tells, and one unit does."""
+    _alone_in("temperature", ("temperature",), columns, layout)
+    _alone_in("time", ("time",), columns, layout)
+    _alone_in("output", ("signal",), columns, layout)
+    moments = [c.place for c in columns if c.numbers.size == 0 and c.can_be("time")]
+    if "time" not in layout.places and len(moments) == 1:
+        layout.places["time"] = moments[0]
+        layout.reasons["time"] = ["because it holds times"]
+    rate = layout.places.get("rate")
+    is_lone = "output" not in layout.places and "rate" in layout.reasons
+    if is_lone and not columns[rate].is_named("rate"):
+        # A rate that is said to be none's, in a log without an output, is the gyro's own.
+        layout.places["output"] = layout.places.pop("rate")
+        layout.reasons["output"] = ["by its name, and because there is no other rate"]
+    _alone_in("output", ("rate",), columns, layout)
 
 
-def _units(names, columns, guess):
-    """Units that the names say, or else the values."""
-    for part, place in guess.places.items():
-        name = names[place]
-        if part in _QUANTITIES and name.quantity in _QUANTITIES[part]:
-            guess.units[part] = (name.unit, "")
-    for part, place in guess.places.items():
-        if part in guess.units or part not in _QUANTITIES:
-            continue
-        values = columns.numbers(place)
-        values = values[np.isfinite(values)]
-        if values.size == 0:
-            continue
-        largest = np.abs(values).max()
-        if part == "temperature" and values.min() > _COLDEST_IN_KELVIN:
-            guess.units[part] = ("K", "by its values")
-        elif part == "time":
-            since = [unit for least, unit in _EPOCHS if values.min() > least]
-            if since:
-                guess.units[part] = (since[0], "since 1970, by its values")
-        elif part == "output" and largest > _LARGEST_RATE and (values == values.round()).all():
-            guess.units[part] = ("counts", "because they are whole numbers")
-
-
-def _date(names, columns, guess):
-    """A date beside a clock, in a column of its own."""
-    time = guess.places.get("time")
-    if time is None or not is_clock(columns.texts(time)):
-        return
-    for place, name in enumerate(names):
-        if place != time and set(name.words) & {"date", "datum", "day", "日期"}:
-            guess.date = place
-
-
-def _axes(names, header, columns, guess, known):
-    """Outputs of several axes, each with the rate of its own or the one that there is."""
-    output, rate = guess.places.get("output"), guess.places.get("rate")
-    if output is None or "output" in known or not names[output].axis:
-        return
-    alike = [
-        place
-        for place, name in enumerate(names)
-        if name.axis
-        and (name.words, name.unit) == (names[output].words, names[output].unit)
-        and columns.can_be("output", place)
+def _alone_in(part, quantities, columns, layout):
+    taken = set(layout.places.values())
+    found = [
+        column.place
+        for column in columns
+        if column.quantity in quantities
+        and column.place not in taken
+        and not column.words & set(_OF_NO_PART.split())
+        and column.can_be(part)
     ]
-    if len(alike) < 2:
-        return
-    for place in alike:
-        own = rate
-        if rate is not None and names[rate].axis:
-            own = next(
-                (
-                    k
-                    for k, name in enumerate(names)
-                    if name.axis == names[place].axis and name.words == names[rate].words
-                ),
-                None,
-            )
-        guess.axes[names[place].axis] = (header[place], None if own is None else header[own])
+    if part not in layout.places and len(found) == 1:
+        layout.places[part] = found[0]
+        layout.reasons[part] = ["by its unit"]
+
+
+def _settle_units(columns, layout, request):
+    """Units that the names say, or else the values."""
+    for part in _QUANTITIES.keys() & layout.places.keys():
+        column = columns[layout.places[part]]
+        values, reason = column.numbers, ""
+        if part in request.units:
+            layout.units[part] = request.units[part]
+        elif column.quantity in _QUANTITIES[part]:
+            layout.units[part] = column.unit
+        elif values.size == 0:
+            continue
+        elif part == "temperature" and values.min() > _COLDEST_IN_KELVIN:
+            layout.units[part], reason = "K", "by its values"
+        elif part == "time" and values.min() > _EPOCHS[-1][0]:
+            layout.units[part] = next(unit for least, unit in _EPOCHS if values.min() > least)
+            reason = "since 1970, by its values"
+        elif part == "output" and _are_counts(values):
+            layout.units[part], reason = "counts", "because they are whole numbers"
+        if reason:
+            layout.reasons.setdefault(part, []).append(f"{layout.units[part]} {reason}")
+
+
+def _are_counts(values):
+    return np.abs(values).max() > _LARGEST_RATE and (values == values.round()).all()
+
+
+def _sentences(layout, request):
+    """What was guessed, in words; what is named as it should be is not worth a word."""
+    told = []
+    for part in (part for part in PARTS if part in layout.places):
+        name, reasons = layout.name(part), layout.reasons.get(part, [])
+        if (part in request.columns or name.strip().casefold() == part) and not reasons:
+            continue
+        unit = f" in {layout.units[part]}" if part in layout.units else ""
+        told.append(f"{part} = {name!r}{unit}" + (f" ({'; '.join(reasons)})" if reasons else ""))
+    if layout.date is not None:
+        told.append(f"the date of the time = {layout.header[layout.date]!r}")
+    if not told:
+        return []
+    return [f"columns, as guessed: {'; '.join(told)}. Say otherwise with --columns and --units"]
+
+
+def _place(source, name, taken):
+    """Position of a column by its name, or by that but for blanks around it and capitals."""
+    header, plain = source.header, name.strip().casefold()
+    found = [place for place, other in enumerate(header) if other == name] or [
+        place
+        for place, other in enumerate(header)
+        if other.strip().casefold() == plain and other not in taken
+    ]
+    if len(found) > 1:
+        names = " and ".join(repr(header[place]) for place in found)
+        raise LogError(f"{source.path}: the header has {names}; which is meant? Rename one.")
+    return found[0] if found else None
+
+
+def _no_column(part, name, header):
+    found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
+    # Columns that are called as another part are that.
+    free = [other for other in header if other.strip().casefold() not in PARTS]
+    close = [part] if part in header else difflib.get_close_matches(name, free, n=1, cutoff=0.4)
+    advice = f"{part}={close[0]}" if close else f"{part}=NAME"
+    return (
+        f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "
+        f"(--columns {advice}; columns= in Python)."
+    )

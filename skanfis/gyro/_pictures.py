@@ -1,10 +1,9 @@
-"""The pictures of a calibration's report, each drawn on a figure of its own.
+"""The pictures of a calibration's report, each drawn on a figure of its own, not pyplot's."""
 
-The figures are not pyplot's: no screen is asked for, and none stays open.
-"""
-
+import base64
+import io
 import re
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,219 +19,153 @@ from .displays import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
-from .displays.groups import MOST_LINES
 
-__all__ = ["PICTURES", "Picture", "draw_coverage", "draw_memberships"]
+__all__ = ["PICTURES", "draw", "draw_coverage", "draw_memberships"]
 
+_DOTS_PER_INCH = 160  # sharp in print
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
-# Points beyond cover one another.
-_MOST_ROWS_SHOWN = 20_000
+_MOST_ROWS_SHOWN = 20_000  # rows beyond cover one another
+_CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls
 
 
 class Picture(NamedTuple):
-    """A matplotlib figure, what it shows for those who cannot see it, and its caption.
+    """What a page shows: a PNG image, what those who cannot see it are told, CSV files; in base64.
 
-    ``files`` are the data behind it, text in CSV by the name of a file.
+    ``is_tall`` tells how the picture stands on paper.
     """
 
-    figure: Any
+    image: str
     alt: str
     caption: str
     files: dict[str, str]
+    is_tall: bool
 
 
-def draw_error_by_time(results):
-    """None where the log has no time."""
-    if results.time is None:
-        return None
-    caption = "Error against time. Bands reach from the smallest to the largest error."
-    return _error_by("time", results, results.since_power_on, "time since power-on [s]", caption)
-
-
-def draw_error_by_temperature(results):
-    caption = "Error against temperature."
-    return _error_by("temperature", results, results.temperature, "temperature [°C]", caption)
-
-
-def _error_by(what, results, position, position_label, caption):
-    figure, axes = _panels(2)
-    display = ErrorDisplay.from_predictions(
-        *_rates(results),
-        position=position,
-        position_label=position_label,
-        unit=results.unit,
-        ax=axes,
-    )
-    alt = f"Error against {what}, before and after"
-    return Picture(figure, alt, caption, _files(f"error-by-{what}", display.tables()))
-
-
-def draw_scale_factor_error(results):
-    """None for a log at one rate."""
-    if np.ptp(results.rate) == 0:
-        return None
-    figure, axes = _panels(2)
-    display = ScaleFactorErrorDisplay.from_predictions(
-        *_rates(results), temperature=results.temperature, ax=axes
-    )
-    alt = "Scale-factor error against rate at three temperatures, before and after"
-    caption = "Scale-factor error against rate, in three bands of temperature."
-    return Picture(figure, alt, caption, _files("scale-factor-error", display.tables()))
-
-
-def draw_hysteresis(results):
-    """None where the temperature does not both rise and fall."""
-    if not results.warms_and_cools:
-        return None
-    figure, axes = _panels(2)
-    display = HysteresisDisplay.from_predictions(
-        *_rates(results),
-        temperature=results.temperature,
-        temperature_rate=results.temperature_rate,
-        unit=results.unit,
-        ax=axes,
-    )
-    alt = "Bias against temperature, warming and cooling apart, before and after"
-    caption = (
-        "Bias while warming and while cooling; what depends on the rate is taken off, other than "
-        "in the table. Temperature alone cannot close a loop."
-    )
-    return Picture(figure, alt, caption, _files("hysteresis", display.tables()))
-
-
-def draw_surface(results):
-    """None for a log at one rate."""
-    if np.ptp(results.rate) == 0:
-        return None
-    figure = _figure(7.0, 3.4)
-    display = ResidualSurfaceDisplay.from_predictions(
-        *_rates(results),
-        temperature=results.temperature,
-        unit=results.unit,
-        ax=figure.subplots(1, 2, sharey=True),
-    )
-    alt = "Mean residual and number of rows over temperature and rate"
-    caption = "What is left over temperature and rate (left), and where there are data (right)."
-    return Picture(figure, alt, caption, _files("residual-surface", display.tables()))
-
-
-def draw_groups(results):
-    groups = results.calibration.split.labels
-    n_lines = min(np.unique(groups.astype(str)).size, MOST_LINES)
-    figure, axes = _panels(1, height=1.6 + 0.2 * n_lines)
-    display = GroupResidualDisplay.from_predictions(
-        *_rates(results), groups=groups, unit=results.unit, ax=axes
-    )
-    alt = "RMS error of every held-out group, before and after"
-    files = _files("held-out-groups", display.tables())
-    return Picture(figure, alt, "Every held-out group, the worst at the top.", files)
-
-
-def draw_allan(results):
-    """None where there is a reason against it."""
-    if results.why_no_allan:
-        return None
-    figure, axes = _panels(1)
-    before, after = results.allan_curves
-    display = AllanDisplay(before=before, after=after).plot(axes, unit=results.unit)
-    caption = "Allan deviation of the error, over the runs that are in range from end to end."
-    alt = "Allan deviation before and after"
-    return Picture(figure, alt, caption, _files("allan-deviation", display.tables()))
-
-
+# Name of the files, display, and caption, whose first sentence is read to those who cannot see.
 PICTURES = (
-    draw_error_by_time,
-    draw_error_by_temperature,
-    draw_scale_factor_error,
-    draw_hysteresis,
-    draw_surface,
-    draw_groups,
-    draw_allan,
+    ("error-by-time", ErrorDisplay, "Error against time, before and after."),
+    ("error-by-temperature", ErrorDisplay, "Error against temperature, before and after."),
+    (
+        "scale-factor-error",
+        ScaleFactorErrorDisplay,
+        "Scale-factor error against rate, in three bands of temperature.",
+    ),
+    (
+        "hysteresis",
+        HysteresisDisplay,
+        "Bias against temperature, while warming and while cooling. What depends on the rate is "
+        "taken off, other than in the table. Temperature alone cannot close a loop.",
+    ),
+    (
+        "residual-surface",
+        ResidualSurfaceDisplay,
+        "Mean residual and number of rows over temperature and rate.",
+    ),
+    ("held-out-groups", GroupResidualDisplay, "RMS error of every held-out group."),
+    (
+        "allan-deviation",
+        AllanDisplay,
+        "Allan deviation of the error, over the runs that are in range from end to end.",
+    ),
 )
+
+
+def draw(plan, results):
+    """The picture of one line of PICTURES; None where it has no sense."""
+    from matplotlib.figure import Figure
+
+    subject, kind, caption = plan
+    arguments = _arguments(results).get(subject)
+    if arguments is None:
+        return None
+    rows = arguments.pop("rows", slice(None))
+    rates = (each[rows] for each in (results.rate, results.before, results.after))
+    unit = None if kind is ScaleFactorErrorDisplay else results.unit
+    display = kind.computed(*rates, unit, **arguments)
+    display.plot(display.panels(Figure))
+    return _picture(subject, display.figure_, display.tables(), caption)
+
+
+def _arguments(results):
+    """What each display is made of, where it has a sense."""
+    temperature, change = results.temperature, results.temperature_rate
+    label = "temperature [degC]"
+    found = {
+        "error-by-temperature": {"position": temperature, "position_label": label},
+        "held-out-groups": {"groups": results.calibration.split.labels.astype(str)},
+    }
+    if results.time is not None:
+        label = "time since power-on [s]"
+        found["error-by-time"] = {"position": results.since_power_on, "position_label": label}
+    if np.ptp(results.rate):
+        found["scale-factor-error"] = found["residual-surface"] = {"temperature": temperature}
+    if change is not None and change.min() < -_CLEARLY < _CLEARLY < change.max():
+        found["hysteresis"] = {"temperature": temperature, "temperature_rate": change}
+    if isinstance(results.of_allan, dict):
+        found["allan-deviation"] = dict(results.of_allan)
+    return found
 
 
 def draw_coverage(calibration):
     """None where temperature or output is no input."""
+    from matplotlib.figure import Figure
+
     if not {"temperature", "output"} <= set(calibration.X):
         return None
-    figure, axes = _panels(1, height=4.0)
     display = CoverageDisplay.from_estimator(
         calibration.compensator.estimator,
         calibration.X,
         min_coverage=calibration.compensator.min_coverage,
         units={"output": calibration.recipe.output_unit, "temperature_rate": "degC/s"},
-        ax=axes,
+        ax=Figure(figsize=(6.2, 4.0), layout="constrained").subplots(),
     )
-    alt = "Coverage over temperature and output, with the range of the calibration"
     caption = (
-        "Coverage by the calibration data; other inputs at their medians. Hatched cells hold no "
-        "row: what is said there is a guess from their neighbours. Rows outside the dashed line "
+        "Coverage over temperature and output; other inputs at their medians. Hatched cells hold "
+        "no row: what is said there is a guess from their neighbours. Rows outside the dashed line "
         "are flagged, and within it those beyond the dotted line, where there is one."
     )
-    return Picture(figure, alt, caption, _files("coverage", display.tables()))
+    return _picture("coverage", display.figure_, display.tables(), caption)
 
 
 def draw_memberships(calibration):
     """None where no input has terms."""
+    from matplotlib.figure import Figure
+
     n_inputs = len({term["input"] for term in calibration.rules[-1].memberships_})
     if not n_inputs:
         return None
-    figure, axes = _panels(n_inputs, height=0.6 + 1.9 * n_inputs, sharex=False)
     rows = evenly_chosen(len(calibration.X), _MOST_ROWS_SHOWN)
-    display = MembershipDisplay.from_estimator(
-        calibration.rules, calibration.X.iloc[rows], ax=list(np.atleast_1d(axes))
-    )
-    alt = "Membership functions before and after training, over histograms of the data"
-    caption = "Fuzzy terms before training (dashed) and after, over the data."
-    return Picture(figure, alt, caption, _files("fuzzy-terms", _tables_of_terms(display)))
+    figure = Figure(figsize=(6.2, 0.6 + 1.9 * n_inputs), layout="constrained")
+    axes = list(figure.subplots(n_inputs, squeeze=False).ravel())
+    display = MembershipDisplay.from_estimator(calibration.rules, calibration.X.iloc[rows], ax=axes)
+    parts = []
+    for each in display.inputs:
+        for term, before, after in zip(each.term_names, each.before, each.after, strict=True):
+            truths = {"value": each.grid, "truth before": before, "truth after": after}
+            parts.append(pd.DataFrame({"input": each.input_name, "term": term} | truths))
+    caption = "Membership functions before training (dashed) and after, over the data."
+    return _picture("fuzzy-terms", figure, {"terms": pd.concat(parts)}, caption)
 
 
-def _rates(results):
-    return results.rate, results.before, results.after
+def _picture(subject, figure, tables, caption):
+    """The figure painted, and its tables as files."""
+    file = io.BytesIO()
+    # Software and date would make two reports on the same log differ.
+    figure.savefig(file, format="png", dpi=_DOTS_PER_INCH, metadata={"Software": None})
+    files = {}
+    for name, table in tables.items():
+        texts = {
+            column: [_FORMULA.sub(r"'\g<0>", str(value)) for value in table[column]]
+            for column in table.select_dtypes(exclude="number")
+        }
+        # What a spreadsheet would take for a formula has an apostrophe in front.
+        text = table.assign(**texts).to_csv(index=False, float_format="%.9g", lineterminator="\n")
+        ending = f"-{name}" if len(tables) > 1 else ""
+        files[f"{subject}{ending}.csv"] = _base64(text.encode("utf-8"))
+    width, height = figure.get_size_inches()
+    alt = caption.partition(".")[0]
+    return Picture(_base64(file.getvalue()), alt, caption, files, height > width)
 
 
-def _tables_of_terms(display):
-    """What a MembershipDisplay has drawn."""
-    terms = [
-        pd.DataFrame(
-            {
-                "input": each.input_name,
-                "term": term,
-                "value": each.grid,
-                "truth before": before,
-                "truth after": after,
-            }
-        )
-        for each in display.inputs
-        for term, before, after in zip(each.term_names, each.before, each.after, strict=True)
-    ]
-    return {"terms": pd.concat(terms, ignore_index=True)}
-
-
-def _files(subject, tables):
-    """Tables as CSV: nine digits, names that any program reads, no cell that a program runs."""
-    return {
-        f"{subject}{f'-{name}' if len(tables) > 1 else ''}.csv": _harmless(table)
-        .rename(columns=lambda column: column.replace("°C", "degC").replace("°", "deg"))
-        .to_csv(index=False, float_format="%.9g", lineterminator="\n")
-        for name, table in tables.items()
-    }
-
-
-def _harmless(table):
-    """Text that a spreadsheet would take for a formula gets an apostrophe in front."""
-    words = table.select_dtypes(exclude="number")
-    return table.assign(
-        **{name: [_FORMULA.sub(r"'\g<0>", str(value)) for value in words[name]] for name in words}
-    )
-
-
-def _panels(n_axes, height=4.2, sharex=True):
-    figure = _figure(6.2, height)
-    return figure, figure.subplots(n_axes, 1, sharex=sharex)
-
-
-def _figure(width, height):
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
+def _base64(data):
+    return base64.b64encode(data).decode("ascii")

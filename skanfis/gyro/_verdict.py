@@ -1,18 +1,11 @@
-r"""Which compensation to use: the simplest that no more elaborate one beats decisively.
+"""Which compensation to use: the simplest that no more elaborate one beats decisively.
 
-All are judged on the same held-out rows, and by the scatter over the groups that were held out. Let
-s_g and e_g be the RMS errors of a simple and of an elaborate compensation in group g. How many
-times smaller the elaborate one's error is, is the geometric mean of s_g / e_g; its interval is that
-of Student's t for the mean of log(s_g / e_g) over the groups, at 95 %. "Decisively" means that the
-interval lies above 1.02, the gain that a fuzzy term must bring too, and that the RMS over all rows
-falls by more than this.
-
-The groups are taken for independent, though the models of different folds share training rows: the
+All are judged on the same held-out rows. How many times smaller the elaborate one's error is, is
+the geometric mean over the groups held out of the ratio of RMS errors, with the interval of
+Student's t at 95 %: a mean of squares alone would be decided by a group ten times larger than the
+others. "Decisively" means that the interval lies above 1.02, and that the RMS over all rows falls
+by more than this, where one bad group shows. The models of different folds share training rows: the
 interval is a little too narrow.
-
-A mean of logarithms, because a group that is ten times larger than the others would decide a mean
-of squares alone; the RMS over all rows besides, because one bad group would hardly show in a mean
-of logarithms.
 """
 
 from dataclasses import dataclass
@@ -24,7 +17,6 @@ from .metrics import rms
 
 __all__ = ["Gain", "Verdict", "judge"]
 
-# The reasons stand at the head of the module.
 _CONFIDENCE = 0.95
 _LEAST_GAIN = 1.02
 # Errors smaller than this part of the uncompensated one are rounding, and equal.
@@ -70,18 +62,9 @@ class Verdict:
 
 
 def judge(errors, groups):
-    """Judge compensations by their errors on the same rows.
+    """Judge compensations by their errors on the same rows, and what was held out together.
 
-    Parameters
-    ----------
-    errors : dict of str to ndarray of shape (n_rows,)
-        [deg/s], in the order of complexity: "no compensation" first, the model last.
-    groups : ndarray of shape (n_rows,)
-        What was held out together.
-
-    Returns
-    -------
-    verdict : Verdict
+    ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     of_all = {name: rms(error) for name, error in errors.items()}

@@ -6,8 +6,8 @@ IEEE 952 reads three coefficients off the double-logarithmic curve sigma(tau), i
     slope 0:     sigma = B sqrt(2 ln 2 / pi) = 0.664 B        at the minimum, in deg/h
     slope +1/2:  sigma = K sqrt(tau / 3)                      K from tau = 3 s, in deg/h/sqrt(h)
 
-where N and K are constants of the fitted lines, wherever on the curve these lie. Tools differ in
-whether they call the minimum or minimum / 0.664 the bias instability: both are given here.
+Tools differ in whether they call the minimum or minimum / 0.664 the bias instability: both are
+given here.
 """
 
 from dataclasses import dataclass, field
@@ -16,31 +16,30 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._columns import check_column
-from ._rate_units import PER_HOUR
+from ._columns import PER_HOUR, check_column
 from .metrics import rows_by_run
 
-__all__ = ["AllanCoefficients", "allan_coefficients", "allan_deviation"]
+__all__ = ["ALLAN_FIGURES", "allan_coefficients", "allan_deviation", "rows_for_allan"]
 
+ALLAN_FIGURES = {
+    "angle_random_walk": "deg/sqrt(h)",
+    "bias_instability": "deg/h",
+    "allan_minimum": "deg/h",
+    "rate_random_walk": "deg/h/sqrt(h)",
+}
 _FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
-# A slope read off two points has no check.
-_POINTS_PER_SLOPE = 3
+_POINTS_PER_SLOPE = 3  # two points have no check
 # Neighbouring processes differ by a half in slope: a third of that tells them apart.
 _SLOPE_TOLERANCE = 0.15
 # A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
-ROWS_PER_TIME = 10
+_ROWS_PER_TIME = 10
+_UNEVEN = 0.01  # largest deviation of the time between rows, relative
 
 
 def allan_deviation(
     error: ArrayLike, sampling_interval: float, *, run: ArrayLike | None = None
 ) -> pd.DataFrame:
-    """Overlapping Allan deviation of the error, in octaves up to a tenth of the run.
-
-    Computed by allantools (``allantools.oadev``), an optional dependency. The runs of one log give
-    one curve: their variances are averaged with the number of differences each has.
-
-    Smoothing the error lowers this curve at short times and compensates nothing; compare curves of
-    equal bandwidth only.
+    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
 
     Parameters
     ----------
@@ -49,13 +48,12 @@ def allan_deviation(
     sampling_interval : float
         Time between rows, positive [s].
     run : array-like of shape (n_rows,), default=None
-        Labels of the runs; None is one run. No difference is taken from one run to another.
+        Labels of the runs, whose variances are averaged; None is one run.
 
     Returns
     -------
     curve : DataFrame of shape (n_times, 4)
-        averaging_time [s]; deviation [deg/h]; error, its standard error as allantools estimates it,
-        deviation / sqrt(n) [deg/h]; n, the number of differences.
+        averaging_time [s]; deviation [deg/h]; its standard error [deg/h]; n, the differences.
 
     Raises
     ------
@@ -77,56 +75,41 @@ def allan_deviation(
         from allantools import oadev
     except ImportError as reason:
         raise ImportError(
-            "The Allan deviation needs allantools, which is not installed: "
-            "pip install allantools (the extra 'allan'; in a clone pip install '.[allan]')."
+            "The Allan deviation needs allantools: pip install allantools."
         ) from reason
     error = check_column(error, "error")
     if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
         raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
-    variances: dict[int, list] = {}
-    for rows in rows_by_run(run, error.size, at_least=1):
-        if rows.size < ROWS_PER_TIME:
+    parts = []
+    for rows in rows_by_run(run, error.size):
+        if rows.size < _ROWS_PER_TIME:
             continue
-        drift = PER_HOUR * error[rows]
         times, deviations, _, counts = oadev(
-            drift, rate=1.0 / sampling_interval, data_type="freq", taus="octave"
+            PER_HOUR * error[rows], rate=1.0 / sampling_interval, data_type="freq", taus="octave"
         )
-        for time, deviation, n in zip(times, deviations, counts, strict=True):
-            multiple = round(time / sampling_interval)
-            if multiple * ROWS_PER_TIME <= rows.size:
-                variances.setdefault(multiple, []).append((deviation**2, n))
-    if not variances:
-        raise ValueError(f"No Allan deviation: no run has {ROWS_PER_TIME} rows.")
-    lines = []
-    for multiple, found in sorted(variances.items()):
-        squares, counts = np.transpose(found)
-        deviation, n = np.sqrt(np.average(squares, weights=counts)), counts.sum()
-        lines.append((multiple * sampling_interval, deviation, deviation / np.sqrt(n), int(n)))
-    return pd.DataFrame(lines, columns=["averaging_time", "deviation", "error", "n"])
+        multiple = np.round(times / sampling_interval)
+        part = pd.DataFrame({"multiple": multiple, "sum": counts * deviations**2, "n": counts})
+        parts.append(part[multiple * _ROWS_PER_TIME <= rows.size])
+    if not parts:
+        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
+    curve = pd.concat(parts).groupby("multiple", as_index=False).sum()
+    times, counts = curve["multiple"] * sampling_interval, curve["n"].astype(int)
+    deviation = np.sqrt(curve["sum"] / counts)
+    standard_error = deviation / np.sqrt(counts)
+    columns = {
+        "averaging_time": times,
+        "deviation": deviation,
+        "error": standard_error,
+        "n": counts,
+    }
+    return pd.DataFrame(columns)
 
 
 @dataclass(frozen=True)
 class AllanCoefficients:
-    """What an Allan curve says of the noise; None where it says nothing, with the reason.
+    """What an Allan curve says of the noise; None where it says nothing, with the reason in notes.
 
-    Parameters
-    ----------
-    angle_random_walk : float or None
-        N [deg/sqrt(h)].
-    allan_minimum : float or None
-        Minimum of the curve [deg/h].
-    bias_instability : float or None
-        B = minimum / 0.664 [deg/h].
-    rate_random_walk : float or None
-        K [deg/h/sqrt(h)].
-    notes : dict of str to str
-        Why a coefficient is None, by its name.
-
-    Examples
-    --------
-    >>> from skanfis.gyro import AllanCoefficients
-    >>> AllanCoefficients(0.05, None, None, None, {"rate_random_walk": "no slope of +1/2"}).notes
-    {'rate_random_walk': 'no slope of +1/2'}
+    N [deg/sqrt(h)], the minimum [deg/h], B = minimum / 0.664 [deg/h] and K [deg/h/sqrt(h)].
     """
 
     angle_random_walk: float | None
@@ -139,23 +122,18 @@ class AllanCoefficients:
 def allan_coefficients(averaging_time: ArrayLike, deviation: ArrayLike) -> AllanCoefficients:
     """Read angle random walk, bias instability and rate random walk off an Allan curve.
 
-    A slope counts as found where a line through three neighbouring points has it within 0.15; the
-    coefficient is that of the lowest such line, before the minimum for N and after it for K: what
-    else is in the noise only adds to the curve. Leave out times longer than a tenth of the
-    record (:func:`allan_deviation` does): they are hardly more than one observation. The minimum
-    counts where the curve has one inside; a curve that still falls at its longest
-    time has none.
+    A slope is found where a line through three neighbouring points has it within 0.15; the lowest
+    such line counts, before the minimum for N and after it for K. A minimum at an end is none.
 
     Parameters
     ----------
-    averaging_time : array-like of shape (n_times,)
-        Increasing, positive [s]; best in octaves.
-    deviation : array-like of shape (n_times,)
-        Allan deviation, positive [deg/h].
+    averaging_time, deviation : array-like of shape (n_times,)
+        Averaging times, increasing and positive [s]; Allan deviation, positive [deg/h].
 
     Returns
     -------
     coefficients : AllanCoefficients
+        angle_random_walk, allan_minimum, bias_instability, rate_random_walk, and notes.
 
     Raises
     ------
@@ -182,38 +160,51 @@ def allan_coefficients(averaging_time: ArrayLike, deviation: ArrayLike) -> Allan
         raise ValueError(f"deviation must be positive; its smallest value is {deviation.min():g}.")
     lowest = int(np.argmin(deviation))
     notes: dict[str, str] = {}
+    found: dict[str, float | None] = dict.fromkeys(ALLAN_FIGURES)
     # sigma sqrt(tau) is N where the slope is -1/2: 1 deg/h at 1 s is 1/60 deg/sqrt(h).
-    walk = _level(tau, deviation, -0.5, slice(0, lowest + 1))
+    walk = _level(tau[: lowest + 1], deviation[: lowest + 1], -0.5)
     if walk is None:
         notes["angle_random_walk"] = "no slope of -1/2"
-    minimum = float(deviation[lowest])
+    else:
+        found["angle_random_walk"] = walk / 60.0
     if lowest in (0, tau.size - 1):
         side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
         reason = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
         notes["allan_minimum"] = notes["bias_instability"] = reason
-    drift = _level(tau, deviation, 0.5, slice(lowest, tau.size))
+    else:
+        found["allan_minimum"] = minimum = float(deviation[lowest])
+        found["bias_instability"] = minimum / float(_FLICKER)
+    drift = _level(tau[lowest:], deviation[lowest:], 0.5)
     if drift is None:
         notes["rate_random_walk"] = "no slope of +1/2"
-    return AllanCoefficients(
-        angle_random_walk=None if walk is None else walk / 60.0,
-        allan_minimum=None if "allan_minimum" in notes else minimum,
-        bias_instability=None if "bias_instability" in notes else minimum / float(_FLICKER),
+    else:
         # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
-        rate_random_walk=None if drift is None else float(drift * np.sqrt(3.0) * 60.0),
-        notes=notes,
-    )
+        found["rate_random_walk"] = float(drift * np.sqrt(3.0) * 60.0)
+    return AllanCoefficients(**found, notes=notes)
 
 
-def _level(tau, deviation, slope, part):
-    """Level of the lowest line of this slope along the curve; None where it never has the slope.
+def rows_for_allan(time, run, answered):
+    """Rows of the runs that were answered from end to end, and the time between them [s].
 
-    The lowest, because the other parts of the noise only add to the curve.
+    ValueError says why there is no Allan deviation.
     """
-    x, y = np.log(tau[part]), np.log(deviation[part])
+    runs = [rows for rows in rows_by_run(run, time.size) if answered[rows].all()]
+    if not runs:
+        raise ValueError("no run is in range from end to end")
+    if max(map(len, runs)) < _ROWS_PER_TIME:
+        raise ValueError(f"no run in range has {_ROWS_PER_TIME} rows")
+    steps = np.concatenate([np.diff(time[rows]) for rows in runs])
+    if np.abs(steps - np.median(steps)).max() > _UNEVEN * np.median(steps):
+        raise ValueError("the rows are not evenly spaced in time")
+    return np.sort(np.concatenate(runs)), float(np.median(steps))
+
+
+def _level(tau, deviation, slope):
+    """Level of the lowest line of this slope along the curve; None where it never has the slope."""
+    x, y = np.log(tau), np.log(deviation)
     levels = []
     for start in range(x.size - _POINTS_PER_SLOPE + 1):
         window = slice(start, start + _POINTS_PER_SLOPE)
-        found = np.polynomial.Polynomial.fit(x[window], y[window], 1).convert().coef[1]
-        if abs(found - slope) <= _SLOPE_TOLERANCE:
+        if abs(np.polyfit(x[window], y[window], 1)[0] - slope) <= _SLOPE_TOLERANCE:
             levels.append(np.mean(y[window] - slope * x[window]))
     return float(np.exp(min(levels))) if levels else None

@@ -5,17 +5,25 @@ file; the law is written here. What is asked of an exported function stays: cons
 heap, no state, the status word.
 """
 
+import warnings
+from copy import copy
 from dataclasses import replace
 from os import PathLike
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.polynomial import Polynomial
+from scipy.stats import qmc
 
+from ..exceptions import OutOfBoundsWarning
 from ..export.c import CCode
 from ..export.c.builder import (
-    DECLARATION,
     FINITE_INPUT,
     LONGEST_NAME,
+    ROWS,
+    STATUS,
+    TOLERANCE,
     Dialect,
     RulesPart,
     check_arguments,
@@ -27,12 +35,12 @@ from ..export.c.builder import (
     policy_line,
     rejection,
     self_test,
+    size_of_sum,
     write_files,
 )
 from ..policies import SILENT
-from ._c_composition import Composition, known_answers
-from ._frozen import law_and_rules
 from ._law_text import past_phase
+from .compose import law_and_rules
 
 __all__ = ["export_c_physics"]
 
@@ -51,8 +59,7 @@ static $real $name_polynomial(const $real *c, int n, $real t)
 
 """
 
-_PREDICT = """
-int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+_PREDICT = """int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
 {
     $real z[$n_rules_inputs], left[1], t, amplitude, sagnac, sine, phase, rate;
     int i, sign = 1, status = $NAME_IN_RANGE;
@@ -88,8 +95,7 @@ $finite_input
     if (sine > $limit) {
         status = $NAME_OUT_OF_RANGE;
         $beyond
-    }$otherwise
-    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
+$within    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
 
     for (i = 0; i < $n_rules_inputs; ++i) {
         z[i] = x[$name_rules_input[i]];
@@ -107,28 +113,16 @@ $finite_input
     return status;
 }
 """
-_DEVIATION = """
-int $name_deviation(const $real x[$NAME_N_INPUTS], $real deviation[$NAME_N_OUTPUTS])
-{
-    $real z[$n_rules_inputs], rate[1];
-    int i;
-    const int status = $name_predict(x, rate) & ~$NAME_UNCOVERED;
-    if (status & $NAME_NO_OUTPUT) {
-        return $NAME_REJECT(deviation, status);
-    }
-    for (i = 0; i < $n_rules_inputs; ++i) {
-        z[i] = x[$name_rules_input[i]];
-    }
-    (void)$rules_deviation(z, deviation);
-    return status;
-}
-"""
 _BEYOND = {
     "clip": "phase = $max_phase;",
     "linear": "phase = $max_phase + (sine - $limit) * $slope;",
+    "nan": "return $NAME_REJECT(y, status);",
+    "raise": "return $NAME_REJECT(y, status);",
 }
-_REFUSED = "return $NAME_REJECT(y, status);"
-_WITHIN = "phase = $ASIN(sine);"
+_WITHIN = """    } else {
+        phase = $ASIN(sine);
+    }
+"""
 
 
 def export_c_physics(
@@ -140,14 +134,11 @@ def export_c_physics(
     std: str = "c99",
     min_coverage: float | None = 0.1,
     saturate: Any = None,
-    deviation: bool = False,
 ) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 
     The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from
-    one row of raw inputs, and a status, as :func:`skanfis.export.export_c` does it for rules alone:
-    constant tables, no heap, no state, no recursion. It takes ``asin`` besides ``exp``,
-    ``log`` and, for the coverage, ``sqrt``.
+    one row of raw inputs, and a status, as :func:`skanfis.export.export_c` does for rules alone.
 
     Parameters
     ----------
@@ -169,12 +160,7 @@ def export_c_physics(
         Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
         leaves that out.
     saturate : Bounds or array-like of shape (1, 2), default=None
-        Limits between which what the rules add to the law is held: what
-        :func:`skanfis.bounds.bounds` has proven of them, or others. None holds nothing.
-    deviation : bool, default=False
-        Whether to write ``int NAME_deviation(const double x[], double deviation[])`` too: the
-        standard deviation of a new rate by the rules; the law, which is fitted before them, is
-        taken for known.
+        Limits between which what the rules add to the law is held. None holds nothing.
 
     Returns
     -------
@@ -192,11 +178,9 @@ def export_c_physics(
 
     Notes
     -----
-    The status is that of :func:`skanfis.export.export_c`. ``NAME_OUT_OF_RANGE`` says that an input
-    lies outside the range of either part's training data, or that the phase lies beyond
-    ``max_phase``: where ``estimator.in_bounds`` is False. Either part then follows its own
-    ``out_of_bounds``; where one of them has no answer, there is none. A rate that is not finite is
-    no answer either.
+    ``NAME_OUT_OF_RANGE`` is set where ``estimator.in_bounds`` is False. Either part then follows
+    its own ``out_of_bounds``; where one of them has no answer, or the rate is not finite, there is
+    none.
 
     Examples
     --------
@@ -221,44 +205,79 @@ def export_c_physics(
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
     dialect = Dialect(name, dtype, std)
-    if not isinstance(deviation, bool | np.bool_):
-        raise ValueError(f"deviation={deviation!r} must be True or False.")
-    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, saturate, bool(deviation))
-    columns = np.union1d(law.columns_, rules.positions)
-    composition = Composition(law, rules, columns, dialect.dtype)
-    of_law = _law(dialect, composition, policies)
-    answers, test = known_answers(composition, part), ""
-    if deviation:
-        test = part.deviation_test(dialect, answers[0][:, composition.rules_inputs])
-    source = "".join(
+    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, saturate)
+    whole = _Composition(law, rules, part, dialect.dtype)
+    code = "".join(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
             part.text(),
             "\n",
-            of_law,
-            _write(dialect, _DEVIATION, composition) if deviation else "",
-            self_test(answers, dialect, test, "deviation_test"),
+            _law_source(dialect, whole, next(iter(policies & set(SILENT)), None)),
+            self_test(_known_answers(whole), dialect),
         ]
     )
-    price = _cost(part.cost, composition)
-    code = CCode(name, _header(composition, dialect, price, part, deviation), source, price)
-    write_files(code, path)
-    return code
+    price = _cost(whole)
+    written = CCode(name, _header(whole, dialect, price), code, price)
+    write_files(written, path)
+    return written
 
 
-def _write(dialect, template, composition, **words):
-    name = dialect.name + _SUFFIX
-    words |= {"rules": name, "RULES": name.upper(), "n_rules_inputs": composition.rules_inputs.size}
-    return dialect.write(template, **words)
+class _Composition:
+    """Both parts, and what of the law is rounded to the type; ``columns`` are the inputs in X."""
+
+    def __init__(self, law, rules, part, dtype):
+        self.law, self.rules, self.part, self.dtype = law, rules, part, dtype
+        self.columns = np.union1d(law.columns_, rules.positions)
+        self.law_inputs = np.searchsorted(self.columns, law.columns_)
+        self.rules_inputs = np.searchsorted(self.columns, rules.positions)
+        self.low, self.high = self.rounded(law.minimum_), self.rounded(law.maximum_)
+        self.reference = self.rounded(law.reference_temperature_)
+        # Coefficients about the reference as it is rounded.
+        shift = Polynomial([float(self.reference) - law.reference_temperature_, 1.0])
+        self.polynomials = {}
+        for key in ("amplitude", "sagnac", "bias"):
+            given = getattr(law, "sagnac_factor_" if key == "sagnac" else f"{key}_")
+            moved = np.zeros(given.size)
+            found = Polynomial(given)(shift).coef
+            moved[: found.size] = found
+            self.polynomials[key] = self.rounded(moved)
+
+    def rounded(self, values):
+        values = np.asarray(values, dtype=float)
+        largest = np.abs(values).max()
+        if not largest <= float(np.finfo(self.dtype).max):
+            raise ValueError(
+                f"Single precision cannot hold {largest:g}, a constant of the arcsine law. Scale "
+                "the output, or export in double precision."
+            )
+        return values.astype(self.dtype)
+
+    @property
+    def box(self):
+        """Of every input, within which both parts know it."""
+        low, high = np.full(self.columns.size, -np.inf), np.full(self.columns.size, np.inf)
+        model = self.rules.model
+        ranges = [(self.law_inputs, self.low, self.high)]
+        ranges.append((self.rules_inputs, *map(self.rounded, (model.minimum, model.maximum))))
+        for places, least, most in ranges:
+            low[places] = np.maximum(low[places], least)
+            high[places] = np.minimum(high[places], most)
+        return low, high
+
+    def table(self, X):
+        """Rows as both parts take them, out of rows of the function's inputs."""
+        whole = np.zeros((len(X), self.law.n_features_in_))
+        whole[:, self.columns] = X
+        names = getattr(self.law, "feature_names_in_", None)
+        return whole if names is None else pd.DataFrame(whole, columns=names)
 
 
-def _law(dialect, composition, policies):
-    """Tables and functions of the law."""
-    law, real = composition.law, dialect.real
-    inputs = composition.law_inputs
-    tables = {"law_low": (real, composition.low), "law_high": (real, composition.high)}
-    tables |= {key: (real, values) for key, values in composition.polynomials.items()}
-    for key, places in (("law_input", inputs), ("rules_input", composition.rules_inputs)):
+def _law_source(dialect, whole, silent):
+    """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
+    law, real, inputs, number = whole.law, dialect.real, whole.law_inputs, dialect.number
+    tables = {"law_low": (real, whole.low), "law_high": (real, whole.high)}
+    tables |= {key: (real, values) for key, values in whole.polynomials.items()}
+    for key, places in (("law_input", inputs), ("rules_input", whole.rules_inputs)):
         tables[key] = (index_type(places), places)
     parts = ["/* Of the law: where it was fitted, powers of the temperature, columns of x. */\n"]
     parts += [
@@ -267,42 +286,41 @@ def _law(dialect, composition, policies):
     ]
     asin = dialect.write("$ASIN(")
     parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
-    silent = next(iter(policies & set(SILENT)), None)
-    parts.append(dialect.write(rejection(silent, dialect.std)).lstrip() + "\n")
-    parts.append(dialect.write(_POLYNOMIAL).lstrip())
-
-    number = dialect.number
+    parts += [dialect.write(rejection(silent, dialect.std)).lstrip() + "\n"]
+    parts += [dialect.write(_POLYNOMIAL).lstrip()]
     temperature = "0.0R"
     if inputs.size > 1:
         lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
-        temperature = f"x[{inputs[1]}]{lag} - {number(composition.reference)}"
-    refuses = law.out_of_bounds in SILENT
+        temperature = f"x[{inputs[1]}]{lag} - {number(whole.reference)}"
+    # Where there is no answer beyond, the function has returned.
+    within = "    }\n    phase = $ASIN(sine);\n" if law.out_of_bounds in SILENT else _WITHIN
     template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
-    template = template.replace("$temperature", temperature)
-    template = template.replace("$beyond", _REFUSED if refuses else _BEYOND[law.out_of_bounds])
-    otherwise = f"\n    {_WITHIN}" if refuses else f" else {{\n        {_WITHIN}\n    }}"
-    return "".join(parts) + _write(
-        dialect,
-        template.replace("$otherwise", otherwise).lstrip(),
-        composition,
+    template = template.replace("$temperature", temperature).replace("$within", within)
+    rules = dialect.name + _SUFFIX
+    return "".join(parts) + dialect.write(
+        template.replace("$beyond", _BEYOND[law.out_of_bounds]),
+        rules=rules,
+        n_rules_inputs=whole.rules_inputs.size,
         n_law=inputs.size,
         output=inputs[0],
         offset=number(law.offset_),
         limit=number(np.sin(law.max_phase)),
         max_phase=number(law.max_phase),
         slope=number(1.0 / np.cos(law.max_phase)),
-        **{f"n_{key}": values.size for key, values in composition.polynomials.items()},
+        **{f"n_{key}": values.size for key, values in whole.polynomials.items()},
     )
 
 
-def _header(composition, dialect, price, part, deviation):
-    law, model = composition.law, composition.rules.model
+def _header(whole, dialect, price):
+    law, part, model = whole.law, whole.part, whole.rules.model
+    given = getattr(law, "feature_names_in_", None)
+    names = [f"x{j}" if given is None else given[j] for j in whole.columns]
     lines = [
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
         f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "an arcsine, "),
         "",
-        *input_lines(composition.names, *composition.box),
+        *input_lines(names, *whole.box),
         "Outputs y:",
         "  [0] rate, in the unit of the training data",
         "",
@@ -315,22 +333,81 @@ def _header(composition, dialect, price, part, deviation):
     if part.limits is not None:
         low, high = part.limits[0]
         lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
-    if deviation:
-        lines.append("The deviation is that of the rules: the law is taken for known.")
     title = "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
-    declarations = dialect.write(DECLARATION) if deviation else ""
-    return header_of(title, lines, dialect, composition.columns.size, 1, declarations)
+    return header_of(title, lines, dialect, whole.columns.size, 1)
 
 
-def _cost(of_rules, composition):
-    sizes = [values.size for values in composition.polynomials.values()]
-    itemsize = composition.dtype.itemsize
-    n_numbers = sum(sizes) + 2 * composition.law_inputs.size
-    n_bytes = itemsize * n_numbers + composition.law_inputs.size + composition.rules_inputs.size
+def _cost(whole):
+    of_rules, itemsize = whole.part.cost, whole.dtype.itemsize
+    sizes = [values.size for values in whole.polynomials.values()]
+    n_inputs, n_rules_inputs = whole.law_inputs.size, whole.rules_inputs.size
+    table_bytes = itemsize * (sum(sizes) + 2 * n_inputs) + n_inputs + n_rules_inputs
     return replace(
         of_rules,
         multiply_adds=of_rules.multiply_adds + sum(sizes) - len(sizes) + 1,
         divisions=of_rules.divisions + 2,
-        table_bytes=of_rules.table_bytes + n_bytes,
-        stack_bytes=of_rules.stack_bytes + itemsize * (composition.rules_inputs.size + 1),
+        table_bytes=of_rules.table_bytes + table_bytes,
+        stack_bytes=of_rules.stack_bytes + itemsize * (n_rules_inputs + 1),
     )
+
+
+def _known_answers(whole):
+    """Rows, rates, status and tolerance, as for rules alone; some rows lie far up the sine.
+
+    Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
+    """
+    law, part, dtype = whole.law, whole.part, whole.dtype
+    rules, min_coverage = replace(whole.rules, model=part.model), part.min_coverage
+    low, high = whole.box
+    points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
+    kind = np.arange(len(points)) % 4
+    reach = np.where(kind % 2, 1.0, 2.0)[:, None]
+    X = low + (high - low) * (0.5 + reach * (points - 0.5))
+    output = whole.law_inputs[0]
+    swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
+    X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
+    X = np.vstack([low, high, X]).astype(dtype)
+    rows = whole.table(X.astype(float))
+    # NaN past the amplitude.
+    phase, coverage = np.abs(law.phase(rows)), rules.coverage(rows)
+    sure = ~(np.abs(phase - law.max_phase) < 1e-3)
+    if min_coverage is not None:
+        sure &= np.abs(coverage - min_coverage) > 1e-3 * min_coverage
+    chosen = np.flatnonzero(sure)[:ROWS]
+    X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= law.max_phase)[chosen]
+    rows = whole.table(X.astype(float))
+
+    def outside(inputs, least, most):
+        return ((X[:, inputs] < least) | (X[:, inputs] > most)).any(axis=1)
+
+    beside = outside(whole.rules_inputs, part.low, part.high)
+    out = beside | beyond | outside(whole.law_inputs, whole.low, whole.high)
+    silent = beyond & (law.out_of_bounds in SILENT)
+    silent |= beside & (rules.model.out_of_bounds in SILENT)
+    with warnings.catch_warnings():
+        # The status tells, row by row.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
+        of_law = _answering(law).predict(rows)
+    model, z = _answering(rules.model), np.asarray(rows)[:, rules.positions]
+    of_rules = model.predict(z)
+    if part.limits is not None:
+        of_rules = np.clip(of_rules, *part.limits.T.astype(float))
+    silent |= ~np.isfinite(of_law.astype(dtype))
+    status = STATUS["OUT_OF_RANGE"] * out | STATUS["NO_OUTPUT"] * silent
+    if min_coverage is not None:
+        status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
+    y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
+    # What rounding of the sine is magnified by, too.
+    steepest = np.abs(of_law[~silent]).max(initial=0.0)
+    steepest = max(steepest, np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
+    size = size_of_sum(model, z, of_rules) + steepest
+    tolerance = TOLERANCE[dtype] * size
+    return X, y.astype(dtype), status, tolerance.astype(dtype)
+
+
+def _answering(part):
+    """A part that answers everywhere: by its own policy, or the nearest where that gives none."""
+    policy = "linear" if part.out_of_bounds == "linear" else "clip"
+    if hasattr(part, "set_params"):
+        return copy(part).set_params(out_of_bounds=policy)
+    return part.with_out_of_bounds(policy)

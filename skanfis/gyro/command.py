@@ -4,26 +4,35 @@ import contextlib
 import os
 from pathlib import Path
 
-import joblib
 import numpy as np
 
 from ..export import export_c
 from ..inspection.labels import printable
 from ._apply import apply
+from ._budget import proven_bounds
 from ._calibration import Recipe, calibrate
-from ._certain import certain_of
-from ._console import ExistsError, Progress, UsageError, refuse_existing, say, say_error
-from ._dossier import dossier_of
-from ._files import check_different, find_logs
-from ._logs import find_tasks, read_task
-from ._options import PROGRAM, make_parser
+from ._checks import LARGEST_AT_REST, check_at_rest, check_log
+from ._columns import SIGNALS
+from ._console import (
+    ExistsError,
+    Progress,
+    UsageError,
+    refuse_existing,
+    say,
+    say_error,
+    staged,
+    usage_errors,
+)
+from ._formulas import rules_text
+from ._headline import errors_and_verdict
+from ._options import PROGRAM, make_parser, request_of
+from ._report_options import report_options
 from ._split import choose_split
-from ._staging import Staging
-from ._summary import errors_and_verdict
-from ._units import SIGNALS
 from .c_code import export_c_physics
+from .compensator import INPUTS
 from .errors import LogError
-from .html_report import report_page, rules_text
+from .html_report import check_installed, report_page
+from .log import check_different, find_logs, read
 from .metrics import hysteresis
 
 __all__ = ["main"]
@@ -31,16 +40,10 @@ __all__ = ["main"]
 DONE, FAILED, MISUSED, REFUSED, EXISTS = 0, 1, 2, 3, 4
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
-_FILES = {
-    "model": "compensator.joblib",
-    "json": "compensator.json",
-    "report": "report.html",
-    "rules": "rules.txt",
-}
+_FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
-# Of several logs a summary names so many, and counts the rest.
-_MOST_NAMED = 3
-_PER_MINUTE = 60.0
+_MOST_ROWS = 1_000_000  # that are held
+_MOST_NAMED = 3  # of several logs in a line
 
 
 def main(arguments=None):
@@ -72,79 +75,132 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
-    with Staging(folder) as staging:
+    with staged(folder) as written:
         tell(f"reading {_named(paths)}")
-        tasks = find_tasks(options, paths)
-        for task in tasks[: len(tasks) if len(tasks) > 1 or tasks[0].axis else 0]:
-            _refuse_overwriting(folder / task.axis, options)
-        done, left_out = [], []
-        for task in tasks:
-            if task.axis:
-                tell(f"axis {task.axis}: {', '.join(task.columns.values())}")
-            try:
-                reading, inputs = read_task(options, paths, task, tell)
-            except LogError as error:
-                if len(tasks) == 1 or not _did_not_turn(task, error):
-                    raise
-                left_out.append(f"axis {task.axis} is left out: {error}")
-                tell(f"note: {left_out[-1]}")
-                continue
-            recipe = _recipe(options, inputs, reading.units["output"])
-            split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
-            tell(f"inputs: {', '.join(inputs)}")
-            tell(f"check: {split.sentence}")
-            calibration = calibrate(
-                reading.log,
-                split,
-                recipe,
-                tell,
-                reading.name_row,
-                made=reading.made,
-                n_rows=reading.n_rows,
-            )
-            tell("drawing the report")
-            target = staging.path / task.axis
-            target.mkdir(exist_ok=True)
-            _write(calibration, options, paths, target, task.axis)
-            done.append((task, calibration, reading.notes))
-        if not done:
-            raise LogError(f"no axis follows the rate: {'; '.join(left_out)}")
-        staging.publish()
-    _say_what_was_found(done, left_out, folder, tell)
+        reading, inputs = _read(options, paths, tell)
+        recipe = _recipe(options, inputs, reading.units["output"])
+        split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
+        tell(f"inputs: {', '.join(inputs)}")
+        tell(f"check: {split.sentence}")
+        calibration = calibrate(
+            reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
+        )
+        tell("drawing the report")
+        _write(calibration, options, paths, written)
+    for message in calibration.warnings:
+        tell(f"warning: {message}")
+    say(_summary(calibration, folder, reading.notes))
+    tell("done, but see the warnings" if calibration.cautions else "done")
 
 
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
-    _refuse_twice(options.inputs or (), "--inputs: {} is given twice.")
-    for name in ("deviation", "saturate"):
-        if getattr(options, name) and not options.c:
-            raise UsageError(f"--{name} is of the model in C: give --c c99 or --c c89 with it.")
-    _refuse_twice([name for name, *_ in options.box], "--box: {} is given twice.")
+    for option, names in (
+        ("--inputs", options.inputs or ()),
+        ("--box", [name for name, *_ in options.box]),
+    ):
+        for name in names:
+            if names.count(name) > 1:
+                raise UsageError(f"{option}: {name} is given twice.")
+    if options.saturate and not options.c:
+        raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    _refuse_overwriting(folder, options)
-    _require_matplotlib()
+    names = (*_FILES, *(_C_FILES if options.c else ()))
+    refuse_existing([folder / name for name in names], options.force)
+    check_installed()
     check_different(paths)
     return folder, paths
 
 
-def _did_not_turn(task, error):
-    """Whether the table did not turn about an axis that was guessed."""
-    return task.is_guessed and "does not follow the rate" in error.reason
+def _read(options, paths, tell):
+    """The checked log; returns its reading and the inputs. What was found out is told."""
+    required = ["temperature", "output"]
+    if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
+        required.append("time")
+    request = request_of(options, required)
+    with usage_errors():
+        reading = read(
+            paths, request, max_gap=options.max_gap, tell=tell, most_rows=_MOST_ROWS, check=True
+        )
+    for note in reading.notes:
+        tell(f"note: {note}")
+    tell(f"{reading.n_rows:,} rows{_counts(reading.log)}")
+    try:
+        at_rest = _settle_rest(options, reading, tell)
+        inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
+        _check_options(options, inputs, reading.units["output"], at_rest)
+        check_log(reading.log, units=reading.units, inputs=inputs)
+    except LogError as error:
+        raise reading.located(error) from error
+    return reading, inputs
 
 
-def _say_what_was_found(done, left_out, folder, tell):
-    for task, calibration, notes in done:
-        for message in calibration.warnings:
-            tell(f"warning: {message}")
-        if task.axis:
-            say([f"axis {task.axis:<10}{', '.join(task.columns.values())}"])
-        say(_summary(calibration, folder / task.axis, notes))
-    say(f"note           {sentence}" for sentence in left_out)
-    cautions = any(calibration.cautions for _, calibration, _ in done)
-    tell("done, but see the warnings" if cautions else "done")
+def _settle_rest(options, reading, tell):
+    """Whether the gyro was at rest, as told or as found; the log then has a rate of zero."""
+    log, unit = reading.log, reading.units["output"]
+    has_rate = "rate" in log
+    still = has_rate and np.abs(log["rate"]).max() <= LARGEST_AT_REST
+    if not options.at_rest:
+        if has_rate and not still:
+            return False
+        try:
+            check_at_rest(log, unit)
+        except LogError as error:
+            if has_rate:
+                return False
+            raise LogError(
+                f"there is no column 'rate' for the true rate among "
+                f"{', '.join(map(repr, reading.files[0].layout.header[:20]))}, and the output "
+                f"{error.reason} Say which it is (--columns rate=NAME)."
+            ) from error
+        what = "the rate is zero throughout" if has_rate else "there is no column for the rate"
+        note = f"{what}, and the output does not move: taken as at rest (--at-rest)"
+        reading.notes.append(note)
+        tell(f"note: {note}")
+    else:
+        check_at_rest(log, unit)
+    reading.log = log.assign(rate=0.0)
+    return True
+
+
+def _check_options(options, inputs, unit, at_rest):
+    if options.physics and "output" not in inputs:
+        raise UsageError("--physics: the arcsine law needs the output among the inputs.")
+    if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
+        raise UsageError(
+            f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs "
+            f"{', '.join(inputs)}."
+        )
+    if options.scale_factor is not None and not (at_rest and unit in SIGNALS):
+        raise UsageError("--scale-factor is for a raw signal at rest: else the rate tells it.")
+    if at_rest and unit in SIGNALS and options.scale_factor is None:
+        raise LogError(
+            f"is in {unit}, and a gyro at rest does not tell its scale factor. Give that of the "
+            f"data sheet (--scale-factor, {unit} per deg/s), or another unit (--units output=...).",
+            "output",
+        )
+
+
+def _default_inputs(log, at_rest):
+    """All that the log has; the time only where several runs can tell it from all else."""
+    inputs: tuple[str, ...] = INPUTS
+    if "time" not in log:
+        inputs = ("temperature", "output")
+    elif "run" not in log or log["run"].nunique() < 3:
+        inputs = ("temperature", "temperature_rate", "output")
+    return tuple(name for name in inputs if not (at_rest and name == "output"))
+
+
+def _counts(log):
+    parts = [
+        f", {log[name].nunique():,} {name}{'s' if log[name].nunique() > 1 else ''}"
+        for name in ("run", "device")
+        if name in log
+    ]
+    return "".join(parts)
 
 
 def _recipe(options, inputs, unit):
@@ -160,10 +216,7 @@ def _recipe(options, inputs, unit):
         physics=options.physics,
         outside=options.outside,
         max_extrapolation=options.max_extrapolation,
-        time_constant=options.time_constant,
         min_coverage=options.min_coverage,
-        max_rules=options.max_rules,
-        fit_rows=options.fit_rows,
         n_jobs=options.jobs,
         box=tuple(options.box),
     )
@@ -176,38 +229,14 @@ def _named(paths):
     return f"{paths[0]} to {paths[-1]}, {len(paths):,} files"
 
 
-def _refuse_overwriting(folder, options):
-    names = [*_FILES.values(), *(_C_FILES if options.c else ())]
-    refuse_existing([folder / name for name in names], options.force)
-
-
-def _refuse_twice(names, sentence):
-    for place, name in enumerate(names):
-        if name in names[:place]:
-            raise UsageError(sentence.format(name))
-
-
-def _require_matplotlib():
-    """A report without its pictures would be found out at the end only."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        message = "the report needs matplotlib: pip install matplotlib"
-        raise ImportError(message) from error
-    except ValueError as error:
-        # Of its settings; MPLBACKEND is one.
-        reason = printable(str(error).partition(";")[0])
-        raise ImportError(f"matplotlib cannot be imported: {reason}.") from error
-
-
-def _write(calibration, options, paths, folder, axis=""):
-    title = _title(options.logs) + (f", axis {axis}" if axis else "")
-    page = report_page(calibration, title, dossier_of(options, paths))
+def _write(calibration, options, paths, folder):
+    names = [Path(path).name for path in paths]
+    title = printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
+    page = report_page(calibration, title, report_options(options, paths))
     compensator = calibration.compensator
-    (folder / _FILES["report"]).write_text(page, encoding="utf-8")
-    joblib.dump(compensator, folder / _FILES["model"])
-    compensator.write_json(folder / _FILES["json"])
-    (folder / _FILES["rules"]).write_text(rules_text(calibration), encoding="utf-8")
+    (folder / "report.html").write_text(page, encoding="utf-8")
+    compensator.write_json(folder / "compensator.json")
+    (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         coverage = compensator.min_coverage or None
         path = folder / "compensator"
@@ -217,14 +246,8 @@ def _write(calibration, options, paths, folder, axis=""):
             path,
             std=options.c,
             min_coverage=coverage,
-            deviation=options.deviation,
-            saturate=certain_of(calibration).found if options.saturate else None,
+            saturate=proven_bounds(calibration).found if options.saturate else None,
         )
-
-
-def _title(logs):
-    names = [Path(log).name for log in logs]
-    return printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
 
 
 def _summary(calibration, folder, notes):
@@ -246,7 +269,7 @@ def _hysteresis_line(calibration, rows):
     if "temperature_rate" not in calibration.X:
         return []
     temperature = calibration.log["temperature"].to_numpy()[rows]
-    warming = _PER_MINUTE * calibration.X["temperature_rate"].to_numpy()[rows]
+    warming = 60.0 * calibration.X["temperature_rate"].to_numpy()[rows]
     errors = [(rates - calibration.rate)[rows] for rates in (calibration.before, calibration.after)]
     try:
         before, after = (hysteresis(error, temperature, warming) for error in errors)

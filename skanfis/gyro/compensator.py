@@ -16,10 +16,9 @@ from ..export import export_json, found_by_search
 from ..export.c.status import STATUS
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, shown
-from ._ask import ask
-from ._frozen import FrozenRules, joined, law_and_rules
-from ._law_json import law_document, read_law
-from .compose import ResidualRegressor
+from ._columns import ask
+from ._law_text import law_document, read_law
+from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
 from .features import ThermalRate, TimeSincePowerOn
 
 __all__ = ["GyroCompensator"]
@@ -38,14 +37,13 @@ _LONGEST_UNIT = 40
 class GyroCompensator:
     """A fitted compensator with its inputs, units and limits: what the command writes and applies.
 
-    It takes logs as :func:`read_log` returns them, and uses nothing that is not known on board:
-    never the true rate.
+    It takes logs as :func:`read_log` returns them, and never uses the true rate.
 
     Parameters
     ----------
     estimator : fitted estimator
-        Predicts from the columns ``inputs``, in this order, and has ``in_bounds`` and ``coverage``,
-        or is a Pipeline that ends in such.
+        Predicts from the columns ``inputs``, in this order; it, or the last step of a Pipeline, has
+        ``in_bounds`` and ``coverage``.
     inputs : tuple of str
         Of "time" (since power-on [s]), "temperature" [degC], "temperature_rate" (low-passed
         [degC/s], see :class:`ThermalRate`) and "output" (in ``output_unit``).
@@ -121,10 +119,9 @@ class GyroCompensator:
         Returns
         -------
         compensated : DataFrame of shape (n_rows, 4)
-            rate_indicated and rate_compensated [deg/s]; coverage, from 0 to 1, how well the
-            training data cover the row; status, the sum of 1 where an input lies outside the
-            range of the training data, 4 where the coverage is below ``min_coverage``, 8 where
-            the policy gives no rate, and the compensated rate is NaN. Zero says that all is well.
+            rate_indicated and rate_compensated [deg/s]; coverage by the training data, 0 to 1;
+            status, the sum of 1 (an input is out of range), 4 (the coverage is below
+            ``min_coverage``) and 8 (the policy gives no rate: NaN). Zero: all is well.
         """
         return self._compensated(self.features(log), self.indicated(log))
 
@@ -155,9 +152,7 @@ class GyroCompensator:
 
         Parameters
         ----------
-        indicated : ndarray of shape (n_rows,)
-            [deg/s]
-        predicted : ndarray of shape (n_rows,)
+        indicated, predicted : ndarray of shape (n_rows,)
             [deg/s]
 
         Returns
@@ -186,7 +181,11 @@ class GyroCompensator:
         OSError
             If the file cannot be written.
         """
-        law, rules = self._parts()
+        found = found_by_search(self.estimator)
+        if isinstance(found, ResidualRegressor):
+            law, rules = law_and_rules(found)
+        else:
+            law, rules = None, FrozenRules.of(found, len(self.inputs))
         document = {
             "format": _FORMAT,
             "version": _VERSION,
@@ -232,13 +231,6 @@ class GyroCompensator:
             reason = str(error).removesuffix(".")
             raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
 
-    def _parts(self):
-        """The law, or None, and the rules."""
-        found = found_by_search(self.estimator)
-        if isinstance(found, ResidualRegressor):
-            return law_and_rules(found)
-        return None, FrozenRules.of(found, len(self.inputs))
-
     def _apply_block(self, X):
         with warnings.catch_warnings():
             # The status tells, row by row.
@@ -251,11 +243,10 @@ class GyroCompensator:
 def features(log, inputs, time_constant, made=None):
     """Columns that are known on board, in the order of ``inputs``; ``made`` are there already."""
     made = made or {}
-    has_run = "run" in log
-    roles = {"time": "time", "run": "run" if has_run else None}
+    clock = log[[part for part in ("time", "run") if part in log]]
+    roles = {"time": "time", "run": "run" if "run" in log else None}
     columns = {}
     for name in inputs:
-        clock = log[[part for part in ("time", "run") if part in log]]
         if name in made:
             columns[name] = made[name]
         elif name == "time":

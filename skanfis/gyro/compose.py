@@ -1,5 +1,6 @@
 """Two regressors in a row: the second learns what the first leaves."""
 
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -19,10 +20,11 @@ from sklearn.utils.validation import (
 )
 
 from .. import ANFISRegressor
-from ._ask import ask
-from .physics import OpenLoopArcsineRegressor
+from ..export import fold_with_rows, found_by_search
+from ._columns import ask
+from .physics import OpenLoopArcsineRegressor, check_parameters
 
-__all__ = ["ResidualRegressor"]
+__all__ = ["FrozenRules", "ResidualRegressor", "joined", "law_and_rules"]
 
 
 def _some_part_has(method):
@@ -39,32 +41,27 @@ def _some_part_has(method):
 
 
 class ResidualRegressor(RegressorMixin, BaseEstimator):
-    """A base regressor, and another that learns what it leaves.
+    """A base regressor, and another that learns what it leaves: the prediction is their sum.
 
-    The base is fitted to the target, the residual model to the target minus what the base predicts;
-    the prediction is the sum of both. With the physics of the sensor as the base, the residual
-    model stays small, and far from the data the sum falls back to physics plus an edge value.
+    With the physics of the sensor as the base, the residual model stays small, and far from the
+    data the sum falls back to physics plus an edge value.
 
     Parameters
     ----------
     base : regressor, default=None
-        Fitted to the target; None is ``OpenLoopArcsineRegressor()``. It is fitted and its residual
-        taken on the same rows: it must be stiff, as a law of few coefficients is. A flexible base
-        would leave nothing there.
+        Fitted to the target; None is ``OpenLoopArcsineRegressor()``. It must be stiff, as a law of
+        few coefficients is: its residual is taken on the rows that it is fitted to.
     residual : regressor, default=None
-        Fitted to what the base leaves; None is ``ANFISRegressor()``. A Pipeline will do, and may
-        begin with a selection of columns.
+        Fitted to what the base leaves; None is ``ANFISRegressor()``. A Pipeline will do.
     n_rounds : int, default=1
-        How often both are fitted in turn, 1 or more. From the second round on, the base is fitted
-        to the target minus what the residual model predicts (backfitting [1]_): an effect that the
-        base does not have then stops pulling at its coefficients. Three rounds are usually enough.
-        It needs a residual model that cannot do the base's work: give it few columns and rules.
+        How often both are fitted in turn (backfitting [1]_), the base then to the target minus what
+        the residual model predicts. Three are enough; the residual model must be too small to do
+        the base's work.
 
     Attributes
     ----------
     base_, residual_ : regressor
-        The fitted parts. ``residual_`` is an estimator like any other: its rules can be shown and
-        exported by themselves.
+        The fitted parts, estimators like any other.
     n_features_in_ : int
         Number of columns of X.
     feature_names_in_ : ndarray of shape (n_features,)
@@ -105,7 +102,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return tags
 
     def get_metadata_routing(self) -> MetadataRouter:
-        """Metadata routing of this object, with both parts; see scikit-learn's user guide.
+        """Metadata routing of this object, with both parts.
 
         Returns
         -------
@@ -125,9 +122,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     ) -> Self:
         """Fit the base, then the residual model.
 
-        To a Pipeline weights and groups are given for its last step. With
-        ``sklearn.set_config(enable_metadata_routing=True)`` they go where the parts request them.
-
         Parameters
         ----------
         X : array-like of shape (n_samples, n_features)
@@ -135,11 +129,10 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,)
             Target.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, given to both parts.
+            Weights, given to both parts; to a Pipeline for its last step.
         groups : array-like of shape (n_samples,), default=None
-            The run, device or day that each row belongs to, given to every part whose ``fit`` takes
-            groups, and to a search for its splitter: an ANFISRegressor then chooses its structure
-            by runs left out.
+            The run, device or day of each row, given to every part whose ``fit`` takes groups, and
+            to a search for its splitter.
 
         Returns
         -------
@@ -159,11 +152,19 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         given = self._given_by_part(base, residual, sample_weight, groups)
         learnt = np.zeros(target.size)
         for _ in range(self.n_rounds):
-            self.base_ = clone(base).fit(X, target - learnt, **given.base)
-            left = target - self.base_.predict(X)
-            _check_answered(left)
-            self.residual_ = clone(residual).fit(X, left, **given.residual)
-            learnt = self.residual_.predict(X)
+            fitted_base = clone(base).fit(X, target - learnt, **given.base)
+            left = target - fitted_base.predict(X)
+            refused = ~np.isfinite(left)
+            if refused.any():
+                raise ValueError(
+                    f"base has no finite prediction for {refused.sum()} of {refused.size} training "
+                    "rows: nothing is left there for the residual model to learn. Drop these rows, "
+                    "or give the base a policy that answers."
+                )
+            fitted_residual = clone(residual).fit(X, left, **given.residual)
+            learnt = fitted_residual.predict(X)
+        # Both at once: a fit that is interrupted leaves no parts of two fits.
+        self.base_, self.residual_ = fitted_base, fitted_residual
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
@@ -176,11 +177,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         y : ndarray of shape (n_samples,)
-
-        Raises
-        ------
-        ValueError
-            If X is refused by either part.
         """
         check_is_fitted(self)
         return self.base_.predict(X) + self.residual_.predict(X)
@@ -196,11 +192,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         inside : ndarray of bool of shape (n_samples,)
-
-        Raises
-        ------
-        ValueError
-            If X is refused by either part.
         """
         check_is_fitted(self)
         return np.logical_and.reduce(self._answers("in_bounds", X))
@@ -217,11 +208,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         -------
         coverage : ndarray of shape (n_samples,)
             From 0 to 1; see :meth:`skanfis.ANFISRegressor.coverage`.
-
-        Raises
-        ------
-        ValueError
-            If X is refused by either part.
         """
         check_is_fitted(self)
         return np.minimum.reduce(self._answers("coverage", X))
@@ -257,16 +243,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return Bunch(**{role: _arguments(part, given) for role, part in parts.items()})
 
 
-def _check_answered(left):
-    refused = ~np.isfinite(left)
-    if refused.any():
-        raise ValueError(
-            f"base has no finite prediction for {refused.sum()} of {refused.size} training rows: "
-            "nothing is left there for the residual model to learn. Drop these rows, or give the "
-            "base a policy that answers."
-        )
-
-
 def _last_step(estimator):
     return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
 
@@ -282,3 +258,69 @@ def _arguments(estimator, given):
     """What of the given ones the estimator's fit takes, by the names that it goes by there."""
     step = f"{estimator.steps[-1][0]}__" if isinstance(estimator, Pipeline) else ""
     return {f"{step}{name}": value for name, value in given.items() if _takes(estimator, name)}
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenRules:
+    """A model of rules on some columns of a table, as a fitted estimator.
+
+    ``positions`` are those of the model's inputs among the columns of X.
+    """
+
+    model: Any
+    positions: np.ndarray
+
+    def predict(self, X):
+        """What the rules give."""
+        return self.model.predict(self._rows(X))[:, 0]
+
+    def in_bounds(self, X):
+        """Tell which rows lie in the box of the training data."""
+        return self.model.in_bounds(self._rows(X))
+
+    def coverage(self, X):
+        """Tell how well the training data cover each row."""
+        return self.model.coverage(self._rows(X))
+
+    def _rows(self, X):
+        return np.asarray(X, dtype=float)[:, self.positions]
+
+    @classmethod
+    def of(cls, estimator, n_columns):
+        """The rules of an estimator that takes so many columns, its scalers folded in."""
+        if isinstance(estimator, cls):
+            return estimator
+        # A row that holds the number of every column tells which of them reach the model.
+        model, places = fold_with_rows(estimator, np.arange(float(n_columns))[None])
+        return cls(model, places[0].astype(int))
+
+
+def law_and_rules(estimator):
+    """Both parts of a fitted composition: OpenLoopArcsineRegressor, FrozenRules."""
+    found = found_by_search(estimator)
+    if not isinstance(found, ResidualRegressor):
+        raise TypeError(
+            "estimator must be a fitted ResidualRegressor of the arcsine law and an ANFIS, or a "
+            f"search over such; got {found!r}."
+        )
+    check_is_fitted(found)
+    law = found.base_
+    if not isinstance(law, OpenLoopArcsineRegressor):
+        raise TypeError(
+            f"base must be an OpenLoopArcsineRegressor, whose law can be written; it is {law!r}. "
+            "The law chooses its columns by its own parameters, and needs no Pipeline."
+        )
+    check_parameters(law)
+    rules = FrozenRules.of(found.residual_, law.n_features_in_)
+    if rules.model.n_outputs != 1:
+        raise ValueError(f"residual has {rules.model.n_outputs} outputs; the rate is one.")
+    return law, rules
+
+
+def joined(law, rules):
+    """The fitted composition of a law and FrozenRules."""
+    composition = ResidualRegressor(law)
+    composition.base_, composition.residual_ = law, rules
+    composition.n_features_in_ = law.n_features_in_
+    composition.feature_names_in_ = law.feature_names_in_
+    return composition

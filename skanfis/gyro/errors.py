@@ -2,8 +2,7 @@
 
 __all__ = ["LogError", "shortened"]
 
-# Of a value in a message.
-_LONGEST_SHOWN = 60
+_LONGEST_SHOWN = 60  # of a value in a message
 
 
 class LogError(ValueError):

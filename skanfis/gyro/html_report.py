@@ -1,46 +1,369 @@
 """The report of a calibration as one page of HTML: verdict, tables, pictures, rules, limits."""
 
-from ._html import Page
-from ._pictures import PICTURES
+import platform
+from collections import Counter
+from importlib.resources import files as resources
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import scipy
+import sklearn
+
+from .. import __version__
+from ..inspection.labels import printable
+from ..policies import policy_in_words
+from ._budget import budget_of, proven_bounds
+from ._columns import RATE_UNITS, SIGNALS
+from ._formulas import formula_of, law_table, on_board, rules_text
+from ._headline import ARTICLES, headline, held_out_groups
+from ._pictures import PICTURES, draw, draw_coverage, draw_memberships
 from ._results import Results
-from ._sections.check import check
-from ._sections.head import cards, conclusion
-from ._sections.identity import identity, programs
-from ._sections.instead import instead
-from ._sections.log import log
-from ._sections.merit import merit
-from ._sections.rules import reading, rules, rules_text
-from ._sections.sure import sure
-from ._sections.use import limits_of_use
-from ._sections.words import words
+from ._simpler import NOTHING, options_for
+from .displays._base import figures, signs
+from .metrics import rms
 
-__all__ = ["report_page", "rules_text"]
+__all__ = ["check_installed", "report_page"]
 
-
-def report_page(calibration, title, dossier=None):
-    """The report of a calibration, as the text of an HTML file.
-
-    ``dossier`` tells of the device, the files, the options, the limits and the unit.
-    """
-    page = Page(f"Gyro compensation: {title}", _subtitle(calibration))
-    results = Results(calibration, dossier)
-    for section in (conclusion, cards, identity, check, instead, merit, _pictures):
-        section(page, results)
-    for section in (limits_of_use, sure, rules, reading, log):
-        section(page, results)
-    page.footer(f"Made by {programs()}. Figures of merit in the terms of IEEE Std 952.")
-    return page.render()
+_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
+_BUDGET = (
+    "Combined and RMS error are two ways to one figure: where the error is clearly larger, the "
+    "rules cannot follow the gyro between the groups, and no part of the budget knows of it."
+)
+_PROOF = "Proven for every point of the box. How far the gyro is from the compensator is not."
 
 
-def _subtitle(calibration):
-    what = "Arcsine law and fuzzy rules" if calibration.recipe.physics else "Fuzzy rules (ANFIS)"
-    target = "rate" if calibration.recipe.physics else "rate error"
-    inputs = ", ".join(words(name) for name in calibration.recipe.inputs)
-    return f"{what} that predict the gyro's {target} from {inputs}."
+class Block(NamedTuple):
+    """Part of a section: "text", "warn", "soft", "heading", "table", "pictures" or "details"."""
+
+    kind: str
+    content: Any
+    title: str = ""
+    is_open: bool = False
 
 
-def _pictures(page, results):
-    page.section("Pictures")
-    page.figures([picture for draw in PICTURES if (picture := draw(results)) is not None])
-    if results.why_no_allan:
-        page.paragraph(f"Allan deviation: {results.why_no_allan}.", kind="soft")
+def report_page(calibration, title, options=None):
+    """The report of a calibration, as the text of an HTML file; ``options`` a ReportOptions."""
+    results = Results(calibration, options)
+    recipe, verdict = calibration.recipe, calibration.verdict
+    what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
+    target = "rate" if recipe.physics else "rate error"
+    inputs = ", ".join(map(_words, recipe.inputs))
+    cautions = calibration.cautions_in(results.symbol, RATE_UNITS[results.unit])
+    sections = [_identity, _check, _instead, _merit, _pictures, _use, _sure, _rules, _log]
+    kept = verdict.model_is_worth_it and all(check.result == "pass" for check in results.checks)
+    return _template().render(
+        title=f"Gyro compensation: {title}",
+        subtitle=f"{what} that predict the gyro's {target} from {inputs}.",
+        verdict=headline(calibration, results.unit)[0],
+        verdict_kind="good" if kept else "bad",
+        reasons=map(signs, _reasons(results)),
+        cautions=[f"Warning: {sentence}" for sentence in cautions],
+        sections=[section for make in sections if (section := make(results))],
+        footer=f"Made by {_programs()}. Figures of merit in the terms of IEEE Std 952.",
+    )
+
+
+def check_installed():
+    """ImportError where the report could not be made: at the end that would be found out late."""
+    for name in ("matplotlib", "jinja2"):
+        try:
+            __import__(name)
+        except ImportError as error:
+            raise ImportError(f"the report needs {name}: pip install {name}") from error
+        except ValueError as error:
+            # Of matplotlib's settings; MPLBACKEND is one.
+            reason = printable(str(error).partition(";")[0])
+            raise ImportError(f"{name} cannot be imported: {reason}.") from error
+
+
+def _template():
+    check_installed()
+    from jinja2 import Environment
+
+    environment = Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_without_hidden_signs
+    )
+    source = resources("skanfis.gyro").joinpath("report.html.jinja").read_text(encoding="utf-8")
+    return environment.from_string(source)
+
+
+def _without_hidden_signs(value):
+    """Text for the page; what the template has made of it already stays as it is."""
+    if hasattr(value, "__html__"):
+        return value
+    return "\n".join(map(printable, str(value).split("\n")))
+
+
+def _reasons(results):
+    """Why the verdict is as it is, and whether the specification is kept."""
+    yield headline(results.calibration, results.unit)[1]
+    if results.checks:
+        told = Counter(check.result for check in results.checks)
+        parts = [f"{told['pass']} of {len(results.checks)} limits are kept"]
+        for result, words in (("fail", "not kept"), ("not measured", "could not be measured")):
+            names = [_words(c.limit.figure) for c in results.checks if c.result == result]
+            parts += [f"{words}: {', '.join(names)}"] if names else []
+        yield f"Specification: {'; '.join(parts)}."
+    if not results.calibration.verdict.model_is_worth_it:
+        yield "The files, and the figures below, are of the fuzzy rules all the same."
+
+
+def _identity(results):
+    """What is needed to find this calibration again, and to repeat it."""
+    options = results.options
+    names = "device, serial number", "operator", "made"
+    entries = [each or "not given" for each in (options.serial, options.operator, options.made)]
+    blocks = [_table(["what", "entry"], zip(names, entries, strict=True))]
+    if options.files:
+        blocks.append(_table(["file of the log", "bytes", "SHA-256"], options.files))
+    text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
+    blocks.append(Block("soft", text))
+    if options.options:
+        text = "\n".join(f"{name}: {value}" for name, value in options.options)
+        blocks.append(Block("details", text, "Options of the command"))
+    return "This calibration", blocks
+
+
+def _check(results):
+    """How it was checked, and what is simpler on the same rows."""
+    calibration, verdict = results.calibration, results.calibration.verdict
+    texts = [
+        "Every row was compensated by a model that had not seen its group: "
+        f"{calibration.split.sentence}. A row outside the range of that model's training data is "
+        "flagged, as it would be on board. All figures and pictures are of the rows in range."
+    ]
+    beyond = ~calibration.inside & np.isfinite(calibration.after)
+    if beyond.any():
+        error = results.shown(rms((calibration.after - results.rate)[beyond]))
+        texts.append(
+            f"{beyond.mean():.1%} of the held-out rows are out of range; on them the RMS error "
+            f"after compensation is {error} {results.symbol}."
+        )
+    if calibration.is_thinned:
+        texts.append(
+            f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, drawn "
+            "at random from every stretch of every run, with those at the ends of the ranges. "
+            "Figures that need every row, of bias stability and Allan's deviation, are left out."
+        )
+    if calibration.fold_choices is not None:
+        found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
+        several = ", ".join(f"{text} in {count} folds" for text, count in found.most_common())
+        texts.append(f"Each fold's training rows alone chose its structure: {several}.")
+    blocks = [Block("text", text) for text in texts]
+    blocks += [Block("warn", message) for message in calibration.warnings]
+    text = (
+        "On the same held-out rows in range. What this model is better by is the ratio of RMS "
+        f"errors, in the geometric mean over {held_out_groups(calibration)}. Recommended is the "
+        "simplest that no more elaborate one beats with an interval above 1.02."
+    )
+    blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
+    lines = []
+    for name, error in verdict.rms.items():
+        gain, better, interval = verdict.gains.get(name), "–", ""
+        if gain is not None:
+            better, interval = f"{figures(gain.factor)} ×", _interval(gain.low, gain.high)
+        use = "recommended" if name == verdict.recommended else ""
+        factor = verdict.rms[NOTHING] / error if error else np.inf
+        lines.append((name, results.shown(error), f"{figures(factor)} ×", better, interval, use))
+    error = f"RMS error [{results.symbol}]"
+    head = ["compensation", error, "reduction", "this model better by", "95 % interval", "result"]
+    missing = [simple for simple in calibration.simpler if simple.missing]
+    notes = [Block("soft", f"{simple.name}: {simple.missing}") for simple in missing]
+    return "How it was checked", [*blocks, _table(head, lines), *notes]
+
+
+def _instead(results):
+    """The simpler compensation, where that is the one to use: what to compute."""
+    calibration, name = results.calibration, results.calibration.verdict.recommended
+    if calibration.verdict.model_is_worth_it:
+        return None
+    if name == NOTHING:
+        factor = calibration.compensator.scale_factor
+        text = f"The indicated rate as it is: rate = output / {factor:.9g} [deg/s]."
+        return "What to use instead", [Block("text", text)]
+    text = (
+        f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
+        "deg/s, inputs in the units of the range of the calibration below."
+    )
+    if wanted := options_for(name, calibration.X.shape[1]):
+        text += f" The command writes its files, C code included, with {wanted}."
+    formula = Block("details", formula_of(calibration, name), "What to compute", is_open=True)
+    return "What to use instead", [Block("text", text), formula]
+
+
+def _merit(results):
+    """The figures of merit of all rows in range, and the limits."""
+    table = results.merit[~results.merit["figure"].str.startswith("rows")]
+    lines = []
+    for _, line in table[table[["before", "after"]].notna().any(axis=1)].iterrows():
+        cells = []
+        for side in ("before", "after"):
+            value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
+            cells += [_shown(value), _interval(low, high)]
+        lines.append((_words(line["figure"]), *cells, signs(line["unit"])))
+    head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit"]
+    resampled = results.merit.attrs["resampled"]["all"]
+    blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
+    for note, part in table[table["note"] != ""].groupby("note", sort=False):
+        blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
+    if results.checks:
+        checks = [
+            (_words(limit.figure), signs(limit.text), _shown(value), signs(limit.unit), *told)
+            for limit, value, *told in results.checks
+        ]
+        caption = "After compensation by the fuzzy rules, on the held-out rows in range"
+        head = ["figure", "required", "after", "unit", "result", "remark"]
+        heading = Block("heading", "Limits of the specification")
+        blocks += [heading, _table(head, checks, caption)]
+    return "Figures of merit", blocks
+
+
+def _pictures(results):
+    found = [picture for plan in PICTURES if (picture := draw(plan, results)) is not None]
+    blocks = [Block("pictures", found)]
+    if isinstance(results.of_allan, str):
+        blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
+    return "Pictures", blocks
+
+
+def _use(results):
+    """The box of the calibration, and what lies beyond."""
+    calibration = results.calibration
+    compensator, recipe = calibration.compensator, calibration.recipe
+    policy = "no rate is given"
+    if recipe.outside != "nan":
+        policy = policy_in_words(recipe.outside, calibration.rules[-1].model_.max_extrapolation)
+    text = (
+        f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
+        "Inside them, rows near which there are hardly any data "
+        f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
+        "that --c writes flags the same rows with the same numbers."
+    )
+    ends = calibration.X.agg(["min", "max"]).T
+    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy())]
+    if (picture := draw_coverage(calibration)) is not None:
+        blocks.append(Block("pictures", [picture]))
+    return "Where it may be used", blocks
+
+
+def _sure(results):
+    """The uncertainty budget, and the bounds over a box of inputs."""
+    calibration = results.calibration
+    budget, certain = budget_of(calibration), proven_bounds(calibration)
+    parts = [
+        ("noise", budget.noise, "of a row, within its group"),
+        ("not repeatable", budget.scatter, f"between the {held_out_groups(calibration)}"),
+        ("model", budget.model, "posterior of the rules, RMS over the rows"),
+        ("combined", budget.combined, "root of the sum of squares"),
+        ("for comparison", rms(results.error_after), "RMS error, held-out rows"),
+    ]
+    lines = [[part, results.shown(size), "", meaning] for part, size, meaning in parts]
+    lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
+    head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
+    caption = "Of one compensated row in range, in a group that the model has not seen"
+    size, names = certain.attained[0], certain.found.input_names
+    added = calibration.recipe.physics
+    what = "addition of the rules to the arcsine law" if added else "compensation"
+    proven = [
+        (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
+        ("largest that was met", f"{results.shown(size)} {results.symbol}"),
+    ]
+    if certain.rate_rises is not None:
+        told = "proven" if certain.rate_rises else "not proven"
+        proven.append(("the compensated rate follows the output, never against it", told))
+    return "How sure", [
+        _table(head, lines, caption),
+        Block("soft", _BUDGET),
+        Block("heading", "What is proven"),
+        _table(["over the box below", "result"], proven),
+        _box(calibration, names, _rounded(certain.found.box)),
+        Block("soft", _PROOF),
+    ]
+
+
+def _rules(results):
+    """The rules in pictures and as text, and whether they can be read one by one."""
+    calibration, blocks = results.calibration, []
+    if calibration.recipe.physics:
+        law = law_table(calibration.compensator.estimator.base_, calibration.recipe)
+        text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
+        blocks += [Block("text", text), Block("details", law, "The arcsine law")]
+    if (picture := draw_memberships(calibration)) is not None:
+        blocks.append(Block("pictures", [picture]))
+    findings = results.readability.findings
+    text, steps = rules_text(calibration, results.readability), on_board(calibration.compensator)
+    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
+    fit = "Nothing measured here speaks against reading the rules one by one."
+    return "The rules", [
+        *blocks,
+        Block("details", text, f"All rules as text ({n_rules}, {terms})"),
+        Block("details", steps, "What to compute on board"),
+        Block("heading", "Can the rules be read?"),
+        *([Block("warn", sentence) for sentence in findings] or [Block("text", fit)]),
+    ]
+
+
+def _log(results):
+    """The log: its size, ranges and scale factor."""
+    calibration, rows = results.calibration, results.log
+    counts = {"rows": calibration.n_rows}
+    if calibration.is_thinned:
+        counts["rows kept, drawn at random"] = len(rows)
+    if calibration.n_fit_rows < len(rows):
+        counts["rows fitted to, chosen at random"] = calibration.n_fit_rows
+    counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}
+    lines = [(name, f"{count:,}", "") for name, count in counts.items()]
+    for name in ("temperature", "rate", "output"):
+        unit = "°/s" if name == "rate" else _unit_of(calibration, name)
+        lines.append((name, f"{rows[name].min():.5g} to {rows[name].max():.5g}", unit))
+    if calibration.recipe.output_unit in SIGNALS:
+        unit = f"{calibration.recipe.output_unit} per °/s"
+        lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
+    return "The log", [_table(["quantity", "value", "unit"], lines)]
+
+
+def _box(calibration, names, ends):
+    lines = [
+        (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
+        for name, (low, high) in zip(names, ends, strict=True)
+    ]
+    return _table(["input", "from", "to", "unit"], lines)
+
+
+def _table(head, lines, caption=""):
+    return Block("table", pd.DataFrame(list(lines), columns=list(head)), caption)
+
+
+def _interval(low, high, shown=figures):
+    return f"[{shown(low)}, {shown(high)}]" if np.isfinite([low, high]).all() else ""
+
+
+def _shown(value):
+    return figures(value) if np.isfinite(value) else "–"
+
+
+def _rounded(values):
+    """What rounding leaves of zero, where a box is in the units before a scaler, is zero."""
+    return np.round(values, 9) + 0.0
+
+
+def _words(name):
+    return name.replace("_", " ")
+
+
+def _unit_of(calibration, name):
+    return signs(_UNITS.get(name, calibration.recipe.output_unit))
+
+
+def _terms_text(terms):
+    """Numbers of fuzzy terms in words."""
+    return f"terms {' × '.join(map(str, terms))}" if terms else "structure left to ANFISRegressor"
+
+
+def _programs():
+    """The programs that figures depend on, with their versions."""
+    return (
+        f"skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy {np.__version__}, "
+        f"SciPy {scipy.__version__} and Python {platform.python_version()}"
+    )

@@ -5,34 +5,37 @@ The columns of a log play parts: ``time``, ``temperature``, ``output`` (the gyro
 A log that has been read has its columns by these names, in s, degC and deg/s.
 """
 
+import codecs
+import glob
+import hashlib
 import os
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ._checks import LABELS, check_log
-from ._files import check_different
-from ._layout import COLUMNS, Request
-from ._runs import lost_rows, name_runs, split_runs
-from ._table import LogFile
-from ._units import declared_units
-from .errors import LogError
+from ._checks import PARTS, RowChecks
+from ._columns import declared_units
+from ._guess import Request
+from ._log_file import LogFile, RunFinder
+from .errors import LogError, shortened
 
 __all__ = [
-    "Columns",
-    "LogError",
     "Reading",
-    "check_log",
+    "check_different",
     "checked_request",
-    "notes_of",
+    "find_logs",
+    "pieces_of",
     "read",
     "read_log",
-    "short_names",
 ]
+
+# Of a folder: tables first; what may as well be a note only where there is no table.
+_SUFFIXES = ((".csv", ".tsv", ".parquet", ".pq"), (".txt", ".dat", ".log"))
 
 
 def read_log(
@@ -55,23 +58,16 @@ def read_log(
     paths : str, path, or sequence of these
         Text files with a header line, or Parquet files (with pyarrow).
     columns : dict of str to str, default=None
-        Names in the file by part: keys "time", "temperature", "output", "rate", "run", "device".
-        A part that is not named here has its own name in the file. Blanks around names, and
-        capitals, do not matter where one column alone fits.
+        Names in the file by part ("time", "temperature", "output", "rate", "run", "device"), where
+        they differ from it; blanks around names, and capitals, do not matter.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
-        and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be a raw signal, in
-        counts, V or mV. By default s, degC and deg/s. Times that are no numbers (ISO 8601, dates,
-        clocks) come in seconds by themselves.
+        and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be in counts, V or mV.
+        By default s, degC and deg/s. Dates and clocks come in seconds by themselves.
     require : sequence of str, default=None
-        Parts without which the log is refused; None stands for temperature, output and rate. The
-        others are read where the file has them.
-    separator : str, default=None
-        Sign between columns; None finds out which of comma, semicolon, tab and bar it is.
-    decimal : str, default=None
-        Sign of the decimal fraction; None finds out whether it is a comma.
-    encoding : str, default=None
-        Of the text; None finds out whether it is UTF-8, UTF-16 or Windows-1252.
+        Parts without which the log is refused; None stands for temperature, output and rate.
+    separator, decimal, encoding : str, default=None
+        Sign between columns, sign of the decimal fraction, encoding of the text; None finds out.
 
     Returns
     -------
@@ -82,11 +78,10 @@ def read_log(
     Raises
     ------
     LogError
-        If a file is empty, no such table, or there twice; if a column that is required is not
-        there; if a value is missing or no number. The message names the file, its column and line.
+        If a file is no such table, or there twice; if a column that is required is not there; if a
+        value is missing or no number. The message names the file, its column and line.
     ValueError
-        If ``columns``, ``units`` or ``require`` name an unknown part or unit, or if ``separator``
-        or ``decimal`` is no single sign.
+        If an argument names an unknown part or unit, or is no single sign.
     OSError
         If a file cannot be read.
 
@@ -111,32 +106,18 @@ def read_log(
 
 @dataclass
 class Reading:
-    """A log that has been read, with what was found out on the way.
+    """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
-    Attributes
-    ----------
-    log : DataFrame of shape (n_rows, n_parts)
-        As :func:`read_log` returns it.
-    files : list of LogFile
-    notes : list of str
-        What was found out, in sentences without a full stop.
-    n_rows : int
-        Rows that there were, held or not.
-    is_exact : bool
-        Whether every row of the log is one of a file, in the order of the files.
-    places : ndarray of shape (n_rows,), optional
-        Which of the files' rows they are, where the log is too long and only some are held.
-    made : dict of str to ndarray
-        Inputs that were made while all rows were at hand.
+    Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
+    many. ``files`` and ``rows`` tell the file of each row, and its position there.
     """
 
     log: pd.DataFrame
+    file: np.ndarray
+    row: np.ndarray
     files: list
     notes: list
     n_rows: int
-    is_exact: bool = True
-    places: np.ndarray | None = None
-    made: dict = field(default_factory=dict)
 
     @property
     def units(self):
@@ -145,116 +126,109 @@ class Reading:
 
     def name_row(self, row):
         """In words, where a row of the log is found."""
-        if self.is_exact:
-            left = row if self.places is None else int(self.places[row])
-            for file in self.files:
-                n_kept = file.n_rows - len(file.dropped)
-                if left < n_kept:
-                    return file.place_of(left)
-                left -= n_kept
-        if "run" in self.log:
-            return f"row {row}, in run {self.log['run'].iloc[row]}"
-        return f"row {row}"
+        file = self.files[self.file[row]]
+        return f"{file.path}, {file.source.place_of(int(self.row[row]))}"
 
     def located(self, error):
-        """An error of :func:`check_log` in the words of the files."""
-        if error.column is None:
-            return error
-        layout = self.files[0].layout
-        name = layout.name(error.column) if error.column in layout.places else error.column
-        called = f"column {name!r}" + ("" if name == error.column else f" ({error.column})")
-        where = self.files[0].path if len(self.files) == 1 else "the log"
+        """An error of a check of the log in the words of the files."""
         if error.row is not None:
-            where = self.name_row(error.row)
-        return LogError(f"{where}, {called}: {error.reason}")
-
-    def of_device(self, name):
-        """The rows of one device alone."""
-        log = self.log[(self.log["device"] == name).to_numpy()].reset_index(drop=True)
-        for part in ("run", "device"):
-            if part in log:
-                log[part] = log[part].cat.remove_unused_categories()
-        return replace(self, log=log, n_rows=len(log), is_exact=False)
+            file = self.files[self.file[error.row]]
+            return file.located(error, pd.Series(self.row))
+        where = None if len(self.files) == 1 else "the log"
+        return self.files[0].located(error, where=where)
 
 
-def read(paths, request, *, max_gap=None, tell=None, most_rows=None):
-    """Read files as :func:`read_log` does; returns a :class:`Reading`, or None of too many rows.
+def read(paths, request, *, max_gap=None, tell=None, most_rows=None, check=False):
+    """Read files as :func:`read_log` does; returns a :class:`Reading`.
 
-    ``max_gap`` is the longest step of the time within a run [s], "auto", or None: no file is split.
-    ``tell`` is called with a line of text for every file, where there are several. More than
-    ``most_rows`` are not held.
+    ``max_gap`` is as for RunFinder. ``tell`` is called with a line of text now and then. With
+    ``check``, every row is checked by :class:`RowChecks`. Of more than ``most_rows`` rows every
+    k-th of each run is held, with k a power of two.
     """
     request = checked_request(request)
     if not paths:
         raise ValueError("paths: at least one file is needed.")
     check_different(paths)
     files: list[LogFile] = []
-    columns = Columns()
-    for path in paths:
-        file = LogFile.open(path, request, files[0] if files else None)
+    finder, checks, thinned = RunFinder(max_gap), None, Thinned(most_rows)
+    for number, path in enumerate(paths):
+        file = LogFile(path, request, files[0] if files else None)
         files.append(file)
-        for piece in file.pieces(tell):
-            columns.add(piece, len(files) - 1)
-            if most_rows is not None and columns.n_rows > most_rows:
-                return None
+        if check and checks is None:
+            checks = RowChecks(file.layout.units)
+        for piece in pieces_of(file, number, finder, checks, tell):
+            thinned.add(piece.drop(columns="device", errors="ignore"))
         if tell is not None and len(paths) > 1:
-            tell(f"read {len(files):,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
-    log = columns.table(list(files[0].layout.places), short_names(paths))
+            tell(f"read {number + 1:,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
+    check_device(files, request)
     notes = notes_of(files)
-    number = None
-    if max_gap is not None and "run" not in log:
-        number, why = split_runs(log, max_gap)
-        notes += [why] if why else []
-    log = name_runs(log, number)
-    log = log[[part for part in COLUMNS if part in log]]
-    if lost := lost_rows(log, sum(len(file.dropped) for file in files)):
-        notes.append(lost)
-    return Reading(log, files, notes, len(log), is_exact=request.average is None)
+    notes += [finder.note] if finder.note else []
+    notes += [thinned.note] if thinned.note else []
+    return _reading(thinned, finder, files, notes)
 
 
-class Columns:
-    """Columns that grow piece by piece; labels as numbers."""
+def pieces_of(file, number, finder, checks=None, tell=None):
+    """Checked pieces of a file of a log, "run" in them being a position in ``finder.runs``."""
+    for piece in file.pieces(tell):
+        piece["run"] = finder.codes(piece, number)
+        try:
+            if checks is not None:
+                checks.add(piece)
+        except LogError as error:
+            raise file.located(error, piece["row"]) from error
+        yield piece
 
-    def __init__(self):
-        self._parts: dict = {}
-        self._labels: dict = {}
-        self._files: list = []
+
+class Thinned:
+    """The rows of a log that comes in pieces; of too many, every k-th of each run."""
+
+    def __init__(self, most_rows):
+        self._most = np.inf if most_rows is None else most_rows
+        self._every = 1
+        self._pieces: list = []
+        self._counts = pd.Series(dtype=int)  # rows so far, by run
         self.n_rows = 0
 
-    def add(self, piece, file):
-        """Append a piece of a file."""
-        n_rows = 0
-        for part, values in piece.items():
-            n_rows = len(values)
-            if part in LABELS:
-                known = self._labels.setdefault(part, {})
-                codes, names = pd.factorize(values)
-                own = np.array([known.setdefault(str(name), len(known)) for name in names], int)
-                values = own[codes].astype(np.int32)
-            self._parts.setdefault(part, []).append(values)
-        if self._files and self._files[-1][0] == file:
-            self._files[-1][1] += n_rows
-        else:
-            self._files.append([file, n_rows])
-        self.n_rows += n_rows
+    def add(self, piece):
+        before = piece["run"].map(self._counts).fillna(0).astype(int)
+        place = before + piece.groupby("run").cumcount()
+        self._counts = self._counts.add(piece["run"].value_counts(), fill_value=0)
+        self.n_rows += len(piece)
+        self._pieces.append(piece.assign(place=place)[place % self._every == 0])
+        if sum(map(len, self._pieces)) > self._most:
+            self._every *= 2
+            self._pieces = [held[held["place"] % self._every == 0] for held in self._pieces]
 
-    def table(self, parts, names):
-        """The log, with a column "file" where there are several."""
-        columns: dict = {}
-        for part in parts:
-            # One column at a time: pieces and columns of all would be the log twice.
-            pieces = self._parts.pop(part, [])
-            values = np.concatenate(pieces) if pieces else np.empty(0)
-            if part in LABELS:
-                categories = pd.Index(list(self._labels.get(part, {})), dtype=object)
-                values = pd.Categorical.from_codes(values.astype(np.int32), categories)
-            columns[part] = values
-        log = pd.DataFrame(columns, copy=False)
-        if len(names) > 1:
-            files, counts = zip(*self._files, strict=True)
-            codes = np.repeat(np.array(files, dtype=np.int32), counts)
-            log["file"] = pd.Categorical.from_codes(codes, categories=pd.Index(names))
-        return log
+    def table(self):
+        return pd.concat(self._pieces, ignore_index=True) if self._pieces else None
+
+    @property
+    def note(self):
+        if self._every == 1:
+            return ""
+        n_held = sum(map(len, self._pieces))
+        return (
+            f"of {self.n_rows:,} rows {n_held:,} are held, one in {self._every} of each run; "
+            "--average makes means of all"
+        )
+
+
+def _reading(thinned, finder, files, notes):
+    parts = files[0].layout.places
+    table = thinned.table()
+    if table is None:
+        table = pd.DataFrame({name: pd.Series(dtype=float) for name in (*parts, "run")})
+        table = table.assign(row=0).astype({"run": int})
+    code, runs = table["run"].to_numpy(), finder.runs
+    names = finder.names(short_names([file.path for file in files]), "run" in parts)
+    log = table[[part for part in parts if part not in ("run", "device")]].copy()
+    if names is not None:
+        log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
+    if "device" in parts:
+        log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
+    log = log[[part for part in PARTS if part in log]]
+    file = runs["file"].to_numpy()[code]
+    return Reading(log, file, table["row"].to_numpy(), files, notes, thinned.n_rows)
 
 
 def short_names(paths):
@@ -264,50 +238,97 @@ def short_names(paths):
 
 
 def notes_of(files):
-    """What was found out about the files; what holds for several is said once."""
-    by_note: dict = {}
-    for file in files:
-        for note in file.notes:
-            by_note.setdefault(note, []).append(file.path)
-    found = []
-    for note, paths in by_note.items():
-        where = "" if len(files) in (1, len(paths)) else f"{paths[0]}"
-        if where and len(paths) > 1:
-            where += f" and {len(paths) - 1} more"
-        found.append(f"{where}: {note}" if where and not note.startswith(where) else note)
-    return found
+    """What was found out about the files; what holds for all is said once."""
+    counts = Counter(note for file in files for note in file.notes)
+    return list(
+        dict.fromkeys(
+            note if counts[note] == len(files) else f"{file.path}: {note}"
+            for file in files
+            for note in file.notes
+        )
+    )
+
+
+def check_device(files, request):
+    """ValueError where the device that is asked for is none of those of the files."""
+    devices = {device for file in files for device in file.devices}
+    if devices and request.device not in devices:
+        raise ValueError(f"--device {request.device}: the log has {', '.join(sorted(devices))}.")
 
 
 def checked_request(request):
     """The request with the usual names of units; ValueError where it names what is unknown."""
-    _check_known(request.columns, "columns")
-    _check_known(request.require, "require")
-    names = list(({part: part for part in COLUMNS} | request.columns).values())
+    for name, parts in (("columns", request.columns), ("require", request.require)):
+        for part in parts:
+            if part not in PARTS:
+                known = ", ".join(PARTS)
+                raise ValueError(f"{name}: there is no {part!r}; it may be one of {known}.")
+    names = list(({part: part for part in PARTS} | request.columns).values())
     shared = [name for name in names if names.count(name) > 1]
     if shared and not request.guess:
         raise LogError(f"two parts cannot be the same column of the file, {shared[0]!r}.")
-    _check_signs(request.separator, request.decimal)
-    if request.encoding is not None:
-        try:
-            "".encode(request.encoding)
-        except (LookupError, ValueError) as error:
-            raise ValueError(f"encoding={request.encoding!r} is not known.") from error
-    return replace(request, units=declared_units(request.units))
-
-
-def _check_known(parts, what):
-    for part in parts:
-        if part not in COLUMNS:
-            known = ", ".join(COLUMNS)
-            raise ValueError(f"{what}: there is no {part!r}; it may be one of {known}.")
-
-
-def _check_signs(separator, decimal):
-    """ValueError where either is no single sign, or both are the same."""
-    for name, sign in (("separator", separator), ("decimal", decimal)):
+    for name, sign in (("separator", request.separator), ("decimal", request.decimal)):
         if sign is None:
             continue
         if not isinstance(sign, str) or len(sign) != 1 or sign.isalnum() or sign in '\r\n"':
             raise ValueError(f"{name}={sign!r} must be one character, such as a comma.")
-    if separator is not None and separator == decimal:
-        raise ValueError(f"separator and decimal are both {separator!r}: numbers would be cut.")
+    if request.encoding is not None:
+        try:
+            decoder = codecs.lookup(request.encoding).incrementaldecoder()
+            is_text = isinstance(decoder.decode(b""), str)
+        except (LookupError, ValueError, TypeError):
+            is_text = False
+        if not is_text:
+            raise ValueError(f"{shortened(request.encoding)} is no encoding of text that is known.")
+    return replace(request, units=declared_units(request.units))
+
+
+def find_logs(arguments):
+    """The files that are named, folders and patterns filled in; those of each in order.
+
+    A name that is no pattern stays as it is, whether there is such a file or not.
+    """
+    found: list[str] = []
+    for argument in arguments:
+        if os.path.isdir(argument):
+            found += _logs_in(argument)
+        elif glob.has_magic(argument) and not os.path.lexists(argument):
+            found += sorted(glob.glob(argument, recursive=True))
+            if not found:
+                raise LogError(f"{argument}: no file matches this pattern.")
+        else:
+            found.append(argument)
+    return found
+
+
+def _logs_in(folder):
+    paths = [os.path.join(folder, name) for name in os.listdir(folder) if name[0] != "."]
+    for suffixes in _SUFFIXES:
+        logs = [path for path in paths if path.lower().endswith(suffixes) and os.path.isfile(path)]
+        if logs:
+            return sorted(logs)
+    known = ", ".join(suffix for suffixes in _SUFFIXES for suffix in suffixes)
+    raise LogError(f"{folder}: is a folder without logs ({known}).")
+
+
+def check_different(paths):
+    """LogError where one log is there twice: as two runs, each would be tested by the other."""
+    seen: dict = {}
+    sizes = [os.path.getsize(path) if os.path.isfile(path) else 0 for path in paths]
+    for path, size in zip(paths, sizes, strict=True):
+        if not size:
+            continue  # said when it is read
+        file = os.path.realpath(path)
+        if file in seen:
+            raise LogError(f"{path}: is the same file as {seen[file]}; name every log once.")
+        seen[file] = path
+        if sizes.count(size) == 1:
+            continue
+        with open(path, "rb") as opened:
+            digest = hashlib.file_digest(opened, "sha256").digest()
+        if digest in seen:
+            raise LogError(
+                f"{path}: holds the same bytes as {seen[digest]}; a run that is there twice would "
+                "be tested by itself. Leave one of them out."
+            )
+        seen[digest] = path

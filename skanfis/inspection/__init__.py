@@ -1,14 +1,12 @@
 """A trained model as text, tables and pictures; whether its rules can be read."""
 
-from .activation import RuleActivationDisplay
-from .contribution import RuleContributionDisplay
-from .html import rules_html
 from .loss import LossCurveDisplay
-from .memberships import MembershipDisplay
-from .reading import Readability, ReadabilityDisplay, readability
-from .surface import ResponseSurfaceDisplay
-from .table import explain, memberships_table, rules_table
-from .text import export_text
+from .model_displays import MembershipDisplay, ResponseSurfaceDisplay
+from .readability import Readability, readability
+from .readability_display import ReadabilityDisplay
+from .rule_displays import RuleActivationDisplay, RuleContributionDisplay
+from .tables import explain, memberships_table, rules_table
+from .text import export_text, rules_html
 
 __all__ = [
     "LossCurveDisplay",

@@ -7,17 +7,15 @@ import numpy as np
 
 from ..export import last_step
 from ..model import TSKModel
-from ._common import one_axes
+from ._display import Display
 from .labels import as_label
 
 __all__ = ["LossCurveDisplay"]
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class LossCurveDisplay:
+class LossCurveDisplay(Display):
     """The error in training, iteration by iteration, and that of the rows held out if any.
-
-    Make it with :meth:`from_estimator`; parameters are stored as attributes.
 
     Parameters
     ----------
@@ -34,10 +32,8 @@ class LossCurveDisplay:
     ----------
     figure_, ax_ : matplotlib Figure, matplotlib Axes
         Once drawn.
-    line_ : matplotlib Line2D
-        The curve, once drawn.
-    validation_line_ : matplotlib Line2D or None
-        That of the rows held out, dashed in the same colour.
+    line_, validation_line_ : matplotlib Line2D
+        The curve, once drawn, and that of the rows held out, dashed, or None.
 
     Examples
     --------
@@ -72,51 +68,31 @@ class LossCurveDisplay:
             Where to draw; None makes a figure. Curves of several estimators can share axes.
         **line_kw : dict
             For matplotlib's ``plot``.
-
-        Returns
-        -------
-        display : LossCurveDisplay
-
-        Raises
-        ------
-        TypeError
-            If ``estimator`` has no rules, or has not been trained here.
-        ImportError
-            Without matplotlib.
         """
         last = estimator if isinstance(estimator, TSKModel) else last_step(estimator)
         loss = getattr(last, "loss_curve_", None)
         if loss is None:
             raise TypeError(f"{type(last).__name__} has not been trained here: no loss_curve_.")
+        solver = getattr(last, "solver", None)
+        if name is None and solver is not None:
+            name = solver if isinstance(solver, str) else type(solver).__name__
         display = cls(
             loss=np.asarray(loss),
             validation_loss=getattr(last, "validation_loss_curve_", None),
-            name=_solver_of(last) if name is None else name,
+            name=name,
             status=getattr(last, "status_", None),
         )
         return display.plot(ax=ax, **line_kw)
 
     def plot(self, *, ax: Any = None, **line_kw: Any) -> Self:
-        """Draw the curve.
-
-        Parameters
-        ----------
-        ax, **line_kw
-            As :meth:`from_estimator` takes them.
-
-        Returns
-        -------
-        display : LossCurveDisplay
-        """
-        self.ax_ = one_axes(ax)
-        self.figure_ = self.ax_.figure
-        iterations = np.arange(len(self.loss))
+        """Draw the curve; parameters are those of :meth:`from_estimator`."""
+        axes = self._begin(ax)
         name = None if self.name is None else as_label(self.name)
         style = {"label": name, "marker": ".", "markersize": 4, "linewidth": 1.5} | line_kw
-        (self.line_,) = self.ax_.plot(iterations, self.loss, **style)
+        (self.line_,) = axes.plot(self.loss, **style)
         self.validation_line_ = None
         if self.validation_loss is not None:
-            (self.validation_line_,) = self.ax_.plot(
+            (self.validation_line_,) = axes.plot(
                 np.arange(1, len(self.validation_loss) + 1),
                 self.validation_loss,
                 "--",
@@ -124,17 +100,11 @@ class LossCurveDisplay:
                 linewidth=self.line_.get_linewidth(),
                 label=None if name is None else f"{name}, rows held out",
             )
-        self.ax_.set(xlabel="iteration", ylabel="mean squared error, standardised target")
+        axes.set(xlabel="iteration", ylabel="mean squared error, standardised target")
         if np.all(self.loss > 0.0):
-            self.ax_.set_yscale("log")
-        self.ax_.xaxis.get_major_locator().set_params(integer=True)
-        self.ax_.grid(True, alpha=0.3)
-        if self.name is not None:
-            self.ax_.legend(frameon=False)
+            axes.set_yscale("log")
+        axes.xaxis.get_major_locator().set_params(integer=True)
+        axes.grid(True, alpha=0.3)
+        if name is not None:
+            axes.legend(frameon=False)
         return self
-
-
-def _solver_of(estimator):
-    """The solver's word, or the class of the object that is given in its place."""
-    solver = getattr(estimator, "solver", None)
-    return solver if solver is None or isinstance(solver, str) else type(solver).__name__

@@ -1,25 +1,27 @@
-"""Rules as text."""
+"""Rules as text, and as HTML for notebooks."""
 
 from collections.abc import Sequence
 from math import floor, log10
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from .._validation import check_choice, check_count
 from ..export.folding import fold
 from .rules import (
     choose_rules,
-    conditions,
-    consequents_about,
-    knows_data,
-    premise_text,
-    renamed,
-    round_reference,
-    warn_if_unreadable,
+    has_training_data,
+    premise_texts,
+    readability_in_training,
+    rename,
+    rounded_reference,
+    rules_frame,
+    warn_of_findings,
+    writable,
 )
 
-__all__ = ["consequent_text", "count_text", "export_text", "range_text", "rows_text", "term_text"]
+__all__ = ["export_text", "range_text", "rows_text", "rules_html"]
 
 # More than these give back no other double.
 _MOST_DIGITS = 17
@@ -48,36 +50,31 @@ def export_text(
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     precision : int, default=4
         Significant digits of the numbers, from 1 to 17. Places on an input's axis get as many more
-        as it takes to tell them to this part of the term's width. Slopes whose effect over the
-        whole range of the input is beyond these digits of the output are left out.
+        as it takes to tell them to this part of the term's width. Slopes that move the output by
+        less than these digits over the whole range of their input are left out.
     about : {"mean", "origin"}, default="mean"
-        How consequents are written. "mean": by the inputs' distances from a round number near their
-        mean, ``1.2 + 0.3 * (temperature - 290)``, so that the digits of the constant say something
-        about the data. "origin": in the textbook form, ``-85.8 + 0.3 * temperature``, the numbers
-        of ``consequents_``.
+        "mean": consequents by the inputs' distances from a round number near their mean,
+        ``1.2 + 0.3 * (temperature - 290)``. "origin": the textbook form of ``consequents_``,
+        ``-85.8 + 0.3 * temperature``.
     sort_by : {"weight", "rows", "rule"}, default="weight"
-        "weight": rules that fire on more of the training data come first; "rows": by the number of
-        rows on which they are the strongest; "rule": as they are numbered.
+        First the rules that fire on more of the training data, or that are the strongest on more
+        rows, or as they are numbered.
     max_rules : int, default=None
-        Write no more rules than this; None is all. A last line says what was left out.
+        Most rules to write; None is all. A last line says what was left out.
     min_weight : float, default=0.0
-        Write only rules that fire on at least this part of the weight of the training data, from 0
-        to 1.
+        Least part of the weight of the training data on which a rule fires, from 0 to 1.
     show_terms : bool, default=True
         Whether to write the terms' parameters, the ranges of the inputs, the policy outside them,
         and the noise, where a fit has found it.
-    feature_names : sequence of str, default=None
-        Names of the inputs; None for those in training.
-    output_names : sequence of str, default=None
-        Names of the outputs; None for the model's, "y" or "y0", "y1", ...
+    feature_names, output_names : sequence of str, default=None
+        Other names of the inputs and the outputs; None for the model's.
 
     Returns
     -------
     text : str
-        Rules by their number, from 0, as in ``rules_`` and ``consequents_``; with the part of the
-        weight of the training data on which each fires, and the number of training rows on which it
-        is the strongest; these two are left out where a model that was read from a file
-        knows of no data.
+        Rules by their number, from 0, as in ``rules_``; with the part of the weight of the training
+        data on which each fires, and the number of rows on which it is the strongest, unless the
+        model knows of no data.
 
     Raises
     ------
@@ -120,40 +117,111 @@ def export_text(
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))
-    model = renamed(fold(estimator), feature_names, output_names)
-    warn_if_unreadable(estimator, model)
-    chosen = choose_rules(model, sort_by, max_rules, min_weight)
-    reference = round_reference(model) if about == "mean" else 0.0 * model.reference
-    consequents = consequents_about(model, reference)
-    told = [_told(consequents[:, :, k], model, precision) for k in range(model.n_outputs)]
-    premises = conditions(model)
-    parts = [f"{count_text(model.n_rules, 'rule')}, {count_text(model.n_inputs, 'input')}."]
-    for r in chosen:
-        lines = [_heading(model, r), f"  IF {premise_text(model, premises[r])}"]
-        word = "THEN"
-        for k, name in enumerate(model.output_names):
-            value = consequent_text(told[k][r], model.input_names, reference, precision)
-            lines.append(f"  {word} {name} = {value}")
-            word = " AND"
-        parts.append("\n".join(lines))
-    if chosen.size < model.n_rules:
-        parts.append(_what_is_left_out(model, chosen))
+    model = rename(fold(estimator), feature_names, output_names)
+    warn_of_findings(estimator, model)
+    reference = rounded_reference(model) if about == "mean" else 0.0 * model.reference
+    frame = rules_frame(model, reference)
+    chosen = choose_rules(frame, sort_by, max_rules, min_weight)
+    consequents = _consequent_texts(model, frame, reference, precision)
+    parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
+    for r, premise in zip(chosen.index, premise_texts(chosen), strict=True):
+        heading = f"Rule {r}"
+        if has_training_data(model):
+            rows = rows_text(model.rule_rows[r])
+            share = f"{100.0 * model.rule_weights[r]:.3g} %"
+            heading += f", {share} of the weight, strongest on {rows}"
+        pairs = zip(model.output_names, consequents[r], strict=True)
+        then = "\n   AND ".join(f"{name} = {formula}" for name, formula in pairs)
+        parts.append(f"{heading}:\n  IF {premise}\n  THEN {then}")
+    if len(chosen) < model.n_rules:
+        parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
         parts.append(_legend(model, precision))
     return "\n\n".join(parts)
 
 
-def _told(consequents, model, precision):
-    """The coefficients, less slopes that move the output by less than the last digit written."""
-    change = np.abs(consequents[:, 1:]) * (model.maximum - model.minimum)
-    scale = max(np.abs(consequents[:, 0]).max(), change.max(initial=0.0))
-    told = consequents.copy()
-    told[:, 1:][change < 10.0 ** -(precision + 2) * scale] = 0.0
-    return told
+def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> str:
+    """Write the rules as HTML, the weightiest first.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
+    max_rules : int, default=10
+        Most rules to show; a last line says what was left out.
+    precision : int, default=4
+        Significant digits of the numbers, from 1 to 17.
+
+    Returns
+    -------
+    html : str
+        One ``<div>``, with names escaped, without script or anything to load. A fitted
+        ANFISRegressor shows it by itself in notebooks. Below the rules stands what its
+        ``readability_`` says.
+
+    Raises
+    ------
+    ValueError
+        If a step of a pipeline cannot be folded, or a number is out of its range.
+    TypeError
+        If ``estimator`` has no rules.
+
+    Examples
+    --------
+    >>> from IPython.display import HTML  # doctest: +SKIP
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import rules_html
+    >>> X, y = make_jang_sinc()
+    >>> page = rules_html(ANFISRegressor(n_mfs=3).fit(X, y))
+    >>> HTML(page)  # doctest: +SKIP
+    >>> page.count("</tr>")
+    11
+    """
+    check_count("precision", precision, 1, _MOST_DIGITS)
+    model = writable(fold(estimator))
+    reference = rounded_reference(model)
+    frame = rules_frame(model, reference)
+    chosen = choose_rules(frame, "weight", max_rules, 0.0)
+    consequents = _consequent_texts(model, frame, reference, precision)
+    cells: dict = {}
+    if has_training_data(model):
+        notes = np.where(chosen["data", "rows"] < 0.5, " (no row)", "")
+        shares = zip(chosen["data", "weight"], notes, strict=True)
+        cells["data", "weight"] = [f"{100.0 * share:.3g} %{note}" for share, note in shares]
+    for name in chosen.get("if", ()):
+        low, high = range_text(model, model.input_names.index(name), precision)
+        cells["if", f"{name}, {low} to {high}"] = chosen["if", name].fillna("any")
+    for k, name in enumerate(model.output_names):
+        cells["then", name] = [consequents[r][k] for r in chosen.index]
+    with pd.option_context("display.max_colwidth", None):
+        table = pd.DataFrame(cells, index=list(chosen.index))
+        table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
+    counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
+    parts = [f"<div>{counts}</div>", table]
+    if len(chosen) < model.n_rules:
+        parts.append(f"<div>and {_left_out(model, chosen)}</div>")
+    found = readability_in_training(estimator, model)
+    parts.append("" if found is None else found.html())
+    style = "font-family:sans-serif;font-size:90%;margin:0.5em 0"
+    return f'<div style="{style}">{"".join(parts)}</div>'
 
 
-def consequent_text(coefficients, input_names, reference, precision):
-    """Write a + b * (x - x0) + ...; inputs of which a rule takes no account are left out."""
+def _consequent_texts(model, frame, reference, precision):
+    """Of each rule and output "a + b * (x - x0) + ...", a list of lists."""
+    texts: list[list[str]] = [[] for _ in range(model.n_rules)]
+    for output in model.output_names:
+        values = frame[f"then {output}"].to_numpy(copy=True)
+        # Slopes that move the output by less than the last digit written.
+        change = np.abs(values[:, 1:]) * (model.maximum - model.minimum)
+        scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
+        values[:, 1:][change < 10.0 ** -(precision + 2) * scale] = 0.0
+        for of_rule, coefficients in zip(texts, values, strict=True):
+            of_rule.append(_formula(coefficients, model.input_names, reference, precision))
+    return texts
+
+
+def _formula(coefficients, input_names, reference, precision):
     text = number(coefficients[0], precision)
     for name, slope, origin in zip(input_names, coefficients[1:], reference, strict=True):
         if slope == 0.0:
@@ -167,7 +235,37 @@ def consequent_text(coefficients, input_names, reference, precision):
     return text
 
 
-def term_text(term, precision):
+def _legend(model, precision):
+    lines = ["Terms:"]
+    memberships = model.memberships()
+    for j, name in enumerate(model.input_names):
+        low, high = range_text(model, j, precision)
+        heading = f"  {name}, trained from {low} to {high}"
+        terms = [term for term in memberships if term["input"] == name]
+        lines.append(heading if terms else f"{heading}: no terms")
+        width = max((len(term["name"]) for term in terms), default=0)
+        lines += [
+            f"    {term['name'] + ':':<{width + 1}} {_term_text(term, precision)}" for term in terms
+        ]
+    lines.append(f"Outside these ranges: {model.policy}.")
+    for k, name in enumerate(model.output_names):
+        low, high = model.output_limits[:, k]
+        if np.isfinite([low, high]).all():
+            ends = " to ".join(place(end, precision, high - low) for end in (low, high))
+            lines.append(f"Held within the limits of its training: {name}, {ends}.")
+        elif np.isfinite([low, high]).any():
+            side, end = ("above", low) if np.isfinite(low) else ("below", high)
+            lines.append(
+                f"Held {side} the limit of its training: {name}, {number(end, precision)}."
+            )
+    if model.posterior is not None:
+        noise = zip(model.output_names, model.posterior.noise, strict=True)
+        values = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
+        lines.append(f"Standard deviation of the noise about the rules: {values}.")
+    return "\n".join(lines)
+
+
+def _term_text(term, precision):
     """Write "gaussian, center 21.3, width 4.2" of an entry of TSKModel.memberships."""
     numbers = {k: v for k, v in term.items() if k not in ("input", "name", "function")}
     location, *lengths = numbers.values()
@@ -175,6 +273,14 @@ def term_text(term, precision):
     written += [number(length, precision) for length in lengths]
     pairs = zip(numbers, written, strict=True)
     return ", ".join([term["function"], *(f"{name} {value}" for name, value in pairs)])
+
+
+def _left_out(model, chosen):
+    text = _count(model.n_rules - len(chosen), "rule")
+    if not has_training_data(model):
+        return text
+    weight = max(1.0 - chosen["data", "weight"].sum(), 0.0)
+    return f"{text} with {100.0 * weight:.3g} % of the weight"
 
 
 def range_text(model, j, precision):
@@ -197,54 +303,8 @@ def place(value, precision, resolution):
 
 def rows_text(count):
     """Write "13 rows"; weights make fractions of rows."""
-    return count_text(f"{count:.0f}" if count >= 10.0 else f"{count:.2g}", "row")
+    return _count(f"{count:.0f}" if count >= 10.0 else f"{count:.2g}", "row")
 
 
-def count_text(number_of, what):
-    """Write "1 rule" or "2 rules"."""
+def _count(number_of, what):
     return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")
-
-
-def _heading(model, r):
-    if not knows_data(model):
-        return f"Rule {r}:"
-    rows = rows_text(model.rule_rows[r])
-    return f"Rule {r}, {100.0 * model.rule_weights[r]:.3g} % of the weight, strongest on {rows}:"
-
-
-def _what_is_left_out(model, chosen):
-    left_out = count_text(model.n_rules - chosen.size, "rule")
-    if not knows_data(model):
-        return f"{left_out} left out."
-    weight = 1.0 - model.rule_weights[chosen].sum()
-    return f"{left_out} with {100.0 * max(weight, 0.0):.3g} % of the weight left out."
-
-
-def _legend(model, precision):
-    lines = ["Terms:"]
-    memberships = model.memberships()
-    for j, name in enumerate(model.input_names):
-        low, high = range_text(model, j, precision)
-        heading = f"  {name}, trained from {low} to {high}"
-        terms = [term for term in memberships if term["input"] == name]
-        lines.append(heading if terms else f"{heading}: no terms")
-        width = max((len(term["name"]) for term in terms), default=0)
-        lines += [
-            f"    {term['name'] + ':':<{width + 1}} {term_text(term, precision)}" for term in terms
-        ]
-    lines.append(f"Outside these ranges: {model.policy}.")
-    for k, name in enumerate(model.output_names):
-        low, high = model.output_limits[:, k]
-        if np.isfinite([low, high]).all():
-            ends = " to ".join(place(end, precision, high - low) for end in (low, high))
-            lines.append(f"Held within the limits of its training: {name}, {ends}.")
-        elif np.isfinite([low, high]).any():
-            side, end = ("above", low) if np.isfinite(low) else ("below", high)
-            lines.append(
-                f"Held {side} the limit of its training: {name}, {number(end, precision)}."
-            )
-    if model.posterior is not None:
-        noise = zip(model.output_names, model.posterior.noise, strict=True)
-        told = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
-        lines.append(f"Standard deviation of the noise about the rules: {told}.")
-    return "\n".join(lines)

@@ -6,13 +6,13 @@ infinity. A score s covers with probability c where the rows of score s or less 
 without groups, where s is the ceil((K + 1) c)-th smallest.
 """
 
+from bisect import bisect_left
 from numbers import Real
 
 import numpy as np
 
 __all__ = [
     "check_level",
-    "cross_bounds",
     "group_scores",
     "is_enough",
     "n_needed",
@@ -23,8 +23,6 @@ __all__ = [
 
 # What rounding leaves of a sum of masses.
 _ROUNDING = 1e-9
-# Halvings that bring a bound down to the last digits of a float.
-_HALVINGS = 60
 
 
 def row_masses(n_rows, sample_weight=None, groups=None):
@@ -88,16 +86,12 @@ def group_scores(scores, masses, groups, coverage):
 
 
 def one_row_per_group(scores, masses, groups, coverage):
-    """The middle one of the quantiles that one row drawn from every group would give.
+    """The median of the quantiles that one row drawn from every group would give.
 
     Of K rows, one from each group, and one of a new group, the ceil((K + 1) c)-th smallest score
-    covers the new one with probability c (Dunn, Wasserman and Ramdas 2023, subsampling once). Which
-    rows are drawn is chance; the median over all draws is not: it is the smallest score q such that
-
-        P(N(q) >= ceil((K + 1) c)) >= 1 / 2 ,
-
-    N the number of rows drawn of a score of q or less, a sum of K indicators with the groups' own
-    probabilities. Surely 2 c - 1, for a row beyond the median is beyond half of the quantiles.
+    covers the new one with probability c (Dunn, Wasserman and Ramdas 2023). The median over all
+    draws is the smallest score q such that P(N(q) >= ceil((K + 1) c)) >= 1 / 2, N the number of
+    rows drawn of a score of q or less, a sum of K indicators with the groups' own probabilities.
     """
     scores = np.where(np.isnan(scores), np.inf, scores)
     numbers, place = np.unique(groups, return_inverse=True)
@@ -111,13 +105,8 @@ def one_row_per_group(scores, masses, groups, coverage):
         below = np.bincount(place, share * (scores <= q), minlength=numbers.size)[present]
         return _at_least(below, needed) >= 0.5 - _ROUNDING
 
-    low, high = -1, values.size - 1
-    if not is_reached(values[high]):
-        return np.inf
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if is_reached(values[middle]) else (middle, high)
-    return values[high]
+    first = bisect_left(values, True, key=is_reached)
+    return values[first] if first < values.size else np.inf
 
 
 def _at_least(probabilities, needed):
@@ -128,52 +117,3 @@ def _at_least(probabilities, needed):
         counts[1:] = counts[1:] * (1.0 - p) + counts[:-1] * p
         counts[0] *= 1.0 - p
     return counts[needed:].sum()
-
-
-def cross_bounds(folds, predictions, deviations, coverage):
-    r"""Lower and upper bound of every row by models that have not seen the row they are judged by.
-
-    The upper bound is the smallest t at which
-
-        sum over rows i of  m_i [ y_k(x) + s_i sigma_k(x) <= t ]  >=  coverage ,
-
-    k the model that has not seen i (Barber, Candes, Ramdas and Tibshirani 2021; with sigma_k = 1
-    the CV+ of that paper, and with one row per fold the jackknife+). The lower bound likewise.
-
-    Parameters
-    ----------
-    folds : list of (ndarray, ndarray)
-        Scores and masses of the rows that each model has not seen.
-    predictions, deviations : ndarray of shape (n_folds, n_rows)
-    coverage : float
-
-    Returns
-    -------
-    lower, upper : ndarray of shape (n_rows,)
-    """
-    steps = []
-    for scores, masses in folds:
-        scores = np.where(np.isnan(scores), np.inf, scores)
-        order = np.argsort(scores)
-        steps.append((scores[order], np.concatenate([[0.0], np.cumsum(masses[order])])))
-    finite = [sorted_[np.isfinite(sorted_)] for sorted_, _ in steps]
-    reach = max((one[-1] for one in finite if one.size), default=0.0)
-    bounds = []
-    for sign in (-1.0, 1.0):
-        centers = sign * predictions
-        low, high = centers.min(axis=0), (centers + reach * deviations).max(axis=0)
-        covers = is_enough(_mass(steps, centers, deviations, high), coverage)
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            enough = is_enough(_mass(steps, centers, deviations, middle), coverage)
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        bounds.append(sign * np.where(covers | np.isnan(high), high, np.inf))
-    return bounds[0], bounds[1]
-
-
-def _mass(steps, centers, deviations, at):
-    """The mass of the rows whose bound is ``at`` or less, (n_rows,)."""
-    total = np.zeros(at.size)
-    for (scores, upto), center, deviation in zip(steps, centers, deviations, strict=True):
-        total += upto[np.searchsorted(scores, (at - center) / deviation, side="right")]
-    return total

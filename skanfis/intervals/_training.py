@@ -90,7 +90,7 @@ def one_part(regressor, n_rows, groups, fraction, seed):
     except ValueError as error:
         raise ValueError(
             f"method='split' with calibration_fraction={fraction:g} leaves nothing to train on "
-            f"of {n_rows} rows: use a smaller fraction, or method='cross'."
+            f"of {n_rows} rows: use a smaller fraction, or method='folds'."
         ) from error
     return np.sort(training), np.sort(held_out)
 
@@ -105,6 +105,11 @@ def folds(cv, targets, groups, seed):
     else:
         splitter = GroupKFold(min(int(cv), int(groups.max()) + 1))
     found = list(splitter.split(np.empty((n_rows, 0)), targets, groups))
+    if not found:
+        raise ValueError(
+            f"cv={cv!r} gives no splits. An iterator can be used once only: give list(...) of it, "
+            "or a number of folds."
+        )
     counts = np.bincount(np.concatenate([held_out for _, held_out in found]), minlength=n_rows)
     if not (counts == 1).all():
         row = int(np.argmax(counts != 1))

@@ -14,10 +14,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
-from ._answering import answering, held_at_the_edge
 from ._quantiles import (
     check_level,
-    cross_bounds,
     group_scores,
     is_enough,
     n_needed,
@@ -25,13 +23,10 @@ from ._quantiles import (
     row_masses,
     score_quantile,
 )
-from ._scores import Scorer
+from ._scores import held_out_scores, least_deviations, leave_one_out_scores, predicted
 from ._training import TrainingSet, checked_targets, fit_params, folds, one_part
 
 __all__ = ["ConformalRegressor"]
-
-# Rows whose bounds are found at one time.
-_MOST_ROWS = 16_384
 
 
 class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
@@ -47,25 +42,19 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     Parameters
     ----------
     estimator : regressor, default=None
-        What predicts; a Pipeline or a search, for example. None is ``ANFISRegressor()``. One with
-        ``out_of_bounds="raise"`` refuses new rows beyond the range of its training; rows held out
-        are not refused, but count as with "clip".
-    method : {"folds", "cross", "split", "loo"}, default="folds"
-        Which rows give the scores. "folds": every row, by a model of the folds without it; the
-        intervals are about the model of all rows, as wide as its own deviation says. Near what is
-        asked for, without a guarantee. "cross": the same scores, and intervals by the models of
-        all folds (CV+ [2]_; of as many folds as rows, jackknife+): surely 2 coverage - 1, and more
-        than asked for where a model of fewer rows is much worse. "split": rows held out, on which
-        the model is never trained. Covers at least as often as asked. "loo": every row, by what
-        the model would be without it: exact in the consequents, to first order in the premises,
-        without a further fit. No guarantee, for the structure has seen every row: for many rows
-        alone, and for a fitted :class:`~skanfis.ANFISRegressor`, or a Pipeline that ends in one.
+        What predicts; a Pipeline or a search, for example. None is ``ANFISRegressor()``.
+    method : {"folds", "split", "loo"}, default="folds"
+        Which rows give the scores. "folds": every row, by a model of the folds without it. Near
+        what is asked for, without a guarantee. "split": rows held out, on which the model is never
+        trained. Covers at least as often as asked. "loo": every row, by leave-one-out without a
+        further fit, to first order; for many rows, and for a fitted
+        :class:`~skanfis.ANFISRegressor` or a Pipeline that ends in one.
     scaled : bool, default=True
-        Whether intervals are as wide as the model's own standard deviation says, row by row, by
-        ``predict(X, return_std=True)``; else all have one width ("cross": nearly).
+        Whether intervals are as wide as ``predict(X, return_std=True)`` says, row by row; else all
+        have one width.
     cv : int, splitter or iterable of splits, default=10
-        Of "folds" and "cross": how many folds, at most; no more than rows, or groups. A splitter of
-        scikit-learn, or splits, must hold out every row once.
+        Of "folds": how many, at most; no more than rows, or groups. A splitter of scikit-learn, or
+        splits, must hold out every row once.
     calibration_fraction : float, default=0.25
         Of "split": part of the rows, or of the groups, held out. 1 takes all rows given, for a
         model that is fitted already, as ``FrozenEstimator(model)``.
@@ -96,30 +85,14 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     Notes
     -----
-    With ``groups`` (runs, devices, days) whole groups are held out, every group counts as much as
-    any other, and what is covered is a *new* group [3]_, which with intervals by row it would not
-    be. A group is one unit, however many rows it has: 90 % takes 9 groups. Of each group held out
-    the score is taken that ``coverage`` of its rows do not exceed: groups are exchangeable, and so
-    are these numbers, one each. The k-th smallest of K is not exceeded by that of a new group with
-    the probability k / (K + 1), however alike the rows of one are; for these K groups, the part of
-    new ones that keep to it is beta distributed, with k and K + 1 - k. What no new group exceeds
-    is nothing that K groups can tell: one in K + 1 is beyond all of them.
-
-    ``confidence=None`` promises rows, not groups, on average: most groups are covered whole, and a
-    few hardly. Its quantile is the median of those that one row drawn from each group would give
-    [4]_; of "cross" that of all rows, with the mass of a whole group for the new one [3]_, which
-    covers up to 1 / (K + 1) more than asked.
+    With ``groups`` (runs, devices, days) whole groups are held out, and what is covered is a *new*
+    group: a group is one unit, however many rows it has, and 90 % takes 9 groups. :doc:`/how_sure`
+    has the formulas and what K groups can promise.
 
     References
     ----------
     .. [1] V. Vovk, A. Gammerman and G. Shafer, "Algorithmic learning in a random world", Springer,
        2005.
-    .. [2] R. F. Barber, E. J. Candès, A. Ramdas and R. J. Tibshirani, "Predictive inference with
-       the jackknife+", Annals of Statistics 49 (2021) 486-507.
-    .. [3] Y. Lee, R. F. Barber and R. Willett, "Distribution-free inference with hierarchical
-       data", arXiv:2306.06342 (2023).
-    .. [4] R. Dunn, L. Wasserman and A. Ramdas, "Distribution-free prediction sets for two-layer
-       hierarchical models", Journal of the American Statistical Association 118 (2023) 2491-2502.
 
     Examples
     --------
@@ -138,7 +111,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     _parameter_constraints: ClassVar[dict] = {
         "estimator": [HasMethods(["fit", "predict"]), None],
-        "method": [StrOptions({"folds", "cross", "split", "loo"})],
+        "method": [StrOptions({"folds", "split", "loo"})],
         "scaled": ["boolean"],
         "cv": [Interval(Integral, 2, None, closed="left"), HasMethods(["split"]), Iterable],
         "calibration_fraction": [Interval(Real, 0, 1, closed="right")],
@@ -218,35 +191,45 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if numbers is not None and self.method == "loo":
             raise ValueError(
                 "method='loo' leaves out rows, not groups: a row's group would stay, and tell. Use "
-                "method='folds', 'cross' or 'split', or leave groups at None."
+                "method='folds' or 'split', or leave groups at None."
             )
         regressor = self._regressor()
         data = TrainingSet(X, y, targets, fit_params(self, regressor, sample_weight, groups))
-        self._single_output, self._scorer = targets.ndim == 1, Scorer.of(targets, self.scaled)
-        self.estimators_: list[Any] = []
-        self._folds: list[np.ndarray] = []
-        held_out = np.arange(len(targets))
+        least = least_deviations(targets) if self.scaled else None
+        held_out, estimators = np.arange(len(targets)), []
         if self.method == "split":
-            fraction, seed = float(self.calibration_fraction), self._seed()
-            training, held_out = one_part(regressor, len(targets), numbers, fraction, seed)
-            self.estimator_ = data.fitted(regressor, training)
-            with answering(self.estimator_):
-                scores = self._scorer.held_out(self.estimator_, data, held_out)
+            fraction = float(self.calibration_fraction)
+            parts = one_part(regressor, len(targets), numbers, fraction, self._seed())
+            training, held_out = parts
+            estimator = data.fitted(regressor, training)
+            scores = held_out_scores(estimator, data, held_out, least)
+        elif self.method == "loo":
+            estimator = data.fitted(regressor)
+            scores = leave_one_out_scores(estimator, data, weight, least)
         else:
-            self.estimator_ = data.fitted(regressor)
-            if self.method == "loo":
-                scores = self._scorer.leave_one_out(self.estimator_, data, weight)
-        self._groups: Any = None if numbers is None else numbers[held_out]
-        own = None if weight is None else weight[held_out]
-        self._masses, self.n_units_ = row_masses(held_out.size, own, self._groups)
-        if self.method in ("folds", "cross"):
-            scores = self._scores_of_folds(data, numbers)
-        self._scores_by_row = scores
-        found = np.sort(scores, axis=0)
-        self.scores_ = found[:, 0] if self._single_output else found
+            estimator = data.fitted(regressor)
+            parts = folds(self.cv, targets, numbers, self._seed())
+            estimators = Parallel(n_jobs=self.n_jobs)(
+                delayed(data.fitted)(regressor, training) for training, _ in parts
+            )
+            scores = np.empty(targets.reshape(len(targets), -1).shape)
+            for one, (_, rows) in zip(estimators, parts, strict=True):
+                scores[rows] = held_out_scores(one, data, rows, least)
+        own_groups = None if numbers is None else numbers[held_out]
+        own_weight = None if weight is None else weight[held_out]
+        masses, n_units = row_masses(held_out.size, own_weight, own_groups)
+        # All at once: a fit that is interrupted leaves what was there.
         for name in ("n_features_in_", "feature_names_in_"):
-            if hasattr(self.estimator_, name):
-                setattr(self, name, getattr(self.estimator_, name))
+            self.__dict__.pop(name, None)
+            if hasattr(estimator, name):
+                setattr(self, name, getattr(estimator, name))
+        self.estimator_, self.estimators_ = estimator, estimators
+        self._least, self._scores_by_row = least, scores
+        self._groups, self._masses, self.n_units_ = own_groups, masses, n_units
+        self._single_output = targets.ndim == 1
+        self.scores_ = np.sort(scores, axis=0)
+        if self._single_output:
+            self.scores_ = self.scores_[:, 0]
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
@@ -278,8 +261,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             With groups: how probable it is to be that ``coverage`` of the rows of a new group, or
             more, lie in their intervals, between 0 and 1. "auto" is as probable as ``coverage``.
             None promises the coverage on average over the rows of new groups, of which some may be
-            covered much less; the intervals are narrower, by a fifth where groups differ much.
-            Without groups "auto" and None are the same: rows are all there is.
+            covered much less. Without groups "auto" and None are the same.
 
         Returns
         -------
@@ -295,18 +277,15 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         coverage, confidence = self._checked_levels(coverage, confidence)
-        centers, deviations = self._scorer.predicted(self.estimator_, X)
-        if self.method == "cross":
-            lower, upper = self._cross_intervals(X, centers, coverage, confidence)
-        else:
-            width = deviations * self._quantiles(coverage, confidence)
-            lower, upper = centers - width, centers + width
+        centers, deviations = predicted(self.estimator_, X, self._least)
+        width = deviations * self._quantiles(coverage, confidence)
+        lower, upper = centers - width, centers + width
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
 
     def half_width(
         self, coverage: float = 0.9, confidence: float | str | None = "auto"
     ) -> float | np.ndarray:
-        """How far intervals reach to either side of the prediction; not of method "cross".
+        """How far intervals reach to either side of the prediction.
 
         Parameters
         ----------
@@ -323,15 +302,9 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            As :meth:`predict_interval` does; of ``method="cross"``, whose intervals are those of
-            several models.
+            As :meth:`predict_interval` does.
         """
         check_is_fitted(self)
-        if self.method == "cross":
-            raise ValueError(
-                "method='cross' has no one half width: its intervals are by the models of all "
-                "folds. Use method='folds', 'split' or 'loo'."
-            )
         found = self._quantiles(*self._checked_levels(coverage, confidence))
         return float(found[0]) if self._single_output else found
 
@@ -353,63 +326,22 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def _seed(self):
         return 0 if self.random_state is None else self.random_state
 
-    def _scores_of_folds(self, data, groups):
-        """Scores of every row by the models of the folds without it."""
-        found = folds(self.cv, data.targets, groups, self._seed())
-        regressor = self._regressor()
-        fitted = Parallel(n_jobs=self.n_jobs)(
-            delayed(data.fitted)(regressor, training) for training, _ in found
-        )
-        self.estimators_ = [held_at_the_edge(one) for one in fitted]
-        self._folds = [held_out for _, held_out in found]
-        scores = np.empty(data.targets.reshape(len(data.targets), -1).shape)
-        for estimator, held_out in zip(self.estimators_, self._folds, strict=True):
-            scores[held_out] = self._scorer.held_out(estimator, data, held_out)
-        return scores
-
-    def _cross_intervals(self, X, centers, coverage, confidence):
-        found = [self._scorer.predicted(one, X, warn=False) for one in self.estimators_]
-        lower, upper = np.empty(centers.shape), np.empty(centers.shape)
-        for k in range(centers.shape[1]):
-            held_out = [(self._scores_by_row[rows, k], self._masses[rows]) for rows in self._folds]
-            if confidence is not None:
-                parts = zip(held_out, self._folds, strict=True)
-                held_out = [group_scores(*own, self._groups[rows], coverage) for own, rows in parts]
-            for start in range(0, len(centers), _MOST_ROWS):
-                part = slice(start, start + _MOST_ROWS)
-                own = np.array([(one[part, k], other[part, k]) for one, other in found])
-                level = coverage if confidence is None else confidence
-                bounds = cross_bounds(held_out, own[:, 0], own[:, 1], level)
-                lower[part, k], upper[part, k] = bounds
-        return lower, upper
-
     def _checked_levels(self, coverage, confidence):
         """Both levels, as far as the rows or groups at hand allow them; None of no groups."""
         if isinstance(confidence, str) and confidence != "auto":
             raise ValueError(f"confidence={confidence!r} must be a number, 'auto' or None.")
-        is_auto = isinstance(confidence, str)
-        if confidence is None or (is_auto and self._groups is None):
+        check_level("coverage", coverage)
+        if confidence is None or (confidence == "auto" and self._groups is None):
             self._check_enough("coverage", coverage)
             return float(coverage), None
-        check_level("coverage", coverage)
         if self._groups is None:
             raise ValueError(
                 "confidence is of whole groups, and fit was given none: give it groups, or None."
             )
-        if self.method == "cross" and not self._keeps_groups():
-            raise ValueError(
-                "confidence takes folds that hold out whole groups, and cv parts some: use a "
-                "number of folds or GroupKFold, or confidence=None for rows on average."
-            )
-        if is_auto:
-            self._check_enough("coverage", coverage)
-            return float(coverage), float(coverage)
-        self._check_enough("confidence", confidence)
-        return float(coverage), float(confidence)
-
-    def _keeps_groups(self):
-        parts = [np.unique(self._groups[rows]) for rows in self._folds]
-        return np.unique(np.concatenate(parts)).size == sum(map(len, parts))
+        is_auto = confidence == "auto"
+        level = coverage if is_auto else confidence
+        self._check_enough("coverage" if is_auto else "confidence", level)
+        return float(coverage), float(level)
 
     def _check_enough(self, name, level):
         check_level(name, level)

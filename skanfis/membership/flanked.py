@@ -11,13 +11,12 @@ The feet are at a = b - left and d = c + right. Since center, plateau c - b and 
 the lengths are what is learnt, a <= b <= c <= d holds for every value of the parameters.
 """
 
-from abc import abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .base import Membership, Parameter
-from .profiles import GaussianProfile, LinearProfile, Profile, SplineProfile
+from .profiles import GaussianProfile, LinearProfile, SplineProfile
 
 __all__ = ["PiShaped", "SShaped", "Trapezoidal", "Triangular", "TwoSidedGaussian", "ZShaped"]
 
@@ -26,19 +25,15 @@ _FIRST_PLATEAU = 0.25
 
 
 class _Flanked(Membership):
-    """A geometry, which gives t and its derivatives, and the profile of its flanks."""
+    """A ``profile``, and a geometry.
 
-    profile: ClassVar[type[Profile]]
+    ``_distance(x, theta)`` gives t and details, from which ``_chain(slope, t, *details)`` gives the
+    derivatives by theta where that by t is ``slope``.
+    """
 
-    @classmethod
-    @abstractmethod
-    def _distance(cls, x, theta):
-        """t, and what else the geometry needs for its derivatives."""
-
-    @classmethod
-    @abstractmethod
-    def _chain(cls, slope, t, *details):
-        """Derivatives by theta from ``slope``, that by t; ``details`` as _distance gave them."""
+    profile: ClassVar[Any]
+    _distance: ClassVar[Any]
+    _chain: ClassVar[Any]
 
     @classmethod
     def value(cls, x, theta):

@@ -17,67 +17,45 @@ e is so small because the least ridge, 1e-12, must outweigh its square: conseque
 bent to make use of a rule where it fires by its floor alone.
 """
 
-from abc import ABC, abstractmethod
+from typing import Any, ClassVar
 
 import numpy as np
 
-__all__ = ["GaussianProfile", "LinearProfile", "Profile", "SplineProfile"]
+__all__ = ["GaussianProfile", "LinearProfile", "SplineProfile"]
 
 # Part of a Gaussian that is mixed in, so that no logarithm is infinite beyond the foot.
 _FLOOR = 1e-10
 
 
-class Profile(ABC):
-    """A flank as a function of t >= 0."""
-
-    @staticmethod
-    @abstractmethod
-    def value(t):
-        """mu, for real and complex t."""
-
-    @staticmethod
-    @abstractmethod
-    def log_value(t):
-        """log mu, finite."""
-
-    @staticmethod
-    @abstractmethod
-    def log_value_and_slope(t):
-        """log mu and its derivative by t, which is zero at t = 0."""
-
-    @staticmethod
-    @abstractmethod
-    def reach(mu):
-        """The t at which the profile has come down to ``mu``, between zero and one."""
-
-
-class GaussianProfile(Profile):
+class GaussianProfile:
     """exp(-t^2 / 2)."""
 
     @staticmethod
     def value(t):
+        """Mu, for real and complex t >= 0."""
         return np.exp(-0.5 * t**2)
 
     @staticmethod
     def log_value(t):
+        """Log mu, finite."""
         return -0.5 * t**2
 
     @staticmethod
     def log_value_and_slope(t):
+        """Log mu and its derivative by t, which is zero at t = 0."""
         return -0.5 * t**2, -t
 
     @staticmethod
     def reach(mu):
+        """The t at which the profile has come down to ``mu``, between zero and one."""
         return np.sqrt(-2.0 * np.log(mu))
 
 
-class _ProfileWithFoot(Profile):
-    """A profile that is zero from t = 1 on, in log space with a floor under it."""
+class _ProfileWithFoot:
+    """A ``value`` that is zero from t = 1 on, with ``slope``; in log space a floor under it."""
 
-    @staticmethod
-    @abstractmethod
-    def slope(t):
-        """The derivative of ``value`` by t; zero at t = 0."""
+    value: ClassVar[Any]
+    slope: ClassVar[Any]
 
     @classmethod
     def _floored(cls, t):

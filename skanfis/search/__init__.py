@@ -5,14 +5,12 @@ from .grid import Spacing, grid_antecedent
 from .request import StructureRequest, report_constant
 from .sample import effective_weight, representative_rows, weighted_quantile
 from .start import Start, check_inputs, imported_antecedent
-from .terms import TermsFound, search_terms
 from .trials import held_out_loss
 
 __all__ = [
     "Spacing",
     "Start",
     "StructureRequest",
-    "TermsFound",
     "check_inputs",
     "clustered_antecedent",
     "effective_weight",
@@ -21,6 +19,5 @@ __all__ = [
     "imported_antecedent",
     "report_constant",
     "representative_rows",
-    "search_terms",
     "weighted_quantile",
 ]

@@ -7,7 +7,7 @@ steepest: the squared correlations of what the linear model leaves with what ter
 Scattered rules come in a short sequence of numbers.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
 from math import prod
@@ -54,15 +54,12 @@ class StructureSearch:
 
     Parameters
     ----------
-    rows, families, order, consequent_inputs, seed, fixed, split
+    rows, families, order, consequent_inputs, seed, fixed
         As ``trials.Trials`` takes them.
     premise_inputs : ndarray of int
         The inputs that may have terms, where they vary.
     other_families : sequence of type of Membership
         For all inputs in place of ``families``, tried on the structure that is found.
-    max_rules : int, optional
-        Most rules of a candidate. Where it is not given, the number of consequent parameters is
-        bounded too.
     """
 
     def __init__(
@@ -75,17 +72,13 @@ class StructureSearch:
         seed,
         fixed: dict,
         other_families: Sequence[type[Membership]] = (),
-        max_rules: int | None = None,
-        split: Callable | None = None,
     ):
         is_constant = rows.inputs.is_constant
         self.inputs = premise_inputs[~is_constant[premise_inputs]]
         self.n_inputs = rows.X.shape[1]
         self.n_basis = 1 + np.count_nonzero(~is_constant[consequent_inputs])
-        self.other_families, self.max_rules = other_families, max_rules
-        self.trials = Trials(
-            rows, families, order, self.inputs, consequent_inputs, seed, fixed, split
-        )
+        self.other_families = other_families
+        self.trials = Trials(rows, families, order, self.inputs, consequent_inputs, seed, fixed)
 
     def run(self, partition) -> Start:
         """A start from the best structure found; ``partition`` is one of ``SEARCHED``."""
@@ -150,14 +143,14 @@ class StructureSearch:
     def _is_small(self, candidate):
         n_rules = prod(candidate.counts)
         of_many = min(_RULES_OF_MANY * self.n_basis, _MOST_OF_MANY)
-        most = max(_MOST_COLUMNS, of_many, (self.max_rules or 0) * self.n_basis)
+        most = max(_MOST_COLUMNS, of_many)
         return (
             max(candidate.counts) <= _MOST_TERMS
             and all(
                 c == 1 or c <= self.trials.spacing.n_values(j)
                 for j, c in enumerate(candidate.counts)
             )
-            and n_rules <= (self.max_rules or MOST_RULES)
+            and n_rules <= MOST_RULES
             and n_rules * self.n_basis <= min(most, 2.0 * self.trials.n_sample)
         )
 

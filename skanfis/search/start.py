@@ -79,14 +79,14 @@ def tuned_start(
     problem = SeparableProblem(
         sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
     )
-    n_sample, box = effective_weight(sample), sample.inputs.box
-    premise, is_free = Premise.of(antecedent, *box), False
+    n_sample, (low, high) = effective_weight(sample), sample.inputs.box
+    premise, is_free = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
     if premises_move and premise.size and has_rows and problem.n_columns <= MOST_COLUMNS:
-        unbounded = Premise.of(antecedent, *box, is_free=True)
+        unbounded = Premise.of(antecedent, low, high, is_free=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, premise, is_free = freed, unbounded, True

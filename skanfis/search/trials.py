@@ -10,7 +10,7 @@ criterion on the same rows can know. Where the groups are given, the score is in
 short trainings on the groups that are left out, a fifth of them at a time.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,9 +64,6 @@ class Trials:
         Of the clustering.
     fixed : dict
         The weights of the penalty that are given, by their names in ``evidence.FREE``.
-    split : callable, optional
-        From the groups of some rows to training and held-out positions of every fold; none where
-        the groups say nothing.
 
     Attributes
     ----------
@@ -85,7 +82,6 @@ class Trials:
         consequent_inputs: np.ndarray,
         seed,
         fixed: dict,
-        split: Callable | None = None,
     ):
         self.order, self.consequent_inputs = order, consequent_inputs
         self.free = [key for key in FREE if key not in fixed]
@@ -96,7 +92,7 @@ class Trials:
         self.rule_bases = RuleBases(families, inputs, self.spacing, seed)
         self.places = _places_between(self.sample)
         self.n_sample, self.n_all = effective_weight(self.sample), effective_weight(rows)
-        self.folds = (split or _folds)(self.sample.groups)
+        self.folds = _folds(self.sample.groups)
         self.scores: dict[Candidate, float] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self._found: dict[Candidate, Tuned] = {}

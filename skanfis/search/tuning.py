@@ -11,6 +11,7 @@ steps of the premises would go where no evidence leads back from.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -183,7 +184,8 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
     What the premises of the start leave of data without noise would be taken for noise.
     """
     x = np.zeros(premise.size)
-    penalty = replace(problem.penalty, **dict.fromkeys(free, _NO_WEIGHT))
+    nothing: dict[str, Any] = dict.fromkeys(free, _NO_WEIGHT)
+    penalty = replace(problem.penalty, **nothing)
     evaluation = problem.evaluate(premise.parameters(x))
     posterior = _improved(problem, evaluation, x, penalty, 0, free, n_rows, False)
     start = Tuned(problem, evaluation, x, posterior)
@@ -304,12 +306,11 @@ def scaled(penalty: Penalty, free, ratio, is_held=False):
         "slope": penalty.rho,
         "stiffness": penalty.stiffness,
     }
-    weights = {key: _in_digits(own[key] * ratio) for key in free}
-    pulls = {
-        key: {name: _in_digits(pull) for name, pull in getattr(penalty, key).items()}
-        for key in ("pulls", "slope_pulls")
-    }
-    return replace(penalty, **weights, **pulls)
+    weights: dict[str, Any] = {key: _in_digits(own[key] * ratio) for key in free}
+    for key in ("pulls", "slope_pulls"):
+        pulls = getattr(penalty, key)
+        weights[key] = {name: _in_digits(pull) for name, pull in pulls.items()}
+    return replace(penalty, **weights)
 
 
 def _in_digits(weight):

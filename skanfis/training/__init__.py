@@ -2,14 +2,12 @@
 
 from .data import Fitted, SolverRun, ValidatedData
 from .fit import fit_rules
-from .information import Information
 from .pruning import RuleStatistics, model_without_rules, redundant_rules
 from .watching import Callbacks
 
 __all__ = [
     "Callbacks",
     "Fitted",
-    "Information",
     "RuleStatistics",
     "SolverRun",
     "ValidatedData",

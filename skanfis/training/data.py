@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..bounds.wishes import Wishes
+from ..bounds.constraints import Constraints
 from ..learning import SolverResult
 from ..learning.data import StandardisedData, check_scales
 from ..learning.objective import Evaluation, SeparableProblem
@@ -29,7 +29,7 @@ class ValidatedData:
     input_names, output_names : sequence of str
     kept : ndarray of bool of shape (n_given_rows,), optional
         Which of the rows given have weight and are here, if not all.
-    wishes : Wishes, optional
+    wishes : Constraints, optional
         What is known of the target, in the user's units.
     """
 
@@ -40,7 +40,7 @@ class ValidatedData:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     kept: np.ndarray | None = None
-    wishes: Wishes | None = None
+    wishes: Constraints | None = None
 
     def rows(self, indices=slice(None)):
         """Some of the rows, on scales of their own."""

@@ -20,13 +20,13 @@ from .._threads import map_in_threads
 from .._validation import warn_user
 from ..bounds.exchange import constrained
 from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
+from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
-from ..posterior import Posterior
 from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
 from .freezing import ModelBuilder, as_given, told_by_outermost
@@ -137,7 +137,8 @@ class _Fit:
         return self._solved(rows, replace(start, displacement=found.displacement), self.solver)
 
     def _solved(self, rows, start, solver, is_watched=True):
-        premise = Premise.of(start.antecedent, *rows.inputs.box, start.is_free)
+        low, high = rows.inputs.box
+        premise = Premise.of(start.antecedent, low, high, start.is_free)
         problem = SeparableProblem(
             rows.sample or rows,
             start.antecedent,
@@ -236,7 +237,7 @@ class _Fit:
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = effective_weight(run.problem.rows)
-        posterior = Posterior.of(run.problem, learnt, run.evaluation, n_rows, robust)
+        posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
         model = replace(builder.model(run.start, run.evaluation, firing), posterior=posterior)
         model = replace(model, told_extrapolation=told_by_outermost(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))

@@ -18,11 +18,12 @@ import numpy as np
 
 from ..learning import SolverResult
 from ..learning.data import StandardisedData
+from ..learning.firing import RuleFiring, rule_support
 from ..learning.objective import Evaluation
 from ..learning.penalty import Penalty
 from ..model import TSKModel
 from ..options import policy_of
-from ..policies import FARTHEST, MAX_EXTRAPOLATION
+from ..policies import FARTHEST, MAX_EXTRAPOLATION, TargetRange
 from ..search import (
     Start,
     StructureRequest,
@@ -30,8 +31,6 @@ from ..search import (
     representative_rows,
     weighted_quantile,
 )
-from ..support import RuleFiring, RuleSupport
-from ..target import TargetRange
 from .data import Fitted, ValidatedData
 from .pruning import redundant_rules, rule_statistics
 
@@ -70,7 +69,7 @@ class ModelBuilder:
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
-        support = RuleSupport.of(rows, trained, self.n_coefficients, firing)
+        support = rule_support(rows, trained, self.n_coefficients, firing)
         model = TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),
@@ -149,6 +148,7 @@ def told_by_outermost(model: TSKModel, rows: StandardisedData) -> float:
     way = (X - nearest) / model.spread
     free = replace(model, target=None)  # outputs are not held
     values, slopes = free.predict(nearest), free.gradient(nearest) * model.spread[:, None]
+    assert model.posterior is not None
     noise = float(np.sum((model.posterior.noise / rows.targets.scale) ** 2))
 
     def left_by(distance):

@@ -15,8 +15,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ..learning.data import StandardisedData
+from ..learning.firing import RuleFiring
 from ..model import TSKModel
-from ..support import RuleFiring, RuleSupport
+from ..support import RuleSupport
 
 __all__ = [
     "RuleStatistics",

@@ -1,12 +1,10 @@
 """Rule bases against the product over every rule, divided by the sum over all rules."""
 
-import itertools
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.membership import Bell, Gaussian
 
 from .. import oracles
@@ -137,69 +135,11 @@ def test_parameters_make_the_round_trip(antecedent, Z, rng):
     )
 
 
-@ALL
-def test_strengths_do_not_depend_on_the_inputs_units(antecedent, Z):
-    offset, scale = np.array([20.0, -3e4, 0.5]), np.array([1e-4, 1e3, 7.0])
-    moved = antecedent.change_units(offset, scale)
-    X = offset[:, None] + scale[:, None] * Z
-    # 20 + 1e-4 z keeps eleven digits of z.
-    assert_allclose(moved.strengths(X), antecedent.strengths(Z), rtol=1e-8, atol=1e-12)
-
-
-@ALL
-def test_nothing_is_changed_in_place(antecedent, Z):
-    before, parameters = Z.copy(), antecedent.parameters.copy()
-    antecedent.strengths(Z)
-    antecedent.log_memberships_and_gradient(Z)
-    antecedent.change_units(np.ones(3), np.full(3, 2.0))
-    antecedent.with_parameters(parameters + 1.0)
-    assert_array_equal(Z, before)
-    assert_array_equal(antecedent.parameters, parameters)
-
-
-@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
-def test_order_of_the_inputs_permutes_the_rules_of_a_grid(rng, Z, order):
-    families, counts = [Gaussian, Bell, Gaussian], [2, 3, 4]
-    thetas = [
-        family.start(np.sort(rng.normal(size=count)), rng.uniform(0.5, 2.0, count), 0.5)
-        for family, count in zip(families, counts, strict=True)
-    ]
-    straight = GridAntecedent.build(families, [0, 1, 2], thetas)
-    turned = GridAntecedent.build(
-        [families[j] for j in order], [int(j) for j in order], [thetas[j] for j in order]
-    )
-    expected = straight.strengths(Z).reshape(*counts, -1).transpose(*order, 3)
-    assert_allclose(turned.strengths(Z), expected.reshape(24, -1), rtol=1e-12)
-
-
-@pytest.mark.parametrize("family", [Gaussian, Bell])
-def test_order_of_scattered_rules_and_of_their_inputs_does_not_matter(rng, Z, family):
-    theta = family.from_center_and_width(rng.normal(size=(5, 3)), rng.uniform(0.5, 2.0, (5, 3)))
-    expected = ScatteredAntecedent.build(family, np.arange(3), theta).strengths(Z)
-    rules, inputs = rng.permutation(5), np.array([2, 0, 1])
-    turned = ScatteredAntecedent.build(family, inputs, theta[:, rules][:, :, inputs])
-    assert_allclose(turned.strengths(Z), expected[rules], rtol=1e-12)
-
-
-def test_rules_on_a_lattice_are_the_grid(Z):
-    # The scattered form of a grid: one rule per combination, each with terms of its own.
-    whole = ANTECEDENTS["mixed counts"]
-    (group,) = whole.groups
-    theta = group.theta[:, whole.rule_terms]
-    loose = ScatteredAntecedent.build(Gaussian, np.arange(3), theta)
-    assert_allclose(loose.strengths(Z), whole.strengths(Z), rtol=1e-11)
-
-
 def test_two_gaussians_of_one_width_share_by_a_logistic_curve(Z):
     # nu_2 / nu_1 = exp((c_2 - c_1) (z - (c_1 + c_2) / 2) / sigma^2)
     theta = np.array([[-1.0, 2.0], np.log([1.5, 1.5])])
     strengths = GridAntecedent.build([Gaussian], [1], [theta]).strengths(Z)
     assert_allclose(strengths[1], 1 / (1 + np.exp(-3.0 * (Z[1] - 0.5) / 2.25)), rtol=1e-12)
-
-
-def test_two_equal_rules_share_alike(Z):
-    theta = Gaussian.from_center_and_width(np.zeros((2, 3)), np.ones((2, 3)))
-    assert_array_equal(ScatteredAntecedent.build(Gaussian, np.arange(3), theta).strengths(Z), 0.5)
 
 
 def test_without_terms_one_rule_always_fires(Z):
@@ -214,21 +154,6 @@ def test_without_terms_one_rule_always_fires(Z):
         antecedent.change_units(np.ones(3), np.ones(3)),
     ]:
         assert_array_equal(same.strengths(Z), np.ones((1, 60)))
-
-
-def test_without_terms_there_is_nothing_that_the_output_could_be_sensitive_to(Z, rng):
-    antecedent = no_terms()
-    values = rng.normal(size=(1, 60))
-    _, shares = antecedent.strengths_and_shares(Z)
-    assert antecedent.sum_over_rules(values).shape == (0, 60)
-    assert antecedent.term_sensitivity(values, values[0], shares).shape == (0, 60)
-
-
-def test_a_family_and_an_input_for_every_theta():
-    theta = Gaussian.start(np.array([-1.0, 1.0]), np.ones(2), 0.6)
-    for families, places in (([Gaussian], [0, 1]), ([Gaussian] * 2, [0])):
-        with pytest.raises(ValueError, match="zip"):
-            GridAntecedent.build(families, places, [theta] * 2)
 
 
 @pytest.mark.parametrize("kind", ["grid", "scattered", "table"])

@@ -13,7 +13,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.bounds import FixedPoint, OutputLimits, bounds, exchange, monotonicity
+from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
 from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
@@ -89,7 +89,6 @@ def test_what_is_held_is_certain_and_is_so_in_a_file(rng):
     assert (after < 0.99 * before)[inside].sum() > 20
     at = np.array([[0.2, -0.4]])
     assert_allclose(model.model_.standard_deviation(at)[:, 0], model.noise_std_, rtol=1e-5)
-    assert_allclose(model.predict(at, return_std=True)[1], model.noise_std_, rtol=1e-3)
     read = parse_json(export_json(model, posterior=True))
     assert_allclose(read.standard_deviation(new), after, rtol=1e-9)
 
@@ -101,24 +100,6 @@ def test_data_that_contradict_are_told(rng):
         ANFISRegressor(**QUICK, monotonic_cst=[-1, 0]).fit(X, y)
 
 
-def test_noise_that_breaks_the_rule_is_not_followed():
-    errors = []
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
-        X, _, y = planted(rng, 80)
-        X_test, _, _ = planted(rng, 1000)
-        X_test = np.clip(X_test, X.min(axis=0), X.max(axis=0))
-        truth = np.tanh(3.0 * X_test[:, 0]) + 0.3 * X_test[:, 1] ** 2
-        errors.append(
-            [
-                np.mean((ANFISRegressor(**QUICK, **known).fit(X, y).predict(X_test) - truth) ** 2)
-                for known in ({}, {"monotonic_cst": {"x0": 1}})
-            ]
-        )
-    free, held = np.sqrt(np.mean(errors, axis=0))
-    assert held < 0.95 * free
-
-
 def test_what_holds_already_is_left_alone(rng):
     X, truth, _ = planted(rng)
     free = ANFISRegressor(**QUICK).fit(X, X[:, 0] + 0.1 * truth)
@@ -126,35 +107,6 @@ def test_what_holds_already_is_left_alone(rng):
     assert held.constraints_["certified"]
     assert held.constraints_["rows"] == 0
     assert_allclose(held.consequents_, free.consequents_, rtol=1e-12)
-
-
-def test_a_constant_target_is_proven_at_once(rng):
-    """Slopes of nothing but rounding."""
-    X = planted(rng)[0]
-    model = ANFISRegressor(**QUICK, monotonic_cst=[1, -1]).fit(X, np.full(len(X), 0.1))
-    assert model.constraints_["certified"]
-    assert model.constraints_["boxes"] == 0
-    assert_allclose(model.predict(X), 0.1, rtol=1e-14)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
-def test_proofs_are_not_what_finds_violations(monkeypatch):
-    """A staircase, whose rules fall between the points of the sample wherever they are not held."""
-    proofs, largest = [], exchange.largest
-
-    def counted(*args, **kwargs):
-        proofs.append(largest(*args, **kwargs))
-        return proofs[-1]
-
-    monkeypatch.setattr(exchange, "largest", counted)
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        X = rng.uniform(-1.0, 1.0, (100, 2))
-        y = np.digitize(X[:, 0], [-0.3, 0.4]) + np.sin(X[:, 1]) + 0.1 * rng.normal(size=100)
-        model = ANFISRegressor(**QUICK | {"n_mfs": [6, 3]}, monotonic_cst=[1, 0]).fit(X, y)
-        assert model.constraints_["certified"]
-        assert falls(model, 0, rng) <= 0.0
-    assert len(proofs) <= 5
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
@@ -246,17 +198,6 @@ def test_points_where_nothing_is_predicted_are_refused(rng, policy):
         held.fit(X, y)
 
 
-def test_units_do_not_matter(rng):
-    X, _, y = planted(rng)
-    known = [OutputLimits(upper=1.0)]
-    one = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[1, 0]).fit(X, y)
-    known = [OutputLimits(upper=1e6 + 1e3)]
-    scaled = X * [1e-4, 1e5] + [3.0, -7e5]
-    other = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[1, 0])
-    other.fit(scaled, 1e6 + 1e3 * y)
-    assert_allclose(other.predict(scaled), 1e6 + 1e3 * one.predict(X), rtol=1e-8)
-
-
 def test_searches_and_pipelines(rng):
     X, _, y = planted(rng)
     known = [OutputLimits(upper=1.2), FixedPoint([0.0, 0.0], 0.0)]
@@ -341,7 +282,9 @@ def test_rules_taken_as_they_are_are_not_constrained(rng):
     X, _, y = planted(rng)
     model = ANFISRegressor(**QUICK).fit(X, y).model_
     again = ANFISRegressor(partition=model, max_iter=0, monotonic_cst=[1, 0])
-    with pytest.raises(ValueError, match="mean nothing where imported rules are taken as they are"):
+    with pytest.raises(
+        ValueError, match="means nothing where imported rules are taken as they are"
+    ):
         again.fit(X, y)
     learnt = ANFISRegressor(partition=model, solver="lse", monotonic_cst=[1, 0], alpha=1e-3)
     assert monotonicity(learnt.fit(X, y), 0) == 1

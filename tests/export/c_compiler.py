@@ -19,7 +19,7 @@ SANITIZE = [
     "-g0",
 ]
 
-# Reads rows from one file, and writes to another what the calls make of them.
+# Reads rows from one file, and writes to another what the functions make of them.
 _DRIVER = """
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,7 +28,8 @@ _DRIVER = """
 
 typedef {real} real;
 static real x[{n_rows}][{n_inputs}];
-{arrays}
+static real y[{n_rows}][{most_outputs}];
+static int status[{n_rows}];
 
 int main(void)
 {{
@@ -42,13 +43,11 @@ int main(void)
     return fclose(out) == 0 ? 0 : 2;
 }}
 """
-_SELF_TEST = """
+_CALL = """
     if ({name}_self_test() != 0) {{
         printf("self-test of {name}: row %d\\n", {name}_self_test());
         return 3;
     }}
-"""
-_CALL = """
     for (i = 0; i < {n_rows}; ++i) {{
         for (o = 0; o < {n_outputs}; ++o) {{
             y[i][o] = (real)-12345.0;
@@ -79,10 +78,12 @@ def run(command, folder):
     )
 
 
-def run_on_rows(codes, X, folder, std, calls, flags=SANITIZE, arrays=""):
-    """What ``calls``, a piece of C for each model, write of the rows, after the models' self-tests.
+def evaluate_all(codes, X, folder, std, n_outputs, flags=SANITIZE):
+    """What compiled models answer: per model outputs (n_rows, n_outputs) and status (n_rows,).
 
-    All models are in one translation unit: nothing of one may clash with another.
+    Each comes after the model's self-test. All models are in one translation unit: nothing of one
+    may clash with another. The sanitizers make compiling six times as long; what they find is in
+    the text of the code, not in its numbers, so that of a long list of models a part may have them.
     """
     for code in codes:
         (folder / f"{code.name}.h").write_text(code.header, encoding="ascii")
@@ -94,10 +95,10 @@ def run_on_rows(codes, X, folder, std, calls, flags=SANITIZE, arrays=""):
         real="float" if X.dtype == np.float32 else "double",
         n_rows=len(X),
         n_inputs=X.shape[1],
-        arrays=arrays,
+        most_outputs=max(n_outputs),
         calls="".join(
-            _SELF_TEST.format(name=code.name) + call
-            for code, call in zip(codes, calls, strict=True)
+            _CALL.format(name=code.name, n_rows=len(X), n_outputs=n)
+            for code, n in zip(codes, n_outputs, strict=True)
         ),
     )
     (folder / "driver.c").write_text(driver, encoding="ascii")
@@ -105,22 +106,7 @@ def run_on_rows(codes, X, folder, std, calls, flags=SANITIZE, arrays=""):
     gcc([f"-std={std}", *STRICT, *flags, "driver.c", "-o", "driver", "-lm"], folder)
     done = run(["./driver"], folder)
     assert done.returncode == 0, (done.stdout + done.stderr)[:4000]
-    return (folder / "answers").read_bytes()
-
-
-def evaluate_all(codes, X, folder, std, n_outputs, flags=SANITIZE):
-    """What compiled models answer: per model outputs (n_rows, n_outputs) and status (n_rows,).
-
-    The sanitizers make compiling six times as long; what they find is in the text of the code, not
-    in its numbers, so that of a long list of models a part may have them.
-    """
-    calls = [
-        _CALL.format(name=code.name, n_rows=len(X), n_outputs=n)
-        for code, n in zip(codes, n_outputs, strict=True)
-    ]
-    arrays = f"static real y[{len(X)}][{max(n_outputs)}];\nstatic int status[{len(X)}];"
-    data = run_on_rows(codes, X, folder, std, calls, flags, arrays)
-    answers, place = [], 0
+    data, answers, place = (folder / "answers").read_bytes(), [], 0
     for n in n_outputs:
         y = np.frombuffer(data, X.dtype, len(X) * n, place).reshape(-1, n)
         place += y.nbytes

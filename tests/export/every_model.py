@@ -16,8 +16,6 @@ from skanfis.policies import OUT_OF_BOUNDS
 from ..oracles import random_grid, random_scattered
 from .rule_bases import OFFSET, SCALE, build, narrow_target
 
-N_ROWS = 3000
-
 
 @dataclass(frozen=True)
 class Case:
@@ -101,7 +99,7 @@ FEWEST = fewest(CASES)
 assert meetings(FEWEST) == meetings(CASES)
 
 
-def rows(dtype, n_rows=N_ROWS):
+def rows(dtype, n_rows=3000):
     """Rows up to half the width of the box beyond it, as numbers of this type."""
     unit = np.random.default_rng(5).uniform(-4.0, 3.5, (n_rows, 3))
     unit[: n_rows // 2] = unit[: n_rows // 2] / 7.5 * 3.5
@@ -111,35 +109,3 @@ def rows(dtype, n_rows=N_ROWS):
 def full_scale(y):
     """The largest output of each column."""
     return np.nanmax(np.abs(y), axis=0)
-
-
-def size_of_sum(model, X):
-    """The largest sum over rules of |w_r f_r|, of each output.
-
-    Rules that cancel each other take digits with them, in Python too: trained on few data without
-    noise they may.
-    """
-    inside = np.clip(X, model.minimum, model.maximum)
-    basis = np.column_stack([np.ones(len(X)), inside - model.reference])
-    values = np.einsum("nb,rbo->nro", basis[:, : 1 + 3 * model.order], model.coefficients)
-    return np.einsum("nr,nro->no", model.strengths(X), np.abs(values)).max(axis=0)
-
-
-def print_differences(title, cases, differences):
-    """The largest difference by family and partition, in full scales."""
-    print(f"\n{title}: largest difference in full scales")
-    kinds = list(PARTITIONS)
-    print(f"{'':20}" + "".join(f"{kind:>14}" for kind in kinds))
-    for name in MEMBERSHIPS:
-        found = [
-            max(
-                (
-                    difference
-                    for case, difference in zip(cases, differences, strict=True)
-                    if (case.family, case.partition) == (name, kind)
-                ),
-                default=np.nan,
-            )
-            for kind in kinds
-        ]
-        print(f"{name:20}" + "".join(f"{value:14.1e}" for value in found))

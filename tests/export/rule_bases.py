@@ -7,7 +7,7 @@ import numpy as np
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import Bell, Gaussian, TwoSidedGaussian
 from skanfis.model import TSKModel
-from skanfis.target import TargetRange
+from skanfis.policies import TargetRange
 
 from .. import oracles
 

@@ -5,6 +5,7 @@ import runpy
 import shutil
 import subprocess
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
@@ -12,30 +13,32 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.cluster import KMeans
-from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
+from sklearn.preprocessing import RobustScaler
 
+from skanfis.antecedent import GridAntecedent, TermGroup
 from skanfis.bounds import bounds
-from skanfis.exceptions import ConstantInputWarning
 from skanfis.export import export_c, fold
 from skanfis.export._numbers import Numbers
+from skanfis.export.c.builder import size_of_sum
 from skanfis.export.c.status import STATUS
 from skanfis.learning import VariableProjection
-from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.membership import MEMBERSHIPS, Gaussian, Triangular
 from skanfis.model import TSKModel
+from skanfis.options import LinearExtrapolation
 from skanfis.policies import OUT_OF_BOUNDS
-from skanfis.target import TargetRange
 
 from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
-from .every_model import CASES, FEWEST, full_scale, print_differences, rows, size_of_sum, surface
+from .every_model import CASES, FEWEST, full_scale, rows, surface
 
 MIN_COVERAGE = 0.3
+TOLERANCE = {"double": 1e-12, "float": 1e-5}
+NUMPY = {"double": np.float64, "float": np.float32}
 
 
-def expected_status(model, X, std):
+def expected_status(model, X):
     """From the definitions in the header; and where rounding decides."""
     outside = ~model.in_bounds(X)
     coverage = model.coverage(X)
@@ -64,10 +67,7 @@ def expected_outputs(model, X, status, std):
     [
         pytest.param("double", "c99", slice(None), [], id="double"),
         pytest.param("float", "c99", slice(None), [], id="float", marks=pytest.mark.theory),
-        # C89 differs by its exp and log alone: three of four models are met by the sanitizers.
-        pytest.param(
-            "double", "c99", slice(0, None, 4), SANITIZE, id="double sane", marks=pytest.mark.theory
-        ),
+        # C89 differs by its exp and log alone: half of the models are met by the sanitizers.
         pytest.param(
             "double", "c89", slice(1, None, 4), SANITIZE, id="double c89", marks=pytest.mark.theory
         ),
@@ -76,9 +76,8 @@ def expected_outputs(model, X, status, std):
         ),
     ],
 )
-def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path, capsys):
-    tolerance = 1e-5 if dtype == "float" else 1e-12
-    X = rows(np.float32 if dtype == "float" else np.float64)
+def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):
+    X = rows(NUMPY[dtype])
     # Each family four times in a row, each time on another partition.
     turned = sorted(range(len(FEWEST)), key=lambda i: (i // 4, (i + i // 4) % 4))
     cases = [FEWEST[i] for i in turned[part]]
@@ -88,57 +87,36 @@ def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path, capsy
     ]
     n_outputs = [case.model.n_outputs for case in cases]
     answers = evaluate_all(codes, X, tmp_path, std, n_outputs, flags)
-    differences = []
     for case, (y, status) in zip(cases, answers, strict=True):
         Z = X.astype(float)
-        expected, unsure = expected_status(case.model, Z, std)
+        expected, unsure = expected_status(case.model, Z)
         assert (status == expected)[~unsure].all(), case.label
         wanted = expected_outputs(case.model, Z, expected, std)
         answered = (expected & STATUS["NO_OUTPUT"]) == 0
         assert np.array_equal(y[~answered], wanted[~answered], equal_nan=True), case.label
         difference = np.abs(y[answered] - wanted[answered]) / full_scale(wanted[answered])
-        differences.append(difference.max())
-    with capsys.disabled():
-        print_differences(f"C, {dtype}, {std}", cases, differences)
-    assert max(differences) < tolerance
+        assert difference.max() < TOLERANCE[dtype], case.label
 
 
 # What lies around the list: pipelines, policies, edges, numbers of unusual size.
 
 
-def around(X, dtype=np.float64, n_rows=2000):
+def around(X, dtype="double", n_rows=2000):
     low, high = X.min(axis=0), X.max(axis=0)
     unit = np.random.default_rng(1).uniform(-0.3, 1.3, (n_rows, X.shape[1]))
-    return (low + (high - low) * unit).astype(dtype)
+    return (low + (high - low) * unit).astype(NUMPY[dtype])
 
 
-def answers_of(code, X, folder, n_outputs=1, std="c99"):
-    return evaluate_all([code], X, folder, std, [n_outputs])[0]
-
-
-def scaled_target():
-    regressor = make_pipeline(StandardScaler(), quick(n_mfs=2, out_of_bounds="linear"))
-    return TransformedTargetRegressor(regressor, transformer=MinMaxScaler())
+def answers_of(code, X, folder):
+    return evaluate_all([code], X, folder, "c99", [1])[0]
 
 
 TRAINED = {
     "pipeline": lambda: make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
-    "scaled target": scaled_target,
-    "triangles untrained": lambda: quick(
-        n_mfs=3, mf="triangular", solver="lse", out_of_bounds="linear"
-    ),
-    "families by input": lambda: quick(
-        n_mfs=2, mf=["bell", "gaussian", "s_shaped"], out_of_bounds="linear"
-    ),
-    "order 0": lambda: quick(n_mfs=[4, 1, 3], order=0),
-    "clusters": lambda: quick(partition=KMeans(5, n_init=1, random_state=0)),
     "one cluster": lambda: quick(partition=KMeans(1), out_of_bounds="linear"),
     "plane": lambda: quick(n_mfs=1, out_of_bounds="linear"),
     "constant": lambda: quick(n_mfs=1, order=0, out_of_bounds="linear"),
     "scheduled": lambda: quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
-    "rules of others": lambda: quick(
-        partition=quick(n_mfs=2).fit(*surface()), out_of_bounds="linear"
-    ),
 }
 
 
@@ -154,20 +132,19 @@ def trained():
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
-    ("dtype", "tolerance", "flags", "kinds"),
+    ("dtype", "flags", "kinds"),
     [
-        ("double", 1e-12, [], list(TRAINED)),
-        ("float", 1e-5, [], list(TRAINED)),
+        ("double", [], list(TRAINED)),
+        ("float", [], list(TRAINED)),
         # Those whose text has least in common with that of the list above.
-        ("double", 1e-12, SANITIZE, ["scaled target", "one cluster", "constant", "scheduled"]),
+        ("double", SANITIZE, ["one cluster", "constant", "scheduled"]),
     ],
     ids=["double", "float", "double sane"],
 )
-def test_trained_models_answer_as_predict(dtype, tolerance, flags, kinds, tmp_path):
+def test_trained_models_answer_as_predict(dtype, flags, kinds, tmp_path):
     estimators = {kind: trained()[kind] for kind in kinds}
-    Z = around(surface()[0], np.float32 if dtype == "float" else float)
+    Z = around(surface()[0], dtype)
     codes = [
         export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
         for place, estimator in enumerate(estimators.values())
@@ -176,19 +153,19 @@ def test_trained_models_answer_as_predict(dtype, tolerance, flags, kinds, tmp_pa
     answers = evaluate_all(codes, Z, tmp_path, "c99", n_outputs, flags)
     for (kind, estimator), (found, status) in zip(estimators.items(), answers, strict=True):
         wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
-        scale = np.maximum(full_scale(wanted), size_of_sum(fold(estimator), Z))
-        assert (np.abs(found - wanted) / scale).max() < tolerance, kind
+        # Rules that cancel each other take digits with them, in Python too.
+        scale = size_of_sum(fold(estimator), Z, wanted)
+        assert (np.abs(found - wanted) / scale).max() < TOLERANCE[dtype], kind
         assert set(status) == {STATUS["IN_RANGE"], STATUS["OUT_OF_RANGE"]}, kind
 
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
 def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     X, y = surface(n_outputs=2)
     estimator = quick(n_mfs=2, max_iter=5, solver=VariableProjection(tol=1.0)).fit(X, y)
-    Z = around(X, np.float32 if dtype == "float" else float)
+    Z = around(X, dtype)
     expected = estimator.predict(Z.astype(float))
     limits = np.quantile(expected, [0.2, 0.7], axis=0).T
     proven = bounds(estimator, np.stack([Z.min(axis=0), Z.max(axis=0)], axis=1))
@@ -208,44 +185,41 @@ def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     np.testing.assert_allclose(sound, free, rtol=2.0 * np.finfo(Z.dtype).eps)
 
 
-@pytest.mark.parametrize("end", [0.1, 0.3, 0.7])
-def test_limits_that_were_asked_for_hold_in_single_precision(end):
+@pytest.mark.theory
+@needs_compiler
+@pytest.mark.parametrize(("scale", "offset"), [(1e4, 1.7e9), (1e-12, 0.0), (1e12, 0.0)])
+def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, tmp_path):
+    # A float has steps of 128 at 1.7e9, where the inputs have a range of 6e6.
     X, y = surface()
-    model = quick(n_mfs=1).fit(X, y).model_
-    told = TargetRange(*np.array([[-2.0], [2.0], [1.0]]), *np.array([[-end], [end]]))
-    numbers = Numbers.of(replace(model, target=told), np.float32)
-    for side, found in ((-1.0, numbers.output_low), (1.0, numbers.output_high)):
-        assert 0.0 <= end - side * float(found[0]) <= np.spacing(np.float32(end))
-
-
-@pytest.mark.parametrize(
-    ("saturate", "message"),
-    [
-        ([(0.0, 1.0)] * 2, r"each of the 1 outputs, .* array of shape \(2, 2\)"),
-        ([(1.0, 0.0)], "must be finite, each low below its high"),
-        ([(0.0, np.inf)], "must be finite, each low below its high"),
-    ],
-)
-def test_what_are_no_limits_is_refused(saturate, message):
-    estimator = quick(n_mfs=1).fit(*surface())
-    with pytest.raises(ValueError, match=message):
-        export_c(estimator, name="m", saturate=saturate)
+    X = (offset + X * scale).astype(np.float32).astype(float)
+    estimator = quick(n_mfs=3).fit(X, y / scale)
+    code = export_c(estimator, name="m", dtype="float", min_coverage=None)
+    found, status = answers_of(code, X.astype(np.float32), tmp_path)
+    assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-6 * np.abs(y / scale).max()
+    assert (status == STATUS["IN_RANGE"]).all()
 
 
 @pytest.mark.theory
 @needs_compiler
-def test_single_precision_bears_an_offset(tmp_path):
-    # Time stamps: a float has steps of 128 there, the inputs a range of 3e6.
-    X, y = surface()
-    X[:, 0] = 1.7e9 + 1e4 * X[:, 0]
-    X = X.astype(np.float32).astype(float)
-    estimator = quick(n_mfs=3).fit(X, y + 1e4)
-    Z = X.astype(np.float32)
-    code = export_c(estimator, name="m", dtype="float", min_coverage=None)
-    found, status = answers_of(code, Z, tmp_path)
-    # All that is lost is the last digit of 1e4.
-    assert np.abs(found[:, 0] - estimator.predict(X)).max() < 2 * np.spacing(np.float32(1e4))
-    assert (status == STATUS["IN_RANGE"]).all()
+@pytest.mark.parametrize("dtype", TOLERANCE)
+def test_corner_and_feet_on_an_edge_of_the_box_stay_there(dtype, tmp_path):
+    # Neither 0.1 nor 0.7 is a float, and the slope jumps there: answers are those on the box as it
+    # is rounded.
+    corners = np.array([[0.1, 0.4, 0.7], *np.log([[0.3] * 3] * 2)])
+    antecedent = GridAntecedent((TermGroup(Triangular, np.zeros(3, dtype=int), corners),), (3,))
+    model = quick(n_mfs=3).fit(np.linspace(0.1, 0.7, 50)[:, None], np.arange(50.0)).model_
+    model = replace(
+        model,
+        antecedent=antecedent,
+        coefficients=np.array([[[1.0], [2.0]], [[5.0], [-3.0]], [[2.0], [7.0]]]),
+        minimum=np.array([0.1]),
+        maximum=np.array([0.7]),
+    ).with_out_of_bounds("linear", 3.0)
+    X = np.linspace(-0.5, 1.5, 500)[:, None].astype(NUMPY[dtype])
+    code = export_c(model, name="m", dtype=dtype, min_coverage=None)
+    found, _ = answers_of(code, X, tmp_path)
+    wanted = Numbers.of(model, NUMPY[dtype]).model.predict(X.astype(float))
+    assert np.abs(found - wanted).max() < TOLERANCE[dtype] * np.abs(wanted).max()
 
 
 @pytest.mark.theory
@@ -268,45 +242,27 @@ def test_row_that_is_not_finite_gets_no_answer(tmp_path):
 
 @pytest.mark.theory
 @needs_compiler
-def test_largest_numbers_are_answered(tmp_path):
+@pytest.mark.parametrize("dtype", TOLERANCE)
+def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
     X, y = surface()
-    model = quick(n_mfs=2, mf="bell", solver="lse").fit(X, y).model_
-    Z = np.array([[1.0, -1.0, 1.0]]) * [[1e100], [1e150], [np.finfo(float).max]]
-    codes = [
-        export_c(model.with_out_of_bounds(policy), name=policy) for policy in ("clip", "linear")
-    ]
-    # The tangent of the largest number there is overflows.
-    sizes = {"clip": 3, "linear": 2}
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [1, 1])
-    for (policy, n_rows), (found, status) in zip(sizes.items(), answers, strict=True):
-        wanted = model.with_out_of_bounds(policy).predict(Z[:n_rows])
-        np.testing.assert_allclose(found[:n_rows], wanted, rtol=1e-10)
-        assert (status[:n_rows] == STATUS["OUT_OF_RANGE"] + STATUS["UNCOVERED"]).all()
-
-
-@pytest.mark.theory
-@needs_compiler
-def test_constant_and_lone_columns(tmp_path):
-    X, y = surface()
-    X[:, 1] = 20.0
-    with pytest.warns(ConstantInputWarning):
-        estimator = quick(n_mfs=[3, 1, 2]).fit(X, y)
-    code = export_c(estimator, name="m", min_coverage=None)
-    found, _ = answers_of(code, X, tmp_path)
-    np.testing.assert_allclose(found[:, 0], estimator.predict(X), rtol=1e-11, atol=1e-11)
-
-
-@pytest.mark.theory
-@needs_compiler
-@pytest.mark.parametrize("scale", [1e-12, 1e12])
-def test_units_do_not_matter_to_single_precision(scale, tmp_path):
-    X, y = surface()
-    X, y = (X * scale).astype(np.float32).astype(float), y / scale
-    estimator = quick(n_mfs=2).fit(X, y)
-    found, _ = answers_of(
-        export_c(estimator, name="m", dtype="float"), X.astype(np.float32), tmp_path
-    )
-    assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-5 * np.abs(y).max()
+    largest = np.finfo(NUMPY[dtype]).max
+    signs = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
+    Z = np.vstack([signs * size for size in (1e30, 1e-3 * largest, largest)]).astype(NUMPY[dtype])
+    endless = {"out_of_bounds": LinearExtrapolation(np.inf), "solver": "lse"}
+    plane = quick(n_mfs=1, **endless).fit(X, y)
+    models = [plane, *(quick(n_mfs=3, mf=mf, **endless).fit(X, y) for mf in MEMBERSHIPS)]
+    codes = [export_c(m, name=f"m{k}", dtype=dtype) for k, m in enumerate(models)]
+    answers = evaluate_all(codes, Z, tmp_path, "c99", [1] * len(codes))
+    beyond = (Z != 0.0).any(axis=1)
+    for found, status in answers:
+        assert np.isfinite(found).all()
+        assert (status[beyond] == STATUS["OUT_OF_RANGE"] + STATUS["UNCOVERED"]).all()
+    # Of a plane, what it is in exact arithmetic.
+    value, *slopes = map(Fraction, plane.model_.consequents[0, :, 0])
+    for row, (found,) in zip(Z, answers[0][0], strict=True):
+        parts = [slope * Fraction(float(x)) for slope, x in zip(slopes, row, strict=True)]
+        exact = min(max(value + sum(parts), -Fraction(float(largest))), Fraction(float(largest)))
+        assert abs(Fraction(float(found)) - exact) <= 1e-5 * float(max(map(abs, [value, *parts])))
 
 
 @pytest.mark.parametrize(
@@ -358,68 +314,6 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 
 
 @pytest.mark.theory
-@needs_compiler
-@pytest.mark.parametrize("case", FEWEST[::5], ids=lambda case: case.label)
-def test_functions_of_the_library_are_called_as_often_as_reported(case, tmp_path):
-    model = case.model.with_out_of_bounds("clip")
-    code = export_c(model, tmp_path / "m", min_coverage=None)
-    *counted, roots = counted_calls(tmp_path)
-    assert roots == 0
-    reported = [code.cost.exponentials, code.cost.logarithms]
-    flat = any(name in case.label for name in ("triang", "trapez", "_shaped"))
-    if flat:
-        # No term needs its exponential where mu is exactly zero or one.
-        assert all(c <= r for c, r in zip(counted, reported, strict=True))
-    else:
-        assert counted == reported
-    # Coverage that cannot be reached asks every rule that has data.
-    cost = export_c(model, tmp_path / "m", min_coverage=1.0).cost
-    exponentials, _, roots = counted_calls(tmp_path)
-    assert cost.coverage_exponentials == cost.coverage_square_roots
-    assert cost.coverage_square_roots == 1 + np.count_nonzero(model.support.share)
-    assert 0 < roots <= cost.coverage_square_roots
-    assert exponentials == counted[0] + roots or flat
-
-
-def counted_calls(folder):
-    """The most calls of exp, log and sqrt by m_predict over rows in the box."""
-    (folder / "count.c").write_text(
-        """
-#include <stdio.h>
-#include <math.h>
-static int exponentials, logarithms, roots;
-static double counted_exp(double u) { ++exponentials; return exp(u); }
-static double counted_log(double u) { ++logarithms; return log(u); }
-static double counted_sqrt(double u) { ++roots; return sqrt(u); }
-#define sqrt counted_sqrt
-#define exp counted_exp
-#define log counted_log
-#include "m.c"
-int main(void)
-{
-    double x[M_N_INPUTS], y[M_N_OUTPUTS];
-    int i, k, most_exp = 0, most_log = 0, most_roots = 0;
-    for (k = 0; k < 100; ++k) {
-        for (i = 0; i < M_N_INPUTS; ++i) {
-            x[i] = m_low[i] + (m_high[i] - m_low[i]) * 0.01 * ((k * (7 + 6 * i)) % 100 + 0.5);
-        }
-        exponentials = logarithms = roots = 0;
-        m_predict(x, y);
-        most_exp = exponentials > most_exp ? exponentials : most_exp;
-        most_log = logarithms > most_log ? logarithms : most_log;
-        most_roots = roots > most_roots ? roots : most_roots;
-    }
-    printf("%d %d %d", most_exp, most_log, most_roots);
-    return 0;
-}
-""",
-        encoding="ascii",
-    )
-    gcc(["-std=c99", "count.c", "-o", "count", "-lm"], folder)
-    return [int(word) for word in run(["./count"], folder).stdout.split()]
-
-
-@pytest.mark.theory
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
 @pytest.mark.parametrize("dtype", ["float", "double"])
 def test_files_are_cpp_too(dtype, tmp_path):
@@ -442,9 +336,9 @@ def test_grid_takes_an_exponential_per_term():
     # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value.
     assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3)
     assert cost.divisions == 2
-    # Two standard deviations; per rule three entries of a factor, two squares, and five more.
+    # Per rule three entries of a factor, two squares, and five more.
     known = 1 + np.count_nonzero(model.model_.support.share)
-    assert cost.coverage_multiply_adds == 2 + known * (3 + 2 + 5)
+    assert cost.coverage_multiply_adds == known * (3 + 2 + 5)
     assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
 
 
@@ -472,17 +366,6 @@ def far_off(mf, seed, offset=1e4):
     y = np.sin(2.0 * X[:, 0]) + X[:, 1] ** 2
     model = quick(3, mf=mf, out_of_bounds="linear", max_iter=5)
     return model.fit(X + offset, y), X + offset
-
-
-@pytest.mark.theory
-@needs_compiler
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-def test_float_self_test_bears_inputs_far_from_zero(tmp_path):
-    models = [far_off(mf, place % 2)[0] for place, mf in enumerate(MEMBERSHIPS)]
-    codes = [export_c(m, name=f"m{k}", dtype="float") for k, m in enumerate(models)]
-    # It begins with the self-test of each.
-    row = np.full((1, 2), 1e4, np.float32)
-    evaluate_all(codes, row, tmp_path, "c99", [1] * len(codes), flags=[])
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
@@ -545,8 +428,6 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
     [
         ({}, "name=None takes the name from path"),
         ({"name": "2x"}, "name='2x' must be a C identifier"),
-        ({"name": "a b"}, "must be a C identifier"),
-        ({"name": "_x"}, "must be a C identifier"),
         ({"name": "grün"}, "must be a C identifier"),
         ({"name": "x\n"}, "must be a C identifier"),
         ({"name": 3}, "must be a C identifier"),
@@ -555,14 +436,13 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
         ({"name": "x" * 17}, "has 17 characters; with 16 or fewer"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
         ({"path": 'a"b', "name": "m"}, "path ends in 'a\"b'"),
-        ({"path": ".."}, r"path ends in '\.\.'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
-        ({"name": "m", "dtype": np.float32}, "must be one of 'double', 'float'"),
         ({"name": "m", "std": "c11"}, "std='c11' must be one of 'c99', 'c89'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
-        ({"name": "m", "min_coverage": 1.5}, r"min_coverage=1\.5 must be"),
         ({"name": "m", "min_coverage": np.nan}, "min_coverage=nan must be"),
         ({"name": "m", "min_coverage": "0.5"}, "min_coverage='0.5' must be"),
+        ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, r"each of the 1 outputs, .* shape \(2, 2\)"),
+        ({"name": "m", "saturate": [(1.0, 0.0)]}, "must be finite, each low below its high"),
     ],
 )
 def test_bad_argument(arguments, message):
@@ -621,33 +501,6 @@ def test_limit_of_zero_is_clip_and_the_header_says_the_limit():
         code = export_c(model.with_out_of_bounds("linear", limit), name="m")
         assert words in " ".join(code.header.replace("*", "").split())
         assert ("m_tangent" in code.source) is (limit > 0.0)
-        assert ("m_reach" in code.source) is (limit == 0.25)
-
-
-@pytest.mark.theory
-@needs_compiler
-@pytest.mark.parametrize("dtype", ["double", "float"])
-def test_rows_on_a_thin_diagonal_are_covered_and_its_corners_are_not(dtype, tmp_path):
-    g = np.random.default_rng(0)
-    along = g.uniform(-1.0, 1.0, 600)
-    X = np.column_stack([along, along + 0.02 * g.normal(size=600)]) * [1e3, 1e-3] + [5e5, 0.0]
-    estimator = quick(n_mfs=[3, 1]).fit(X, np.sin(3.0 * along))
-    Z = around(X, np.float32 if dtype == "float" else np.float64)
-    Z = np.vstack([Z, X.astype(Z.dtype)])
-    limits = [0.05, 0.5, 0.95]
-    codes = [
-        export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=limit)
-        for place, limit in enumerate(limits)
-    ]
-    coverage = estimator.coverage(Z.astype(float))
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [1, 1, 1], flags=[])
-    for min_coverage, (_, status) in zip(limits, answers, strict=True):
-        sure = np.abs(coverage - min_coverage) > 1e-3
-        uncovered = (status & STATUS["UNCOVERED"]) > 0
-        np.testing.assert_array_equal(uncovered[sure], (coverage < min_coverage)[sure])
-        # Where rules share a row, one with little say may have it beyond its own.
-        assert uncovered[-600:].mean() < (0.2 if min_coverage > 0.9 else 1e-9)
-        assert uncovered[:-600].mean() > 0.3
 
 
 def test_rules_that_have_seen_no_data_are_not_called_uncovered():

@@ -130,10 +130,8 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
         ("gaussmf", [1.0], "gaussmf takes 2 parameters, found 1"),
         ("gaussmf", [0.0, 1.0], "width 0, which must be between 1e-50 and 1e"),
         ("gbellmf", [1.0, 0.0, 0.0], "b must be positive"),
-        ("gbellmf", [1.0, -2.0, 0.0], "b must be positive"),
         ("trimf", [0.0, -1.0, 1.0], "ascending order"),
         ("trimf", [0.0, 0.0, 1.0], r"vertical flank within its input's Range \[-4 4\]"),
-        ("trimf", [-1.0, 0.0, 0.0], "vertical flank"),
         ("trimf", [-4.0, -4.0, -4.0], "vertical flank"),
         ("trapmf", [0.0, 2.0, 1.0, 3.0], "ascending order"),
         ("pimf", [0.0, 0.0, 1.0, 2.0], "vertical flank"),
@@ -142,11 +140,9 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
         ("smf", [1.0, 1.0], "ascending order"),
         ("zmf", [2.0, 1.0], "ascending order"),
         ("dsigmf", [1.0, 0.0, 2.0, 1.0], "must be the same and not zero"),
-        ("dsigmf", [0.0, 0.0, 0.0, 1.0], "must be the same and not zero"),
         ("dsigmf", [1.0, 1.0, 1.0, 0.0], "rises at 1, not before it falls at 0"),
         ("psigmf", [1.0, 0.0, 2.0, 1.0], "one must be positive and one negative"),
         ("psigmf", [1.0, 1.0, -1.0, 1.0], "rises at 1, not before it falls at 1"),
-        ("psigmf", [1e-300, 0.0, -1.0, 1.0], "must be between"),
     ],
 )
 def test_refuses(name, parameters, message):

@@ -1,10 +1,9 @@
 """Programs that are not ours read our .fis files and compute what the model predicts.
 
 fuzzylite is Debian's libfuzzylite; where it is not installed, its package is downloaded by apt-get
-and unpacked, for which nobody needs to be root. Octave is used where it is there.
+and unpacked, for which nobody needs to be root.
 """
 
-import os
 import shutil
 import subprocess
 import sys
@@ -36,10 +35,6 @@ library = ctypes.CDLL(sys.argv[1])
 ctypes.c_double.in_dll(library, "_ZN2fl9fuzzylite8_machepsE").value = 0.0
 words = [word.encode() for word in sys.argv[1:]]
 sys.exit(library._ZN2fl7Console4mainEiPPKc(len(words), (ctypes.c_char_p * len(words))(*words)))
-"""
-OCTAVE = """
-pkg load fuzzy-logic-toolkit
-dlmwrite("out.txt", evalfis(dlmread("in.txt"), readfis("model.fis")), "precision", "%.17g");
 """
 
 
@@ -92,30 +87,6 @@ def _run(command, folder):
     return done.returncode == 0
 
 
-@pytest.fixture(scope="session")
-def octave():
-    """A function of a .fis file and rows: outputs by Octave, (n_rows, n_outputs)."""
-    program = shutil.which("octave-cli")
-    if program is None or not _run([program, "--eval", "pkg load fuzzy-logic-toolkit"], "/"):
-        pytest.skip(
-            "Octave has not checked the .fis files: it or its fuzzy toolkit is not installed. On "
-            "Debian or Ubuntu: apt-get install octave octave-fuzzy-logic-toolkit."
-        )
-
-    def evaluate(path, rows):
-        folder = path.parent
-        shutil.copy(path, folder / "model.fis")
-        np.savetxt(folder / "in.txt", rows, fmt="%.17g")
-        # Octave draws nothing here; some builds complain where they cannot.
-        environment = {**os.environ, "DISPLAY": ""}
-        subprocess.run(
-            [program, "--quiet", "--eval", OCTAVE], cwd=folder, env=environment, check=False
-        )
-        return np.loadtxt(folder / "out.txt", delimiter=",", ndmin=2).reshape(len(rows), -1)
-
-    return evaluate
-
-
 def difference(outputs, model, rows):
     """Largest difference from the model in full scales of each output (1 of a constant one)."""
     expected = model.predict(rows)
@@ -166,20 +137,3 @@ def test_we_read_what_fuzzylite_writes(fuzzylite, tmp_path):
     fuzzylite(*files, "-if", "fis", "-of", "fis")
     read = read_fis(tmp_path / "theirs.fis")
     assert_allclose(read.predict(rows), model.predict(rows), rtol=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("mf", ["gaussian", "trapezoidal", "sigmoid_product"])
-def test_octave_agrees(mf, octave, tmp_path):
-    model, rows = trained(mf)
-    write_fis(model, tmp_path / "trained.fis")
-    assert difference(octave(tmp_path / "trained.fis", rows), model, rows) < TOLERANCE[mf]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [name for name in MODELS if name.startswith("scattered,")])
-def test_octave_agrees_on_scattered_rules(kind, octave, tmp_path):
-    model = MODELS[kind]
-    rows = rows_of(model, 1.0, N_ROWS)
-    write_fis(model, tmp_path / "trained.fis")
-    assert difference(octave(tmp_path / "trained.fis", rows), model, rows) < 1e-10

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
-from skanfis.export import read_fis, write_fis
+from skanfis.export import read_fis
 from skanfis.export.fis.reader import parse_fis
-from skanfis.learning import VariableProjection
 
 from .fis_files import BY_HAND, with_line
 from .mutations import mutated, seeds
@@ -61,13 +59,6 @@ def test_means_what_was_written_by_hand():
     assert model.out_of_bounds == "clip"
 
 
-def test_knows_nothing_of_data():
-    model = parse_fis(BY_HAND)
-    assert_array_equal(model.coverage(np.array([[1.0, 0.0]])), 0.0)
-    assert_allclose(model.rule_weights, 1 / 3)
-    assert_allclose(model.spread, [10 / np.sqrt(12), 2 / np.sqrt(12)])
-
-
 @pytest.mark.parametrize(
     ("n_terms", "rules", "kind"),
     [
@@ -108,28 +99,6 @@ def test_terms_of_a_grid_stay_in_order_else_rules_are_listed():
     assert type(parse_fis(mixed).antecedent) is RuleTableAntecedent
 
 
-def test_names_that_stand_twice_are_numbered():
-    text = system([2, 2], [(1, 1), (2, 2)]).replace("'t2'", "'t1'").replace("'x1'", "'x0'")
-    model = parse_fis(text)
-    assert model.input_names == ("x0", "x0 (2)")
-    assert model.term_names == ("t1", "t1", "t1 (2)", "t1 (2)")
-
-
-@pytest.mark.parametrize("end", ["\r\n", "\r"])
-def test_line_ends_of_other_systems(end):
-    rows = np.array([[2.0, 0.5]])
-    expected = parse_fis(BY_HAND).predict(rows)
-    assert_array_equal(parse_fis(BY_HAND.replace("\n", end)).predict(rows), expected)
-
-
-def test_sections_and_keys_may_stand_in_any_order():
-    blocks = BY_HAND.split("\n\n")
-    blocks[1] = "\n".join([blocks[1].split("\n")[0], *blocks[1].split("\n")[:0:-1]])
-    rows = np.array([[2.0, 0.5]])
-    expected = parse_fis(BY_HAND).predict(rows)
-    assert_array_equal(parse_fis("\n\n".join(blocks[::-1])).predict(rows), expected)
-
-
 REFUSED = [
     # the system
     ("Type=", "Type='mamdani'", "'mamdani': only Sugeno systems are supported"),
@@ -137,16 +106,13 @@ REFUSED = [
     ("DefuzzMethod=", "DefuzzMethod='wtsum'", "only the weighted average"),
     ("AndMethod=", "AndMethod='min'", "only the product"),
     ("NumInputs=", "NumInputs=two", "a whole number, found 'two'"),
-    ("NumInputs=", "NumInputs=-1", "a whole number"),
     ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
     ("NumInputs=", "NumInputs=0", "0 is not between 1 and 1000"),
     ("NumRules=", "NumRules=999999999", "is not between 1 and 100000"),
-    ("NumRules=", f"NumRules={'9' * 5000}", "a whole number"),
     ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
     ("Version=", "Version 2.0", "key=value"),
     # names
-    ("Name='by hand'", "Name='by 'hand'", "single quotes"),
     ("Name='by hand'", "Name='by \N{BELL}\x07'", "cannot be printed"),
     ("Name='by hand'", "Name=__import__('os').abort()", "a name in single quotes"),
     # sections
@@ -156,40 +122,32 @@ REFUSED = [
     ("% A comment", "stray", r"expected \[System\]"),
     # variables
     ("Range=[0 10]", "Range=[10 0]", "low < high"),
-    ("Range=[0 10]", "Range=[0 0]", "low < high"),
-    ("Range=[0 10]", "Range=[0 10 20]", "low < high"),
     ("Range=[0 10]", "Range=[0 inf]", "a finite number, found 'inf'"),
-    ("Range=[0 10]", "Range=[0 nan]", "a finite number, found 'nan'"),
     ("Range=[0 10]", "Range=[0 1e999]", "beyond 1e"),
     ("Range=[0 10]", "Range=[0 1_0]", "a finite number"),
-    ("Range=[0 10]", "Range=[0 0x10]", "a finite number"),
     ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a finite number"),
     ("Range=[0 10]", "Range=0 10", r"expected \[low high\]"),
     ("Range=[-1, +1.0]", "Range=[-1,, 1]", "a finite number, found ''"),
     # membership functions
     ("MF1='low'", "MF1='low':'trimf',[2 2 8]", r"vertical flank within its input's Range \[0 10\]"),
     ("MF1='low'", "MF1='low':'sigmf',[1 2]", "'sigmf' is not supported"),
-    ("MF1='low'", "MF1='low':'os.system',[1 2]", "'os.system' is not supported"),
     ("MF1='low'", "MF1='low':'gaussmf',[1 2", "'name':'function'"),
     ("MF1='low'", "MF1='low':'gaussmf',[1 exp(2)]", "a finite number"),
     ("MF1='low'", "MF1='low':'gaussmf',[1e-60 2]", "must be between"),
     ("MF1='low'", "MF3='low':'gaussmf',[1 2]", None),
     ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' is not supported; constant"),
     ("MF1='flat'", "MF1='flat':'constant',[3 4]", "constant takes 1 parameters, found 2"),
-    ("MF2='sloped'", "MF2='sloped':'linear',[1 2]", "linear takes 3 parameters, found 2"),
     # rules
     ("1 1, 2 1", "1 1 1, 2 1 (1) : 1", "3 numbers for 2 inputs"),
     ("1 1, 2 1", "1 1, 2 (1) : 1", "1 numbers for 2 outputs"),
     ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight 0.5; only weight 1"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 2", r"by OR \(2\)"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 3", "the connection is 1 or 2"),
-    ("1 1, 2 1", "1 1, 2 1 () : 1", "the connection is 1 or 2"),
     ("1 1, 2 1", "1 1, 2 1", "expected a rule"),
     ("1 1, 2 1", "-1 1, 2 1 (1) : 1", "NOT, a negative number"),
     ("1 1, 2 1", "1.2 1, 2 1 (1) : 1", "hedges"),
     ("1 1, 2 1", "3 1, 2 1 (1) : 1", "3 for input 'x y', which has 2"),
     ("1 1, 2 1", "1 1, 0 1 (1) : 1", "0 for output 'u'"),
-    ("1 1, 2 1", "1 1, 2 9 (1) : 1", "9 for output 'v', which has 3"),
 ]
 
 
@@ -218,23 +176,6 @@ def test_refuses_with_the_line(old, new, message):
 def test_refuses_counts_that_do_not_agree(old, new, message):
     with pytest.raises(ValueError, match=message):
         parse_fis(with_line(old, new)[0])
-
-
-@pytest.mark.parametrize(
-    "text", ["", "\n\n", "% only a comment", "[System]", "[Rules]\n1, 1 (1) : 1"]
-)
-def test_refuses_next_to_nothing(text):
-    with pytest.raises(ValueError, match=r"line \d"):
-        parse_fis(text)
-
-
-def test_one_condition_needs_no_and(rng):
-    rules = [(1, 0), (0, 2)]
-    text = system([2, 2], rules).replace("'prod'", "'min'").replace(": 1", ": 2")
-    rows = rng.uniform(0.0, 4.0, (5, 2))
-    assert_array_equal(
-        parse_fis(text).predict(rows), parse_fis(system([2, 2], rules)).predict(rows)
-    )
 
 
 def test_says_which_file(tmp_path):
@@ -268,11 +209,6 @@ def test_takes_names_of_columns(tmp_path):
     for names in (["time"], ["time", "time"], ["a", "b", "c"]):
         with pytest.raises(ValueError, match="must be 2 different names"):
             read_fis(path, input_names=names)
-
-
-def test_missing_file_is_the_systems_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        read_fis(tmp_path / "none.fis")
 
 
 def test_refuses_a_large_file_without_reading_it(tmp_path):
@@ -330,18 +266,6 @@ def test_long_lines_take_no_long_time(line):
     assert time.process_time() - start < 1.0
 
 
-@pytest.mark.parametrize(
-    "rule",
-    ["1 1" + " " * 10**6 + "1 1", "1 " * 5 * 10**5, "1 1, 2 1 (" + "(" * 10**6, ":" * 10**6],
-    ids=lambda rule: rule[:20],
-)
-def test_long_rules_take_no_long_time(rule):
-    start = time.process_time()
-    with pytest.raises(ValueError, match=r"line \d+: "):
-        parse_fis(with_line("1 1, 2 1", rule)[0])
-    assert time.process_time() - start < 1.0
-
-
 def test_what_an_error_shows_of_the_file_is_short_and_ascii():
     text, _ = with_line("Type=", "Type='\N{RIGHT-TO-LEFT OVERRIDE}" + "x" * 10_000 + "'")
     with pytest.raises(ValueError, match="cannot be printed") as caught:
@@ -362,32 +286,6 @@ def test_what_an_error_shows_of_the_file_is_short_and_ascii():
             parse_fis(text.replace("2 0, 2 3", "9 9, 2 3"))
         assert str(caught.value).isascii()
         assert len(str(caught.value)) < 400
-
-
-@pytest.mark.parametrize(
-    "rules",
-    [
-        [(1, 1), (1, 2), (2, 1), (2, 2)],
-        [(1, 1), (2, 2)],
-        [(1, 0), (0, 2), (2, 1)],
-    ],
-    ids=["grid", "scattered", "table"],
-)
-def test_training_goes_on_from_a_file_and_back(rules, tmp_path, rng):
-    prior = parse_fis(system([2, 2], rules))
-    X = rng.uniform(0.0, 4.0, (200, 2))
-    y = np.sin(X[:, 0]) * X[:, 1]
-    weights = {"agreement": 1e-3, "alpha": 1e-6}
-    estimator = ANFISRegressor(
-        partition=prior, solver=VariableProjection(stiffness=1e-3), **weights
-    ).fit(X, y)
-    write_fis(estimator, tmp_path / "trained.fis")
-    trained = read_fis(tmp_path / "trained.fis")
-    assert type(trained.antecedent) is type(prior.antecedent)
-    assert_allclose(trained.predict(X)[:, 0], estimator.predict(X), atol=1e-12 * np.ptp(y))
-    again = ANFISRegressor(partition=trained, solver="lse", **weights).fit(X, y)
-    # The same premises: the consequents differ by what the penalty leaves open.
-    assert_allclose(again.predict(X), estimator.predict(X), atol=1e-4 * np.ptp(y))
 
 
 @pytest.mark.theory

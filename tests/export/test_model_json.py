@@ -13,13 +13,10 @@ from skanfis import ANFISRegressor
 from skanfis.export import export_json, read_json, write_json
 from skanfis.export.json_reader import parse_json
 from skanfis.inspection import export_text
-from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
-from skanfis.policies import OUT_OF_BOUNDS
 
-from .. import oracles
 from .json_mutations import mutated_numbers, with_number
-from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
@@ -59,35 +56,6 @@ def test_comes_back_to_the_last_bit(model):
     rows = rows_of(model, 1.3)
     assert_array_equal(read.predict(rows), model.predict(rows))
     assert_array_equal(read.coverage(rows), model.coverage(rows))
-
-
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-def test_every_family_comes_back(family, rng):
-    model = build(oracles.random_grid(rng, [family] * 2, (3, 2), (0, 2)))
-    assert_same(parse_json(export_json(model)), model)
-
-
-@pytest.mark.parametrize("policy", OUT_OF_BOUNDS)
-def test_policy_comes_back(policy):
-    assert parse_json(export_json(replace(A_GRID, out_of_bounds=policy))).out_of_bounds == policy
-
-
-@pytest.mark.parametrize("limit", [0.0, 0.1, 3.0, np.inf])
-def test_limit_of_the_tangent_comes_back(limit):
-    model = A_GRID.with_out_of_bounds("linear", limit)
-    assert parse_json(export_json(model)).max_extrapolation == limit
-
-
-def test_a_model_that_knows_of_no_data_stays_one():
-    model = replace(A_GRID, support=None)
-    read = parse_json(export_json(model))
-    assert read.support is None
-    assert_array_equal(read.coverage(rows_of(model, 1.0)), 0.0)
-
-
-def test_names_of_all_kinds_come_back():
-    names = ('"quoted"\n', "Temperatur in °C", "</script>")
-    assert parse_json(export_json(replace(A_GRID, input_names=names))).input_names == names
 
 
 def test_file_of_a_trained_model(tmp_path, rng):
@@ -133,16 +101,13 @@ REFUSED = [
     (_set("format", "pickle"), "not a model of skanfis"),
     (_set("version", 0), '"version" is 0'),
     (_set("version", True), '"version" is True'),
-    (_set("version", 1.0), '"version" is 1.0'),
     (_set("more", 1), "the file has the unknown key 'more'"),
     (lambda d: d.pop("rules"), "the file has no 'rules'"),
     (_set("out_of_bounds", "wrap"), "out_of_bounds is 'wrap'"),
-    (_set("out_of_bounds", ["clip"]), "out_of_bounds is"),
     (_set("outputs", []), "outputs: .* is not a list of 1 or more"),
     (_set("outputs", [1, 2]), r"outputs\[0\] is 1, not an object"),
     (_set("outputs", 0, "name", 1), r"outputs\[0\]: 1 is not a name"),
     (_set("outputs", 0, "spread", 0.0), r"outputs\[0\]\.spread: 0\.0 is not a number from"),
-    (_set("outputs", 0, "minimum", 3.0), r"outputs\[0\]: minimum is above maximum"),
     (_set("outputs", 0, "minimum", None), r"outputs\[0\]\.minimum: None is not a number"),
     (
         lambda d: d["outputs"][0].update(dict.fromkeys(d["outputs"][0], None) | {"name": "y"}),
@@ -153,44 +118,30 @@ REFUSED = [
     (_set("outputs", 0, "lower", 1.6), r"outputs\[0\]: nothing from minimum to maximum is within"),
     (_set("outputs", 1, "upper", -1.1), r"outputs\[1\]: nothing from minimum to maximum is within"),
     (lambda d: d["outputs"].pop(), r'"consequents" of rules\[0\] must be one list per output'),
-    (_set("inputs", {}), "inputs: .* is not a list"),
-    (_set("inputs", 0, []), r"inputs\[0\] is \[\], not an object"),
     (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),
     (_set("max_extrapolation", -1), "max_extrapolation: -1 is not a number from 0"),
-    (_set("max_extrapolation", "inf"), "max_extrapolation: 'inf' is not a number"),
-    (lambda d: d.pop("max_extrapolation"), "the file has no 'max_extrapolation'"),
     (_set("support", []), "support: .* is not a list of 1 or more"),
     (lambda d: d["support"].pop(), "support has 11 entries; the model has 12 rules"),
     (_set("support", 2, "share", 1.5), r"support\[2\]\.share: 1\.5 is not a number from 0 to 1"),
     (_set("support", 2, "radius", -0.1), r"support\[2\]\.radius: -0\.1 is not a number from 0"),
-    (_set("support", 0, "center", [0.0]), "must be lists of 3 and 6 numbers"),
-    (_set("support", 0, "factor", [0.0] * 9), "must be lists of 3 and 6 numbers"),
-    (_set("support", 0, "factor", ["0"] * 6), "'0' is not a number"),
-    (_set("support", 0, "more", 1), r"support\[0\] has the unknown key"),
-    (_set("inputs", 0, "spread", -1), r"inputs\[0\]\.spread: -1 is not a number from 1e-50"),
+    (_set("support", 0, "center", [0.0]), r"support\[0\]\.center: \[0\.0\] is not a list of 3"),
+    (_set("support", 0, "factor", [0.0] * 9), "is not a list of 6"),
     (_set("inputs", 0, "spread", 0.0), r"inputs\[0\]\.spread: 0.0 is not a number from"),
     (_set("inputs", 0, "name", None), "None is not a name"),
-    (_set("inputs", 0, "reference", "0"), "'0' is not a number"),
     (_set("inputs", 0, "reference", 1e60), "not a number of size up to 1e"),
-    (_set("inputs", 0, "reference", 10**4000), "not a number of size up to 1e"),
     (_set("inputs", 0, "reference", True), "True is not a number"),
-    (_set("terms", 0, "function", "gauss"), r'terms\[0\] has no "function" among gaussian'),
     (_set("terms", 0, "function", ["bell"]), r'terms\[0\] has no "function" among gaussian'),
-    (_set("terms", 0, 3), r'terms\[0\] has no "function"'),
     (_set("terms", 0, "function", "bell"), r"terms\[0\] has no 'log_width'|'log_slope'"),
     (_set("terms", 0, "input", 3), r"is not a whole number from 0 to 2"),
-    (_set("terms", 0, "input", -1), r"is not a whole number from 0 to 2"),
     (_set("terms", 0, "input", 1), "rules are not those"),
     (_set("terms", 0, "log_width", 200.0), "not a number of size up to 115"),
     (_set("terms", 0, "before_training", {}), r'"before_training" of terms\[0\] has no'),
     (_set("terms", 0, "extra", 1), r"terms\[0\] has the unknown key 'extra'"),
     (_set("rule_base", "tree"), "\"rule_base\" is 'tree'"),
-    (_set("rule_base", ["grid"]), '"rule_base" is'),
     (_set("rule_base", "scattered"), 'the rules are not those of "rule_base": "scattered"'),
     (_set("rules", 0, "terms", [0, 2, 6]), 'the rules are not those of "rule_base": "grid"'),
     (_set("rules", 0, "terms", [0, 2]), "other numbers of terms"),
     (_set("rules", 0, "terms", [0, 2, 99]), "99 is not a whole number from -1 to 6"),
-    (_set("rules", 0, "terms", [0, 2, -2]), "-2 is not a whole number"),
     (_set("rules", 0, "terms", [0, 2, 5.0]), "5.0 is not a whole number"),
     (_set("rules", 0, "weight", -0.1), r"rules\[0\]\.weight: -0.1 is not a number from 0 to 1"),
     (_set("rules", 0, "weight", 0.9), r"rules\[\]\.weight: the sum over all rules is 1\.\d+"),
@@ -203,12 +154,10 @@ REFUSED = [
         _set("terms", 0, "before_training", "center", 10**60),
         r"terms\[0\]\.before_training\.center: 10+\.\.\. is not a number of size up to",
     ),
-    (_set("rules", 0, "rows", None), "None is not a number"),
     (_set("rules", 0, "consequents", 0, [1.0, 2.0]), "of 1 or 4 numbers"),
     (_set("rules", 0, "consequents", 1, [1.0]), "other numbers of terms or coefficients"),
     (_set("rules", 1, "consequents", [[1.0], [1.0]]), "other numbers of terms or coefficients"),
     (lambda d: d["rules"].pop(), 'the rules are not those of "rule_base": "grid"'),
-    (_set("rules", []), "rules: .* is not a list of 1 or more"),
 ]
 
 
@@ -280,14 +229,6 @@ def test_refuses_a_rule_base_too_large_before_memory_is_asked_for():
         parse_json(changed(grow))
 
 
-def test_refuses_to_write_a_membership_of_the_users_own(rng):
-    class Own(Gaussian):
-        name = "own"
-
-    with pytest.raises(ValueError, match="'own' is not one of skanfis' own"):
-        export_json(build(oracles.random_grid(rng, [Own], [2], [0])))
-
-
 @pytest.mark.theory
 @pytest.mark.parametrize(("part", "kind"), [(0, "grid"), (1, "scattered"), (2, "rule table")])
 def test_no_number_that_is_read_makes_one_that_is_not_finite(part, kind):
@@ -313,17 +254,3 @@ def test_what_could_not_be_read_is_not_written():
     wide = replace(A_GRID, spread=np.array([1e-60, 1.0, 1.0]))
     with pytest.raises(ValueError, match=r"cannot be written .*: inputs\[0\]\.spread: 1e-60"):
         export_json(wide)
-
-
-@pytest.mark.theory
-def test_small_damage_is_never_anything_but_a_value_error(rng):
-    text = export_json(A_GRID)
-    for _ in range(2000):
-        spoilt = bytearray(text, "ascii")
-        for place in rng.integers(0, len(spoilt), rng.integers(1, 5)):
-            spoilt[place] = rng.integers(32, 127)
-        try:
-            model = parse_json(spoilt.decode())
-        except ValueError:
-            continue
-        assert np.isfinite(model.predict(rows_of(A_GRID, 1.0, 5))).all()

@@ -5,7 +5,7 @@ from itertools import islice
 
 import pytest
 
-from skanfis.gyro import _choice, _models, _results, _simpler
+from skanfis.gyro import _models, _results, _simpler
 
 from ..quick import quick
 
@@ -23,7 +23,7 @@ def coarse_report():
     """Pictures of few points, intervals of few resamples: both are looked at elsewhere."""
     every = _results.gyro_report
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skanfis.gyro._html._DOTS_PER_INCH", 30)
+        patch.setattr("skanfis.gyro._pictures._DOTS_PER_INCH", 30)
         patch.setattr(_results, "gyro_report", lambda *a, **o: every(*a, **{"n_resamples": 20} | o))
         yield
 
@@ -38,4 +38,4 @@ def few_rivals(monkeypatch):
 @pytest.fixture
 def law_of_degree_one(monkeypatch):
     """Nor is the degree of the law compared on every fold; that too is of test_calibration.py."""
-    monkeypatch.setattr(_choice, "_held_out_rms", lambda recipe, structure, *_: structure[0])
+    monkeypatch.setattr(_models, "_law_degree", lambda *_: 1)

@@ -84,21 +84,17 @@ class TestDeviation:
             assert line.deviation == pytest.approx(np.sqrt(np.mean(differences**2) / 2))
             assert line.error == pytest.approx(line.deviation / np.sqrt(line.n))
 
-    def test_white_noise_has_its_angle_random_walk(self, rng):
-        """A sample of white noise over h has the standard deviation N / sqrt(h)."""
-        n, interval = 0.05, 0.1
-        error = n / 60.0 / np.sqrt(interval) * rng.normal(size=2**16)
-        curve = allan_deviation(error, interval)
-        read = allan_coefficients(curve["averaging_time"], curve["deviation"])
-        assert read.angle_random_walk == pytest.approx(n, rel=0.05)
-
-    def test_random_walk_of_the_rate(self, rng):
-        """Steps of K sqrt(h) in the rate."""
-        k, interval = 3.0, 1.0
-        drift = k * np.sqrt(interval / HOUR) * rng.normal(size=2**16).cumsum()  # deg/h
-        curve = allan_deviation(drift / HOUR, interval)
-        read = allan_coefficients(curve["averaging_time"], curve["deviation"])
-        assert read.rate_random_walk == pytest.approx(k, rel=0.1)
+    def test_noise_has_its_coefficient(self, rng):
+        """White noise over h has the deviation N / sqrt(h); a random walk steps by K sqrt(h)."""
+        n, k, interval = 0.05, 3.0, 0.1
+        white, steps = rng.normal(size=(2, 2**16))
+        for error, name, value in (
+            (n / 60.0 / np.sqrt(interval) * white, "angle_random_walk", n),
+            (k * np.sqrt(interval / HOUR) * steps.cumsum() / HOUR, "rate_random_walk", k),
+        ):
+            curve = allan_deviation(error, interval)
+            read = allan_coefficients(curve["averaging_time"], curve["deviation"])
+            assert getattr(read, name) == pytest.approx(value, rel=0.1)
 
     def test_runs_are_not_joined(self, rng):
         """A step between two runs is no noise; their curve is the mean of the variances."""

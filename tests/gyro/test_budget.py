@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis.gyro._budget import budget_of, noise_within, scatter_between
+from skanfis.gyro._budget import budget_of, noise_within, proven_bounds, scatter_between
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._certain import certain_of
-from skanfis.gyro._option_types import box
+from skanfis.gyro._options import parse_box
 from skanfis.gyro._split import Split, choose_split
 from skanfis.gyro.command import main
 
@@ -87,7 +86,7 @@ def test_largest_compensation_of_a_line_is_that_of_its_corner():
         max_extrapolation=np.inf,
         box=(("temperature", -40.0, 85.0), ("output", -120.0, 150.0)),
     )
-    certain = certain_of(calibration)
+    certain = proven_bounds(calibration)
     # error = output - rate, as a line in temperature and output.
     corner = 150.0 - (150.0 - 0.005 - 2e-4 * 85.0) / 1.001
     assert certain.largest == pytest.approx(corner, rel=1e-3)
@@ -101,7 +100,7 @@ def test_largest_compensation_of_a_line_is_that_of_its_corner():
 def test_rate_goes_with_the_output_or_is_not_proven(unit, gain):
     """An axis mounted the other way round: its scale factor's sign is found of counts alone."""
     calibration = calibrated(lambda t: 1e-3 * t, gain=gain, output_unit=unit)
-    assert certain_of(calibration).rate_rises is (unit == "counts")
+    assert proven_bounds(calibration).rate_rises is (unit == "counts")
 
 
 def test_one_group_in_range_leaves_the_scatter_open():
@@ -118,7 +117,7 @@ def test_one_group_in_range_leaves_the_scatter_open():
 @pytest.mark.parametrize("text", ["temperature", "temperature=85", "t=85:-40", "t=a:b", "t=0:inf"])
 def test_box_that_is_none_is_refused(text):
     with pytest.raises(argparse.ArgumentTypeError, match="must be INPUT=LOW:HIGH"):
-        box(text)
+        parse_box(text)
 
 
 def test_command_takes_a_box_and_names_an_input_that_is_none(tmp_path, capsys):

@@ -15,7 +15,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
-from skanfis.gyro._ask import ask
+from skanfis.gyro._columns import ask
 
 from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from ..quick import quick
@@ -159,8 +159,7 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
     label, model, X = case
     # The text is the same but for the names of types, and for what policies do.
     flags = SANITIZE if dtype == "double" and label in ("everything", "rules_raise") else []
-    # Its deviation is held against Python's by the self-test.
-    options = {"dtype": dtype, "std": std, "min_coverage": MIN_COVERAGE, "deviation": True}
+    options = {"dtype": dtype, "std": std, "min_coverage": MIN_COVERAGE}
     code = export_c_physics(model, name="gyro", **options)
     rows = around(X).astype(real)
     used = [j for j, name in enumerate(X) if name != "unused"]

@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 from sklearn.model_selection import GroupKFold
 
+from skanfis.gyro import _calibration, _simpler
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._choice import choose, choose_in_folds
-from skanfis.gyro._headline import headline
-from skanfis.gyro._sections.instead import formula_of
+from skanfis.gyro._formulas import formula_of
+from skanfis.gyro._headline import errors_and_verdict, headline
+from skanfis.gyro._models import fit_model
 from skanfis.gyro._split import Split
-from skanfis.gyro._summary import errors_and_verdict
 
 pytestmark = pytest.mark.theory
 
@@ -35,11 +35,14 @@ def folds_of(log, n_folds=3):
     return list(GroupKFold(n_folds).split(log, groups=log["run"]))
 
 
-def calibrated(log, **options):
+def split_of(log, n_folds=3):
     labels = log["run"].astype(str).to_numpy(dtype=object)
-    split = Split("run", folds_of(log), labels, "runs held out")
+    return Split("run", folds_of(log, n_folds), labels, "runs held out")
+
+
+def calibrated(log, **options):
     recipe = Recipe(("temperature", "output"), **options)
-    return calibrate(log, split, recipe, lambda text: None)
+    return calibrate(log, split_of(log), recipe, lambda text: None)
 
 
 def law(temperature, rate):
@@ -78,12 +81,11 @@ def test_the_planted_truth_is_recommended(truth, request):
 
 
 @pytest.mark.floors
-def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended():
+def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(monkeypatch):
     log = log_of(law)
     log["time"] = np.tile(np.arange(N_ROWS) * 60.0, N_RUNS)
     log["output"] += 2e-6 * log["time"]
-    labels = log["run"].astype(str).to_numpy(dtype=object)
-    split = Split("run", folds_of(log, 4), labels, "held out")
+    split = split_of(log, 4)
     recipe = Recipe(("time", "temperature", "output"), terms=(1, 1, 1))
     calibration = calibrate(log, split, recipe, lambda text: None)
     verdict = calibration.verdict
@@ -91,6 +93,7 @@ def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended():
     # Law and line are fitted in turns: what is left is a little more than the noise.
     assert verdict.rms["arcsine law and a line"] < 0.5 * verdict.rms["arcsine law"]
     assert verdict.rms["arcsine law and a line"] < 3.0 * NOISE
+    monkeypatch.setattr(_simpler, "_kinds", lambda inputs: [])
     # The single rule of --physics --terms 1,1,1 is that line.
     alone = calibrate(log, split, replace(recipe, physics=True), lambda text: None)
     assert alone.verdict.rms["this model"] == pytest.approx(
@@ -139,53 +142,34 @@ def test_a_gyro_at_rest_has_no_law():
     assert "arcsine law" not in calibration.verdict.rms
 
 
-def test_what_a_fold_holds_out_has_no_say_in_its_structure():
-    """Whatever is done to the rows that a fold holds out, its structure stays the same."""
-    log = log_of(PLANTED["this model"][0])
-    X, y = log[["temperature"]], (log["output"] - log["rate"]).to_numpy()
-    recipe = Recipe(("temperature",), max_rules=2)
-    folds = folds_of(log, 3)
-    found = choose_in_folds(X, y, folds, recipe, lambda text: None)
-    assert max(choice.terms for choice in found) > (1,)
-    _, test = folds[1]
-    spoilt = y.copy()
-    spoilt[test] += 0.5 * np.sign(np.sin(log["temperature"].to_numpy()[test]))
-    again = choose_in_folds(X, spoilt, folds, recipe, lambda text: None)
-    assert again[1].terms == found[1].terms
-    assert dict(again[1].tried) == pytest.approx(dict(found[1].tried), rel=1e-9)
-    assert dict(again[0].tried) != pytest.approx(dict(found[0].tried), rel=1e-3)
-    assert choose_in_folds(X, y, folds, Recipe(("temperature",), terms=(2,)), print) is None
+@pytest.mark.usefixtures("few_rivals")
+def test_what_a_fold_holds_out_has_no_say_in_its_model(monkeypatch):
+    log = log_of(PLANTED["constant"][0])
+    split, seen = split_of(log), []
 
+    def spy(X, target, groups, recipe):
+        seen.append(X.index.to_numpy())
+        return fit_model(X, target, groups, recipe)
 
-def test_folds_without_a_row_in_range_do_not_choose_a_structure():
-    """Beside the run in the middle lie the coldest and the hottest: they hold out none in range."""
-    rng = np.random.default_rng(0)
-    middle = [20.0, 0.0, 25.0, 50.0, 30.0]
-    temperature = np.concatenate([center + rng.uniform(-12.0, 12.0, 120) for center in middle])
-    run = np.repeat(np.arange(5), 120)
-    X = pd.DataFrame({"temperature": temperature})
-    y = 0.3 * np.abs(temperature - 25.0) + 0.01 * rng.normal(size=run.size)
-    folds = [(np.flatnonzero(run != k), np.flatnonzero(run == k)) for k in (0, 1, 2, 4, 3)]
-    recipe = Recipe(("temperature",), max_rules=4)
-    found = choose_in_folds(X, y, folds, recipe, lambda text: None)
-    assert all(choice.terms > (1,) for choice in found)
-    assert all(np.isfinite(rms) for choice in found for _, rms in choice.tried)
-    # Of two runs apart, each is outside of the other: there is nothing to compare.
-    three = run < 3
-    apart = pd.DataFrame({"temperature": (temperature + 1e3 * run)[three]})
-    folds = folds_of(pd.DataFrame({"run": run[three]}), 3)
-    found = choose_in_folds(apart, y[three], folds, recipe, lambda text: None)
-    assert [choice.structure for choice in found] == [(1, None)] * 3
+    monkeypatch.setattr(_calibration, "fit_model", spy)
+    calibration = calibrate(log, split, Recipe(("temperature",), terms=(1,)), lambda text: None)
+    assert calibration.fold_choices is None
+    for rows, (train, _) in zip(seen[:-1], split.folds, strict=True):
+        np.testing.assert_array_equal(rows, train)
+    np.testing.assert_array_equal(seen[-1], log.index)
 
 
 @pytest.mark.floors
-def test_terms_are_for_what_the_law_leaves():
-    log, told = log_of(law), []
+def test_terms_and_degree_are_for_what_the_law_leaves():
+    log = log_of(law)
     X, rate = log[["temperature", "output"]], log["rate"].to_numpy()
-    recipe = Recipe(tuple(X), physics=True)
-    choice = choose(X, rate, folds_of(log), recipe, np.random.default_rng(0), told.append)
-    assert choice.structure == (1, (1, 1))
+    groups = log["run"].astype(str).to_numpy()
+    _, choice = fit_model(X, rate, groups, Recipe(tuple(X), physics=True))
+    assert (choice.degree, choice.terms) == (1, (1, 1))
     # That is the noise of the output, over the slope of a sine up to 0.8 rad.
     error = dict(choice.tried)[1, 1]
     assert error == pytest.approx(NOISE * np.sqrt(np.tan(0.8) / 0.8), rel=0.06)
-    assert f"terms 1,1: held-out RMS {error:.4g} deg/s" in told
+    # An amplitude that is curved in temperature.
+    curved = X.assign(output=X["output"] * (1 - 2e-5 * (X["temperature"] - 25.0) ** 2))
+    _, choice = fit_model(curved, rate, groups, Recipe(tuple(X), physics=True, terms=(1, 1)))
+    assert (choice.degree, choice.terms) == (2, (1, 1))

@@ -218,6 +218,16 @@ def test_a_base_that_refuses_training_rows_is_refused(data):
         ResidualRegressor(base, LinearRegression()).fit(X, rate)
 
 
+def test_a_fit_that_fails_leaves_both_parts_of_the_one_before(data):
+    X, rate = data
+    model = ResidualRegressor(OpenLoopArcsineRegressor(), LinearRegression()).fit(X, rate)
+    before = model.predict(X)
+    model.set_params(residual=LinearRegression(positive="no"))
+    with pytest.raises(ValueError, match="positive"):
+        model.fit(X, 2.0 * rate)
+    np.testing.assert_array_equal(model.predict(X), before)
+
+
 def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
     X, rate = data
     selected = make_pipeline(

@@ -82,13 +82,6 @@ def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     assert_allclose(rate, -0.02 * (1 - np.exp(-(time - time[0]) / 30)), rtol=1e-9)
 
 
-def test_lag_of_a_ramp_is_late_by_the_time_constant():
-    time = 5.0 * np.arange(400)
-    lagged = ThermalLag(100.0, time=0).fit_transform(np.column_stack([time, 0.01 * time])).ravel()
-    assert_allclose(lagged, 0.01 * (time - 100 * (1 - np.exp(-time / 100))), atol=1e-12)
-    assert_allclose(time[-1] - 100 * lagged[-1], 100.0, rtol=1e-6)
-
-
 def test_lag_solves_its_equation_on_the_polygon_through_the_samples(rng):
     time = np.cumsum(rng.uniform(1, 30, 60))
     temperature = np.cumsum(rng.normal(size=60))
@@ -105,16 +98,6 @@ def test_lag_solves_its_equation_on_the_polygon_through_the_samples(rng):
     assert_allclose(lagged, solution.y[0], atol=1e-4)
 
 
-def test_rows_more_on_the_straight_lines_change_nothing(log):
-    run = log[log["run"] == "b"]
-    time, temperature = run["t"].to_numpy(), run["T"].to_numpy()
-    more = np.sort(np.concatenate([time, 0.3 * time[:-1] + 0.7 * time[1:]]))
-    finer = np.column_stack([more, np.interp(more, time, temperature)])
-    for feature in (ThermalRate(25.0, time=0), ThermalLag(25.0, time=0)):
-        coarse = feature.fit_transform(run[["t", "T"]].to_numpy())
-        assert_allclose(feature.transform(finer)[np.isin(more, time)], coarse, rtol=1e-9)
-
-
 def test_rate_and_lag_are_two_sides_of_one_filter(log):
     columns = log[["t", "T", "run"]]
     rate = ThermalRate(40.0, time="t", run="run").fit_transform(columns)
@@ -129,16 +112,6 @@ def test_low_pass_quietens_a_noisy_thermometer(rng):
     assert_allclose(rate.mean(), 0.01, rtol=0.01)
     # White noise sigma: the difference of noise and low-passed noise, over tau.
     assert_allclose(rate.std(), 0.1 / 60, rtol=0.05)
-
-
-def test_recursion_is_the_one_that_the_documentation_gives(log):
-    columns = log[["t", "T", "run"]]
-    rate = ThermalRate(12.0, time="t", run="run").fit_transform(columns).ravel()
-    for name in "abc":
-        rows = (log["run"] == name).to_numpy()
-        run = log[rows]
-        expected = reference(run["t"].to_numpy(), run["T"].to_numpy(), 12.0)
-        assert_allclose(rate[rows], expected, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -240,27 +213,12 @@ def test_new_columns_have_names_and_keep_the_index(feature, names, log):
         feature.get_feature_names_out(["a", "b"])
 
 
-def test_names_of_arrays_come_from_their_positions():
-    rate = ThermalRate(time=1).fit(np.array([[20.0, 0.0, 5.0], [21.0, 1.0, 5.0]]))
-    assert list(rate.get_feature_names_out()) == ["x0_rate", "x2_rate"]
-    assert list(rate.get_feature_names_out(["T", "t", "V"])) == ["T_rate", "V_rate"]
-
-
 def test_time_since_power_on_is_that_of_the_simulation():
     data = make_ofog(n_devices=2, n_runs=2, n_power_ups=2, duration=600.0, random_state=0)
     clock = 1e5 + 10.0 * np.arange(len(data))
     feature = TimeSincePowerOn(time="clock", run="power_up")
     elapsed = feature.fit_transform(data.assign(clock=clock, note="text is no matter"))
     assert_allclose(elapsed.ravel(), data["time"], atol=1e-9)
-
-
-def test_thermal_rate_is_that_of_the_simulation():
-    data = make_ofog(n_devices=1, n_runs=3, sampling_interval=1.0, random_state=0)
-    rate = ThermalRate(10.0, time="time", run="run")
-    found = rate.fit_transform(data[["time", "temperature", "run"]]).ravel()
-    # A lag of ten seconds where the rate changes within minutes.
-    late = data["time"] > 60
-    assert_allclose(found[late], data["temperature_rate"][late], rtol=0.1, atol=2e-4)
 
 
 def test_works_in_a_pipeline_that_is_cross_validated_and_saved(tmp_path):
@@ -289,13 +247,6 @@ def test_works_in_a_pipeline_that_is_cross_validated_and_saved(tmp_path):
     joblib.dump(fitted, tmp_path / "model.joblib")
     loaded = joblib.load(tmp_path / "model.joblib")
     assert_array_equal(loaded.predict(data), fitted.predict(data))
-
-
-def test_without_time_the_rows_are_one_unit_apart(rng):
-    temperature = rng.normal(size=(50, 1))
-    with_time = np.column_stack([np.arange(50.0), temperature])
-    expected = ThermalRate(7.0, time=0).fit_transform(with_time)
-    assert_array_equal(ThermalRate(7.0).fit_transform(temperature), expected)
 
 
 @pytest.mark.parametrize(

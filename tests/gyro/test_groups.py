@@ -9,12 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.model_selection import (
     GroupKFold,
-    GroupShuffleSplit,
-    KFold,
     LeaveOneGroupOut,
-    LeavePGroupsOut,
     ShuffleSplit,
-    StratifiedGroupKFold,
     cross_val_predict,
 )
 
@@ -22,7 +18,6 @@ from skanfis.datasets import make_ofog
 from skanfis.exceptions import SplitLeakWarning
 from skanfis.gyro import (
     check_split,
-    combine_groups,
     find_rate_levels,
     group_by_rate_level,
     group_by_run,
@@ -52,11 +47,6 @@ def test_rows_on_the_way_between_levels_count_to_the_nearest(rng):
     assert_allclose(find_rate_levels(rate), GRID, atol=0.01)
     expected = np.abs(rate[:, None] - GRID).argmin(axis=1)
     assert_array_equal(group_by_rate_level(rate, signed=True), expected)
-
-
-def test_levels_are_found_beside_a_long_rest():
-    rate = np.concatenate([np.zeros(100_000), np.repeat(GRID, 3)])
-    assert_allclose(find_rate_levels(rate), GRID, atol=1e-12)
 
 
 def test_one_level_is_a_level():
@@ -89,7 +79,7 @@ def test_tolerance_decides_where_it_is_given():
     ids=["1500", "5000", "15000", "500000", "sine", "normal"],
 )
 def test_a_rate_that_changes_continuously_has_no_levels(rate):
-    with pytest.raises(ValueError, match=r"no levels: it changes continuously between -.*clip_dw"):
+    with pytest.raises(ValueError, match=r"no levels: it changes continuously between -"):
         find_rate_levels(rate)
     with pytest.raises(ValueError, match="no levels"):
         group_by_rate_level(rate)
@@ -116,30 +106,6 @@ def test_levels_are_dealt_out_by_turns():
         group_by_rate_level(rate, n_groups=1)
 
 
-@pytest.mark.parametrize(
-    "splitter",
-    [
-        GroupKFold(5),
-        LeaveOneGroupOut(),
-        LeavePGroupsOut(2),
-        GroupShuffleSplit(3, random_state=0),
-        StratifiedGroupKFold(3),
-    ],
-    ids=lambda splitter: type(splitter).__name__,
-)
-def test_groups_serve_every_splitter_of_scikit_learn(splitter):
-    data = make_ofog(n_devices=2, n_runs=3, n_rate_levels=15, random_state=0)
-    season = pd.cut(data["temperature"], 3, labels=False)
-    for groups in (
-        group_by_rate_level(data["rate"]),
-        combine_groups(data["device"], data["run"]),
-    ):
-        for train, test in splitter.split(data, season, groups):
-            assert set(groups[train]).isdisjoint(groups[test])
-    report = check_split(splitter, data["rate"], y=season, groups=group_by_rate_level(data["rate"]))
-    assert not report["shared_levels"].any()
-
-
 def test_runs_begin_where_the_clock_goes_back_or_stands_long():
     assert group_by_run([5.0, 6, 7]).tolist() == [0, 0, 0]
     assert group_by_run([5.0, 6, 2, 3, 1]).tolist() == [0, 0, 1, 1, 2]
@@ -150,21 +116,6 @@ def test_runs_begin_where_the_clock_goes_back_or_stands_long():
         group_by_run([0.0, 1.0], max_gap=0)
     with pytest.raises(ValueError, match="time must be finite; 1 of its 2"):
         group_by_run([0.0, np.nan])
-
-
-def test_combined_groups_agree_in_all_labels(rng):
-    device, run = rng.choice(["b", "a"], 60), rng.integers(4, size=60)
-    groups = combine_groups(device, run)
-    pairs = pd.DataFrame({"device": device, "run": run, "group": groups})
-    assert (pairs.groupby("group").nunique() == 1).all(axis=None)
-    assert pairs.groupby(["device", "run"])["group"].nunique().eq(1).all()
-    assert set(groups) == set(range(8))
-    with pytest.raises(ValueError, match=r"labels\[1\] has 3 rows where the other columns have 2"):
-        combine_groups([1, 2], [1, 2, 3])
-    with pytest.raises(ValueError, match=r"labels\[0\] has missing values, the first at row 1"):
-        combine_groups(["a", None])
-    with pytest.raises(ValueError, match="needs one column"):
-        combine_groups()
 
 
 @pytest.fixture(scope="module")
@@ -195,19 +146,7 @@ def test_a_split_by_level_shares_the_runs(table_data):
     assert set(report["in_shared_runs"]) == {1.0}
 
 
-def test_rates_without_levels_can_be_split_by_run_and_not_at_random():
-    data = make_ofog(n_devices=1, n_runs=12, random_state=0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        report = check_split(GroupKFold(12), data["rate"], groups=data["run"], run=data["run"])
-    # Rates meet by chance.
-    assert report["on_shared_levels"].max() < 0.1
-    assert not report["shared_runs"].any()
-    with pytest.warns(SplitLeakWarning, match="5 of 5 splits test at rate levels"):
-        check_split(KFold(5, shuffle=True, random_state=0), data["rate"])
-
-
-@pytest.mark.parametrize("n_rows", [100, 300, 1000, 3000, 10_000, 100_000])
+@pytest.mark.parametrize("n_rows", [100, 1000, 100_000])
 def test_a_continuous_rate_shares_no_levels_however_it_is_split(n_rows, rng):
     rate = rng.uniform(-100, 100, n_rows)
     # That it warns of nothing is part of it: a warning is an error here.
@@ -227,6 +166,8 @@ def test_splits_may_be_given_as_scikit_learn_takes_them(table_data):
         assert len(check_split(5, rate)) == 5
     with pytest.raises(ValueError, match="run has 2 rows where the other columns have"):
         check_split(5, rate, run=[1, 2])
+    with pytest.raises(ValueError, match="run has missing values, the first at row 0"):
+        check_split(5, rate, run=[None] * len(rate))
 
 
 @pytest.mark.theory

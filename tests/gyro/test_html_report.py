@@ -3,7 +3,7 @@
 import base64
 import io
 import re
-from functools import cache
+import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -11,20 +11,19 @@ import pandas as pd
 import pytest
 
 pytest.importorskip("matplotlib")
+pytest.importorskip("jinja2")
+
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import _html
+from skanfis.gyro import _pictures
+from skanfis.gyro._budget import budget_of, proven_bounds
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._dossier import Dossier, LogFile
-from skanfis.gyro._html import Page
-from skanfis.gyro._limits import parse_limit
-from skanfis.gyro._models import make_estimator
-from skanfis.gyro._pictures import PICTURES, Picture
+from skanfis.gyro._formulas import formula_of, rules_text
+from skanfis.gyro._report_options import ReportOptions, parse_limit
 from skanfis.gyro._results import Results
-from skanfis.gyro._sections.instead import formula_of
 from skanfis.gyro._split import choose_split
-from skanfis.gyro.displays._style import figures
-from skanfis.gyro.html_report import report_page, rules_text
+from skanfis.gyro.displays._base import figures
+from skanfis.gyro.html_report import check_installed, report_page
 from skanfis.inspection import readability
 
 PNG = re.compile('data:image/png;base64,([^"]*)')
@@ -67,39 +66,46 @@ def calibration(given_weights):
     return calibration_of(log, terms=(1, 1, 1, 3))
 
 
-SCRIPT = "<script>alert('1')</script>"
+SCRIPT = "<script>alert('1')</script>\x00\u202e"
 TITLE = "<gyro> & co.csv"
 
 
 @pytest.fixture(scope="module")
-def dossier(calibration):
+def options(calibration):
     """All in it is text from outside; the limits lie on both sides of what was found."""
-    merit = Results(calibration).merit.query("group == 'all'").set_index("figure")
+    merit = Results(calibration).merit.set_index("figure")
     value = merit.loc["residual_rms", "after"]
     typed = [f"residual_rms={factor * value:.9f}deg/s" for factor in (1.001, 0.999)]
-    return Dossier(
+    return ReportOptions(
         serial=SCRIPT,
         operator=SCRIPT,
-        files=(LogFile(SCRIPT, 12, "0" * 64),),
+        files=((SCRIPT, 12, "0" * 64),),
         options=(("logs", SCRIPT),),
         limits=tuple(map(parse_limit, [*typed, "bias_instability=1deg/h"])),
     )
 
 
 @pytest.fixture(scope="module")
-def page(calibration, dossier, coarse_report):
-    return report_page(calibration, TITLE, dossier)
+def page(calibration, options, coarse_report):
+    return report_page(calibration, TITLE, options)
 
 
 @pytest.fixture
 def no_drawing(monkeypatch):
     """Pictures are made but not painted, which takes longer than all else."""
-    monkeypatch.setattr("skanfis.gyro._html._png", lambda figure: b"")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
 
 
 def test_is_well_formed_and_escaped(page):
     outline = Outline(page)
-    assert "Gyro compensation: <gyro> & co.csv" in "".join(outline.text)
+    text = "".join(outline.text)
+    assert "Gyro compensation: <gyro> & co.csv" in text
+    # What was typed is data; control signs are shown as such.
+    assert "script" not in outline.tags
+    assert text.count(r"<script>alert('1')</script>\x00\u202e") == 4
+    assert not {"\x00", "\u202e"} & set(text)
+    # On a phone no table may push the page wider than the screen.
+    assert page.count('<div class="scroll') == page.count("<table>")
 
 
 def test_needs_nothing_from_elsewhere(page):
@@ -114,178 +120,37 @@ def test_needs_nothing_from_elsewhere(page):
 
 
 def test_says_how_sure(calibration, page):
-    results = Results(calibration)
+    results, budget = Results(calibration), budget_of(calibration)
     text = " ".join(" ".join(Outline(page).text).split())
     told = text[text.rindex("How sure") : text.rindex("Can the rules be read?")]
-    budget = results.budget
     for value in (budget.noise, budget.scatter, budget.scatter_high, budget.model, budget.combined):
         assert results.shown(value) in told
-    assert f"{results.shown(results.certain.largest)} °/s" in told
+    assert f"{results.shown(proven_bounds(calibration).largest)} °/s" in told
     assert "never against it proven" in told
 
 
-def test_every_picture_says_what_it_shows(page):
-    outline = Outline(page)
-    n_pictures = outline.tags.count("img")
-    alternatives = [
-        value for tag, name, value in outline.attributes if (tag, name) == ("img", "alt")
-    ]
-    assert len(set(alternatives)) == n_pictures
-    for subject in ("time", "temperature", "scale-factor", "warming", "rows over", "held-out",
-                    "Coverage", "Membership"):  # fmt: skip
-        assert any(subject.lower() in text.lower() for text in alternatives), subject
-
-
-def test_fits_a_phone(page):
-    assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in page
-    # No table may push the page wider than the screen.
-    assert page.count('<div class="scroll') == page.count("<table>")
-
-
-def test_figures_are_those_of_held_out_rows_in_range(page, calibration):
-    rows = calibration.inside
-    after = np.sqrt(np.mean((calibration.after - calibration.rate)[rows] ** 2))
-    before = np.sqrt(np.mean((calibration.before - calibration.rate)[rows] ** 2))
-    text = " ".join(Outline(page).text)
-    for value in (f"{before:#.3g} °/s", f"{after:#.3g} °/s", f"{before / after:#.3g} ×"):
-        assert value in text.replace(",", "")
-    assert "whole runs held out (5 runs" in text
-
-
-def test_every_fold_was_new_to_its_model(calibration):
-    # The last fold by hand.
-    train, test = calibration.split.folds[-1]
-    error = calibration.before - calibration.rate
-    model = make_estimator(calibration.recipe, (1, (1, 1, 1, 3)))
-    model.fit(calibration.X.iloc[train], error[train])
-    expected = calibration.before[test] - model.predict(calibration.X.iloc[test])
-    np.testing.assert_allclose(calibration.after[test], expected, rtol=1e-9)
-
-
-@pytest.mark.theory
-def test_the_same_log_gives_the_same_report(page, calibration, dossier, monkeypatch):
-    # To paint takes longer than all else: the first two pictures are painted again.
-    painted, (first, second, *others) = iter(PNG.findall(page)), PNG.findall(page)
-    paint, again = _html._png, []
-
-    def png(figure):
-        told = base64.b64decode(next(painted))
-        if len(again) < 2:
-            again.append(base64.b64encode(paint(figure)).decode())
-        return told
-
-    monkeypatch.setattr(_html, "_png", png)
-    assert report_page(calibration, TITLE, dossier) == page
-    assert again == [first, second]
-    assert others
-
-
-def test_rules_and_what_to_compute_on_board(page, calibration):
-    text = " ".join(Outline(page).text)
-    assert "error = " in rules_text(calibration)
-    assert rules_text(calibration).splitlines()[0] in text
-    assert "temperature_rate += (1 - exp(-h / 30))" in text
-    assert "rate = output / 1 - error(time, temperature, temperature_rate, output);" in text
-
-
-@cache
-def short_log():
-    return make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)
-
-
-@cache
-def timeless(physics):
-    """A calibration of a log that says nothing of time."""
-    options = {"outside": "linear"} if physics else {}
-    log = short_log().drop(columns="time")
-    return calibration_of(log, ("temperature", "output"), terms=(2, 2), physics=physics, **options)
-
-
-@pytest.mark.theory
-@pytest.mark.parametrize("physics", [False, True])
-def test_says_whether_the_rules_can_be_read(physics, few_rivals, no_drawing):
-    calibration = timeless(physics)
-    estimator = calibration.compensator.estimator
-    # What the rules were taught, by hand.
-    taught = calibration.before - calibration.rate
-    if physics:
-        taught = calibration.rate - estimator.base_.predict(calibration.X)
-    found = readability(getattr(estimator, "residual_", estimator), calibration.X, taught)
-    text = "".join(Outline(report_page(calibration, "log.csv")).text)
-    section = text[text.index("Can the rules be read?") :]
-    for sentence in found.findings or ["Nothing measured here speaks against"]:
-        assert sentence in section
-    assert f"[sd]{figures(found.summary['strongest_alone'])}0.5" in section.replace("\n", "")
-
-
-def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
-    log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
-    calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
-    text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
-    assert "°/h" in text
-    assert "Scale-factor error against rate" not in text
-    assert "no rate is given" in text
-
-
-@pytest.mark.parametrize("has_time", [True, False])
-def test_physics_shows_its_law(has_time, few_rivals, no_drawing):
-    calibration = timeless(physics=True)
-    if has_time:
-        inputs = ("temperature", "temperature_rate", "output")
-        settings = {"terms": (1, 1, 1), "physics": True, "outside": "linear"}
-        calibration = calibration_of(short_log(), inputs, **settings)
+def test_physics_shows_its_law(few_rivals, no_drawing):
+    log = make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)
+    inputs = ("temperature", "temperature_rate", "output")
+    settings = {"terms": (1, 1, 1), "physics": True, "outside": "linear"}
+    calibration = calibration_of(log, inputs, **settings)
     text = " ".join(Outline(report_page(calibration, "law.csv")).text)
     law, found = calibration.compensator.estimator.base_, calibration.rules[-1].model_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
-    assert (
-        f"along its tangent, for each input up to {found.max_extrapolation:g} of its standard"
-        in text
-    )
-    if has_time:
-        assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
-        # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.
-        assert 100.0 < law.thermometer_lag_ < 260.0
-    else:
-        assert "the log has no time" in text or "allantools is not installed" in text
+    assert f"along its tangent, for each input up to {found.max_extrapolation:g} of its" in text
+    assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
+    # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.
+    assert 100.0 < law.thermometer_lag_ < 260.0
+    estimator = calibration.compensator.estimator
+    taught = calibration.rate - law.predict(calibration.X)
+    findings = readability(estimator.residual_, calibration.X, taught).findings
+    section = text[text.index("Can the rules be read?") :]
+    for sentence in findings or ["Nothing measured here speaks against"]:
+        assert sentence in section
 
 
-def test_page_refuses_no_text():
-    page = Page("a < b", "c & d")
-    page.banner(SCRIPT, [SCRIPT], "bad")
-    page.cards([("what", "1", "<i>")])
-    page.section("s")
-    page.heading("h")
-    page.table(("x", "unit"), [(("1", "[0, 2]"), "°/s"), ("2", SCRIPT)], "caption")
-    page.preformatted("a\n<b>", "more")
-    page.download('"><b>.csv', SCRIPT)
-    page.footer("end\x00\u202e")
-    outline = Outline(page.render())
-    text = "".join(outline.text)
-    for part in ("a < b", "c & d", "<i>", "[0, 2]", "a\n<b>", "caption", SCRIPT):
-        assert part in text
-    assert not {"script", "b", "i"} & set(outline.tags)
-    assert not {"\x00", "\u202e"} & set(text)
-
-
-def test_names_from_outside_are_data(page):
-    outline = Outline(page)
-    assert "script" not in outline.tags
-    assert "".join(outline.text).count(SCRIPT) == 4
-
-
-def test_the_verdict_comes_first(page, calibration):
-    text = "".join(Outline(page).text)
-    verdict = calibration.verdict
-    assert not verdict.model_is_worth_it  # three rules, where the law of the sensor knows more
-    title = "Use the arcsine law instead of the fuzzy rules"
-    assert title in text[: text.index("RMS error before")]
-    assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
-    model = next(each for each in calibration.simpler if each.name == "arcsine law").model
-    assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What to use instead") :]
-
-
-@pytest.mark.parametrize("name", ["constant", "straight line", "cubic polynomial"])
+@pytest.mark.parametrize("name", ["constant", "cubic polynomial"])
 def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
     """Each line of it is run."""
     names = calibration.X.to_dict("series")
@@ -299,93 +164,83 @@ def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
     np.testing.assert_allclose(names["rate"], expected, atol=1e-6)
 
 
+def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
+    log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
+    calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
+    text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
+    assert "°/h" in text
+    assert "Scale-factor error against rate" not in text
+    assert "no rate is given" in text
+
+
+def test_the_verdict_comes_first(page, calibration):
+    text = "".join(Outline(page).text)
+    verdict = calibration.verdict
+    assert not verdict.model_is_worth_it  # three rules, where the law of the sensor knows more
+    title = "Use the arcsine law instead of the fuzzy rules"
+    assert title in text[: text.index("This calibration")]
+    assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
+    model = next(each for each in calibration.simpler if each.name == "arcsine law").model
+    assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What to use instead") :]
+
+
 def test_one_unit_throughout(page, calibration, no_drawing):
     """Of errors; rates, and the formula of what to use instead, are in deg/s."""
-    hourly = report_page(calibration, TITLE, Dossier(unit="deg/h"))
+    hourly = report_page(calibration, TITLE, ReportOptions(unit="deg/h"))
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
         text = " ".join(Outline(text).text)
-        checked, rest = text.split("What to use instead")[-2:]
-        results = (
-            checked[checked.index("How it was checked") :]
-            + rest[
-                rest.index("Figures of merit") : rest.index("Limits of the spec")
-                if unit == "°/s"
-                else rest.index("Where it may be used")
-            ]
-        )
-        assert unit in results
-        assert other not in results
+        told = text[text.index("How it was checked") : text.rindex("What to use instead")]
+        assert unit in told
+        assert other not in told
         assert f"{figures(factor * rms)} {unit}" in text
+
+
+def test_every_picture_says_what_it_shows_and_has_its_data(page, calibration):
+    outline = Outline(page)
+    alternatives = [value for *which, value in outline.attributes if which == ["img", "alt"]]
+    assert len(set(alternatives)) == outline.tags.count("img") >= 8
+    for subject in ("time", "temperature", "scale-factor", "warming", "rows over", "held-out",
+                    "Coverage", "Membership"):  # fmt: skip
+        assert any(subject.lower() in text.lower() for text in alternatives), subject
+    pictures = re.findall("<figure.*?</figure>", page, re.DOTALL)
+    assert all("download=" in picture for picture in pictures)
+    links = re.findall(r'download="([^"]*)" href="data:text/csv;charset=utf-8;base64,(.*?)"', page)
+    files = {name: pd.read_csv(io.BytesIO(base64.b64decode(content))) for name, content in links}
+    points = files["error-by-temperature-points.csv"]
+    error = np.where(calibration.in_range, calibration.after - calibration.rate, np.nan)
+    np.testing.assert_allclose(points["error after [deg/s]"], error, rtol=1e-8)
+    temperature = calibration.log["temperature"]
+    np.testing.assert_allclose(points["temperature [degC]"], temperature, rtol=1e-8)
+    assert files["coverage-cells.csv"]["rows"].sum() == len(calibration.log)
+    groups = files["held-out-groups.csv"].set_index("group")["RMS error after [deg/s]"]
+    expected = pd.Series(error**2).groupby(calibration.log["run"].to_numpy()).mean() ** 0.5
+    np.testing.assert_allclose(groups.sort_index(), expected, rtol=1e-8)
+
+
+def test_a_file_runs_nothing_in_a_spreadsheet():
+    from matplotlib.figure import Figure
+
+    tables = {"groups": pd.DataFrame({"group": ["=HYPERLINK(1)", "-5"], "error": [1.0, 2.0]})}
+    picture = _pictures._picture("subject", Figure(), tables, "Caption.")
+    lines = base64.b64decode(picture.files["subject.csv"]).decode().splitlines()
+    assert lines == ["group,error", "'=HYPERLINK(1),1", "-5,2"]
+
+
+def test_without_jinja2_the_way_to_get_it_is_said(calibration, monkeypatch, no_drawing):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    for make in (check_installed, lambda: report_page(calibration, "log.csv")):
+        with pytest.raises(ImportError, match="pip install jinja2"):
+            make()
 
 
 def test_limits_on_both_sides_of_the_figure(page):
     text = " ".join(Outline(page).text)
-    section = text[text.index("Limits of the specification") : text.index("By held-out run")]
+    section = text[text.index("Limits of the specification") : text.index("Pictures")]
     assert re.findall(r"pass|fail|not measured", section) == ["pass", "fail", "not measured"]
     assert "1 of 3 limits are kept; not kept: residual rms; could not be measured" in text
-
-
-def files_in(page):
-    """Tables of the files that a page holds, by name."""
-    links = re.findall(r'download="([^"]*)" href="data:text/csv;charset=utf-8;base64,(.*?)"', page)
-    return {name: pd.read_csv(io.BytesIO(base64.b64decode(content))) for name, content in links}
-
-
-def test_the_data_behind_every_picture(page, calibration):
-    pictures = re.findall("<figure.*?</figure>", page, re.DOTALL)
-    assert len(pictures) >= 8
-    assert all("download=" in picture for picture in pictures)
-    files = files_in(page)
-    rows = calibration.in_range
-    points = files["error-by-temperature-points.csv"]
-    error = np.where(rows, calibration.after - calibration.rate, np.nan)
-    np.testing.assert_allclose(points["error after [deg/s]"], error, rtol=1e-8)
-    np.testing.assert_allclose(
-        points["temperature [degC]"], calibration.log["temperature"], rtol=1e-8
-    )
-    cells = files["coverage-cells.csv"]
-    assert cells["rows"].sum() == len(calibration.log)
-    groups = files["held-out-groups.csv"].set_index("group")["RMS error after [deg/s]"]
-    for run in calibration.log["run"].unique():
-        these = rows & (calibration.log["run"] == run).to_numpy()
-        expected = np.sqrt(np.mean((calibration.after - calibration.rate)[these] ** 2))
-        assert groups[run] == pytest.approx(expected, rel=1e-8)
-
-
-def test_a_file_runs_nothing_in_a_spreadsheet(calibration):
-    results = Results(calibration)
-    labels = np.where(calibration.log["run"] == 0, "=HYPERLINK(1)", "-5")
-    split = calibration.split
-    object.__setattr__(calibration, "split", type(split)(split.kind, split.folds, labels, ""))
-    try:
-        (picture,) = [draw(results) for draw in PICTURES if draw.__name__ == "draw_groups"]
-    finally:
-        object.__setattr__(calibration, "split", split)
-    assert isinstance(picture, Picture)
-    (text,) = picture.files.values()
-    assert sorted(line.split(",")[0] for line in text.splitlines()[1:]) == ["'=HYPERLINK(1)", "-5"]
-
-
-def test_paper_shows_what_a_click_opens(page):
-    style = page[page.index("@media print") : page.index("</style>")]
-    assert "details::details-content" in style
-    assert re.search(r"figure[^{}]*\{ break-inside: avoid", style)
 
 
 def test_no_screen_is_asked_for(fresh_process):
     assert fresh_process["matplotlib_of_the_command"] == []
     assert fresh_process["pyplot_of_pictures"] == []
-
-
-def test_a_run_without_a_row_in_range_has_no_error(few_rivals, no_drawing):
-    # Every run at a temperature of its own: the outermost lie beyond what the others have seen.
-    log = make_ofog(
-        n_devices=1, n_runs=6, duration=600.0, max_residual_heat=0.0, rates=[0.0], random_state=3
-    )
-    calibration = calibration_of(log, ("time", "temperature"), terms=(1, 2))
-    in_range = [calibration.inside[log["run"] == run].any() for run in log["run"].unique()]
-    assert not all(in_range)
-    shown = "".join(Outline(report_page(calibration, "log.csv")).text)
-    assert "–" in shown
-    assert not re.search(r"\bnan\b", shown)

@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from skanfis.gyro import metrics
+from skanfis.gyro._figures_of_merit import figures_of_merit
 
 HOUR = 3600.0
+
+
+def figure(name, full_scale=100.0, **columns):
+    """A figure of the table, of these columns."""
+    found = next(each for each in figures_of_merit(full_scale) if each.name == name)
+    return found.value({key: np.asarray(column) for key, column in columns.items()})
 
 
 @pytest.fixture
@@ -16,66 +23,48 @@ def table(rng):
     return rate.ravel()[order], temperature.ravel()[order]
 
 
-def test_scale_factor_and_its_error(table):
-    rate, _ = table
-    output = 62_000.0 * (1 + 300e-6) * rate + 800.0
-    assert metrics.scale_factor(rate, output) == pytest.approx(62_018.6)
-    assert metrics.scale_factor_error(rate, output, nominal=62_000.0) == pytest.approx(300.0)
-
-
-def test_negative_scale_factor(table):
-    rate, _ = table
+def test_scale_factor_of_either_sign(table):
+    rate, temperature = table
+    assert metrics.scale_factor(rate, 62_018.6 * rate + 800.0) == pytest.approx(62_018.6)
     assert metrics.scale_factor(rate, -5.0 * rate) == pytest.approx(-5.0)
-    assert metrics.scale_factor_error(rate, -5.005 * rate, nominal=-5.0) == pytest.approx(1000.0)
-    assert metrics.scale_factor_nonlinearity(rate, -5.0 * rate + 3.0) == pytest.approx(
-        0.0, abs=1e-6
-    )
+    output = np.where(rate > 0, 1.0002, 0.9998) * rate + 0.3
+    assert figure("scale_factor_asymmetry", rate=rate, output=output) == pytest.approx(400.0)
+    # The mean temperature is 20 degC, so that the slope is relative to the factor there.
+    columns = {"rate": rate, "temperature": temperature}
+    columns["output"] = 2.0 * (1 - 410e-6 * (temperature - 20.0)) * rate + 0.01 * temperature
+    found = figure("scale_factor_temperature_sensitivity", **columns)
+    assert found == pytest.approx(-410.0)
 
 
 def test_nonlinearity_of_a_sine():
     """A sine of phase p, densely: by Legendre's expansion its cubic part is 2/5 of p^2/6 off.
 
     x - x^3 p^2/6 has the best line x (1 - p^2/10) and the largest deviation at x = 1,
-    p^2 (1/6 - 1/10) = p^2/15, relative to the line there.
+    p^2 (1/6 - 1/10) = p^2/15, relative to the line there. P3 has the mean square 1/7.
     """
-    phase = 0.05
-    x = np.linspace(-1.0, 1.0, 20_001)
+    phase, x = 0.05, np.linspace(-1.0, 1.0, 20_001)
+    columns = {"rate": 100.0 * x, "output": np.sin(phase * x)}
     expected = 1e6 * phase**2 / 15
-    found = metrics.scale_factor_nonlinearity(100.0 * x, np.sin(phase * x))
-    assert found == pytest.approx(expected, rel=1e-3)
-    # The cubic P3 = (5x^3 - 3x)/2 is 1 at x = 1 and has mean square 1/7.
-    rms = metrics.scale_factor_nonlinearity(100.0 * x, np.sin(phase * x), statistic="rms")
-    assert rms == pytest.approx(expected / np.sqrt(7), rel=1e-3)
+    # The outermost of 101 bins has its mean at 1 - 1/101, where the cubic falls six times as fast.
+    found = figure("scale_factor_nonlinearity", **columns)
+    assert found == pytest.approx(expected * (1 - 6 / 101), rel=0.005)
+    root = figure("scale_factor_nonlinearity_rms", **columns)
+    assert root == pytest.approx(expected / np.sqrt(7), rel=0.02)
+    assert figure("scale_factor_nonlinearity", 200.0, **columns) == pytest.approx(found / 2)
 
 
-def test_nonlinearity_relates_to_full_scale(table):
-    rate, _ = table
-    output = rate + 0.01 * np.cos(rate)
-    at_own = metrics.scale_factor_nonlinearity(rate, output)
-    assert metrics.scale_factor_nonlinearity(rate, output, full_scale=200.0) == at_own / 2
-
-
-def test_asymmetry(table):
-    rate, _ = table
-    output = np.where(rate > 0, 1.0002, 0.9998) * rate + 0.3
-    assert metrics.scale_factor_asymmetry(rate, output) == pytest.approx(400.0)
-
-
-def test_scale_factor_repeatability(table):
+def test_repeatability_is_the_spread_over_runs(table):
     rate, _ = table
     factors = np.array([1.0, 1.0002, 0.9995, 1.0001])
     output = (factors[:, None] * rate + [[0.1], [0.2], [-3.0], [0.0]]).ravel()
     run = np.repeat(["a", "b", "c", "d"], rate.size)
-    found = metrics.scale_factor_repeatability(np.tile(rate, 4), output, run)
+    columns = {"rate": np.tile(rate, 4), "output": output, "run": run}
+    found = figure("scale_factor_repeatability", **columns)
     assert found == pytest.approx(1e6 * factors.std(ddof=1) / factors.mean())
-
-
-def test_scale_factor_temperature_sensitivity(table):
-    rate, temperature = table
-    output = 2.0 * (1 - 410e-6 * (temperature - 20.0)) * rate + 0.01 * temperature
-    # The mean temperature is 20 degC, so that the slope is relative to the factor there.
-    found = metrics.scale_factor_temperature_sensitivity(rate, output, temperature)
-    assert found == pytest.approx(-410.0)
+    means, sizes = np.array([1.0, -2.0, 4.0]), (3, 5, 9)  # deg/h
+    error, run = np.repeat(means, sizes) / HOUR, np.repeat([7, 3, 5], sizes)
+    found = figure("bias_repeatability", error=error, run=run, rate=error)
+    assert found == pytest.approx(means.std(ddof=1))
 
 
 def test_input_error_takes_the_scale_factor_out(table):
@@ -85,33 +74,17 @@ def test_input_error_takes_the_scale_factor_out(table):
     np.testing.assert_array_equal(metrics.input_error([5.0, 5.0], [5.25, 4.75]), [0.25, -0.25])
 
 
-def test_bias_figures(table, rng):
-    _, temperature = table
-    ramp = rng.normal(size=temperature.size)
-    # 12 deg/h, 0.5 deg/h/degC about the mean of 20 degC, 5 deg/h/(degC/min)
-    error = (12.0 + 0.5 * (temperature - 20.0) + 5.0 * (ramp - ramp.mean())) / HOUR
-    assert metrics.bias(error) == pytest.approx(12.0)
-    both = metrics.bias_temperature_sensitivity(error, temperature, temperature_rate=ramp)
-    assert both == pytest.approx(0.5)
-    assert metrics.bias_ramp_sensitivity(error, ramp, temperature=temperature) == pytest.approx(5.0)
-
-
 def test_sensitivities_found_together_do_not_count_for_each_other():
     """On a warm-up temperature and its rate go together; alone, the one takes the other's part."""
     time = np.linspace(0.0, 3.0, 200)
     temperature, ramp = 1.0 - np.exp(-time), 0.7 * np.exp(-time) + 0.1 * np.sin(9 * time)
     error = 5.0 * ramp / HOUR
-    alone = metrics.bias_temperature_sensitivity(error, temperature)
-    assert alone < -2.0
-    together = metrics.bias_temperature_sensitivity(error, temperature, temperature_rate=ramp)
-    assert together == pytest.approx(0.0, abs=1e-9)
-
-
-def test_bias_repeatability():
-    means = np.array([1.0, -2.0, 4.0])  # deg/h
-    error = np.concatenate([np.full(n, mean) for n, mean in zip((3, 5, 9), means, strict=True)])
-    run = np.repeat([7, 3, 5], (3, 5, 9))
-    assert metrics.bias_repeatability(error / HOUR, run) == pytest.approx(means.std(ddof=1))
+    columns = {"error": error, "temperature": temperature}
+    name = "bias_temperature_sensitivity"
+    assert figure(name, **columns) < -2.0
+    columns["temperature_rate"] = ramp
+    assert figure(name, **columns) == pytest.approx(0.0, abs=1e-9)
+    assert figure("bias_ramp_sensitivity", **columns) == pytest.approx(5.0)
 
 
 def test_bias_stability_of_planted_means():
@@ -121,40 +94,19 @@ def test_bias_stability_of_planted_means():
     time = 100.0 + np.arange(30.0)
     assert metrics.bias_stability(error, time) == pytest.approx(1.0)
     # Two runs: each is taken about its own mean.
-    doubled = np.concatenate([error, error + 1.0])
-    run = np.repeat([0, 1], 30)
-    found = metrics.bias_stability(doubled, np.tile(time, 2), run=run)
-    assert found == pytest.approx(1.0)
-
-
-def test_bias_stability_falls_with_the_root_of_the_time_for_white_noise(rng):
-    error, time = rng.normal(size=200_000) / HOUR, np.arange(200_000.0)
-    ten, hundred = (metrics.bias_stability(error, time, averaging_time=s) for s in (10.0, 100.0))
-    assert ten == pytest.approx(1 / np.sqrt(10), rel=0.02)  # 4 standard errors
-    assert hundred == pytest.approx(0.1, rel=0.06)
+    doubled, run = np.concatenate([error, error + 1.0]), np.repeat([0, 1], 30)
+    assert metrics.bias_stability(doubled, np.tile(time, 2), run=run) == pytest.approx(1.0)
 
 
 def test_hysteresis_of_a_planted_loop(rng):
     """An ellipse about a curve: its gap is largest in the middle."""
     phase = np.linspace(0.0, 2 * np.pi, 4000, endpoint=False)
     temperature, ramp = 20.0 - 30.0 * np.cos(phase), np.sin(phase)
-    error = (0.02 * temperature**2 + 4.0 * ramp + 0.05 * rng.normal(size=4000)) / HOUR
+    curve = 0.02 * temperature**2 + 0.05 * rng.normal(size=4000)
     # Bins of 3 degC: within one, the curve 0.02 T^2 and the ellipse cost less than 0.1.
-    assert metrics.hysteresis(error, temperature, ramp) == pytest.approx(8.0, abs=0.15)
-
-
-def test_no_hysteresis_where_the_error_depends_on_temperature_alone():
-    temperature = np.concatenate([np.linspace(0, 50, 999), np.linspace(50, 0, 999)])
-    direction = np.repeat([1.0, -1.0], 999)
-    assert metrics.hysteresis(temperature / HOUR, temperature, direction) < 0.1
-
-
-def test_residual_figures():
-    before, after = np.array([3.0, -4.0, 0.0, 5.0]), np.array([0.3, -0.4, 0.0, 0.5])
-    assert metrics.residual_rms(before) == pytest.approx(np.sqrt(50 / 4))
-    assert metrics.residual_peak(-before) == 5.0
-    assert metrics.residual_peak_to_peak(before) == 9.0
-    assert metrics.reduction_factor(before, after) == pytest.approx(10.0)
+    found = metrics.hysteresis((curve + 4.0 * ramp) / HOUR, temperature, ramp)
+    assert found == pytest.approx(8.0, abs=0.15)
+    assert metrics.hysteresis(curve / HOUR, temperature, ramp) < 0.1
 
 
 @pytest.mark.parametrize(
@@ -166,31 +118,45 @@ def test_residual_figures():
         (lambda: metrics.scale_factor([], []), "rate is empty"),
         (lambda: metrics.scale_factor([[1, 2]], [[1, 2]]), "rate must have one dimension"),
         (lambda: metrics.scale_factor(["a"], [1]), "rate must hold numbers"),
-        (lambda: metrics.scale_factor_error([1, 2], [1, 2], nominal=0), "nominal=0"),
-        (lambda: metrics.scale_factor_nonlinearity([1, 2], [1, 2], statistic="p"), "statistic='p'"),
-        (lambda: metrics.scale_factor_nonlinearity([1, 2], [1, 2], full_scale=-1), "full_scale=-1"),
-        (lambda: metrics.scale_factor_asymmetry([1, 2], [1, 2]), "two different negative rates"),
-        (lambda: metrics.scale_factor_repeatability([1, 2], [1, 2], [0, 0]), "There is 1 run"),
-        (
-            lambda: metrics.scale_factor_temperature_sensitivity([1, 2, 3], [1, 2, 3], [5, 5, 5]),
-            "do not change independently",
-        ),
-        (lambda: metrics.bias_temperature_sensitivity([1, 2], [5, 5]), "temperature never changes"),
-        (lambda: metrics.bias_ramp_sensitivity([1, 2], [5, 5]), "temperature_rate never changes"),
-        (
-            lambda: metrics.bias_ramp_sensitivity([1, 2, 3], [1, 2, 3], temperature=[2, 4, 6]),
-            "do not change independently",
-        ),
-        (lambda: metrics.bias_repeatability([1, 2], [0, 0]), "There is 1 run"),
         (lambda: metrics.bias_stability([1, 2], [1, 1]), "time must increase"),
         (lambda: metrics.bias_stability([1, 2], [0, 60]), "rows are 60 s apart"),
         (lambda: metrics.bias_stability([1, 2], [0, 1]), "no run is as long as two"),
         (lambda: metrics.bias_stability([1], [0], averaging_time=0), "averaging_time=0"),
         (lambda: metrics.hysteresis([1, 2], [1, 2], [1, 1]), "does not both rise and fall"),
         (lambda: metrics.hysteresis([1, 2], [1, 2], [1, -1]), "share no temperature"),
-        (lambda: metrics.reduction_factor([1.0], [0.0]), "after is zero everywhere"),
     ],
 )
 def test_what_cannot_be_found_is_said(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("name", "columns", "message"),
+    [
+        ("scale_factor_asymmetry", {"rate": [1, 2], "output": [1, 2]}, "different negative rates"),
+        (
+            "scale_factor_temperature_sensitivity",
+            {"rate": [1, 2, 3], "output": [1, 2, 3], "temperature": [5, 5, 5]},
+            "do not change independently",
+        ),
+        (
+            "bias_ramp_sensitivity",
+            {"error": [1, 2, 3], "temperature_rate": [1, 2, 3], "temperature": [2, 4, 6]},
+            "do not change independently",
+        ),
+        (
+            "bias_temperature_sensitivity",
+            {"error": [1, 2], "temperature": [5, 5]},
+            "temperature never changes",
+        ),
+        (
+            "bias_repeatability",
+            {"error": [1, 2], "run": [0, 0], "rate": [1, 2]},
+            "There is 1 run",
+        ),
+    ],
+)
+def test_what_the_table_cannot_find_is_said(name, columns, message):
+    with pytest.raises(ValueError, match=message):
+        figure(name, **columns)

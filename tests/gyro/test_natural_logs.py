@@ -6,9 +6,8 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError
-from skanfis.gyro._files import find_logs
-from skanfis.gyro._layout import Request
-from skanfis.gyro.log import read
+from skanfis.gyro._guess import Request
+from skanfis.gyro.log import find_logs, read
 
 ASKED = {"require": ("temperature", "output"), "guess": True, "drop_missing": True}
 PARTS = ["time", "temperature", "output", "rate"]
@@ -141,17 +140,12 @@ def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth, suf
     np.testing.assert_allclose(reading.log["output"], -27_000.0 * truth["output"])
 
 
-def test_columns_without_names_are_told_by_what_they_do(tmp_path, truth):
-    warming = 20.0 + 0.1 * np.arange(len(truth)) + 3.0 * np.sin(truth.index / 40.0)
-    table = pd.DataFrame(
-        {"a": 0.5 * truth.index, "b": truth["output"], "c": warming, "d": truth["rate"]}
-    )
+def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
+    table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
     table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv", require=("temperature", "output", "rate", "time"))
-    names = {part: reading.files[0].layout.name(part) for part in PARTS}
-    assert names == {"time": "a", "temperature": "c", "output": "b", "rate": "d"}
-    assert "because one follows the other" in "; ".join(reading.notes)
-    told = found(tmp_path / "log.csv", columns={"output": "D ", "rate": "b"})
+    with pytest.raises(LogError, match=r"Say which it is .--columns temperature=NAME"):
+        found(tmp_path / "log.csv")
+    told = found(tmp_path / "log.csv", columns={"temperature": "a", "output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
     assert "'d' is taken for 'D '" in told.notes
 
@@ -168,15 +162,6 @@ def test_a_raw_signal_is_no_rate(tmp_path, truth, name, scale):
     layout = reading.files[0].layout
     assert (layout.name("output"), layout.name("rate")) == (name, "rate_dps")
     assert reading.units["output"] == "mV"
-
-
-def test_an_output_alone_is_told_by_its_unit(tmp_path, truth):
-    table = truth[["time", "temperature"]].assign(**{"G7 [mV]": truth["output"], "note": "a"})
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
-    np.testing.assert_allclose(reading.log["output"], truth["output"])
-    assert reading.units["output"] == "mV"
-    assert "output = 'G7 [mV]' in mV (by its unit)" in "; ".join(reading.notes)
 
 
 def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
@@ -200,25 +185,25 @@ def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
 def test_many_files_folders_patterns_and_headers_that_nearly_agree(tmp_path, truth):
     folder = tmp_path / "logs"
     folder.mkdir()
-    spelt = {2: {"Temp": " temp"}, 10: {"Temp": "TEMP"}}
-    for number, (_, part) in zip((1, 2, 10), truth.groupby("run"), strict=False):
+    spelt = {2: {"Temp": " temp"}, 3: {"Temp": "TEMP"}}
+    for number, (_, part) in zip((1, 2, 3), truth.groupby("run"), strict=False):
         table = part.rename(columns={"temperature": "Temp"})[["time", "Temp", "output", "rate"]]
         table.rename(columns=spelt.get(number, {})).to_csv(folder / f"r{number}.csv", index=False)
     (folder / "notes.txt").write_text("not a log")
     paths = find_logs([str(folder)])
-    assert [path[-7:].strip("/") for path in paths] == ["r1.csv", "r2.csv", "r10.csv"]
+    assert [path[-6:] for path in paths] == ["r1.csv", "r2.csv", "r3.csv"]
     assert find_logs([f"{folder}/r*.csv"]) == paths
     reading = found(paths)
     same(reading, truth[truth["run"].astype(int) < 3])
-    assert list(reading.log["run"].cat.categories) == ["r1", "r2", "r10"]
-    assert sum("is taken for 'Temp' of the first file" in note for note in reading.notes) == 2
+    assert list(reading.log["run"].cat.categories) == ["r1", "r2", "r3"]
+    assert sum("is taken for 'Temp'" in note for note in reading.notes) == 2
     assert reading.name_row(60).endswith("r2.csv, line 2")
     for empty in ([f"{folder}/x*.csv"], [str(tmp_path)]):
         with pytest.raises(LogError, match=r"no file matches|folder without logs"):
             find_logs(empty)
-    (folder / "r3.csv").write_bytes((folder / "r2.csv").read_bytes())
-    with pytest.raises(LogError, match=r"r3.csv: holds the same bytes as .*r2.csv"):
-        found([*paths, str(folder / "r3.csv")])
+    (folder / "r4.csv").write_bytes((folder / "r2.csv").read_bytes())
+    with pytest.raises(LogError, match=r"r4.csv: holds the same bytes as .*r2.csv"):
+        found([*paths, str(folder / "r4.csv")])
 
 
 def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
@@ -232,7 +217,7 @@ def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
 
 
 def test_means_while_reading_are_those_of_the_rows(tmp_path, monkeypatch, truth):
-    monkeypatch.setattr("skanfis.gyro._table._ROWS", 37)  # no multiple of a cell
+    monkeypatch.setattr("skanfis.gyro._log_file._ROWS", 37)  # no multiple of a cell
     truth[[*PARTS, "run"]].to_csv(tmp_path / "log.csv", index=False)
     reading = found(tmp_path / "log.csv", average=50.0)
     cells = truth.groupby(["run", (truth["time"] // 50.0)])[PARTS].mean()
@@ -240,6 +225,28 @@ def test_means_while_reading_are_those_of_the_rows(tmp_path, monkeypatch, truth)
     assert len(reading.log) == 60
     # The same pieces without means are the log itself.
     same(found(tmp_path / "log.csv"), truth, PARTS)
+
+
+def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, truth):
+    monkeypatch.setattr("skanfis.gyro._log_file._ROWS", 37)
+    table = truth[[*PARTS, "run"]].sort_values("time", kind="stable").reset_index(drop=True)
+    table.to_csv(tmp_path / "log.csv", index=False)
+    request = Request(**ASKED)
+    some = read([tmp_path / "log.csv"], request, most_rows=100, check=True)
+    place = table.groupby("run").cumcount()
+    expected = table[place % 4 == 0]
+    assert (some.n_rows, len(some.log)) == (300, 75)
+    same(some, expected, PARTS)
+    assert some.log["run"].astype(int).tolist() == expected["run"].astype(int).tolist()
+    assert some.notes == [
+        "of 300 rows 75 are held, one in 4 of each run; --average makes means of all"
+    ]
+    assert some.name_row(7).endswith(f"line {expected.index[7] + 2}")
+    # A row that would not be held is checked all the same.
+    table.loc[290, "time"] = 0.0
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(LogError, match=r"line 292, column 'time': time does not increase"):
+        read([tmp_path / "log.csv"], request, most_rows=100, check=True)
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from sklearn.base import clone
-from sklearn.model_selection import GridSearchCV
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
-from skanfis.gyro import _law_fit
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
 
 REFERENCE = 20.0
@@ -65,37 +62,6 @@ def test_phase_is_that_of_the_planted_law(rng):
     np.testing.assert_allclose(arcsine().fit(X, rate).phase(X), expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("has_offset", [False, True])
-@pytest.mark.parametrize("has_lag", [False, True])
-def test_jacobian_is_that_of_the_misfit(rng, has_lag, has_offset):
-    X, rate = calibration(rng, n_rows=40)
-    thermal_rate = rng.normal(size=(40, int(has_lag)))
-    log = _law_fit.standardise(np.hstack([X, thermal_rate]), rate, rng.uniform(0.5, 2.0, 40))
-    shape = _law_fit.Shape((2, 1, 3), has_lag, has_offset)
-    # Far from the optimum, where no term of the derivative is hidden by a small residual.
-    point = rng.uniform(0.2, 0.8, shape.n_coefficients)
-    exact = _law_fit.jacobian(point, log, shape)
-    for j, column in enumerate(exact.T):
-        step = np.zeros(point.size, dtype=complex)
-        step[j] = 1e-30j
-        # Complex step: no difference is taken, so that the derivative is exact to rounding.
-        by_step = complex_misfit(point + step, log, shape).imag / 1e-30
-        np.testing.assert_allclose(column, by_step, rtol=1e-12, atol=1e-13)
-
-
-def complex_misfit(parameters, log, shape):
-    """The misfit from its definition, for complex parameters."""
-    s, k, b, rest = np.split(parameters, np.cumsum([degree + 1 for degree in shape.degrees]))
-    tau = log.tau + (rest[0] if shape.has_lag else 0.0) * log.rho
-    value = np.polynomial.polynomial.polyval
-    phase = value(tau, k) * (log.rate + value(tau, b))
-    output = value(tau, s) / k[0] * np.sin(phase) + (rest[-1] if shape.has_offset else 0.0)
-    misfit = log.root_weights * (output - log.output)
-    found = _law_fit.misfit(parameters.real, log, shape)
-    np.testing.assert_allclose(found, misfit.real, atol=1e-13)
-    return misfit
-
-
 def test_lag_of_the_thermometer_comes_back(rng):
     """The coil is ahead of the thermometer by the lag times the thermal rate."""
     rate, shown = rng.uniform(-150, 150, 600), rng.uniform(-20, 60, 600)
@@ -150,14 +116,6 @@ def test_columns_by_name_and_place(rng):
     np.testing.assert_array_equal(named.predict(frame), plain.predict(X))
     placed = arcsine(output=-1, temperature=1).fit(frame.to_numpy(), rate)
     np.testing.assert_array_equal(placed.predict(frame.to_numpy()), plain.predict(X))
-
-
-def test_without_temperature(rng):
-    rate = rng.uniform(-100, 100, 50)
-    counts = planted_output(rate, np.full(50, REFERENCE))[:, None]
-    law = OpenLoopArcsineRegressor(temperature=None).fit(counts, rate)
-    np.testing.assert_allclose(law.predict(counts), rate, atol=1e-7)
-    assert law.amplitude_.shape == law.sagnac_factor_.shape == law.bias_.shape == (1,)
 
 
 def test_constant_temperature_is_said_and_survived(rng):
@@ -262,19 +220,6 @@ def test_bad_logs_are_refused(rng):
         OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
     with pytest.raises(ValueError, match="sample_weight must be zero or positive"):
         OpenLoopArcsineRegressor().fit(X, rate, sample_weight=-np.ones(20))
-
-
-def test_degrees_are_found_by_grid_search(rng):
-    X, rate = calibration(rng, n_rows=300, bias=[0.0, 1e-3, 1e-4])
-    X[:, 0] += 300.0 * rng.standard_normal(300)
-    search = GridSearchCV(
-        arcsine(),
-        {"bias_degree": [0, 1, 2]},
-        cv=3,
-        scoring="neg_root_mean_squared_error",
-    ).fit(X, rate)
-    assert search.best_params_ == {"bias_degree": 2}
-    assert clone(search.best_estimator_).bias_degree == 2
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

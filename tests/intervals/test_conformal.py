@@ -9,7 +9,7 @@ from sklearn.base import clone
 from sklearn.dummy import DummyRegressor
 from sklearn.frozen import FrozenEstimator
 from sklearn.linear_model import BayesianRidge, LinearRegression
-from sklearn.model_selection import GridSearchCV, GroupKFold, KFold, ShuffleSplit
+from sklearn.model_selection import GroupKFold, KFold, ShuffleSplit
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import estimator_checks_generator
@@ -17,14 +17,13 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 from skanfis import ANFISRegressor
 from skanfis.intervals import ConformalRegressor
 from skanfis.intervals._quantiles import (
-    cross_bounds,
     group_scores,
     n_needed,
     one_row_per_group,
     row_masses,
     score_quantile,
 )
-from skanfis.intervals._scores import final_step
+from skanfis.intervals._scores import last_step
 from skanfis.learning import VariableProjection
 
 QUICK = {
@@ -65,38 +64,19 @@ def test_split_is_that_of_crepes():
         assert_allclose(np.column_stack(ours.predict_interval(new, coverage)), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("method", "theirs"), [("cross", "plus"), ("folds", "base")])
 @pytest.mark.parametrize("n_splits", [5, 40])
-def test_folds_and_cross_are_those_of_mapie(n_splits, method, theirs):
+def test_folds_are_those_of_mapie(n_splits):
     from mapie.regression import CrossConformalRegressor
 
     rng = np.random.default_rng(1)
     X, y = bent(rng, 40)
     new = rng.uniform(-3, 3, size=(30, 1))
     cv = KFold(n_splits, shuffle=True, random_state=3)
-    settings = {"confidence_level": 0.8, "method": theirs, "cv": cv}
+    settings = {"confidence_level": 0.8, "method": "base", "cv": cv}
     mapie = CrossConformalRegressor(LinearRegression(), **settings).fit_conformalize(X, y)
     expected = mapie.predict_interval(new)[1][:, :, 0]
-    ours = ConformalRegressor(LinearRegression(), method=method, scaled=False, cv=cv).fit(X, y)
+    ours = ConformalRegressor(LinearRegression(), scaled=False, cv=cv).fit(X, y)
     assert_allclose(np.column_stack(ours.predict_interval(new, 0.8)), expected, rtol=1e-9)
-
-
-def test_cross_bounds_are_those_found_by_sorting():
-    rng = np.random.default_rng(2)
-    scores = [rng.exponential(size=n) for n in (7, 12, 9)]
-    scores[1][:2] = scores[1][2], np.nan
-    masses = np.split(row_masses(28, rng.uniform(0.5, 2.0, size=28))[0], [7, 19])
-    centers, deviations = rng.normal(size=(3, 40)), rng.uniform(0.1, 2.0, size=(3, 40))
-    every = np.concatenate(masses)
-    found = cross_bounds(list(zip(scores, masses, strict=True)), centers, deviations, 0.8)
-    for i in range(40):
-        for sign, bounds in zip((-1, 1), found, strict=True):
-            reached = [
-                sign * centers[k, i] + np.nan_to_num(scores[k], nan=np.inf) * deviations[k, i]
-                for k in range(3)
-            ]
-            expected = score_quantile(np.concatenate(reached), every, 0.8)
-            assert_allclose(sign * bounds[i], expected, rtol=1e-12)
 
 
 def test_units_count_and_not_the_size_of_weights():
@@ -179,7 +159,7 @@ def test_leave_one_out_is_that_of_refits(weighting):
     root = np.sqrt(w)
     beta = np.linalg.lstsq(root[:, None] * A, root * y, rcond=None)[0]
     noise = np.sqrt(np.sum(w * (y - A @ beta) ** 2) / (w.sum() - 3.0))
-    assert_allclose(final_step(model.estimator_).noise_std_, noise, rtol=1e-8)
+    assert_allclose(last_step(model.estimator_)[0].noise_std_, noise, rtol=1e-8)
     expected, residuals = [], []
     for i in range(25):
         rest, own = np.delete(A, i, axis=0), np.delete(w, i)
@@ -207,8 +187,7 @@ def test_split_covers_exactly_as_often_as_theory_says():
     assert abs(np.mean(found) - 0.9) < 0.012
 
 
-@pytest.mark.parametrize("method", ["folds", "cross"])
-def test_by_group_covers_new_groups_where_by_row_does_not(method):
+def test_by_group_covers_new_groups_where_by_row_does_not():
     """Every run has an offset of its own: rows of a known run say nothing of a new one."""
     rng = np.random.default_rng(6)
     by_row, by_group, by_run = [], [], []
@@ -218,7 +197,7 @@ def test_by_group_covers_new_groups_where_by_row_does_not(method):
         X, known = np.zeros((run.size, 1)), run < 12
         # Each run's mean is learnt from its own rows, as a flexible model does.
         X[:, 0] = run
-        model = ConformalRegressor(NearestRun(), method=method, scaled=False, cv=20)
+        model = ConformalRegressor(NearestRun(), scaled=False, cv=20)
         by_row.append(covered(model.fit(X[known], y[known]).predict_interval(X[~known]), y[~known]))
         model.fit(X[known], y[known], groups=run[known])
         lower, upper = model.predict_interval(X[~known], 0.9, confidence=None)
@@ -249,7 +228,7 @@ class NearestRun(DummyRegressor):
         return self.means_[X[:, 0].astype(int)]
 
 
-@pytest.mark.parametrize("method", ["folds", "cross", "split", "loo"])
+@pytest.mark.parametrize("method", ["folds", "split", "loo"])
 def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method):
     rng = np.random.default_rng(7)
     X, y = bent(rng, 300)
@@ -261,51 +240,11 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert (np.diff(upper - lower) > 0.0).all()
 
 
-def refusing(inside, policy):
-    """Rules with a policy, alone or inside of something; the search looks at rows it has seen."""
-    rules = ANFISRegressor(**QUICK, out_of_bounds=policy)
-    if inside == "search":
-        return GridSearchCV(rules, {"alpha": [0.01]}, cv=[(np.arange(20), np.arange(20))])
-    return rules if inside == "alone" else make_pipeline(StandardScaler(), rules)
-
-
-@pytest.mark.parametrize(
-    ("inside", "method"), [("alone", "cross"), ("pipeline", "split"), ("search", "folds")]
-)
-def test_of_a_model_that_refuses_rows_those_held_out_count_as_at_the_edge(method, inside):
-    """Some row is the largest, and beyond the range of the model of the folds without it."""
-    X, y = bent(np.random.default_rng(5), 60)
-    middle, found = np.linspace(-0.5, 0.5, 5)[:, None], {}
-    for policy in ("clip", "raise"):
-        model = ConformalRegressor(
-            refusing(inside, policy), method=method, cv=3, calibration_fraction=0.5
-        ).fit(X, y)
-        found[policy] = [model.scores_, *model.predict_interval(middle)]
-    for one, other in zip(*found.values(), strict=True):
-        assert_array_equal(one, other)
-    with pytest.raises(ValueError, match="X lies outside the training data"):
-        model.predict_interval([[9.0]])
-
-
-def test_what_a_search_finds_says_how_sure_it_is():
-    """By the best of its candidates, whose own intervals they are, within a Pipeline too."""
-    rng = np.random.default_rng(12)
-    X, y = bent(rng, 60)
-    scaled = make_pipeline(StandardScaler(), ANFISRegressor(**QUICK))
-    search = GridSearchCV(scaled, {"anfisregressor__n_mfs": [1, 2]}, cv=2)
-    best = search.fit(X, y).best_estimator_
-    found, expected = (
-        ConformalRegressor(one, method="loo").fit(X, y).predict_interval(X, 0.8)
-        for one in (search, best)
-    )
-    assert_allclose(found, expected, rtol=1e-9)
-
-
 def test_several_outputs_are_each_covered():
     rng = np.random.default_rng(8)
     X, y = bent(rng, 160)
     y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=160)])
-    for method in ("folds", "cross", "split"):
+    for method in ("folds", "split"):
         model = ConformalRegressor(ANFISRegressor(**QUICK), method=method, cv=3).fit(X[:80], y[:80])
         lower, upper = model.predict_interval(X[80:], 0.8)
         assert lower.shape == (80, 2)
@@ -337,51 +276,50 @@ def metadata_routing():
         yield
 
 
-def refused(match, *args, fit=None, **params):
-    rng = np.random.default_rng(10)
-    X, y = bent(rng, 24)
-    model, given = ConformalRegressor(*args, **params), fit(X) if fit else {}
+RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
+
+
+@pytest.mark.parametrize(
+    ("match", "params", "given"),
+    [
+        ("needs 9 rows held out or more; there are 6, enough for", {"method": "split"}, {}),
+        ("needs 9 groups or more; there are 8", {}, {"groups": np.arange(24) // 3}),
+        ("single group", {}, {"groups": np.zeros(24)}),
+        ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
+        (
+            r"tells nothing of its noise.* another method; with scaled",
+            {"method": "loo", "estimator": BayesianRidge()},
+            {},
+        ),
+        ("not have: use scaled=False", {"estimator": LinearRegression()}, {}),
+        ("every row must be held out once", {"cv": ShuffleSplit(2, random_state=0)}, {}),
+        ("An iterator can be used once only", {"cv": iter([])}, {}),
+        (
+            "out_of_bounds='raise' refuses rows held out",
+            {"estimator": make_pipeline(StandardScaler(), ANFISRegressor(out_of_bounds="raise"))},
+            {},
+        ),
+        ("leaves no row to train on", {"method": "split", "calibration_fraction": 1.0}, {}),
+        (
+            "enable_metadata_routing=True",
+            {"estimator": make_pipeline(StandardScaler(), RULES)},
+            {"sample_weight": np.ones(24)},
+        ),
+        ("Negative values in sample_weight", {}, {"sample_weight": -np.ones(24)}),
+    ],
+)
+def test_bad_input_is_refused_by_name(match, params, given):
+    X, y = bent(np.random.default_rng(10), 24)
+    model = ConformalRegressor(**({"estimator": RULES} | params))
     with pytest.raises(ValueError, match=match):
         model.fit(X, y, **given).predict_interval(X)
 
 
-def test_bad_input_is_refused_by_name():
-    rules = ANFISRegressor(n_mfs=1, alpha=0.1)
-    refused(
-        r"needs 9 rows held out or more; there are 6, enough for coverage=0\.857",
-        rules,
-        method="split",
-    )
-    refused(
-        r"needs 9 groups or more; there are 8", rules, fit=lambda X: {"groups": np.arange(24) // 3}
-    )
-    refused(
-        r"coverage=0\.9 needs 9 groups or more",
-        rules,
-        method="cross",
-        fit=lambda X: {"groups": np.arange(24) // 3},
-    )
-    refused("single group", rules, fit=lambda X: {"groups": np.zeros(24)})
-    refused(
-        "leaves out rows, not groups", rules, method="loo", fit=lambda X: {"groups": np.arange(24)}
-    )
-    for other in (BayesianRidge(), LinearRegression()):
-        refused(r"tells nothing of its noise.* another method; with scaled", other, method="loo")
-    refused("LinearRegression does not have: use scaled=False", LinearRegression())
-    refused("every row must be held out once", rules, cv=ShuffleSplit(2, random_state=0))
-    refused("leaves no row to train on", rules, method="split", calibration_fraction=1.0)
-    refused(
-        "enable_metadata_routing=True",
-        make_pipeline(StandardScaler(), rules),
-        fit=lambda X: {"sample_weight": np.ones(24)},
-    )
-    refused(
-        "Negative values in sample_weight", rules, fit=lambda X: {"sample_weight": -np.ones(24)}
-    )
+def test_levels_and_missing_numbers_are_refused_by_name():
     X, y = bent(np.random.default_rng(0), 24)
     with pytest.raises(ValueError, match="Input y contains NaN in column 'y0', first at row 3"):
-        ConformalRegressor(rules).fit(X, np.where(np.arange(24) == 3, np.nan, y))
-    model = ConformalRegressor(rules).fit(X, y)
+        ConformalRegressor(RULES).fit(X, np.where(np.arange(24) == 3, np.nan, y))
+    model = ConformalRegressor(RULES, cv=4).fit(X, y)
     with pytest.raises(ValueError, match=r"coverage=90 must be a number between 0 and 1"):
         model.predict_interval(X, 90)
     with pytest.raises(ValueError, match="Input X contains NaN"):
@@ -390,15 +328,32 @@ def test_bad_input_is_refused_by_name():
         model.predict_interval(X, confidence=0.9)
     with pytest.raises(ValueError, match="confidence='all' must be a number, 'auto' or None"):
         model.predict_interval(X, confidence="all")
-    model.set_params(cv=list(KFold(5).split(X)), method="cross")
     model.fit(X, y, groups=np.arange(24) // 2)
-    with pytest.raises(ValueError, match="confidence takes folds that hold out whole groups"):
-        model.predict_interval(X, 0.5, confidence=0.9)
-    model.set_params(cv=4, method="folds").fit(X, y, groups=np.arange(24) // 2)
     with pytest.raises(ValueError, match=r"confidence=0\.95 needs 19 groups or more; there are 12"):
         model.predict_interval(X, 0.99, confidence=0.95)
     with pytest.raises(ValueError, match=r"confidence=2 must be a number between 0 and 1"):
         model.half_width(0.9, confidence=2)
+
+
+def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch):
+    """And a cv of splits that can be read once is refused the second time."""
+    rng = np.random.default_rng(14)
+    X, y = bent(rng, 40)
+    model = ConformalRegressor(RULES, cv=iter(list(KFold(4).split(X)))).fit(X, y)
+    before = vars(model).copy()
+    with pytest.raises(ValueError, match="gives no splits"):
+        model.fit(np.hstack([X, X**2]), y)
+    assert vars(model) == before
+    model.set_params(cv=4)
+
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("skanfis.intervals.conformal.held_out_scores", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        model.fit(np.hstack([X, X**2]), y)
+    assert vars(model) == before | {"cv": 4}
+    assert len(model.predict_interval(X)[0]) == 40
 
 
 CHECKED = ConformalRegressor(ANFISRegressor(n_mfs=1, alpha=0.1), cv=2)

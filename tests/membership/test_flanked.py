@@ -8,14 +8,10 @@ from skanfis.antecedent import GridAntecedent
 from skanfis.membership import MEMBERSHIPS
 from skanfis.membership.flanked import (
     PiShaped,
-    SShaped,
     Trapezoidal,
     Triangular,
-    TwoSidedGaussian,
-    ZShaped,
 )
-
-from .. import oracles
+from skanfis.membership.profiles import GaussianProfile, LinearProfile, SplineProfile
 
 WITH_FOOT = pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped])
 
@@ -23,49 +19,6 @@ WITH_FOOT = pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped
 def theta_of(*numbers):
     """One term: a location, and lengths that become logarithms."""
     return np.array([[numbers[0]], *[[np.log(length)] for length in numbers[1:]]])
-
-
-@pytest.mark.parametrize(
-    ("family", "numbers", "x", "mu"),
-    [
-        # a = 1, b = c = 3, d = 7
-        (Triangular, (3, 2, 4), [0, 1, 2, 3, 5, 7, 9], [0, 0, 1 / 2, 1, 1 / 2, 0, 0]),
-        # a = 1, b = 2, c = 4, d = 8
-        (Trapezoidal, (3, 1, 4, 2), [0, 1.5, 2, 3, 4, 5, 8.5], [0, 1 / 2, 1, 1, 1, 3 / 4, 0]),
-        (
-            PiShaped,
-            (3, 1, 4, 2),
-            [0, 1.25, 1.5, 2, 3, 4, 5, 7],
-            [0, 1 / 8, 1 / 2, 1, 1, 1, 7 / 8, 1 / 8],
-        ),
-        (TwoSidedGaussian, (3, 1, 4, 2), [1, 2, 3, 4, 8], [np.exp(-0.5), 1, 1, 1, np.exp(-0.5)]),
-        (SShaped, (3, 4), [-2, -1, 0, 1, 2, 3, 99], [0, 0, 1 / 8, 1 / 2, 7 / 8, 1, 1]),
-        (ZShaped, (3, 4), [-99, 3, 4, 5, 6, 7, 8], [1, 1, 7 / 8, 1 / 2, 1 / 8, 0, 0]),
-    ],
-)
-def test_values_in_numbers(family, numbers, x, mu):
-    assert_allclose(family.value(np.array([x]), theta_of(*numbers)), [mu], rtol=1e-13, atol=1e-15)
-
-
-@pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped, TwoSidedGaussian])
-def test_whatever_the_parameters_mu_rises_to_one_and_falls(family, rng):
-    theta = 3.0 * rng.normal(size=(len(family.parameters), 50))
-    theta[1:] = np.clip(theta[1:], -8.0, 8.0)
-    a, b, c, d = oracles.corners(
-        family.name,
-        dict(zip([p.name for p in family.parameters], family.natural(theta), strict=True)),
-    )
-    assert (a < b).all()
-    assert (b <= c).all()
-    assert (c < d).all()
-    x = np.linspace(a, d, 201, axis=1)
-    mu = family.value(x, theta)
-    rising = np.diff(mu, axis=1)[x[:, 1:] <= b[:, None]]
-    falling = np.diff(mu, axis=1)[x[:, :-1] >= c[:, None]]
-    # Where a flank is much shorter than the term, the last bit of x is not so small on it.
-    assert (rising >= -1e-8).all()
-    assert (falling <= 1e-8).all()
-    assert_array_equal(family.value(theta[[0]].T, theta), 1.0)
 
 
 @pytest.mark.parametrize("name", ["trapezoidal", "pi_shaped", "two_sided_gaussian"])
@@ -76,14 +29,6 @@ def test_on_the_plateau_there_is_nothing_to_learn(name, rng):
     )
     assert_array_equal(log_mu, 0.0)
     assert_array_equal(gradient, 0.0)
-
-
-def test_a_peak_has_the_slope_of_its_side():
-    x = np.array([[2.9, 3.1]])
-    _, gradient = Triangular.log_value_and_gradient(x, theta_of(3, 2, 4))
-    # d log mu / dc = -1 / (mu left) on the left, 1 / (mu right) on the right
-    assert_allclose(gradient[0, 0], [-1 / 2 / 0.95, 1 / 4 / 0.975], rtol=1e-8)
-    assert_array_equal(gradient[[1, 2], 0, [1, 0]], 0.0)
 
 
 def strengths_on_a_line(family, theta, x):
@@ -118,3 +63,31 @@ def test_where_no_term_reaches_the_nearest_speaks(family):
     between = strengths_on_a_line(family, theta, np.linspace(4.0, 6.0, 401))
     assert_allclose(between[:2, 200], 0.5, rtol=1e-10)
     assert (np.abs(np.diff(between, axis=1)) < 0.05).all()
+
+
+FLOOR = 1e-10
+PROFILES = pytest.mark.parametrize("profile", [GaussianProfile, LinearProfile, SplineProfile])
+FOOTED = pytest.mark.parametrize("profile", [LinearProfile, SplineProfile])
+
+
+@PROFILES
+@pytest.mark.parametrize("mu", [0.01, 0.3, 0.5, 0.6, 0.99])
+def test_reach_is_the_inverse_of_the_value(profile, mu):
+    assert_allclose(profile.value(profile.reach(mu)), mu, rtol=1e-12)
+
+
+@FOOTED
+def test_the_floor_is_a_gaussian_without_end(profile):
+    t = np.array([1.0, 2.0, 40.0, 1e8, 1e150])
+    log_mu, slope = profile.log_value_and_slope(t)
+    assert_allclose(log_mu, np.log(FLOOR) - 0.5 * t**2, rtol=1e-14)
+    assert_allclose(slope, -t, rtol=1e-14)
+
+
+@FOOTED
+def test_log_value_falls_through_the_foot_without_a_jump(profile):
+    t = 1.0 + np.linspace(-1e-9, 1e-9, 2001)
+    log_mu = profile.log_value(t)
+    assert (np.diff(log_mu) <= 0.0).all()
+    assert (np.abs(np.diff(log_mu)) < 0.02).all()
+    assert log_mu[0] > log_mu[-1]

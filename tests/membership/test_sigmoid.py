@@ -18,22 +18,6 @@ def test_with_equal_flanks_difference_and_product_differ_by_a_factor(ratio):
     assert_allclose(difference - product, np.log(-np.expm1(-2.0 * ratio)), rtol=1e-10, atol=1e-14)
 
 
-def test_tops():
-    # tanh(v / 2) and s(v)^2 at v = 2
-    theta = np.array([[3.0], [np.log(2.0)], [0.0], [0.0]])
-    center = np.array([[3.0]])
-    assert_allclose(SigmoidDifference.value(center, theta[:3]), np.tanh(1.0), rtol=1e-14)
-    assert_allclose(SigmoidProduct.value(center, theta), 1 / (1 + np.exp(-2.0)) ** 2, rtol=1e-14)
-
-
-def test_product_may_be_steeper_on_one_side():
-    # Far from the other flank, a sigmoid of length 1/10 on the left and of 1 on the right.
-    theta = np.array([[0.0], [np.log(20.0)], [np.log(0.1)], [0.0]])
-    x = np.array([[-20.1, -20.0, 20.0, 21.0]])
-    s = 1 / (1 + np.exp(1.0))
-    assert_allclose(SigmoidProduct.value(x, theta), [[s, 0.5, 0.5, s]], rtol=1e-12)
-
-
 @pytest.mark.parametrize("family", [SigmoidDifference, SigmoidProduct])
 @pytest.mark.parametrize("log_ratio", [-12.0, 6.0, 12.0])
 def test_flanks_much_longer_or_shorter_than_the_width(family, log_ratio):
@@ -44,10 +28,3 @@ def test_flanks_much_longer_or_shorter_than_the_width(family, log_ratio):
     assert np.isfinite(log_mu).all()
     assert np.isfinite(gradient).all()
     assert (log_mu <= 0.0).all()
-
-
-@pytest.mark.parametrize("family", [SigmoidDifference, SigmoidProduct])
-@pytest.mark.parametrize("overlap", [1e-3, 0.5, 0.999])
-def test_start_for_any_overlap(family, overlap):
-    theta = family.start(np.zeros(1), np.ones(1), overlap)
-    assert_allclose(family.value(np.array([[0.5]]), theta), overlap, rtol=1e-9)

@@ -72,12 +72,17 @@ def whole_and_settings(request, premises):
 
 @pytest.mark.parametrize("chunking", CHUNKINGS)
 def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
+    """But for the penalty's extents, which are about the rules' centres in the first model."""
     X, y = surface()
     whole, settings = whole_and_settings
     model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS[chunking])
-    assert difference(model, whole, X) < EXACT
-    assert (model.agreement_, model.alpha_) == (whole.agreement_, whole.alpha_)
-    assert model.loss_curve_[-1] == pytest.approx(whole.loss_curve_[-1], rel=1e-9)
+    once = ANFISRegressor(**settings).partial_fit(X, y)
+    assert difference(model, once, X) < EXACT
+    assert (model.agreement_, model.alpha_) == (once.agreement_, once.alpha_)
+    has_slopes = settings.get("order", 1) == 1 and settings.get("alpha") != 0.0
+    assert difference(model, whole, X) < (0.05 if has_slopes else EXACT)
+    assert model.agreement_ == pytest.approx(whole.agreement_, rel=0.02)
+    assert model.loss_curve_[-1] == pytest.approx(once.loss_curve_[-1], rel=1e-9)
     assert model.redundant_rules_ == whole.redundant_rules_
     for name in ("minimum", "maximum", "reference", "spread", "rule_weights", "rule_rows"):
         found, expected = getattr(model.model_, name), getattr(whole.model_, name)
@@ -95,7 +100,7 @@ def test_weights_zeros_and_several_outputs(premises):
     X, y = surface(n_outputs=2)
     weight = np.random.default_rng(3).integers(0, 4, len(X)).astype(float)
     settings = {"partition": premises, "solver": "lse"}
-    whole = ANFISRegressor(**settings).fit(X, y, weight)
+    whole = ANFISRegressor(**settings).partial_fit(X, y, weight)
     model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS["uneven"], weight)
     assert difference(model, whole, X) < EXACT
     repeated = np.repeat(np.arange(len(X)), weight.astype(int))
@@ -110,7 +115,7 @@ def test_weights_zeros_and_several_outputs(premises):
 def test_forgetting_is_a_fit_with_fading_weights(premises):
     X, y = surface()
     factor = 0.98
-    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
+    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.0}
     whole = ANFISRegressor(**settings).fit(X, y, factor ** np.arange(299.0, -1.0, -1.0))
     for sizes in ([300], [1] * 20 + [280], [100, 200]):
         model = in_chunks(ANFISRegressor(**settings), X, y, sizes, forgetting=factor)
@@ -119,7 +124,7 @@ def test_forgetting_is_a_fit_with_fading_weights(premises):
 
 
 @pytest.mark.parametrize("kind", ["given", "weighted", "auto"])
-def test_window_is_a_fit_of_its_rows(premises, kind):
+def test_window_is_the_rows_of_the_last_calls(premises, kind):
     X, y = surface()
     # What leaves is far larger than what stays, and of other scales: nothing of it may be left.
     X[:120, 0] *= 3.0
@@ -128,62 +133,25 @@ def test_window_is_a_fit_of_its_rows(premises, kind):
     if kind != "auto":
         settings |= {"agreement": 0.01, "alpha": 0.01}
     weight = np.linspace(1.0, 2.0, 300) if kind == "weighted" else None
-    latest = None if weight is None else weight[-170:]
-    whole = ANFISRegressor(**settings).fit(X[-170:], y[-170:], latest)
-    for sizes in ([300], [1] * 20 + [280], [100, 30, 150, 20]):
-        model = in_chunks(ANFISRegressor(**settings), X, y, sizes, weight, window=170)
-        assert difference(model, whole, X[-170:]) < EXACT
-        for name in ("minimum", "maximum", "spread", "rule_rows", "output_limits"):
-            found, expected = getattr(model.model_, name), getattr(whole.model_, name)
-            assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
-        found, expected = model.model_.support.radius, whole.model_.support.radius
-        assert np.all(found >= 0.9 * expected)
-        assert np.all(found <= expected * (1.0 + 1e-9))
-        assert model.n_samples_seen_ == 300
-
-
-def test_window_may_change_and_its_memory_does_not_grow(premises):
-    X, y = surface()
-    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
-    model, sizes = ANFISRegressor(**settings), []
-    for start in range(0, 300, 50):
-        model.partial_fit(X[start : start + 50], y[start : start + 50], window=80)
-        sizes.append(len(pickle.dumps(model)))
-    assert max(sizes[2:]) < 1.1 * sizes[1]
-    model = pickle.loads(pickle.dumps(model)).partial_fit(X[:10], y[:10], window=60)
-    rows = np.r_[250:300, :10]
-    assert difference(model, ANFISRegressor(**settings).fit(X[rows], y[rows]), X[rows]) < EXACT
-    # Without a window nothing leaves any more; the rows in it go along to a merge.
-    other = ANFISRegressor(**settings).partial_fit(X[30:60], y[30:60])
-    rows = np.r_[rows, 10:60]
-    expected = ANFISRegressor(**settings).fit(X[rows], y[rows])
-    merged = model.partial_fit(X[10:30], y[10:30]).merge(other)
-    assert difference(merged, expected, X[rows]) < EXACT
-    with pytest.raises(ValueError, match="sums that no row can leave"):
-        merged.partial_fit(X, y, window=60)
-
-
-def test_window_after_a_first_call_that_is_a_fit():
-    X, y = surface()
-    settings = {"agreement": 1e-3, "alpha": 1e-3}
-    model = ANFISRegressor(n_mfs=2, **settings).partial_fit(X, y, window=100)
-    held = ANFISRegressor(partition=model, solver="lse", **settings)
-    assert difference(model, held.fit(X[200:], y[200:]), X[200:]) < EXACT
-    assert model.model_.minimum == pytest.approx(X[200:].min(axis=0))
+    latest = None if weight is None else weight[130:]
+    expected = ANFISRegressor(**settings).partial_fit(X[130:], y[130:], latest)
+    model = ANFISRegressor(**settings)
+    model = in_chunks(model, X, y, [100, 30, 150, 1, 19], weight, window=3)
+    assert difference(model, expected, X[130:]) < EXACT
+    for name in ("minimum", "maximum", "spread", "rule_rows", "output_limits"):
+        found, whole = getattr(model.model_, name), getattr(expected.model_, name)
+        assert found == pytest.approx(whole, rel=1e-9, abs=1e-9), name
     assert model.n_samples_seen_ == 300
-
-
-@pytest.mark.parametrize("window", [1, 0, -5, 10.0, True, "10"])
-def test_window_out_of_range(premises, window):
-    X, y = surface()
-    with pytest.raises(ValueError, match=r"window=.* must be a whole number of 2 or more"):
-        ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y, window=window)
-
-
-def test_window_beside_forgetting_is_refused(premises):
-    X, y = surface()
-    with pytest.raises(ValueError, match="two ways to let old rows go"):
-        ANFISRegressor(partition=premises).partial_fit(X, y, window=50, forgetting=0.9)
+    # It may shrink, survives a file, and what is in it goes along to a merge.
+    model = pickle.loads(pickle.dumps(model)).partial_fit(X[:10], y[:10], window=2)
+    rows = np.r_[281:300, :10]
+    other = ANFISRegressor(**settings).partial_fit(X[30:60], y[30:60])
+    weight = np.ones(300) if weight is None else weight
+    weight[:10] = 1.0
+    expected = ANFISRegressor(**settings).partial_fit(X[rows], y[rows], weight[rows])
+    assert difference(model, expected, X[rows]) < EXACT
+    merged, both = model.merge(other), expected.merge(other)
+    assert difference(merged, both, X[rows]) < EXACT
 
 
 def test_drift_of_inputs_costs_no_digits(premises):
@@ -192,7 +160,7 @@ def test_drift_of_inputs_costs_no_digits(premises):
     near = X.copy()
     near[:150, 0] = 0.0 + 1e-4 * np.arange(150)
     settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
-    whole = ANFISRegressor(**settings).fit(near, y)
+    whole = ANFISRegressor(**settings).partial_fit(near, y)
     model = in_chunks(ANFISRegressor(**settings), near, y, [150, 150])
     assert difference(model, whole, near) < EXACT
 
@@ -211,7 +179,7 @@ def test_first_call_is_a_fit_and_premises_stay():
     assert model.n_samples_seen_ == 200
     model.partial_fit(X[200:], y[200:])
     assert model.memberships_ == fitted.memberships_
-    held = ANFISRegressor(partition=fitted, solver="lse", agreement=1e-3, alpha=1e-4).fit(X, y)
+    held = chunk(fitted, agreement=1e-3, alpha=1e-4).partial_fit(X, y)
     assert difference(model, held, X) < EXACT
     # And what fit says afterwards is of its own rows.
     model.fit(X[:200], y[:200])
@@ -223,7 +191,7 @@ def test_after_fit_premises_stay_and_rows_are_new(premises):
     model = deepcopy(premises)
     with pytest.warns(ForgottenRowsWarning, match="no sums over its 300 rows"):
         model.partial_fit(X, y)
-    held = ANFISRegressor(partition=premises, solver="lse", agreement=1e-3, alpha=1e-4).fit(X, y)
+    held = chunk(premises, agreement=1e-3, alpha=1e-4).partial_fit(X, y)
     assert difference(model, held, X) < EXACT
     assert model.n_samples_seen_ == 300
 
@@ -294,6 +262,24 @@ def test_state_survives_a_file_and_not_a_clone(premises):
     assert model.n_samples_seen_ == 300
 
 
+def test_rows_far_beyond_the_premises_are_refused_by_name(premises):
+    X, y = surface(50)
+    model = chunk(premises).partial_fit(X, y)
+    for value in (1e299, -1e150):
+        X[7, 1] = value
+        with pytest.raises(
+            ValueError, match=r"Column 'x1' of X holds .*more than 1e\+100 standard"
+        ):
+            model.partial_fit(X, y)
+        with pytest.raises(ValueError, match=r"Column 'x1' of X holds"):
+            chunk(premises).partial_fit(X, y)
+    X[7, 1], y[3] = 1e50, 1e299
+    with pytest.raises(ValueError, match=r"Column 'y' of y varies by .* no slope"):
+        model.partial_fit(X, y)
+    y[3] = 0.0
+    assert np.isfinite(model.partial_fit(X, y).predict(X[:3])).all()
+
+
 def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
     X, y = surface()
     model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y)
@@ -310,10 +296,18 @@ def chunk(premises, **settings):
     return ANFISRegressor(partition=premises, solver="lse", **settings)
 
 
-@pytest.mark.parametrize("forgetting", [0.0, -0.1, 1.01, np.nan, "0.9", True, None])
-def test_forgetting_out_of_range(premises, forgetting):
-    with pytest.raises(ValueError, match=r"forgetting=.*above 0 and at most 1"):
-        chunk(premises).partial_fit(*surface(), forgetting=forgetting)
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        *(({"forgetting": f}, "forgetting=.*above 0 and at most 1") for f in (0.0, 1.01, np.nan)),
+        *(({"forgetting": f}, "forgetting=.*above 0 and at most 1") for f in ("0.9", True, None)),
+        *(({"window": w}, "window=.* a whole number of 1 or more") for w in (0, -5, 10.0, True)),
+        ({"window": 50, "forgetting": 0.9}, "two ways to let old rows go"),
+    ],
+)
+def test_forgetting_and_window_out_of_range(premises, given, said):
+    with pytest.raises(ValueError, match=said):
+        chunk(premises).partial_fit(*surface(), **given)
 
 
 BAD_CHUNKS = {

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import ScatteredAntecedent
+from skanfis.learning.firing import RuleFiring
 from skanfis.membership import Bell, Gaussian
-from skanfis.support import RuleFiring
 from skanfis.training.pruning import redundant_rules, rule_statistics
 
 from .. import oracles

@@ -4,22 +4,17 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-from .._numbers import Numbers, as_held
+from .._numbers import Numbers
 from ..folding import fold
-from ._cost import CCost
-from ._deviation import DeviationSource
-from ._deviation_tables import deviation_of
-from ._deviation_test import deviation_test
-from ._dialect import Dialect
-from ._files import check_arguments, write_files
+from ._dialect import (
+    Dialect,
+    check_arguments,
+    read_limits,
+    write_files,
+)
 from ._header import header
-from ._interval import check_deviation, read_interval
-from ._learner import learner_of
-from ._learning_source import LearningSource, learning_test
-from ._saturation import read_limits
 from ._self_test import known_answers, self_test
-from ._source import Source
-from .status import STATUS
+from ._source import CCost, Source
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -35,7 +30,6 @@ class CCode:
     header, source : str
         The text of the two files, in ASCII.
     cost : CCost
-        Arithmetic per evaluation, and memory.
 
     Examples
     --------
@@ -62,23 +56,17 @@ def export_c(
     std: str = "c99",
     min_coverage: float | None = 0.1,
     saturate: Any = None,
-    forgetting: float | None = None,
-    deviation: bool = False,
-    coverage: float | None = None,
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
-    The function ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row
-    of raw inputs and returns a status. It uses constant tables and the functions ``exp`` and
-    ``log``, and for the coverage ``sqrt``: no heap, no state, no recursion, loops of bounded
-    length. Scalers of a pipeline are folded in.
+    ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row of raw inputs
+    and returns a status. It reads constant tables: no heap, no state, no recursion, bounded loops.
+    :doc:`/c_export` tells of the status, the self-test and rows outside the training data.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline of scalers that ends in one, a TransformedTargetRegressor
-        or a search over these. What it does with rows outside the training data is what the
-        function does: see Notes.
+        As :func:`fold` takes it; scalers are folded in.
     path : str or path-like, default=None
         Where to write, without a suffix: "out/gyro" makes out/gyro.h and out/gyro.c. None writes
         nothing.
@@ -88,31 +76,12 @@ def export_c(
     dtype : {"double", "float"}, default="double"
         Type of inputs, outputs, tables and arithmetic.
     std : {"c99", "c89"}, default="c99"
-        The oldest standard that a compiler must know. "c89" is for compilers of old signal
-        processors; it does without ``expf``.
+        The oldest standard that a compiler must know.
     min_coverage : float or None, default=0.1
         Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
-        leaves that out of status, code and tables, most of which it may take: the support of a rule
-        is 2 + n + n (n + 1) / 2 numbers for n inputs. It is left out too where the rules have never
-        seen data, as those read from a .fis file.
+        leaves that out, as do rules that have never seen data.
     saturate : Bounds or array-like of shape (n_outputs, 2), default=None
-        Limits between which every output is held, low and high: those that
-        :func:`skanfis.bounds.bounds` has proven for the box that is specified, or others. Within
-        proven limits nothing changes, until an input beyond the box, or a fault of the hardware,
-        would give more. None holds nothing.
-    forgetting : float or None, default=None
-        A number above 0 and at most 1 adds recursive least squares, by which the consequents go on
-        learning on the device, with this forgetting factor; ``estimator`` is then an ANFISRegressor
-        trained by ``partial_fit``, which knows how sure its consequents are. None leaves it out.
-    deviation : bool, default=False
-        Whether to write ``int NAME_deviation(const double x[], double deviation[])`` too: the
-        standard deviation of :meth:`~skanfis.ANFISRegressor.predict`, with ``return_std=True``. Its
-        tables grow with the square of the number of coefficients.
-    coverage : float, default=None
-        Between 0 and 1: adds ``int NAME_interval(const double x[], double lower[], double
-        upper[])``, the ends of :meth:`~skanfis.intervals.ConformalRegressor.predict_interval` at
-        this coverage, and the deviation. ``estimator`` is then a fitted ConformalRegressor with
-        ``scaled=True`` and not ``method="cross"``, whose intervals are those of several models.
+        Limits between which every output is held, such as :func:`skanfis.bounds.bounds` proves.
 
     Returns
     -------
@@ -122,31 +91,8 @@ def export_c(
     Raises
     ------
     ValueError
-        If a parameter is none of the above, if ``estimator`` has a step that cannot be folded in,
-        if it cannot learn and ``forgetting`` is given, or if the model's numbers go beyond what
-        "float" holds.
-
-    Notes
-    -----
-    The status is a sum of bits: ``NAME_OUT_OF_RANGE`` (1), ``NAME_NOT_FINITE`` (2),
-    ``NAME_UNCOVERED`` (4), ``NAME_NO_OUTPUT`` (8); zero says that all is well. A row outside the
-    range of the training data is answered by ``out_of_bounds`` of the estimator. "clip" and
-    "linear" give an answer, the latter within ``max_extrapolation`` of the estimator. "raise"
-    leaves y as it is, so that a controller which keeps y holds its last value. "nan" writes NaN, or
-    in C89, which has none, leaves y as it is. A row that is not finite gets no answer under any
-    policy.
-
-    With ``forgetting``, a ``NAME_learner`` of fixed size, which is the caller's, holds what is
-    learnt: ``NAME_reset`` sets it to what training has left, ``NAME_learn(&q, x, t)`` takes in a
-    row x with its target t, ``NAME_predict_learnt(&q, x, y)`` answers, and ``NAME_freeze(&q, 1)``
-    holds it. Where the penalty is zero, that is what ``partial_fit`` would have learnt with the
-    same rows and forgetting factor; else the penalty stays as it was at the export, and fades.
-    Rows out of the range of the training data are not learnt from, and the status says so
-    (``NAME_NOT_LEARNT``, 16). See :doc:`/streaming`.
-
-    With the macro ``NAME_SELF_TEST`` defined, ``int NAME_self_test(void)`` compares the function
-    with what Python predicts, and returns zero if all is well; with ``NAME_SELF_TEST_MAIN`` too,
-    the file is a program that exits with zero then.
+        If a parameter is none of the above, a step cannot be folded in, or the model's numbers go
+        beyond what "float" holds.
 
     Examples
     --------
@@ -161,8 +107,6 @@ def export_c(
     (8, 88)
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
-    estimator, reach = read_interval(estimator, coverage)
-    deviation = check_deviation(deviation, forgetting) or reach is not None
     model = fold(estimator)
     if model.support is None:
         # Rules that come from elsewhere: no data to be near to or far from.
@@ -170,27 +114,13 @@ def export_c(
     dialect = Dialect(name, dtype, std)
     numbers = Numbers.of(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
-    answers = known_answers(model, numbers, min_coverage, STATUS, limits)
-    given = (numbers, dialect, model.out_of_bounds, min_coverage)
-    test, call = "", "learner_test"
-    body: Source
-    if deviation:
-        found = deviation_of(model, numbers, reach, coverage)
-        body = DeviationSource(*given, found, limits=limits)
-        test = deviation_test(as_held(model, numbers), dialect, answers[0], body)
-        call = "deviation_test"
-    elif forgetting is None:
-        body = Source(*given, limits=limits)
-    else:
-        learner = learner_of(estimator, numbers, forgetting)
-        body = LearningSource(*given, learner, limits=limits)
-        test = learning_test(as_held(model, numbers), body)
-    price = body.cost
+    source = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits)
+    test = self_test(known_answers(numbers, min_coverage, limits), dialect)
     code = CCode(
         name,
-        header(model, numbers, dialect, price, min_coverage, limits, body.declarations()),
-        body.text(f"{stem}.h") + self_test(answers, dialect, test, call),
-        price,
+        header(model, numbers, dialect, source.cost(), min_coverage, limits),
+        source.text(f"{stem}.h") + test,
+        source.cost(),
     )
     write_files(code, path)
     return code

@@ -1,18 +1,48 @@
-"""The dialect of C that a file is written in: its type, its standard, its functions."""
+"""The dialect of C that a file is written in: its arguments, and what may stand in it."""
 
 import re
 from dataclasses import dataclass
+from numbers import Real
+from pathlib import Path
 
 import numpy as np
 
-from .._constants import FLOOR, SMALLEST_LOG_SQUARE
-from ._text import literal
+from ..._validation import check_choice
+from .._numbers import FLOOR, SMALLEST_LOG_SQUARE, rounded_within
 
-__all__ = ["DTYPES", "STANDARDS", "Dialect"]
+__all__ = [
+    "LONGEST_NAME",
+    "Dialect",
+    "check_arguments",
+    "comment",
+    "index_type",
+    "kept_lines",
+    "literals",
+    "read_limits",
+    "write_files",
+]
 
-DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
-STANDARDS = ("c99", "c89")
+_DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
+_STANDARDS = ("c99", "c89")
+# C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.
+LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
+# Of C89, C99, C11, C23 and C++: the files may be compiled as any of them.
+_KEYWORDS = """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char class compl concept
+    const const_cast consteval constexpr constinit continue co_await co_return co_yield decltype
+    default delete do double dynamic_cast else enum explicit export extern false float for friend
+    goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq
+    private protected public register reinterpret_cast requires restrict return short signed sizeof
+    static static_assert static_cast struct switch template this thread_local throw true try typedef
+    typeof typeof_unqual typeid typename union unsigned using virtual void volatile wchar_t while
+    xor xor_eq
+"""
+_FUNCTIONS = ("exp", "log", "sqrt", "asin")
 _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
+# Decimal digits that give back the very same float or double.
+_DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
+# A name in a comment stays on its line.
+_LONGEST_COMMENT = 60
 
 
 @dataclass(frozen=True)
@@ -20,8 +50,8 @@ class Dialect:
     """Turns templates into C.
 
     A number that ends in R becomes a constant of the type, ``$name`` the prefix of identifiers,
-    ``$NAME`` that of macros, ``$real`` the type, ``$EXP``, ``$LOG``, ``$SQRT`` and ``$ASIN`` its
-    functions, ``$MAX`` its largest number; further words are given to :meth:`write`.
+    ``$NAME`` that of macros, ``$real`` the type, ``$EXP`` and the like its functions, ``$MAX`` its
+    largest number.
     """
 
     name: str
@@ -31,26 +61,24 @@ class Dialect:
     @property
     def dtype(self):
         """NumPy's name of the type."""
-        return DTYPES[self.real]
+        return _DTYPES[self.real]
 
     def number(self, value):
         """A constant of the type."""
-        return literal(self.dtype.type(value))
+        return _literal(self.dtype.type(value))
 
     def write(self, template, **words):
         """The template with everything filled in."""
+        prefix = self.name.upper()
         words = {
             "floor": self.number(FLOOR),
             "log_floor": self.number(np.log(FLOOR)),
             "smallest_log_square": self.number(SMALLEST_LOG_SQUARE),
             "name": self.name,
-            "NAME": self.name.upper(),
+            "NAME": prefix,
             "real": self.real,
-            "EXP": f"{self.name.upper()}_EXP",
-            "LOG": f"{self.name.upper()}_LOG",
-            "SQRT": f"{self.name.upper()}_SQRT",
-            "ASIN": f"{self.name.upper()}_ASIN",
             "MAX": "FLT_MAX" if self.real == "float" else "DBL_MAX",
+            **{name.upper(): f"{prefix}_{name.upper()}" for name in _FUNCTIONS},
             **words,
         }
         longest_first = "|".join(sorted(words, key=len, reverse=True))
@@ -58,14 +86,131 @@ class Dialect:
         return re.sub(rf"\$({longest_first})", lambda found: str(words[found[1]]), text)
 
     def functions(self):
-        """Macros for the functions of <math.h>; C89 has them for double alone."""
-        lines = []
-        for function in ("exp", "log", "sqrt", "asin"):
-            macro = f"#define {self.name.upper()}_{function.upper()}(u)"
-            if self.real == "double":
-                lines.append(f"{macro} {function}(u)")
-            elif self.std == "c99":
-                lines.append(f"{macro} {function}f(u)")
-            else:
-                lines.append(f"{macro} ((float){function}((double)(u)))")
-        return "\n".join(lines)
+        """Macros for the functions of <math.h>, one a line; C89 has them for double alone."""
+        calls = {"double": "{}(u)", "float": "{}f(u)" if self.std == "c99" else "((float){}(u))"}
+        return "\n".join(
+            f"#define {self.name.upper()}_{name.upper()}(u) {calls[self.real].format(name)}"
+            for name in _FUNCTIONS
+        )
+
+    def table(self, name, values, kind=None):
+        """A constant array, of the type where no other kind is given."""
+        shape = "".join(f"[{n}]" for n in values.shape)
+        head = self.write(f"static const {kind or self.real} $name_{name}{shape} =\n")
+        return f"{head}{literals(values)};\n"
+
+
+def kept_lines(template, facts):
+    """The lines of a template whose words before the first "|" are all among ``facts``."""
+    lines = [line.split("|", 1) for line in template.strip("\n").splitlines()]
+    return "\n".join(text for words, text in lines if facts.issuperset(words.split()))
+
+
+def index_type(values):
+    """The smallest unsigned type that holds these positions whatever the width of a char is."""
+    largest = max(map(int, np.ravel(values)), default=0)
+    limits = [(255, "unsigned char"), (65535, "unsigned short")]
+    return next((kind for limit, kind in limits if largest <= limit), "unsigned long")
+
+
+def _literal(value):
+    """A NumPy floating-point number as a C constant that reads back as the same number."""
+    if not np.isfinite(value):
+        raise ValueError(f"The model holds {value}, which has no C constant.")
+    text = f"{value:.{_DIGITS[value.dtype]}g}"
+    if not set(text) & set(".e"):
+        text += ".0"
+    return text + ("f" if value.dtype == np.float32 else "")
+
+
+def literals(values, indent=""):
+    """Nested braces for an array of numbers of any kind and dimension."""
+    if values.ndim == 2 and len(values) == 1:
+        return f"{indent}{{ {literals(values[0])} }}"
+    if values.ndim > 1:
+        inner = ",\n".join(literals(part, indent + "    ") for part in values)
+        return f"{indent}{{\n{inner}\n{indent}}}"
+    write = _literal if values.dtype.kind == "f" else str
+    lines, line = [], ""
+    for text in map(write, values):
+        if line and len(indent) + len(line) + len(text) > 90:
+            lines.append(line)
+            line = ""
+        line += f"{text}, " if line else f" {text}, "
+    lines.append(line)
+    return f"{indent}{{{f'{chr(10)}{indent} '.join(x.rstrip() for x in lines).rstrip(',')} }}"
+
+
+def comment(text):
+    """Any text as something that cannot end a comment, continue a line or make a trigraph."""
+    text = str(text)
+    shown = text[:_LONGEST_COMMENT]
+    safe = re.sub(r"[^ -~]|[*?\\]", lambda found: f"<U+{ord(found[0]):04X}>", shown)
+    return safe + ("..." if len(text) > len(shown) else "")
+
+
+def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_NAME):
+    """The name of the files, without a suffix, and what identifiers start with."""
+    check_choice("dtype", dtype, _DTYPES)
+    check_choice("std", std, _STANDARDS)
+    if min_coverage is not None and not (
+        isinstance(min_coverage, Real) and 0.0 < float(min_coverage) <= 1.0
+    ):
+        raise ValueError(
+            f"min_coverage={min_coverage!r} must be a number above 0 and at most 1, or None."
+        )
+    if name is None and path is None:
+        raise ValueError("name=None takes the name from path, and path is None too: give either.")
+    stem = None if path is None else Path(path).name
+    if stem is not None and not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", stem):
+        raise ValueError(
+            f"path ends in {stem!r}; C can include files of letters, digits, '_', '.' and '-'."
+        )
+    name = stem if name is None else name
+    _check_name(name, longest_name)
+    return stem or name, name
+
+
+def _check_name(name, longest):
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+        reason = "must be a C identifier: a letter, then letters, digits and underscores"
+    elif "__" in name:
+        reason = "must not have two underscores in a row, which C++ keeps for itself"
+    elif name.lower() in _KEYWORDS.split():
+        reason = "is a keyword of C or C++"
+    elif len(name) > longest:
+        reason = (
+            f"has {len(name)} characters; with {longest} or fewer, all identifiers differ "
+            f"in the 31 that a C compiler must look at"
+        )
+    else:
+        return
+    raise ValueError(f"name={name!r} {reason}.")
+
+
+def read_limits(saturate, numbers):
+    """Limits (n_outputs, 2) in the type of the code, none beyond what is given; or None."""
+    if saturate is None:
+        return None
+    if hasattr(saturate, "lower") and hasattr(saturate, "upper"):
+        given = np.stack([saturate.lower, saturate.upper], axis=-1).astype(float)
+    else:
+        given = np.array(saturate, dtype=float)
+    n_outputs = numbers.n_outputs
+    if given.shape != (n_outputs, 2):
+        raise ValueError(
+            f"saturate must have (low, high) for each of the {n_outputs} outputs, or be what "
+            f"skanfis.bounds.bounds returns for this model; got an array of shape {given.shape}."
+        )
+    if not (np.isfinite(given).all() and (given[:, 0] < given[:, 1]).all()):
+        raise ValueError(f"saturate={given.tolist()} must be finite, each low below its high.")
+    return rounded_within(given.T, numbers.dtype).T
+
+
+def write_files(code, path):
+    """Write a CCode beside each other as .h and .c, or nothing where ``path`` is None."""
+    if path is None:
+        return
+    folder, stem = Path(path).parent, Path(path).name
+    (folder / f"{stem}.h").write_text(code.header, encoding="ascii", newline="\n")
+    (folder / f"{stem}.c").write_text(code.source, encoding="ascii", newline="\n")

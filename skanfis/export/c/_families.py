@@ -1,29 +1,15 @@
 r"""Every family of memberships in C: log mu(x) and its derivative by x.
 
-In the templates a number that ends in R becomes a constant of the type the file is for; ``$d0``,
-``$d1`` are distances of x from the term's locations, ``$p0``, ``$p1``, ... its other constants, all
-as in ``_constants``; ``$name`` is the prefix of identifiers, ``$real`` the type.
+In the templates x is an input about the reference and p the constants of a term, as in
+``_numbers``; see ``_dialect`` for the other words.
 
 log(1 + exp(-|u|)) stands where Python has log1p, which C89 lacks: it is as exact where it counts,
 since an absolute error of log mu is a relative one of the strengths.
 """
 
-from dataclasses import dataclass
-
 from ...membership import MEMBERSHIPS
 
-__all__ = ["BODIES", "HELPERS", "FamilyInC", "words_of"]
-
-
-@dataclass(frozen=True)
-class FamilyInC:
-    """Bodies of functions of x and p, a term's constants, and the most that ``value`` takes."""
-
-    value: str
-    slope: str
-    exponentials: int = 0
-    logarithms: int = 0
-    multiplications: int = 0
+__all__ = ["BODIES", "COSTS", "HELPERS"]
 
 
 # Functions that bodies share. A flank with a foot is a function of s, which is zero at the foot and
@@ -105,62 +91,57 @@ static $real $name_spline_slope($real s)
 """,
 }
 
-_TWO_FEET = """
-    const $real left = $d0 * $p0;
-    const $real right = -$d1 * $p1;
+
+def _two_feet(profile):
+    value = """
+    const $real left = (x - p[0]) * p[2];
+    const $real right = (p[1] - x) * p[3];
     return $name_@(left < right ? left : right);
 """
-_TWO_FEET_SLOPE = """
-    const $real left = $d0 * $p0;
-    const $real right = -$d1 * $p1;
+    slope = """
+    const $real left = (x - p[0]) * p[2];
+    const $real right = (p[1] - x) * p[3];
     if (left < right) {
-        return left < 1.0R ? $p0 * $name_@_slope(left) : 0.0R;
+        return left < 1.0R ? p[2] * $name_@_slope(left) : 0.0R;
     }
-    return right < 1.0R ? -$p1 * $name_@_slope(right) : 0.0R;
+    return right < 1.0R ? -p[3] * $name_@_slope(right) : 0.0R;
 """
-# An input that is held at the edge of the box may lie on a corner. The last bit then decides on
-# which side, or that it is the corner itself, where the slope is zero: so it is the corner that it
-# is compared with, not the feet.
+    return value.replace("@", profile), slope.replace("@", profile)
+
+
+# An input that is held at the edge of the box may lie on a corner, where the slope is zero: by the
+# distances from the feet, the last bit would decide on which side.
 _TRIANGLE_SLOPE = """
-    if ($d2 < 0.0R) {
-        return $p0 * $name_@_slope($d0 * $p0);
+    if (x < p[4]) {
+        return p[2] * $name_linear_slope((x - p[0]) * p[2]);
     }
-    return $d2 > 0.0R ? -$p1 * $name_@_slope(-$d1 * $p1) : 0.0R;
+    return x > p[4] ? -p[3] * $name_linear_slope((p[1] - x) * p[3]) : 0.0R;
 """
-_ONE_FOOT = """
-    return $name_@($d0 * $p0);
-"""
-_ONE_FOOT_SLOPE = """
-    const $real s = $d0 * $p0;
-    return s < 1.0R ? $p0 * $name_@_slope(s) : 0.0R;
-"""
+_ONE_FOOT = (
+    """
+    return $name_spline((x - p[0]) * p[1]);
+""",
+    """
+    const $real s = (x - p[0]) * p[1];
+    return s < 1.0R ? p[1] * $name_spline_slope(s) : 0.0R;
+""",
+)
 
-
-def _two_sided(profile, multiplications, slope=_TWO_FEET_SLOPE):
-    value, slope = (body.replace("@", profile) for body in (_TWO_FEET, slope))
-    return FamilyInC(value, slope, 1, 1, multiplications)
-
-
-def _one_sided():
-    value, slope = (body.replace("@", "spline") for body in (_ONE_FOOT, _ONE_FOOT_SLOPE))
-    return FamilyInC(value, slope, 1, 1, 6)
-
-
+# Bodies of functions of x and p: the value, and its derivative by x.
 _BY_NAME = {
-    "gaussian": FamilyInC(
+    "gaussian": (
         """
-    const $real t = $d0 * $p0;
+    const $real t = (x - p[0]) * p[1];
     return -t * t;
 """,
         """
-    return -2.0R * $d0 * $p0 * $p0;
+    return -2.0R * (x - p[0]) * p[1] * p[1];
 """,
-        multiplications=2,
     ),
     # 2 log |u| has a floor, log(1e-300), as in Python: at the centre mu is one.
-    "bell": FamilyInC(
+    "bell": (
         """
-    const $real u = $d0 * $p0;
+    const $real u = (x - p[0]) * p[1];
     $real log_square = $smallest_log_square;
     if (u < 0.0R || u > 0.0R) {
         log_square = 2.0R * $LOG(u < 0.0R ? -u : u);
@@ -168,75 +149,70 @@ _BY_NAME = {
             log_square = $smallest_log_square;
         }
     }
-    return $name_log_sigmoid(-$p1 * log_square);
+    return $name_log_sigmoid(-p[2] * log_square);
 """,
         """
-    const $real u = $d0 * $p0;
+    const $real u = (x - p[0]) * p[1];
     if (!(u < 0.0R || u > 0.0R)) {
         return 0.0R;
     }
-    return -2.0R * $p1 * $p0 / u * $name_sigmoid(2.0R * $p1 * $LOG(u < 0.0R ? -u : u));
+    return -2.0R * p[2] * p[1] / u * $name_sigmoid(2.0R * p[2] * $LOG(u < 0.0R ? -u : u));
 """,
-        exponentials=1,
-        logarithms=2,
-        multiplications=3,
     ),
-    "triangular": _two_sided("linear", 5, _TRIANGLE_SLOPE),
-    "trapezoidal": _two_sided("linear", 5),
-    "two_sided_gaussian": FamilyInC(
+    "triangular": (_two_feet("linear")[0], _TRIANGLE_SLOPE),
+    "trapezoidal": _two_feet("linear"),
+    "two_sided_gaussian": (
         """
-    const $real d = $d0;
-    const $real beyond = (d < 0.0R ? -d : d) - $p0;
-    const $real t = beyond > 0.0R ? beyond * (d < 0.0R ? $p1 : $p2) : 0.0R;
+    const $real d = x - p[0];
+    const $real beyond = (d < 0.0R ? -d : d) - p[1];
+    const $real t = beyond > 0.0R ? beyond * (d < 0.0R ? p[2] : p[3]) : 0.0R;
     return -0.5R * t * t;
 """,
         """
-    const $real d = $d0;
-    const $real beyond = (d < 0.0R ? -d : d) - $p0;
-    const $real per_length = d < 0.0R ? -$p1 : $p2;
+    const $real d = x - p[0];
+    const $real beyond = (d < 0.0R ? -d : d) - p[1];
+    const $real per_length = d < 0.0R ? -p[2] : p[3];
     return beyond > 0.0R ? -beyond * per_length * (d < 0.0R ? -per_length : per_length) : 0.0R;
 """,
-        multiplications=3,
     ),
-    "pi_shaped": _two_sided("spline", 7),
-    "s_shaped": _one_sided(),
-    "z_shaped": _one_sided(),
-    "sigmoid_difference": FamilyInC(
+    "pi_shaped": _two_feet("spline"),
+    "s_shaped": _ONE_FOOT,
+    "z_shaped": _ONE_FOOT,
+    "sigmoid_difference": (
         """
-    const $real u = $d0 * $p0;
-    return $p2 + $name_log_sigmoid($p1 + u) + $name_log_sigmoid($p1 - u);
+    const $real u = (x - p[0]) * p[1];
+    return p[3] + $name_log_sigmoid(p[2] + u) + $name_log_sigmoid(p[2] - u);
 """,
         """
-    const $real u = $d0 * $p0;
-    return $p0 * ($name_sigmoid(-$p1 - u) - $name_sigmoid(u - $p1));
+    const $real u = (x - p[0]) * p[1];
+    return p[1] * ($name_sigmoid(-p[2] - u) - $name_sigmoid(u - p[2]));
 """,
-        exponentials=2,
-        logarithms=2,
-        multiplications=1,
     ),
-    "sigmoid_product": FamilyInC(
+    "sigmoid_product": (
         """
-    const $real d = $d0;
-    return $name_log_sigmoid($p2 + d * $p0) + $name_log_sigmoid($p3 - d * $p1);
+    const $real d = x - p[0];
+    return $name_log_sigmoid(p[3] + d * p[1]) + $name_log_sigmoid(p[4] - d * p[2]);
 """,
         """
-    const $real d = $d0;
-    return $p0 * $name_sigmoid(-$p2 - d * $p0) - $p1 * $name_sigmoid(d * $p1 - $p3);
+    const $real d = x - p[0];
+    return p[1] * $name_sigmoid(-p[3] - d * p[1]) - p[2] * $name_sigmoid(d * p[2] - p[4]);
 """,
-        exponentials=2,
-        logarithms=2,
-        multiplications=2,
     ),
 }
 
 # By the class, since another class may go by the same name.
 BODIES = {MEMBERSHIPS[name]: in_c for name, in_c in _BY_NAME.items()}
 
-
-def words_of(terms):
-    """What stands for the distances and constants of terms in their family's templates."""
-    n, n_columns = terms.n_locations, terms.constants.shape[1]
-    rest = [f" - p[{n + k}]" if terms.is_in_two else "" for k in range(n)]
-    first = n * (1 + terms.is_in_two)
-    distances = {f"d{k}": f"(x - p[{k}]{rest[k]})" for k in range(n)}
-    return distances | {f"p{k - first}": f"p[{k}]" for k in range(first, n_columns)}
+# Exponentials, logarithms and multiplications that a value takes at most.
+COSTS = {
+    "gaussian": (0, 0, 2),
+    "bell": (1, 2, 3),
+    "triangular": (1, 1, 5),
+    "trapezoidal": (1, 1, 5),
+    "two_sided_gaussian": (0, 0, 3),
+    "pi_shaped": (1, 1, 7),
+    "s_shaped": (1, 1, 6),
+    "z_shaped": (1, 1, 6),
+    "sigmoid_difference": (2, 2, 1),
+    "sigmoid_product": (2, 2, 2),
+}

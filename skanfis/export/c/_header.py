@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...policies import policy_in_words
-from ._text import comment
+from ._dialect import comment
 from .status import status_lines
 
 __all__ = ["cost_lines", "header", "header_of", "input_lines", "policy_line"]
@@ -19,15 +19,12 @@ _SILENT = {
     "nan": "there is no output: y becomes NaN, or stays as it is where C has no NaN",
 }
 
-_OF_A_LEARNER = """
- * A learner is the caller's, and to be called for by one of them at a time."""
-
 _CODE = """/*
  * $title written by skanfis; generated, not to be edited.
  *
 $facts
  *
- * Constant tables, no heap, no state: safe to call from several threads and from interrupts.$but
+ * Constant tables, no heap, no state: safe to call from several threads and from interrupts.
  * Compile without -ffast-math, which takes away the check of the inputs.
  */
 #ifndef $NAME_H
@@ -45,7 +42,7 @@ $status_lines
 
 /* Evaluates the model at x, writes y, returns the status. */
 int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS]);
-$declarations
+
 #ifdef $NAME_SELF_TEST
 /* Returns 0, or else the number of the first test row that fails, counted from 1. */
 int $name_self_test(void);
@@ -59,13 +56,11 @@ int $name_self_test(void);
 """
 
 
-def header(model, numbers, dialect, cost, min_coverage, limits=None, declarations=""):
+def header(model, numbers, dialect, cost, min_coverage, limits=None):
     """The header, whose first comment says what the model is and what it costs."""
     lines = [
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(cost),
-        *learner_line(cost),
-        *deviation_line(cost),
         "",
         *input_lines(model.input_names, numbers.low, numbers.high),
         "Outputs y, and what they are held within:",
@@ -75,16 +70,13 @@ def header(model, numbers, dialect, cost, min_coverage, limits=None, declaration
         ends = zip(model.output_names, limits, strict=True)
         told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in ends)
         lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
-    lines += precision_lines(model, numbers)
-    lines += [
-        "",
-        policy_line(model, "Outside this range"),
-        "A row that is not finite gets no output either way.",
-    ]
+    lines += _precision_lines(model, numbers)
+    lines += ["", policy_line(model, "Outside this range")]
+    lines.append("A row that is not finite gets no output either way.")
     if min_coverage is not None:
         lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
-    return header_of(title, lines, dialect, model.n_inputs, model.n_outputs, declarations)
+    return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
 
 
 def cost_lines(cost, besides=""):
@@ -103,7 +95,6 @@ def cost_lines(cost, besides=""):
 
 
 def input_lines(names, low, high):
-    """The inputs, and their range."""
     return ["Inputs x, and their range in the training data:", *_ranges(names, low, high)]
 
 
@@ -112,32 +103,13 @@ def _ranges(names, low, high):
     return [f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in ends]
 
 
-def learner_line(cost):
-    """What learning on the device takes besides, where it is there."""
-    if cost.learner_bytes:
-        yield (
-            f"To learn a row takes, beside an evaluation and at most, {cost.learn_multiply_adds} "
-            f"multiply-adds and {cost.learn_divisions} divisions, {cost.learn_stack_bytes} bytes "
-            f"on the stack, and {cost.learner_bytes} of a learner, which is the caller's."
-        )
-
-
-def deviation_line(cost):
-    """What a standard deviation takes, where it is there."""
-    if cost.deviation_multiply_adds:
-        yield (
-            f"A standard deviation in range takes {cost.deviation_multiply_adds} multiply-adds and "
-            f"{cost.deviation_stack_bytes} bytes on the stack; beyond it four times as many."
-        )
-
-
 def policy_line(model, where):
     """What is answered out of bounds."""
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     return f"{where} {_SILENT.get(model.out_of_bounds, words)}."
 
 
-def precision_lines(model, numbers):
+def _precision_lines(model, numbers):
     """What single precision makes of inputs that lie far from zero for their spread."""
     if numbers.dtype != np.float32:
         return []
@@ -159,8 +131,7 @@ def precision_lines(model, numbers):
     ]
 
 
-def header_of(title, lines, dialect, n_inputs, n_outputs, declarations=""):
-    """The header with these lines in its first comment."""
+def header_of(title, lines, dialect, n_inputs, n_outputs):
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),
@@ -168,6 +139,4 @@ def header_of(title, lines, dialect, n_inputs, n_outputs, declarations=""):
         title=title,
         n_inputs=n_inputs,
         n_outputs=n_outputs,
-        declarations=declarations,
-        but=_OF_A_LEARNER if "_learner" in declarations else "",
     )

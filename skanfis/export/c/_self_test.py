@@ -4,8 +4,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...policies import SILENT
-from .._numbers import as_held
-from ._text import literals
+from ._dialect import literals
+from .status import STATUS
 
 __all__ = ["ROWS", "TOLERANCE", "known_answers", "self_test", "size_of_sum"]
 
@@ -32,7 +32,7 @@ $status;
 /* As much as an output may be off. */
 static const $real $name_test_tolerance[$NAME_N_OUTPUTS] =
 $tolerance;
-$coarse$learner_test
+$coarse
 int $name_self_test(void)
 {
     int i, o;
@@ -54,7 +54,7 @@ int $name_self_test(void)
             }
         }
     }
-    return $rest;
+    return 0;
 }
 
 #ifdef $NAME_SELF_TEST_MAIN
@@ -77,58 +77,53 @@ _COARSE = """
 """
 
 
-def self_test(answers, dialect, learner_test="", call="learner_test"):
-    """The code, with what comes from :func:`known_answers`, and with a further test."""
+def self_test(answers, dialect):
+    """The code, with answers as :func:`known_answers` gives them."""
     X, y, status, tolerance = answers
     is_double = dialect.real == "double"
     allowed = "$name_test_tolerance[o]" + (" * $NAME_TEST_FACTOR" if is_double else "")
     template = _CODE.replace("$coarse", _COARSE if is_double else "").replace("$allowed", allowed)
-    return dialect.write(
-        template,
-        learner_test=learner_test,
-        rest=f"{dialect.name}_{call}()" if learner_test else "0",
-        n=len(X),
-        x=literals(X),
-        y=literals(y),
-        status=literals(status),
-        tolerance=literals(tolerance),
-    )
+    tables = {"x": X, "y": y, "status": status, "tolerance": tolerance}
+    texts = {name: literals(values) for name, values in tables.items()}
+    return dialect.write(template, n=len(X), **texts)
 
 
-def known_answers(model, numbers, min_coverage, bits, limits=None):
-    """Rows, outputs, status and the tolerance of every output.
+def known_answers(numbers, min_coverage, limits=None):
+    """Rows, outputs, status and the tolerance of every output, of the model of the numbers.
 
-    Half of the rows lie in the box, the others up to half its width beyond; the first two are its
-    corners. Rows so near to the coverage asked for that rounding decides are left out. Outputs are
-    held between ``limits``, if there are any.
+    Half of the rows lie in the box, the others up to half its width beyond. Rows are left out where
+    rounding decides: on the coverage, or, in a gap between all terms, on the strongest rule.
     """
-    model = as_held(model, numbers)
+    model = numbers.model
+    policy = "linear" if model.out_of_bounds == "linear" else "clip"
+    held = (-np.inf, np.inf) if limits is None else limits.T.astype(float)
+
+    def outputs(rows):
+        return np.clip(model.with_out_of_bounds(policy).predict(rows), *held)
+
     points = qmc.Halton(model.n_inputs, scramble=False).random(4 * ROWS)
-    low, width = numbers.low.astype(float), (numbers.high - numbers.low).astype(float)
+    width = model.maximum - model.minimum
     reach = np.where(np.arange(len(points)) % 2, 1.0, 2.0)[:, None]
-    X = (low + width * (0.5 + reach * (points - 0.5))).astype(numbers.dtype)
+    X = (model.minimum + width * (0.5 + reach * (points - 0.5))).astype(numbers.dtype)
     X = np.vstack([numbers.low, numbers.high, X])
     Z = X.astype(float)
-    outside = ~((numbers.low <= X) & (numbers.high >= X)).all(axis=1)
-    coverage = model.coverage(Z)
-    status = np.where(outside, bits["OUT_OF_RANGE"], 0)
-    if model.out_of_bounds in SILENT:
-        status |= np.where(outside, bits["NO_OUTPUT"], 0)
-    if min_coverage is not None:
-        judged = ~(status & bits["NO_OUTPUT"]).astype(bool)
-        status |= np.where(judged & (coverage < min_coverage), bits["UNCOVERED"], 0)
+    outside = ~model.in_bounds(Z)
+    silent = outside & (model.out_of_bounds in SILENT)
+    status = STATUS["OUT_OF_RANGE"] * outside | STATUS["NO_OUTPUT"] * silent
     sure = np.full(len(X), True)
     if min_coverage is not None:
+        coverage = model.coverage(Z)
+        status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
         sure = np.abs(coverage - min_coverage) > 1e-3 * min_coverage
-    chosen = np.flatnonzero(sure)[:ROWS]
-    policy = "linear" if model.out_of_bounds == "linear" else "clip"
-    y = model.with_out_of_bounds(policy).predict(Z[chosen])
-    if limits is not None:
-        y = np.clip(y, *limits.T.astype(float))
-    y = np.where((status[chosen] & bits["NO_OUTPUT"]).astype(bool)[:, None], 0.0, y)
-    tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z[chosen], y)
-    tolerance *= max(_largest_logarithm(model, Z[chosen]) / _USUAL, 1.0)
-    return X[chosen], y.astype(numbers.dtype), status[chosen], tolerance.astype(numbers.dtype)
+    y = outputs(Z)
+    tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z, y)
+    tolerance *= max(_largest_logarithm(model, Z) / _USUAL, 1.0)
+    step = 4.0 * np.finfo(numbers.dtype).eps * (np.abs(Z - numbers.reference) + model.spread)
+    steady = (np.abs(outputs(Z + step) - y) <= 0.25 * tolerance).all(axis=1)
+    chosen = np.flatnonzero(sure & steady if (sure & steady).any() else sure)[:ROWS]
+    y[silent] = 0.0
+    y, tolerance = y[chosen].astype(numbers.dtype), tolerance.astype(numbers.dtype)
+    return X[chosen], y, status[chosen], tolerance
 
 
 def _largest_logarithm(model, X):

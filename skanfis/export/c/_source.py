@@ -1,84 +1,135 @@
 """The .c file: constant tables, and the functions that read them.
 
-The order of work is that of ``skanfis.model``: hold the inputs in the box, log memberships,
-strengths by a softmax that subtracts the largest, consequents weighed by the strengths. The
-continuation "linear" is worked out only for rows outside the box: it is the derivative along the
-way back to the box, carried forward through the same loops. Coverage takes a quadratic form per
-rule: the strongest rule is asked first, then the others, until there is enough.
+The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
+multiplies shares in nested loops: one exponential per term, not per rule and input. "linear" is
+worked out only outside the box, by the derivative along the way back.
 """
 
 import re
+from dataclasses import dataclass
+
+import numpy as np
 
 from ...policies import SILENT
-from ._cost import cost
-from ._families import BODIES, HELPERS, words_of
-from ._fragments import (
-    CENTRE,
-    FINITE_INPUT,
-    HOLD,
-    INPUTS,
-    LIMIT,
-    NEAR,
-    NORMALISE,
-    SATURATE,
-    rejection,
-)
-from ._loops import RuleLoops
-from ._text import index_type, literals, loop
+from . import _templates as templates
+from ._dialect import index_type, kept_lines
+from ._families import BODIES, COSTS, HELPERS
 
-__all__ = ["Source"]
+__all__ = ["CCost", "Source"]
+
+# C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
+_MOST_LOOPS = 12
+# What there is nearly everywhere.
+_INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 
 
-class Source(RuleLoops):
-    """The functions and tables of a .c file, without its self-test.
+@dataclass(frozen=True)
+class CCost:
+    """What one evaluation inside the box takes, and the memory of the function.
 
-    ``policy`` is that of the model for rows outside the box, ``min_coverage`` the coverage below
-    which a row is uncovered, or None; ``limits`` are those between which outputs are held, or None;
-    ``is_part`` whether the main function is for others in the same file.
+    Parameters
+    ----------
+    exponentials, logarithms : int
+        Calls of ``exp`` and ``log``, at most, coverage aside.
+    multiply_adds, divisions : int
+        Multiplications, most of them with an addition to follow; divisions.
+    table_bytes, stack_bytes : int
+        Constant tables, which may lie in read-only memory; arrays on the stack.
+    coverage_exponentials, coverage_square_roots, coverage_multiply_adds : int
+        What the coverage takes besides, at most. Where the strongest rule alone covers the row, it
+        is one quadratic form. Zero with ``min_coverage=None``.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_c
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> export_c(model, name="sinc").cost.exponentials  # 2 inputs of 4 terms, not 16 rules
+    8
     """
 
-    # What differs where consequents are learnt on the device: of the functions that read them the
-    # name and first argument.
-    suffix = ""
-    learner: tuple[str, ...] = ()
-    passes: tuple[str, ...] = ()
+    exponentials: int
+    logarithms: int
+    multiply_adds: int
+    divisions: int
+    table_bytes: int
+    stack_bytes: int
+    coverage_exponentials: int = 0
+    coverage_square_roots: int = 0
+    coverage_multiply_adds: int = 0
 
-    def __init__(self, numbers, dialect, policy, min_coverage, *, is_part=False, limits=None):
-        super().__init__(numbers, dialect)
-        is_constant = not numbers.n_terms and not numbers.slope_inputs.size
+
+class Source:
+    """The functions and tables of a .c file; ``is_part`` for others in the same file."""
+
+    def __init__(self, numbers, dialect, policy, min_coverage, limits=None, is_part=False):
+        self.numbers, self.dialect, self.policy = numbers, dialect, policy
+        self.min_coverage, self.limits, self.is_part = min_coverage, limits, is_part
+        n_loops = len(numbers.counts or ())
+        if dialect.std == "c89" and n_loops > _MOST_LOOPS:
+            raise ValueError(
+                f"std='c89' has {_MOST_LOOPS} loops in one another at most, and the grid has "
+                f"terms on {n_loops} inputs. Export as 'c99', or put terms on fewer inputs."
+            )
+        self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
+        # Whether the terms of a table of rules follow from the order of its rules.
+        self.is_in_order = np.array_equal(numbers.rule_terms.ravel(), np.arange(numbers.n_terms))
+        # Logarithms of terms, and the zero of "none".
+        self.n_logarithms = numbers.n_terms + int((numbers.rule_terms == numbers.n_terms).any())
+        self.facts = self._facts()
+
+    def _facts(self):
+        """What decides which lines there are."""
+        numbers = self.numbers
+        covers, answers = self.min_coverage is not None, self.policy not in SILENT
         # The tangent of a constant is the constant; one of no length is its start.
-        is_held = is_constant or (numbers.reach is not None and not numbers.reach.any())
-        self.policy = "clip" if is_held and policy == "linear" else policy
-        self.min_coverage, self.limits = min_coverage, limits
-        self.linkage = "static " if is_part else ""
+        is_constant = not numbers.n_terms and not self.n_slopes
+        linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
+        facts = {
+            "shares": numbers.n_terms > 0 or not self.is_grid,
+            "slopes": self.n_slopes > 0,
+            "covers": covers,
+            # Rows outside the box get no answer; are less covered; are followed along the tangent.
+            "silent": not answers,
+            "fades": covers and answers,
+            "linear": linear,
+            "beyond": linear or (covers and answers),
+            "held": numbers.output_limits is not None,
+            "saturates": self.limits is not None,
+        }
+        return {fact for fact, holds in facts.items() if holds}
 
-    @property
     def cost(self):
-        """What it takes, as a CCost."""
-        return cost(self)
-
-    @property
-    def is_linear(self):
-        return self.policy == "linear"
-
-    @property
-    def measures_distance(self):
-        """Whether rows outside the box get an answer, whose coverage falls with the distance."""
-        return self.min_coverage is not None and self.policy not in SILENT
-
-    @property
-    def judges_coverage(self):
-        """Whether rows can be uncovered."""
-        return self.min_coverage is not None
-
-    @property
-    def has_limit(self):
-        """Whether the tangent ends."""
-        return self.is_linear and self.numbers.reach is not None
-
-    def declarations(self):
-        """What the header says besides."""
-        return ""
+        """CCost of a row in the box."""
+        numbers, itemsize = self.numbers, self.numbers.dtype.itemsize
+        n_inputs = numbers.n_inputs
+        of_terms = np.array([0, 0, 0])
+        for terms in numbers.terms:
+            of_terms += len(terms.constants) * np.array(COSTS[terms.family.name])
+        exponentials, logarithms, multiply_adds = map(int, of_terms)
+        n_shares = numbers.n_terms if self.is_grid else numbers.n_rules
+        # Of a grid, products of shares: after two inputs, after three, ...
+        products = np.cumprod(numbers.counts or (), dtype=int)[1:].sum()
+        # The strongest rule is asked, then all that have data.
+        asked = 0 if "covers" not in self.facts else 1 + np.count_nonzero(numbers.support[:, 0])
+        main, tangent = self.arrays()
+        n_values = sum(main.values()) + ("linear" in self.facts) * sum(tangent.values())
+        return CCost(
+            exponentials=exponentials + n_shares,
+            logarithms=logarithms,
+            multiply_adds=int(multiply_adds + products + n_shares + numbers.coefficients.size),
+            divisions=len(numbers.counts) if self.is_grid else 1,
+            table_bytes=sum(
+                values.size * _INDEX_BYTES.get(kind, itemsize)
+                for values, kind in self.tables().values()
+            ),
+            stack_bytes=n_values * itemsize,
+            coverage_exponentials=int(asked),
+            coverage_square_roots=int(asked),
+            # The factor's triangle, its square, share and strength.
+            coverage_multiply_adds=int(asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5)),
+        )
 
     def text(self, include):
         """All of it; ``include`` is the name of the header."""
@@ -86,282 +137,187 @@ class Source(RuleLoops):
 
     def body(self):
         """What follows the lines that include other files."""
-        return "\n".join([self.macros() + "\n", self.tables(), *self.families(), self.functions()])
-
-    def macros(self):
-        """EXP and LOG, where the functions below take them."""
-        body = "".join([*self.families(), self.functions()])
-        lines = self.dialect.functions().splitlines()
-        return "\n".join(line for line in lines if f"{line.split()[1].split('(')[0]}(" in body)
-
-    def table(self, kind, name, values):
-        shape = "".join(f"[{n}]" for n in values.shape)
-        return self.write(f"static const {kind} $name_{name}{shape} =\n{literals(values)};\n")
+        dialect = self.dialect
+        tables = [dialect.table(name, *table) for name, table in self.tables().items()]
+        functions = dialect.write("".join([self._helpers(), self._predict()]), int=self._int)
+        return "\n".join([dialect.functions() + "\n", *tables, *self._memberships(), functions])
 
     def tables(self):
-        numbers, real = self.numbers, self.dialect.real
-        tables = [self.table(real, "low", numbers.low), self.table(real, "high", numbers.high)]
-        if self.has_slopes or self.judges_coverage:
-            tables.append(self.table(real, "reference", numbers.reference))
-        if self.judges_coverage:
-            tables.append(self.table(real, "inverse_spread", numbers.inverse_spread))
-        if self.has_limit:
-            tables.append("/* How far the tangent is followed. */")
-            tables.append(self.table(real, "reach", numbers.reach))
-        if numbers.output_low is not None:
-            tables.append("/* What outputs are held within. */")
-            tables.append(self.table(real, "output_low", numbers.output_low))
-            tables.append(self.table(real, "output_high", numbers.output_high))
+        """Constant tables by their names: an array, and the type where it is one of positions."""
+        numbers, facts = self.numbers, self.facts
+        reals = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
+        if "beyond" in facts:
+            reals["inverse_spread"] = numbers.inverse_spread
+        if "linear" in facts:
+            reals["reach"] = numbers.reach
+        if "held" in facts:
+            reals["output_low"], reals["output_high"] = numbers.output_limits
         for k, terms in enumerate(numbers.terms):
-            tables.append(self.table(real, f"terms{k}", terms.constants))
+            reals[f"terms{k}"] = terms.constants
+        if "covers" in facts:
+            reals["support"] = numbers.support
+        if "saturates" in facts:
+            reals["limits"] = self.limits
+        reals |= {"offset": numbers.offset, "consequents": numbers.coefficients}
+        positions = {}
         if numbers.n_terms:
-            tables.append(self.index_table("term_input", numbers.term_inputs))
-        if numbers.rule_terms is not None:
-            tables.append(self.index_table("rule_terms", numbers.rule_terms))
-        if self.selects_slopes:
-            tables.append(self.index_table("slope_input", numbers.slope_inputs))
-        if self.judges_coverage:
-            tables.append("/* Of each rule: share, radius, centre, rows of the factor. */")
-            tables.append(self.table(real, "support", numbers.support))
-        if self.limits is not None:
-            tables.append("/* Between which every output is held. */")
-            tables.append(self.table(real, "limits", self.limits))
-        tables.append(self.table(real, "offset", numbers.offset))
-        tables.append("/* Of each rule and output: a value, then a slope per input. */")
-        tables.append(self.table(real, "consequents", numbers.coefficients))
-        return "\n".join(tables)
+            positions["term_input"] = numbers.term_inputs
+        if not self.is_grid and not self.is_in_order:
+            positions["rule_terms"] = numbers.rule_terms
+        if 0 < self.n_slopes < numbers.n_inputs:
+            positions["slope_input"] = numbers.slope_inputs
+        found = {name: (values, None) for name, values in reals.items()}
+        return found | {name: (values, index_type(values)) for name, values in positions.items()}
 
-    def index_table(self, name, values):
-        return self.table(index_type(values), name, values)
+    def arrays(self):
+        """Arrays on the stack and their lengths: of the main function, and of the tangent."""
+        numbers = self.numbers
+        main, tangent = {"z": numbers.n_inputs, "sum": numbers.n_outputs}, {}
+        if "beyond" in self.facts:
+            main["e"] = numbers.n_inputs
+        if "linear" in self.facts:
+            main["change"] = numbers.n_outputs
+        if "shares" in self.facts:
+            main["l"] = tangent["t"] = self.n_logarithms
+        if not self.is_grid:
+            main["w"] = tangent["s"] = numbers.n_rules
+        return main, tangent
 
-    def families(self):
+    def _memberships(self):
         """Functions of the families in use, after those that they call."""
-        used = {terms.family.name: terms for terms in self.numbers.terms}
         functions = []
-        for label, terms in used.items():
-            bodies = {"": BODIES[terms.family].value}
-            if self.is_linear:
-                bodies["_slope"] = BODIES[terms.family].slope
-            for suffix, body in bodies.items():
+        for family in {terms.family: None for terms in self.numbers.terms}:
+            suffixes = ["", "_slope"] if "linear" in self.facts else [""]
+            for suffix, body in zip(suffixes, BODIES[family], strict=False):
                 what = "Derivative of the logarithm" if suffix else "Logarithm"
-                head = f"/* {what} of a membership: {label}. */\n"
-                head += f"static $real $name_{label}{suffix}($real x, const $real *p)\n"
-                functions.append(self.write(f"{head}{{{body}}}\n", **words_of(terms)))
+                head = f"/* {what} of a membership: {family.name}. */\n"
+                head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n"
+                functions.append(self.dialect.write(f"{head}{{{body}}}\n"))
         calls = "".join(functions)
         helpers = [
-            self.write(code).lstrip()
+            self.dialect.write(code).lstrip()
             for name, code in HELPERS.items()
             if re.search(rf"\b{self.dialect.name}_{name}\(", calls)
         ]
         return helpers + functions
 
-    def functions(self):
-        parts = []
-        if self.has_shares:
-            parts.append(self.write(NORMALISE).lstrip())
-            if self.is_linear:
-                parts.append(self.write(CENTRE).lstrip())
-        if self.judges_coverage:
-            parts += [self.write(NEAR).lstrip(), self.coverage()]
-        if self.is_linear:
-            parts.append(self.tangent())
-        parts.append(self.write(rejection(self.policy, self.dialect.std)).lstrip())
-        parts.append(self.predict())
-        return "\n".join(parts)
-
-    # The main function.
-
-    def predict(self):
-        arguments = "".join(f"{argument}, " for argument in self.learner)
-        lines = [
-            f"{self.linkage}int $name_predict{self.suffix}({arguments}"
-            "const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])",
-            "{",
-            *self.variables(),
-            "",
-            *self.hold_inputs(),
-            *self.strengths("l", "w", ""),
-            "",
-            *self.measure_distance(),
-            *loop("o", "$NAME_N_OUTPUTS", ["sum[o] = 0.0R;"]),
-            *self.over_rules(self.add_rule, tangent=False),
-            *self.go_on(),
-            *self.judge_coverage(),
-            *self.write_outputs(),
-            "    return status;",
-            "}",
-        ]
-        return self.write("\n".join(lines) + "\n")
-
-    def variables(self):
-        """The variables of the main function."""
-        numbers = self.numbers
-        lines = [
-            "    /* Inputs in the box. */",
-            f"    $real c[{numbers.n_inputs}], sum[{numbers.n_outputs}];",
-        ]
-        if self.has_slopes:
-            lines.append(f"    $real z[{numbers.n_inputs}];")
-        lines += self.strength_arrays()
-        if self.is_linear:
-            lines.append(f"    $real e[{numbers.n_inputs}];")
-        if self.judges_coverage:
-            lines.append(f"    $real u[{numbers.n_inputs}], top = 0.0R;")
-            lines.append(f"    {self.int} best = 0;")
-        if self.measures_distance:
-            lines.append("    $real beside = 1.0R;")
-        return [
-            *lines,
-            "    int status = $NAME_IN_RANGE;",
-            f"    $int {', '.join(self.loop_variables(tangent=False))};",
-        ]
-
-    def hold_inputs(self):
-        """The inputs, checked and held in the box; rows beyond it may be refused."""
-        lines = [FINITE_INPUT.strip("\n"), INPUTS.strip("\n")]
-        if self.has_slopes:
-            lines.append("        z[i] = c[i] - $name_reference[i];")
-        if self.judges_coverage:
-            lines.append("        u[i] = (c[i] - $name_reference[i]) * $name_inverse_spread[i];")
-        lines.append("    }")
-        if self.policy in SILENT:
-            lines += [
-                "    if (status != $NAME_IN_RANGE) {",
-                "        return $NAME_REJECT(y, status);",
-                "    }",
-            ]
-        return lines
-
-    def go_on(self):
-        """Beyond the box, the way along the tangent."""
-        if not self.is_linear:
-            return []
-        values = [*self.passes, *self.places, "e", *self.shares]
-        return [
-            "    if (status != $NAME_IN_RANGE) {",
-            "        for (i = 0; i < $NAME_N_INPUTS; ++i) {",
-            "            e[i] = x[i] - c[i];",
-            *([LIMIT.strip("\n")] if self.has_limit else []),
-            "        }",
-            f"        $name_tangent{self.suffix}({', '.join([*values, 'sum'])});",
-            "    }",
-        ]
-
-    def write_outputs(self):
-        """The outputs, held within their limits; last, so that y may be x."""
-        return [
-            "    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {",
-            "        y[o] = $name_offset[o] + sum[o];",
-            *([HOLD.strip("\n")] if self.numbers.output_low is not None else []),
-            *([] if self.limits is None else [SATURATE.strip("\n")]),
-            "    }",
-        ]
-
-    def add_rule(self, strength, change):
-        lines = []
-        if self.judges_coverage:
-            lines += [f"if ({strength} > top) {{", f"    top = {strength};", "    best = r;", "}"]
-        body = [
-            f"$real f = {self.height};",
-            *self.slope_loop(f"f += {self.slope} * z[@];"),
-            f"sum[o] += {strength} * f;",
-        ]
-        return [*lines, *loop("o", "$NAME_N_OUTPUTS", body, "")]
-
-    def measure_distance(self):
-        if not self.measures_distance:
-            return []
-        distance = [
-            "const $real d = (x[i] - c[i]) * $name_inverse_spread[i];",
-            "distance += d * d;",
-        ]
-        return [
-            "    if (status != $NAME_IN_RANGE) {",
-            "        $real distance = 0.0R;",
-            *loop("i", "$NAME_N_INPUTS", distance, 8 * " "),
-            "        beside = $EXP(-0.5R * distance);",
-            "    }",
-        ]
-
-    def judge_coverage(self):
-        if not self.judges_coverage:
-            return []
-        beside = "beside * " if self.measures_distance else ""
-        values = ["u", *self.shares, *(["beside"] if self.measures_distance else [])]
-        return [
-            f"    if ({beside}top * $name_near(u, $name_support[best]) < {self.enough}",
-            f"        && $name_coverage({', '.join(values)}) < {self.enough}) {{",
-            "        status |= $NAME_UNCOVERED;",
-            "    }",
-        ]
+    # The functions as templates, of which the parts are filled in.
 
     @property
-    def enough(self):
-        """The coverage asked for, as a constant."""
-        return self.dialect.number(self.min_coverage)
+    def _int(self):
+        # int has 16 bits at least.
+        return "long" if max(self.numbers.n_rules, self.numbers.n_terms) > 32767 else "int"
 
-    def coverage(self):
-        """The sum over the rules that have data, as far as it takes to be enough."""
-        n_loops = len(self.numbers.counts or ())
-        arguments = [f"const $real *{name}" for name in ("u", *self.shares)]
-        arguments += ["$real beside"] if self.measures_distance else []
-        lines = [
-            "/* The coverage, or a part of it that is enough. */",
-            f"static $real $name_coverage({', '.join(arguments)})",
-            "{",
-            "    $real covered = 0.0R;",
-            f"    $int {', '.join(['r', *(f'i{k}' for k in range(n_loops))])};",
-            "",
-            *self.over_rules(self.add_support, tangent=False),
-            "    return covered;",
-            "}",
-        ]
-        return self.write("\n".join(lines) + "\n")
+    @property
+    def _taken(self):
+        """What the place of a row is told by: z, and what the strengths are made of."""
+        return ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
 
-    def add_support(self, strength, _):
-        beside = "beside * " if self.measures_distance else ""
-        return [
-            f"if (covered < {self.enough} && $name_support[r][0] > 0.0R) {{",
-            f"    covered += {beside}{strength} * $name_near(u, $name_support[r]);",
-            "}",
-        ]
+    @property
+    def _loops(self):
+        return [f"i{k}" for k in range(len(self.numbers.counts or ()))]
 
-    # The continuation of "linear".
+    @property
+    def _indices(self):
+        """Of loops over rules and what they are made of."""
+        return ["r", "o", *["j"] * (self.n_slopes > 0), *["k"] * (not self.is_grid), *self._loops]
 
-    def tangent(self):
-        """Add to ``sum`` its derivative along e, the way from the box to the input."""
+    def _helpers(self):
+        return self._filled(
+            templates.FUNCTIONS,
+            given=", ".join(f"const $real *{name}" for name in self._taken),
+            coverage_indices=", ".join(["r", *self._loops]),
+            tangent_indices=", ".join(["i"] * (self.numbers.n_terms > 0) + self._indices),
+            tangent_arrays=_declared(self.arrays()[1]),
+            strengths_slope=self._strengths("t", "s", "_slope"),
+            add_support=self._over_rules(templates.ADD_SUPPORT),
+            add_changes=self._over_rules(templates.ADD_CHANGE),
+        )
+
+    def _predict(self):
+        head = templates.rejection(self.policy, self.dialect.std).lstrip() + "\n"
+        return head + self._filled(
+            templates.PREDICT,
+            linkage="static " if self.is_part else "",
+            finite_input=templates.FINITE_INPUT.strip("\n"),
+            taken=", ".join(self._taken),
+            arrays=_declared(self.arrays()[0]),
+            indices=", ".join(["i", *self._indices]),
+            limit=self.dialect.number(self.min_coverage or 0.0),
+            strengths_inside=self._strengths("l", "w", ""),
+            add_rules=self._over_rules(templates.ADD_RULE),
+        )
+
+    def _filled(self, template, **parts):
+        text = kept_lines(template, self.facts) + "\n"
+        for word, part in parts.items():
+            text = text.replace(f"${word}", part)
+        return text
+
+    def _strengths(self, logarithms, rules, slope):
+        """Terms, then shares (of a grid, in place) or strengths; or their derivatives along e."""
+        numbers, lines = self.numbers, []
+        for k, terms in enumerate(numbers.terms):
+            at = _at(terms.start, "i")
+            value = (
+                f"$name_{terms.family.name}{slope}(z[$name_term_input[{at}]], $name_terms{k}[i])"
+            )
+            value += f" * e[$name_term_input[{at}]]" if slope else ""
+            lines += _loop("i", len(terms.constants), [f"{logarithms}[{at}] = {value};"])
+        finish = "$name_centre({0}, {1}, {2});" if slope else "$name_normalise({0}, {2});"
+        if self.is_grid:
+            for start, count in zip(numbers.block_starts, numbers.counts, strict=True):
+                of_input = (
+                    (f"{logarithms} + {start}", f"l + {start}") if start else (logarithms, "l")
+                )
+                lines.append(finish.format(*of_input, count))
+        else:
+            if self.n_logarithms > numbers.n_terms:
+                lines.append(f"{logarithms}[{numbers.n_terms}] = 0.0R;")
+            n_each = numbers.rule_terms.shape[1]
+            term = f"r * {n_each} + k" if self.is_in_order else "$name_rule_terms[r][k]"
+            total = _loop("k", n_each, [f"{rules}[r] += {logarithms}[{term}];"])
+            lines += _loop("r", numbers.n_rules, [f"{rules}[r] = 0.0R;", *total])
+            lines.append(finish.format(rules, "w", numbers.n_rules))
+        return _indented(lines)
+
+    def _over_rules(self, template):
+        """What a template does with every rule r, its strength $w and its change $s."""
         numbers = self.numbers
-        values = [f"const $real *{name}" for name in (*self.places, "e", *self.shares)]
-        arguments = [*self.learner, *values]
-        lines = [
-            "/* Adds to every sum its derivative by the inputs times e, the way out of the box. */",
-            f"static void $name_tangent{self.suffix}({', '.join(arguments)},",
-            "    $real *sum)",
-            "{",
-        ]
-        # Of a grid: change of the logarithm of each share; else of terms, and of each strength.
-        if self.is_grid and numbers.n_terms:
-            lines.append(f"    $real s[{numbers.n_terms}];")
+        body = kept_lines(template, self.facts)
+        body = body.replace("$n_slopes", str(self.n_slopes))
+        selects = 0 < self.n_slopes < numbers.n_inputs
+        body = body.replace("$input", "$name_slope_input[j]" if selects else "j")
         if not self.is_grid:
-            lines.append(f"    $real t[{self.n_logarithms}], s[{numbers.n_rules}];")
-        lines.append(f"    $real change[{numbers.n_outputs}];")
-        lines.append(f"    $int {', '.join(self.loop_variables(tangent=True))};")
-        names = ("s", "") if self.is_grid else ("t", "s")
-        lines += ["", *self.strengths(*names, "_slope")]
-        lines += loop("o", "$NAME_N_OUTPUTS", ["change[o] = 0.0R;"])
-        lines += self.over_rules(self.add_rule_change, tangent=True)
-        lines += loop("o", "$NAME_N_OUTPUTS", ["sum[o] += change[o];"])
-        return self.write("\n".join([*lines, "}"]) + "\n")
+            body = body.replace("$w", "w[r]").replace("$s", "s[r]")
+            return _indented(_loop("r", numbers.n_rules, body.splitlines()))
+        if not numbers.counts:
+            body = body.replace("$w", "1.0R").replace("$s", "0.0R")
+            return _indented(["r = 0;", *body.splitlines()])
+        last = len(numbers.counts) - 1
+        lines = body.replace("$w", f"w{last}").replace("$s", f"s{last}").splitlines()
+        lines.append("++r;")
+        for k in reversed(range(last + 1)):
+            at = _at(numbers.block_starts[k], f"i{k}")
+            declared = [f"const $real w{k} = {f'w{k - 1} * ' if k else ''}l[{at}];"]
+            if "$s" in template:
+                declared.append(f"const $real s{k} = {f's{k - 1} + ' if k else ''}t[{at}];")
+            lines = _loop(f"i{k}", numbers.counts[k], declared + lines)
+        return _indented(["r = 0;", *lines])
 
-    def add_rule_change(self, strength, change):
-        along = f"f += {self.slope} * z[@];"
-        ahead = f"change_of_f += {self.slope} * e[@];"
-        body = [
-            f"$real f = {self.height};",
-            *(["$real change_of_f = 0.0R;"] if self.has_slopes else []),
-            *self.slope_loop(along),
-            *self.slope_loop(ahead),
-            f"change[o] += {strength} * ({change} * f"
-            + (" + change_of_f);" if self.has_slopes else ");"),
-        ]
-        return loop("o", "$NAME_N_OUTPUTS", body, "")
+
+def _at(start, index):
+    return f"{start} + {index}" if start else index
+
+
+def _declared(arrays):
+    return ", ".join(f"{name}[{length}]" for name, length in arrays.items())
+
+
+def _indented(lines):
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def _loop(index, count, body):
+    head = f"for ({index} = 0; {index} < {count}; ++{index}) {{"
+    return [head, *(f"    {line}" for line in body), "}"]

@@ -1,27 +1,26 @@
 """Rules as a part of a larger C function: for code that writes C around them, as skanfis.gyro does.
 
-What surrounds the rules is written in the same :class:`Dialect`, under the same status word, with
-the same header and self-test; :func:`skanfis.export.export_c` is made of the same parts.
+What surrounds the rules is written in the same :class:`Dialect`, under the same status word.
 """
 
-from .._numbers import Numbers, as_held
-from ._cost import CCost
-from ._deviation import DeviationSource
-from ._deviation_code import DECLARATION
-from ._deviation_tables import deviation_of
-from ._deviation_test import deviation_test
-from ._dialect import Dialect
-from ._files import check_arguments, write_files
-from ._fragments import FINITE_INPUT, rejection
+from .._numbers import Numbers
+from ._dialect import (
+    LONGEST_NAME,
+    Dialect,
+    check_arguments,
+    comment,
+    index_type,
+    literals,
+    read_limits,
+    write_files,
+)
 from ._header import cost_lines, header_of, input_lines, policy_line
-from ._saturation import read_limits
 from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
-from ._source import Source
-from ._text import LONGEST_NAME, comment, index_type, literals
+from ._source import CCost, Source
+from ._templates import FINITE_INPUT, rejection
 from .status import STATUS
 
 __all__ = [
-    "DECLARATION",
     "FINITE_INPUT",
     "LONGEST_NAME",
     "ROWS",
@@ -48,84 +47,22 @@ __all__ = [
 class RulesPart:
     """The rules of a model as static functions of a larger C file, which share its status word.
 
-    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is :attr:`name`.
-
-    Parameters
-    ----------
-    model : TSKModel
-        What :func:`skanfis.export.fold` gives.
-    dialect : Dialect
-        Of the file.
-    suffix : str
-        What the identifiers of the rules have after the prefix of the file, such as "_r".
-    min_coverage : float or None
-        Rows are uncovered where the coverage is below this. None leaves coverage out; it is left
-        out too where the rules have never seen data.
-    saturate : Bounds or array-like of shape (n_outputs, 2), default=None
-        Limits between which the outputs of the rules are held.
-    deviation : bool, default=False
-        Whether there is ``int NAME_deviation(const REAL x[], REAL deviation[])`` too.
-
-    Attributes
-    ----------
-    name : str
-        What the identifiers of the rules start with.
-    model : TSKModel
-        The model as its rounded numbers hold it, for answers to compare the C code with.
-    low, high : ndarray of shape (n_inputs,)
-        The box of the training data, in the type of the file.
-    min_coverage : float or None
-    limits : ndarray of shape (n_outputs, 2) or None
-        ``saturate`` in the type of the file.
-    cost : CCost
-        Of the rules alone.
-
-    Raises
-    ------
-    ValueError
-        If the type cannot hold the numbers of the model.
-
-    Examples
-    --------
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import fold
-    >>> from skanfis.export.c.builder import Dialect, RulesPart
-    >>> model = fold(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()))
-    >>> part = RulesPart(model, Dialect("plant", "double", "c99"), "_r", None)
-    >>> "static int plant_r_predict(" in part.text()
-    True
+    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is :attr:`name`: the
+    prefix of the file and ``suffix``. ``min_coverage`` and ``saturate`` are those of
+    :func:`skanfis.export.export_c`. ``model``, ``low``, ``high`` and ``limits`` are the model, its
+    box and ``saturate`` in the type of the file.
     """
 
-    def __init__(
-        self,
-        model,
-        dialect: Dialect,
-        suffix: str,
-        min_coverage: float | None,
-        saturate=None,
-        deviation: bool = False,
-    ) -> None:
+    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage, saturate=None) -> None:
+        numbers = Numbers.of(model, dialect.dtype)
         self.name = dialect.name + suffix
         self.min_coverage = None if model.support is None else min_coverage
-        numbers = Numbers.of(model, dialect.dtype)
-        own = Dialect(self.name, dialect.real, dialect.std)
         self.limits = read_limits(saturate, numbers)
-        given = (numbers, own, model.out_of_bounds, self.min_coverage)
-        self._source: Source
-        self.model = as_held(model, numbers)
-        self.low, self.high = numbers.low, numbers.high
-        if deviation:
-            found = deviation_of(model, numbers)
-            self._source = DeviationSource(*given, found, is_part=True, limits=self.limits)
-        else:
-            self._source = Source(*given, is_part=True, limits=self.limits)
-        self.cost = self._source.cost
-        self._outer = dialect.name.upper()
-
-    def deviation_test(self, dialect: Dialect, rows) -> str:
-        """The self-test of deviations of a file in a dialect, at ``rows`` of the rules."""
-        return deviation_test(self.model, dialect, rows, self._source)
+        self.model, self.low, self.high = numbers.model, numbers.low, numbers.high
+        own = Dialect(self.name, dialect.real, dialect.std)
+        given = (numbers, own, model.out_of_bounds, self.min_coverage, self.limits)
+        self._source, self._outer = Source(*given, is_part=True), dialect.name.upper()
+        self.cost = self._source.cost()
 
     def text(self) -> str:
         """The C code, for after the lines that include other files."""

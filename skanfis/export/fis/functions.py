@@ -1,29 +1,12 @@
-r"""Membership functions of the .fis format and the families of skanfis that they are.
+"""Membership functions of the .fis format and the families of skanfis that they are.
 
-Every function of the table is the family's textbook mu, with other parameters:
-
-=============  =====================  ============================================================
-.fis           family                 parameters in the file
-=============  =====================  ============================================================
-``gaussmf``    gaussian               width, center
-``gbellmf``    bell                   width, slope, center
-``trimf``      triangular             feet and peak, in order
-``trapmf``     trapezoidal            feet and shoulders, in order
-``pimf``       pi_shaped              feet and shoulders, in order
-``gauss2mf``   two_sided_gaussian     deviation and shoulder of the left flank, of the right flank
-``smf``        s_shaped               foot, shoulder
-``zmf``        z_shaped               shoulder, foot
-``dsigmf``     sigmoid_difference     slope and place of the rise, the same of the fall
-``psigmf``     sigmoid_product        slope and place of the rise, slope (negative) of the fall
-=============  =====================  ============================================================
-
-The functions that turn parameters take and give lists of floats; on the side of skanfis these are
-natural parameters (widths, not their logarithms). What a family cannot be raises ValueError.
+Every function is the family's textbook mu, with other parameters. The functions that turn them take
+and give lists of floats; on the side of skanfis these are natural parameters (widths, not their
+logarithms). What a family cannot be raises ValueError.
 """
 
 from collections.abc import Callable
 from math import log
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +26,8 @@ def function_of(family, natural):
             f"the membership {family.name!r} has no function in the .fis format; "
             f"{', '.join(_TABLE)} have."
         )
-    function = _TABLE[family.name]
-    return function.name, function.to_file(*map(float, natural))
+    name, _, to_file, _ = _TABLE[family.name]
+    return name, to_file(*map(float, natural))
 
 
 def theta_of(name, parameters, low, high):
@@ -53,33 +36,27 @@ def theta_of(name, parameters, low, high):
         raise ValueError(
             f"the membership function {shown(name)} is not supported; {', '.join(_FAMILIES)} are."
         )
-    function = _TABLE[_FAMILIES[name]]
-    if len(parameters) != function.n_parameters:
-        raise ValueError(
-            f"{name} takes {function.n_parameters} parameters, found {len(parameters)}."
-        )
-    family = MEMBERSHIPS[_FAMILIES[name]]
-    if name in _WITH_CORNERS:
+    family = _FAMILIES[name]
+    _, n_parameters, _, from_file = _TABLE[family]
+    if len(parameters) != n_parameters:
+        raise ValueError(f"{name} takes {n_parameters} parameters, found {len(parameters)}.")
+    if name in ("trimf", "trapmf", "pimf"):
         parameters = _open_flanks(name, parameters, low, high)
-        if name == "trapmf" and parameters[1] == parameters[2]:
-            family, function = MEMBERSHIPS["triangular"], _TABLE["triangular"]
-            del parameters[1]
-    return family, _theta(family, function.from_file(*parameters), f"{name} {parameters}")
-
-
-def _theta(family, natural, what):
+    natural = from_file(*parameters)
+    if name == "trapmf" and parameters[1] == parameters[2]:
+        family, natural = "triangular", natural[:3]
     theta = []
-    for parameter, value in zip(family.parameters, natural, strict=True):
+    for parameter, value in zip(MEMBERSHIPS[family].parameters, natural, strict=True):
         if parameter.kind == "location":
             theta.append(value)
         elif 1.0 / LARGEST_NUMBER <= value <= LARGEST_NUMBER:
             theta.append(log(value))
         else:
             raise ValueError(
-                f"{what} is a {family.name} membership of {parameter.name} {value:g}, which must "
-                f"be between {1.0 / LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}."
+                f"{name} {parameters} is a {family} membership of {parameter.name} {value:g}, "
+                f"which must be between {1.0 / LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}."
             )
-    return np.array(theta)
+    return MEMBERSHIPS[family], np.array(theta)
 
 
 def _open_flanks(name, corners, low, high):
@@ -109,7 +86,10 @@ def _corners(center, left, right, plateau):
 
 
 def _from_corners(foot, shoulder, other_shoulder, other_foot):
-    left, right = shoulder - foot, other_foot - other_shoulder
+    return _about_middle(shoulder - foot, shoulder, other_shoulder, other_foot - other_shoulder)
+
+
+def _about_middle(left, shoulder, other_shoulder, right):
     plateau = other_shoulder - shoulder or _POINT * min(left, right)
     return [0.5 * (shoulder + other_shoulder), left, right, plateau]
 
@@ -124,9 +104,11 @@ def _two_sided_from_file(left, shoulder, right, other_shoulder):
             f"gauss2mf with its right shoulder {other_shoulder:g} left of the left one "
             f"{shoulder:g} is not supported: it does not reach 1."
         )
-    left, right = abs(left), abs(right)
-    plateau = other_shoulder - shoulder or _POINT * min(left, right)
-    return [0.5 * (shoulder + other_shoulder), left, right, plateau]
+    return _about_middle(abs(left), shoulder, other_shoulder, abs(right))
+
+
+def _difference_to_file(center, width, flank):
+    return [1.0 / flank, center - width, 1.0 / flank, center + width]
 
 
 def _difference_from_file(slope, place, other_slope, other_place):
@@ -168,60 +150,35 @@ def _bell_from_file(width, slope, center):
     return [center, abs(width), slope]
 
 
-def _flank(name, left, right):
-    if left >= right:
-        raise ValueError(f"the corners of {name} [{left:g} {right:g}] must be in ascending order.")
-    return right - left
+def _s_from_file(foot, shoulder, name="smf"):
+    if foot >= shoulder:
+        raise ValueError(
+            f"the corners of {name} [{foot:g} {shoulder:g}] must be in ascending order."
+        )
+    return [shoulder, shoulder - foot]
 
 
-class _Function(NamedTuple):
-    """A function of the format, and its parameters from and to those of the family."""
-
-    name: str
-    n_parameters: int
-    to_file: Callable
-    from_file: Callable
+def _z_from_file(shoulder, foot):
+    return [shoulder, _s_from_file(shoulder, foot, "zmf")[1]]
 
 
-# By family.
-_TABLE = {
-    "gaussian": _Function(
-        "gaussmf",
-        2,
-        lambda center, width: [width, center],
-        lambda width, center: [center, abs(width)],
-    ),
-    "bell": _Function(
-        "gbellmf", 3, lambda center, width, slope: [width, slope, center], _bell_from_file
-    ),
-    "triangular": _Function(
+# By family: the function's name, its number of parameters, and what turns those of the family into
+# them and back.
+_TABLE: dict[str, tuple[str, int, Callable, Callable]] = {
+    "gaussian": ("gaussmf", 2, lambda c, width: [width, c], lambda width, c: [c, abs(width)]),
+    "bell": ("gbellmf", 3, lambda c, width, slope: [width, slope, c], _bell_from_file),
+    "triangular": (
         "trimf",
         3,
-        lambda center, left, right: [center - left, center, center + right],
+        lambda c, left, right: [c - left, c, c + right],
         lambda foot, peak, other_foot: [peak, peak - foot, other_foot - peak],
     ),
-    "trapezoidal": _Function("trapmf", 4, _corners, _from_corners),
-    "pi_shaped": _Function("pimf", 4, _corners, _from_corners),
-    "two_sided_gaussian": _Function("gauss2mf", 4, _two_sided_to_file, _two_sided_from_file),
-    "s_shaped": _Function(
-        "smf",
-        2,
-        lambda shoulder, width: [shoulder - width, shoulder],
-        lambda foot, shoulder: [shoulder, _flank("smf", foot, shoulder)],
-    ),
-    "z_shaped": _Function(
-        "zmf",
-        2,
-        lambda shoulder, width: [shoulder, shoulder + width],
-        lambda shoulder, foot: [shoulder, _flank("zmf", shoulder, foot)],
-    ),
-    "sigmoid_difference": _Function(
-        "dsigmf",
-        4,
-        lambda center, width, flank: [1.0 / flank, center - width, 1.0 / flank, center + width],
-        _difference_from_file,
-    ),
-    "sigmoid_product": _Function("psigmf", 4, _product_to_file, _product_from_file),
+    "trapezoidal": ("trapmf", 4, _corners, _from_corners),
+    "pi_shaped": ("pimf", 4, _corners, _from_corners),
+    "two_sided_gaussian": ("gauss2mf", 4, _two_sided_to_file, _two_sided_from_file),
+    "s_shaped": ("smf", 2, lambda top, width: [top - width, top], _s_from_file),
+    "z_shaped": ("zmf", 2, lambda top, width: [top, top + width], _z_from_file),
+    "sigmoid_difference": ("dsigmf", 4, _difference_to_file, _difference_from_file),
+    "sigmoid_product": ("psigmf", 4, _product_to_file, _product_from_file),
 }
-_FAMILIES = {function.name: family for family, function in _TABLE.items()}
-_WITH_CORNERS = {"trimf", "trapmf", "pimf"}
+_FAMILIES = {name: family for family, (name, *_) in _TABLE.items()}

@@ -2,14 +2,21 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import groupby
-from math import prod
 from os import PathLike
+from typing import NamedTuple
 
 import numpy as np
 
-from ...antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from ...antecedent import (
+    Antecedent,
+    GridAntecedent,
+    RuleTableAntecedent,
+    ScatteredAntecedent,
+    TermGroup,
+)
 from ...model import TSKModel
 from ..limits import check_size, read_bytes, shown
 from .functions import theta_of
@@ -26,18 +33,10 @@ _MOST_RULES = 100_000
 
 
 def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = None) -> TSKModel:
-    r"""Read a Sugeno system from a .fis file of MATLAB, Octave or fuzzylite.
+    """Read a Sugeno system from a .fis file of MATLAB, Octave or fuzzylite.
 
-    The file is data: it is parsed strictly, and no part of it is ever run. What it may hold:
-
-    * Sugeno systems with product as AND, weighted average, constant or linear consequents, and one
-      or more outputs;
-    * the membership functions gaussmf, gbellmf, trimf, trapmf, gauss2mf, pimf, smf, zmf, dsigmf
-      with one slope, and psigmf;
-    * rules of weight 1 that are joined by AND and may leave inputs out (0).
-
-    Everything else is refused: Mamdani systems, OR, NOT, hedges, rule weights, other functions. At
-    most 4 MiB are read, and at most 20 million numbers held.
+    The file is data: it is parsed strictly, and no part of it is ever run. :doc:`/files` says what
+    it may hold; everything else is refused, as is a file of more than 4 MiB.
 
     Parameters
     ----------
@@ -48,24 +47,14 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     Returns
     -------
     model : skanfis.model.TSKModel
-        The box of the model is the Range of the inputs; outside it the edge is held
-        (``out_of_bounds="clip"``), where other programs compute on or refuse. A full grid becomes a
-        ``GridAntecedent`` with its rules in C order, rules with terms of their own a
-        ``ScatteredAntecedent``, all else a ``RuleTableAntecedent``. Of the training data the file
-        knows nothing: ``coverage`` is zero everywhere.
+        Its box is the Range of the inputs; outside it the edge is held (``out_of_bounds="clip"``).
+        Of the training data the file knows nothing: ``coverage`` is zero everywhere.
 
     Raises
     ------
     ValueError
-        With the line, if the file is malformed or holds what is not supported; if
-        ``input_names`` are not one per input, and different.
-    OSError
-        If the file cannot be opened.
-
-    Notes
-    -----
-    Membership functions that no rule uses are left out. Where no rule fires, programs give zero,
-    NaN, or the middle of the output's Range; here the nearest rule speaks.
+        With the line, if the file is malformed or holds what is not supported; if ``input_names``
+        are not one per input, and different.
 
     Examples
     --------
@@ -74,25 +63,18 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import read_fis, write_fis
-    >>> X, y = make_jang_sinc()
-    >>> estimator = ANFISRegressor(n_mfs=4).fit(X, y)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_fis(estimator, Path(folder) / "sinc.fis")
-    ...     model = read_fis(Path(folder) / "sinc.fis")
-    >>> model.n_rules
+    ...     write_fis(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()), Path(folder) / "sinc.fis")
+    ...     read_fis(Path(folder) / "sinc.fis").n_rules
     16
-    >>> bool(abs(model.predict(X)[:, 0] - estimator.predict(X)).max() < 1e-9)
-    True
     """
     try:
         model = parse_fis(text_of(read_bytes(path, _MOST_BYTES)))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return model if input_names is None else _renamed(model, input_names)
-
-
-def _renamed(model, names):
-    names = tuple(map(str, names))
+    if input_names is None:
+        return model
+    names = tuple(map(str, input_names))
     if len(set(names)) != model.n_inputs or len(names) != model.n_inputs:
         raise ValueError(
             f"input_names={list(names)!r} must be {model.n_inputs} different names, one for each "
@@ -108,9 +90,8 @@ def parse_fis(text):
         raise ValueError("line 1: the file has no [System].")
     n_inputs, n_outputs, n_rules, and_method = _read_system(sections["System"])
     inputs = [_variable(sections, "Input", j + 1, theta_of) for j in range(n_inputs)]
-    outputs = [
-        _variable(sections, "Output", k + 1, _consequent(n_inputs)) for k in range(n_outputs)
-    ]
+    consequent = partial(_consequent, n_inputs)
+    outputs = [_variable(sections, "Output", k + 1, consequent) for k in range(n_outputs)]
     rules = _rules(sections, inputs, outputs, n_rules, and_method)
     for name, section in sections.items():
         if name not in ("System", "Rules"):
@@ -118,8 +99,7 @@ def parse_fis(text):
     return _model(inputs, outputs, *rules)
 
 
-@dataclass(frozen=True)
-class _Variable:
+class _Variable(NamedTuple):
     """An input or output: its name, its range, its membership functions and their names."""
 
     name: str
@@ -132,7 +112,13 @@ class _Variable:
 def _read_system(section):
     """Numbers of inputs, outputs and rules, and the entry of the AND method."""
     section.take("Name").name()
-    _expect(section, "Type", "sugeno", "only Sugeno systems are supported")
+    for key, wanted, reason in (
+        ("Type", "sugeno", "only Sugeno systems are supported"),
+        ("DefuzzMethod", "wtaver", "only the weighted average is supported"),
+    ):
+        entry = section.take(key)
+        if entry.name() != wanted:
+            raise entry.error(f"{key}={shown(entry.name())}: {reason} ({wanted!r}).")
     section.entries.pop("Version", None)
     n_inputs = section.take("NumInputs").whole(1, _MOST_VARIABLES)
     n_outputs = section.take("NumOutputs").whole(1, _MOST_VARIABLES)
@@ -142,15 +128,8 @@ def _read_system(section):
     # These three have no part in a Sugeno system of rules joined by AND.
     for key in ("OrMethod", "ImpMethod", "AggMethod"):
         section.take(key).name()
-    _expect(section, "DefuzzMethod", "wtaver", "only the weighted average is supported")
     section.check_empty()
     return n_inputs, n_outputs, n_rules, and_method
-
-
-def _expect(section, key, wanted, reason):
-    entry = section.take(key)
-    if entry.name() != wanted:
-        raise entry.error(f"{key}={shown(entry.name())}: {reason} ({wanted!r}).")
 
 
 def _variable(sections, kind, number, read_term):
@@ -176,22 +155,18 @@ def _variable(sections, kind, number, read_term):
     return _Variable(name, low, high, names, terms)
 
 
-def _consequent(n_inputs):
-    """A reader of consequents: p0 of a constant; p0, p1 .. pd of a linear one."""
-
-    def read(function, parameters, low, high):
-        lengths = {"constant": 1, "linear": n_inputs + 1}
-        if function not in lengths:
-            raise ValueError(
-                f"the consequent {shown(function)} is not supported; constant, linear are."
-            )
-        if len(parameters) != lengths[function]:
-            raise ValueError(
-                f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
-            )
-        return [parameters[-1], *parameters[:-1]]
-
-    return read
+def _consequent(n_inputs, function, parameters, low, high):
+    """p0 of a constant; p0, p1 .. pd of a linear one."""
+    lengths = {"constant": 1, "linear": n_inputs + 1}
+    if function not in lengths:
+        raise ValueError(
+            f"the consequent {shown(function)} is not supported; constant, linear are."
+        )
+    if len(parameters) != lengths[function]:
+        raise ValueError(
+            f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
+        )
+    return [parameters[-1], *parameters[:-1]]
 
 
 def _rules(sections, inputs, outputs, n_rules, and_method):
@@ -209,24 +184,20 @@ def _rules(sections, inputs, outputs, n_rules, and_method):
     antecedents = np.zeros((n_rules, len(inputs)), dtype=int)
     consequents = np.zeros((n_rules, len(outputs)), dtype=int)
     for r, entry in enumerate(section.rules):
-        antecedents[r], consequents[r] = _rule(entry, inputs, outputs, and_method)
-    return antecedents, consequents
-
-
-def _rule(entry, inputs, outputs, and_method):
-    antecedent, consequent, weight, connection = entry.rule()
-    _check_terms(entry, antecedent, inputs, "input", lowest=0)
-    _check_terms(entry, consequent, outputs, "output", lowest=1)
-    if weight != 1.0:
-        raise entry.error(f"the rule has weight {weight:g}; only weight 1 is supported.")
-    if np.count_nonzero(antecedent) > 1:
-        if connection == 2:
+        antecedent, consequent, weight, connection = entry.rule()
+        _check_terms(entry, antecedent, inputs, "input", lowest=0)
+        _check_terms(entry, consequent, outputs, "output", lowest=1)
+        if weight != 1.0:
+            raise entry.error(f"the rule has weight {weight:g}; only weight 1 is supported.")
+        is_joined = np.count_nonzero(antecedent) > 1
+        if is_joined and connection == 2:
             raise entry.error("the rule joins its terms by OR (2); only AND (1) is supported.")
-        if and_method.name() != "prod":
+        if is_joined and and_method.name() != "prod":
             raise and_method.error(
                 f"AndMethod={shown(and_method.name())}: only the product ('prod') is supported."
             )
-    return antecedent, consequent
+        antecedents[r], consequents[r] = antecedent, consequent
+    return antecedents, consequents
 
 
 def _check_terms(entry, numbers, variables, kind, lowest):
@@ -237,15 +208,13 @@ def _check_terms(entry, numbers, variables, kind, lowest):
             "for each."
         )
     for number, variable in zip(numbers, variables, strict=True):
+        what, n_terms = f"{number} for {kind} {shown(variable.name)}", len(variable.terms)
         if number < 0:
+            raise entry.error(f"{what}: NOT, a negative number, is not supported.")
+        if not lowest <= number <= n_terms:
             raise entry.error(
-                f"{number} for {kind} {shown(variable.name)}: NOT, a negative number, is not "
-                "supported."
-            )
-        if not lowest <= number <= len(variable.terms):
-            raise entry.error(
-                f"{number} for {kind} {shown(variable.name)}, which has {len(variable.terms)} "
-                f"membership functions; it must be from {lowest} to that."
+                f"{what}, which has {n_terms} membership functions; it must be from {lowest} to "
+                "that."
             )
 
 
@@ -253,18 +222,34 @@ def _model(inputs, outputs, antecedents, consequents):
     rows = _grid_rows(inputs, antecedents)
     if rows is not None:
         antecedents, consequents = antecedents[rows], consequents[rows]
-        antecedent, term_names = _grid(inputs, antecedents)
+    # Input and number of each term that a rule looks at, input by input.
+    places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
+    antecedent: Antecedent
+    if rows is not None:
+        counts = tuple(Counter(j for j, _ in places).values())
+        antecedent = GridAntecedent(_groups(inputs, places), counts=counts)
     elif _is_scattered(inputs, antecedents):
-        antecedent, term_names = _scattered(inputs, antecedents)
+        premises = np.flatnonzero(antecedents.any(axis=0))
+        places = [(j, rule[j]) for rule in antecedents for j in premises]
+        antecedent = ScatteredAntecedent(_groups(inputs, places), n_premise_inputs=premises.size)
     else:
-        antecedent, term_names = _table(inputs, antecedents)
+        table = np.full(antecedents.shape, -1)
+        for t, (j, k) in enumerate(places):
+            table[antecedents[:, j] == k, j] = t
+        antecedent = RuleTableAntecedent(_groups(inputs, places), table)
+    names = [_distinct(variable.names) for variable in inputs]
+    # Constants beside linear consequents have no slopes.
+    n_basis = max(len(term) for output in outputs for term in output.terms)
+    coefficients = np.zeros((len(consequents), n_basis, len(outputs)))
+    for (r, k), number in np.ndenumerate(consequents):
+        term = outputs[k].terms[number - 1]
+        coefficients[r, : len(term), k] = term
     n_rules = len(antecedents)
-    low = np.array([variable.low for variable in inputs])
-    high = np.array([variable.high for variable in inputs])
+    low, high = np.array([(variable.low, variable.high) for variable in inputs]).T.copy()
     return TSKModel(
         antecedent=antecedent,
         initial_antecedent=antecedent,
-        coefficients=_coefficients(outputs, consequents),
+        coefficients=coefficients,
         # About another point the file's own p0 would be rounded.
         reference=np.zeros(len(inputs)),
         # That of rows spread evenly over the Range.
@@ -275,20 +260,9 @@ def _model(inputs, outputs, antecedents, consequents):
         rule_rows=np.zeros(n_rules),
         input_names=_distinct(variable.name for variable in inputs),
         out_of_bounds="clip",
-        term_names=term_names,
+        term_names=tuple(names[j][k - 1] for j, k in places),
         output_names=_distinct(variable.name for variable in outputs),
     )
-
-
-def _coefficients(outputs, consequents):
-    """As of a model; constants beside linear consequents have no slopes."""
-    n_basis = max(len(term) for output in outputs for term in output.terms)
-    coefficients = np.zeros((len(consequents), n_basis, len(outputs)))
-    for k, output in enumerate(outputs):
-        for r, number in enumerate(consequents[:, k]):
-            term = output.terms[number - 1]
-            coefficients[r, : len(term), k] = term
-    return coefficients
 
 
 def _grid_rows(inputs, antecedents):
@@ -296,60 +270,31 @@ def _grid_rows(inputs, antecedents):
 
     A grid has at least two terms of one family, in order, on every input that it looks at.
     """
-    premises = np.flatnonzero(antecedents.any(axis=0))
-    used = [np.unique(antecedents[:, j]) for j in premises]
-    n_combinations = prod(own.size for own in used)
-    if n_combinations != len(antecedents) or not all(
-        own.size > 1 and own[0] > 0 and _is_ordered([inputs[j].terms[k - 1] for k in own])
-        for j, own in zip(premises, used, strict=True)
-    ):
+    n_combinations = 1
+    for variable, column in zip(inputs, antecedents.T, strict=True):
+        own = np.unique(column)
+        if not own.any():
+            continue
+        n_combinations *= own.size
+        terms = [variable.terms[k - 1] for k in own]
+        is_one_family = len({family for family, _ in terms}) == 1
+        is_ordered = np.all(np.diff([theta[0] for _, theta in terms]) > 0.0)
+        if own.size == 1 or own[0] == 0 or not (is_one_family and is_ordered):
+            return None
+    if n_combinations != len(antecedents):
         return None
     rows = np.lexsort(antecedents.T[::-1])
     distinct = np.any(np.diff(antecedents[rows], axis=0), axis=1)
     return rows if distinct.all() else None
 
 
-def _is_ordered(terms):
-    """Whether terms are of one family and each stands above the one before."""
-    families, thetas = zip(*terms, strict=True)
-    return len(set(families)) == 1 and bool(np.all(np.diff([theta[0] for theta in thetas]) > 0.0))
-
-
 def _is_scattered(inputs, antecedents):
     """Whether all rules look at the same inputs, by terms of their own and of one family."""
-    premises = np.flatnonzero(antecedents.any(axis=0))
-    families = {inputs[j].terms[k - 1][0] for j in premises for k in antecedents[:, j] if k > 0}
-    n_rules = len(antecedents)
+    used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
+    families = {one.terms[k - 1][0] for one, own in used for k in own if k > 0}
     return len(families) == 1 and all(
-        antecedents[:, j].min() > 0 and np.unique(antecedents[:, j]).size == n_rules
-        for j in premises
+        own.min() > 0 and np.unique(own).size == own.size for _, own in used
     )
-
-
-def _grid(inputs, antecedents):
-    places = _places(antecedents)
-    counts = tuple(Counter(j for j, _ in places).values())
-    return GridAntecedent(_groups(inputs, places), counts=counts), _names(inputs, places)
-
-
-def _scattered(inputs, antecedents):
-    premises = np.flatnonzero(antecedents.any(axis=0))
-    places = [(j, rule[j]) for rule in antecedents for j in premises]
-    groups = _groups(inputs, places)
-    return ScatteredAntecedent(groups, n_premise_inputs=premises.size), _names(inputs, places)
-
-
-def _table(inputs, antecedents):
-    places = _places(antecedents)
-    table = np.full(antecedents.shape, -1)
-    for t, (j, k) in enumerate(places):
-        table[antecedents[:, j] == k, j] = t
-    return RuleTableAntecedent(_groups(inputs, places), table), _names(inputs, places)
-
-
-def _places(antecedents):
-    """Input and number of each term that a rule looks at, input by input."""
-    return [(j, k) for j, column in enumerate(antecedents.T) for k in np.unique(column) if k > 0]
 
 
 def _groups(inputs, places):
@@ -360,11 +305,6 @@ def _groups(inputs, places):
         numbers, _, thetas = zip(*members, strict=True)
         groups.append(TermGroup(family, np.array(numbers), np.stack(thetas, axis=1)))
     return tuple(groups)
-
-
-def _names(inputs, places):
-    names = [_distinct(variable.names) for variable in inputs]
-    return tuple(names[j][k - 1] for j, k in places)
 
 
 def _distinct(names):

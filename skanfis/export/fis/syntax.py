@@ -12,6 +12,7 @@ __all__ = ["Entry", "Section", "sections_of", "text_of"]
 
 _HEAD = re.compile(r"\[(System|Rules|(?:Input|Output)[1-9][0-9]{0,5})\]")
 _QUOTED = re.compile(r"'([^']*)'")
+_BRACKETS = re.compile(r"\[(.*)\]")
 _WHOLE = re.compile(r"[0-9]{1,9}")
 # fuzzylite writes them as 1.000.
 _SIGNED_WHOLE = re.compile(r"(-?[0-9]{1,9})(?:\.0*)?")
@@ -38,78 +39,71 @@ class Entry:
 
     def name(self):
         """A name in single quotes, of printable characters."""
-        match = _QUOTED.fullmatch(self.text)
-        if match is None:
-            raise self.error(f"expected a name in single quotes, found {shown(self.text)}.")
-        return self._printable(match[1])
+        return self._printable(self._match(_QUOTED, "a name in single quotes")[1])
 
     def whole(self, lowest, highest):
         """A whole number within bounds."""
-        if _WHOLE.fullmatch(self.text) is None:
-            raise self.error(f"expected a whole number, found {shown(self.text)}.")
-        number = int(self.text)
+        number = int(self._match(_WHOLE, "a whole number")[0])
         if not lowest <= number <= highest:
             raise self.error(f"{number} is not between {lowest} and {highest}.")
         return number
 
     def interval(self):
         """Two numbers in square brackets, the first below the second."""
-        if not (self.text.startswith("[") and self.text.endswith("]")):
-            raise self.error(f"expected [low high], found {shown(self.text)}.")
-        numbers = self._numbers(self.text[1:-1])
+        numbers = self._numbers(self._match(_BRACKETS, "[low high]")[1])
         if len(numbers) != 2 or not numbers[0] < numbers[1]:
             raise self.error(f"expected [low high] with low < high, found {shown(self.text)}.")
         return numbers
 
     def membership(self):
         """Name, function and parameters of a membership function."""
-        match = _MEMBERSHIP.fullmatch(self.text)
-        if match is None:
-            raise self.error(f"expected 'name':'function',[parameters], found {shown(self.text)}.")
+        match = self._match(_MEMBERSHIP, "'name':'function',[parameters]")
         return self._printable(match[1]), self._printable(match[2]), self._numbers(match[3])
 
     def rule(self):
         """Antecedent and consequent as lists of whole numbers; weight; 1 for AND, 2 for OR."""
-        match = _RULE.fullmatch(self.text)
-        if match is None:
-            raise self.error(
-                "expected a rule such as '1 2, 3 (1) : 1' (terms of the inputs, consequents, "
-                f"weight, connection), found {shown(self.text)}."
-            )
-        antecedent, consequent = (self._signed_wholes(match[k]) for k in (1, 2))
+        match = self._match(
+            _RULE,
+            "a rule such as '1 2, 3 (1) : 1' (terms of the inputs, consequents, weight, "
+            "connection)",
+        )
+        sides = []
+        for tokens in (match[1].split(), match[2].split()):
+            numbers = []
+            for token in tokens:
+                whole = _SIGNED_WHOLE.fullmatch(token)
+                if whole is None:
+                    raise self.error(
+                        f"expected whole numbers of terms, found {shown(token)}; hedges, written "
+                        "as fractions, are not supported."
+                    )
+                numbers.append(int(whole[1]))
+            sides.append(numbers)
         weights, connection = self._numbers(match[3]), match[4].strip()
         if len(weights) != 1 or connection not in ("1", "2"):
             raise self.error(
                 f"expected '(weight) : connection', where the connection is 1 or 2, at the end of "
                 f"{shown(self.text)}."
             )
-        return antecedent, consequent, weights[0], int(connection)
+        return *sides, weights[0], int(connection)
 
-    def _signed_wholes(self, text):
-        numbers = []
-        for token in text.split():
-            match = _SIGNED_WHOLE.fullmatch(token)
-            if match is None:
-                raise self.error(
-                    f"expected whole numbers of terms, found {shown(token)}; hedges, written as "
-                    "fractions, are not supported."
-                )
-            numbers.append(int(match[1]))
-        return numbers
+    def _match(self, pattern, wanted):
+        match = pattern.fullmatch(self.text)
+        if match is None:
+            raise self.error(f"expected {wanted}, found {shown(self.text)}.")
+        return match
 
     def _numbers(self, text):
-        text = text.strip()
-        return [self._number(token) for token in _BETWEEN.split(text)] if text else []
-
-    def _number(self, token):
-        if len(token) > _LONGEST_NUMBER or _NUMBER.fullmatch(token) is None:
-            raise self.error(f"expected a finite number, found {shown(token)}.")
-        number = float(token)
-        if abs(number) > LARGEST_NUMBER:
-            raise self.error(
-                f"{token} is beyond {LARGEST_NUMBER:g}, the largest number that is read."
-            )
-        return number
+        text, numbers = text.strip(), []
+        for token in _BETWEEN.split(text) if text else []:
+            if len(token) > _LONGEST_NUMBER or _NUMBER.fullmatch(token) is None:
+                raise self.error(f"expected a finite number, found {shown(token)}.")
+            numbers.append(float(token))
+            if abs(numbers[-1]) > LARGEST_NUMBER:
+                raise self.error(
+                    f"{token} is beyond {LARGEST_NUMBER:g}, the largest number that is read."
+                )
+        return numbers
 
     def _printable(self, text):
         if not text.isprintable():
@@ -175,19 +169,14 @@ def sections_of(text):
             _check_number(entry, current.rules)
             current.rules.append(entry)
         else:
-            _add(current, entry)
+            key, separator, value = (part.strip() for part in line.partition("="))
+            if not separator:
+                raise entry.error(f"expected key=value in [{current.name}], found {shown(line)}.")
+            if key in current.entries:
+                raise entry.error(f"[{current.name}] has {shown(key)} for the second time.")
+            _check_number(entry, current.entries)
+            current.entries[key] = Entry(number, value)
     return sections
-
-
-def _add(section, entry):
-    key, separator, value = entry.text.partition("=")
-    key = key.rstrip()
-    if not separator:
-        raise entry.error(f"expected key=value in [{section.name}], found {shown(entry.text)}.")
-    if key in section.entries:
-        raise entry.error(f"[{section.name}] has {shown(key)} for the second time.")
-    _check_number(entry, section.entries)
-    section.entries[key] = Entry(entry.line, value.lstrip())
 
 
 def _check_number(entry, others):

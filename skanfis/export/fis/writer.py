@@ -18,98 +18,66 @@ __all__ = ["export_fis", "write_fis"]
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MINUS = re.compile(r"(?<!\S)-(?=[0-9.])")
 # What fuzzylite takes for words of a rule.
-_WORDS = {
-    "if",
-    "is",
-    "then",
-    "with",
-    "and",
-    "or",
-    "not",
-    "any",
-    "very",
-    "seldom",
-    "somewhat",
-    "extremely",
-}
+_WORDS = {"if", "is", "then", "with", "and", "or", "not"}
+_WORDS |= {"any", "very", "seldom", "somewhat", "extremely"}
 # Points of the box at which the rules of the file are tried.
 _N_POINTS = 1000
 
 
 def export_fis(estimator: Any) -> str:
-    r"""Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
+    """Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
 
-    The system is Sugeno's, with product as AND and weighted average. Its membership functions are
-    those of the model under MATLAB's names, its consequents are constant or linear in the raw
-    inputs; numbers have all their digits. A scaler in front of the estimator is folded in.
+    The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
+    Outside the Range of the inputs, the box of the training data, other programs do as they like:
+    clamp the inputs.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An :class:`~skanfis.ANFISRegressor`, or a Pipeline of scalers and one (a
-        TransformedTargetRegressor with a scaler likewise).
+        As :func:`fold` takes it.
 
     Returns
     -------
     text : str
-        ASCII. Names of inputs, outputs and terms become letters, digits and underscores, different
-        from each other; a comment gives the names that changed.
+        ASCII. Names become letters, digits and underscores; a comment gives those that changed.
 
     Raises
     ------
-    ValueError
-        If a step in front cannot be folded, if a membership has no function in the format, or if
+    ValueError, TypeError
+        As :func:`fold`; ValueError if a membership has no function in the format, or if
         :func:`read_fis` would refuse a number, such as a width beyond 1e50.
-    TypeError
-        If ``estimator`` is no such estimator.
 
     Warns
     -----
     UserWarning
         If there are places in the box of the training data at which no rule of the file fires.
 
-    Notes
-    -----
-    The file holds the model within the box of the training data, which is the Range of its inputs.
-    What lies outside, the format cannot say: MATLAB and fuzzylite compute on, Octave refuses. Clamp
-    the inputs to the Range to have ``out_of_bounds="clip"``; a tangent
-    (``max_extrapolation``) has no counterpart there, nor has coverage.
-
     Examples
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import export_fis
-    >>> X, y = make_jang_sinc()
-    >>> text = export_fis(ANFISRegressor(n_mfs=2).fit(X, y))
-    >>> print(text[text.index("[Rules]") :])
-    [Rules]
-    1 1, 1 (1) : 1
-    1 2, 2 (1) : 1
-    2 1, 3 (1) : 1
-    2 2, 4 (1) : 1
-    <BLANKLINE>
+    >>> export_fis(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc())).splitlines()[-1]
+    '2 2, 4 (1) : 1'
     """
     model = fold(estimator)
     _warn_of_gaps(model)
     inputs, names_of_terms, terms, rules = _premises(model)
     input_names = _identifiers(model.input_names, "input")
     output_names = _identifiers(model.output_names, "output")
-    system = {
-        "Name": "'skanfis'",
-        "Type": "'sugeno'",
-        "Version": "2.0",
-        "NumInputs": model.n_inputs,
-        "NumOutputs": model.n_outputs,
-        "NumRules": model.n_rules,
-        "AndMethod": "'prod'",
-        "OrMethod": "'probor'",
-        "ImpMethod": "'prod'",
-        "AggMethod": "'sum'",
-        "DefuzzMethod": "'wtaver'",
-    }
-    lines = [*_comments(model, input_names, output_names), "[System]"]
-    lines += [f"{key}={value}" for key, value in system.items()]
+    head = f"""[System]
+Name='skanfis'
+Type='sugeno'
+Version=2.0
+NumInputs={model.n_inputs}
+NumOutputs={model.n_outputs}
+NumRules={model.n_rules}
+AndMethod='prod'
+OrMethod='probor'
+ImpMethod='prod'
+AggMethod='sum'
+DefuzzMethod='wtaver'"""
+    lines = [*_comments(model, input_names, output_names), head]
     for j, name in enumerate(input_names):
         own = np.flatnonzero(inputs == j)
         names = _identifiers([names_of_terms[t] for t in own], "term")
@@ -119,7 +87,11 @@ def export_fis(estimator: Any) -> str:
     for k, name in enumerate(output_names):
         interval, consequents = _consequents(model, k)
         lines += _variable(f"Output{k + 1}", name, interval, names, consequents)
-    text = "\n".join([*lines, "", "[Rules]", *_rules(rules, model.n_outputs), ""])
+    lines += ["", "[Rules]"]
+    for r, rule in enumerate(rules):
+        consequents = " ".join([str(r + 1)] * model.n_outputs)
+        lines.append(f"{' '.join(map(str, rule))}, {consequents} (1) : 1")
+    text = "\n".join([*lines, ""])
     try:
         parse_fis(text)
     except ValueError as error:
@@ -137,23 +109,7 @@ def write_fis(estimator: Any, path: str | PathLike[str]) -> None:
     ----------
     estimator : fitted estimator or TSKModel
     path : str or path-like
-        Of the file, which is replaced where it exists; Octave wants it to end in ".fis".
-
-    Returns
-    -------
-    None
-
-    Raises
-    ------
-    ValueError, TypeError
-        As :func:`export_fis`.
-    OSError
-        If the file cannot be written.
-
-    Warns
-    -----
-    UserWarning
-        As :func:`export_fis`.
+        Octave wants it to end in ".fis".
 
     Examples
     --------
@@ -162,9 +118,8 @@ def write_fis(estimator: Any, path: str | PathLike[str]) -> None:
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import write_fis
-    >>> X, y = make_jang_sinc()
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_fis(ANFISRegressor(n_mfs=2).fit(X, y), Path(folder) / "sinc.fis")
+    ...     write_fis(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), Path(folder) / "sinc.fis")
     """
     Path(path).write_text(export_fis(estimator), encoding="ascii", newline="\n")
 
@@ -174,21 +129,17 @@ def _premises(model):
 
     A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
     """
-    groups, inputs = model.antecedent.groups, model.antecedent.term_inputs
+    inputs, rule_terms = model.antecedent.term_inputs, model.antecedent.rule_terms
     terms = [
         function_of(group.family, natural)
-        for group in groups
+        for group in model.antecedent.groups
         for natural in group.family.natural(group.theta).T
     ]
-    number = np.zeros_like(inputs)
-    for j in range(model.n_inputs):
-        own = np.flatnonzero(inputs == j)
-        number[own] = np.arange(own.size) + 1
-    rule_terms = model.antecedent.rule_terms
+    number = [np.count_nonzero(inputs[: t + 1] == j) for t, j in enumerate(inputs)]
     rules = np.zeros((model.n_rules, model.n_inputs), dtype=int)
-    which, place = np.nonzero(rule_terms >= 0)
-    term = rule_terms[which, place]
-    rules[which, inputs[term]] = number[term]
+    for r, place in np.argwhere(rule_terms >= 0):
+        term = rule_terms[r, place]
+        rules[r, inputs[term]] = number[term]
     names, always = list(model.term_names), ~rules.any(axis=1)
     if always.any():
         # Readers want every rule to have a condition: a term that is 1 on the whole Range.
@@ -226,12 +177,6 @@ def _variable(section, name, interval, names, functions):
     for k, (term, (function, parameters)) in enumerate(zip(names, functions, strict=True)):
         lines.append(f"MF{k + 1}='{term}':'{function}',{_numbers(parameters)}")
     return lines
-
-
-def _rules(rules, n_outputs):
-    for r, terms in enumerate(rules):
-        consequents = " ".join([str(r + 1)] * n_outputs)
-        yield f"{' '.join(map(str, terms))}, {consequents} (1) : 1"
 
 
 def _numbers(values):

@@ -1,12 +1,13 @@
-"""Pictures of a compensation, after scikit-learn's Displays: they store arrays and draw them."""
+"""Pictures of a compensation, after scikit-learn's Displays: they store tables and draw them."""
 
-from .allan import AllanDisplay
-from .coverage import CoverageDisplay
-from .error import ErrorDisplay
-from .groups import GroupResidualDisplay
-from .hysteresis import HysteresisDisplay
-from .scale_factor import ScaleFactorErrorDisplay
-from .surface import ResidualSurfaceDisplay
+from .errors import (
+    AllanDisplay,
+    ErrorDisplay,
+    GroupResidualDisplay,
+    HysteresisDisplay,
+    ScaleFactorErrorDisplay,
+)
+from .maps import CoverageDisplay, ResidualSurfaceDisplay
 
 __all__ = [
     "AllanDisplay",

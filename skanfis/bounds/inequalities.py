@@ -1,0 +1,224 @@
+"""Inequalities that outputs must keep, held at points: linear constraints on the consequents.
+
+Slopes are held as mean slopes over a small step, [y(x + d) - y(x)] / d, which a monotone output has
+of the right sign too: what is constrained is the prediction itself.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import TSKModel
+from ..policies import SILENT
+from .constraints import Constraints
+from .quadratic_program import InfeasibleError, nearest
+
+__all__ = ["HeldPoints", "Inequality", "Solved", "inequalities_of"]
+
+# The step of a slope, in standard deviations of the input.
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """An inequality on one output: on its slope by ``input``, or, where that is None, its value.
+
+    sign times it must be at least sign times ``limit``.
+    """
+
+    output: int
+    sign: float
+    input: int | None
+    limit: float
+    name: str
+
+
+def inequalities_of(constraints: Constraints, model: TSKModel):
+    """The inequalities among the constraints, output by output."""
+    found = []
+    for k, name in enumerate(model.output_names):
+        for j, sign in enumerate(constraints.signs[k]):
+            if sign and model.minimum[j] < model.maximum[j]:
+                what = f"monotonic_cst={sign} of {name!r} by {model.input_names[j]!r}"
+                found.append(Inequality(k, float(sign), j, 0.0, what))
+        for sign, limit in ((1.0, constraints.lower[k]), (-1.0, constraints.upper[k])):
+            if np.isfinite(limit):
+                found.append(Inequality(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Consequents that keep what is held, at some premises.
+
+    ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
+    how much of it each output pays. ``known`` has for every output what is met with equality:
+    points in the user's units, and those that a slope begins at, or None. ``active`` is how many
+    points of each inequality are met so.
+    """
+
+    local: np.ndarray
+    cost: float
+    paid: np.ndarray
+    known: tuple
+    active: np.ndarray
+
+
+class HeldPoints:
+    """Points at which inequalities are held, and the consequents that do so at any premises.
+
+    ``model`` is in the user's units: its range is where inequalities are held, its policy says what
+    it predicts at fixed points beyond. They are held by ``margin``, in standard deviations of the
+    target (and of the input).
+    """
+
+    def __init__(self, model: TSKModel, problem, constraints: Constraints, margin: float):
+        self.model, self.problem, self.constraints = model, problem, constraints
+        self._check_points()
+        self.inequalities, self.margin = inequalities_of(constraints, model), margin
+        # Of each, points in standardised inputs: where a slope ends, and where it begins.
+        nothing = np.empty((0, model.n_inputs))
+        self.after, self.before = ([nothing] * len(self.inequalities) for _ in range(2))
+
+    def _check_points(self):
+        """Raise ValueError where a value is asked for and nothing is predicted."""
+        model, points = self.model, self.constraints.points
+        beyond = points[~model.in_bounds(points)]
+        if len(beyond) and model.out_of_bounds in SILENT:
+            raise ValueError(
+                f"constraints has a FixedPoint at {beyond[0]}, where a model with "
+                f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
+                f"{model.describe_out_of_bounds(beyond)} Fix a point in the range, add a row of "
+                "data there, or use out_of_bounds='linear' or 'clip'."
+            )
+
+    @property
+    def n_rows(self):
+        """Number of points held."""
+        return sum(len(points) for points in self.after)
+
+    def standardised(self, X):
+        """Points in standardised inputs."""
+        inputs = self.problem.rows.inputs
+        return (X - inputs.offset) / inputs.scale
+
+    def steps(self, X, j):
+        """A small step along j at each point, to both sides of it: a slope may jump there.
+
+        The points before and after, in the range, and the step.
+        """
+        step = _STEP * self.model.spread[j]
+        low, high = self.model.minimum[j], self.model.maximum[j] - step
+        before = np.repeat(X, 2, axis=0)
+        before[1::2, j] -= step
+        before[:, j] = np.clip(before[:, j], low, high)
+        after = before.copy()
+        after[:, j] += step
+        return before, after, step
+
+    def hold(self, place, X):
+        """Hold an inequality at these points too."""
+        if not len(X):
+            return
+        j = self.inequalities[place].input
+        before, after = X[:0], X
+        if j is not None:
+            before, after, _ = self.steps(X, j)
+        self.after[place] = np.vstack([self.after[place], self.standardised(after)])
+        self.before[place] = np.vstack([self.before[place], self.standardised(before)])
+
+    def solve(self, evaluation, chosen=None) -> Solved:
+        """The nearest consequents; ``chosen`` inequalities alone, if given."""
+        columns, model = self._columns(evaluation.antecedent), self.model
+        normal, problem = evaluation.normal, self.problem
+        local, targets = normal.coefficients.copy(), problem.rows.targets
+        # By the policy where they lie beyond the range.
+        at_points = columns.with_out_of_bounds(model.out_of_bounds, model.max_extrapolation)
+        equal = self._in_local(at_points.predict(self.standardised(self.constraints.points)))
+        values = (self.constraints.values - targets.offset) / targets.scale
+        places = range(len(self.inequalities)) if chosen is None else chosen
+        known, active = [], np.zeros(len(self.inequalities), dtype=int)
+        for k in range(problem.n_outputs):
+            own = [p for p in places if self.inequalities[p].output == k]
+            rows, least = self._rows(columns, own)
+            try:
+                local[:, k], is_active = nearest(
+                    normal.factor, normal.coefficients[:, k], equal, values[:, k], rows, least
+                )
+            except InfeasibleError as failure:
+                failure.output = k
+                raise
+            known.append(self._known(own, is_active, active))
+        change = local - normal.coefficients
+        paid = 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
+        cost = evaluation.cost + float(paid.sum())
+        return Solved(local, cost, paid, tuple(known), active)
+
+    def _known(self, places, is_active, active):
+        """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
+        inputs, found, start = self.problem.rows.inputs, [], 0
+        model, points = self.model, self.constraints.points
+        if model.out_of_bounds == "linear":
+            # Beyond, a tangent is known, which is more than a value: it is not counted.
+            points = points[model.in_bounds(points)]
+        if len(points):
+            found.append((np.clip(points, model.minimum, model.maximum), None))
+        for p in places:
+            chosen = is_active[start : start + len(self.after[p])]
+            start, active[p] = start + chosen.size, chosen.sum()
+            if not chosen.any():
+                continue
+            after, before = inputs.offset + inputs.scale * self.after[p][chosen], None
+            if self.inequalities[p].input is not None:
+                before = inputs.offset + inputs.scale * self.before[p][chosen]
+            found.append((after, before))
+        return found
+
+    def _rows(self, columns, places):
+        """Local rows of the inequalities of one output, and what they must be at least."""
+        targets, n_columns = self.problem.rows.targets, self.problem.n_columns
+        rows, least = [np.empty((0, n_columns))], [np.empty(0)]
+        for p in places:
+            one = self.inequalities[p]
+            found, size, limit = columns.predict(self.after[p]), 1.0, 0.0
+            if one.input is None:
+                limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
+            else:
+                found = (found - columns.predict(self.before[p])) / _STEP
+                # Where no consequents have much of a slope, none is asked for.
+                size = np.minimum(np.abs(found).sum(axis=1), 1.0)
+            rows.append(self._in_local(one.sign * found))
+            least.append(np.full(len(found), one.sign * limit) + self.margin * size)
+        return np.vstack(rows), np.concatenate(least)
+
+    def _columns(self, antecedent):
+        """A model whose outputs are the columns of the design, in standardised inputs."""
+        problem = self.problem
+        n_rules, n_basis, n_inputs = antecedent.n_rules, problem.n_basis, self.model.n_inputs
+        unit = np.eye(problem.n_columns).reshape(n_rules, n_basis, -1)
+        coefficients = unit
+        if problem.order == 1:
+            coefficients = np.zeros((n_rules, 1 + n_inputs, problem.n_columns))
+            coefficients[:, 0] = unit[:, 0]
+            coefficients[:, 1 + problem.consequent_inputs] = unit[:, 1:]
+        low, high = problem.rows.inputs.box
+        return replace(
+            self.model,
+            antecedent=antecedent,
+            initial_antecedent=antecedent,
+            coefficients=coefficients,
+            reference=np.zeros(n_inputs),
+            spread=np.ones(n_inputs),
+            minimum=low,
+            maximum=high,
+            support=None,
+            out_of_bounds="clip",
+            output_names=tuple(map(str, range(problem.n_columns))),
+        )
+
+    def _in_local(self, rows):
+        """Rows (n, n_columns) by local coefficients from those by global ones."""
+        if not len(rows):
+            return rows
+        # In place, on a copy.
+        return self.problem.local.transform_rows(np.array(rows.T, order="C")).T

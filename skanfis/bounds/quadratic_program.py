@@ -1,0 +1,91 @@
+r"""The nearest consequents that keep linear constraints.
+
+With M = Phi' S Phi / W + P = L L' the matrix of the normal equations and u0 their solution, the
+cost at other consequents is
+
+    F(u) = F(u0) + 1/2 (u - u0)' M (u - u0) .
+
+Its minimum over E u = e, G u >= h is sought: in v = L' (u - u0), the point nearest to the origin.
+Equalities are eliminated by a QR factorisation of L^-1 E'; what is left, min |t|^2 over A t >= b,
+is least-distance programming, which is a non-negative least-squares problem (Lawson and Hanson
+1974, chapter 23): with lambda the minimiser of |[A'; b'] lambda - (0, 1)|,
+
+    t = A' lambda / (1 - b' lambda) ,
+
+and there is no such t where the minimum is zero.
+"""
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
+
+from ..consequent import NormalFactor
+
+__all__ = ["InfeasibleError", "nearest"]
+
+# A minimum below this is zero; rows are of length one.
+_ZERO = 1e-10
+# Equalities of which one follows from others.
+_DEPENDENT = 1e-10
+
+
+class InfeasibleError(Exception):
+    """No consequents keep the constraints; ``by_equalities``: not even the equalities alone."""
+
+    def __init__(self, by_equalities):
+        super().__init__()
+        self.by_equalities, self.output = by_equalities, 0
+
+
+def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
+    """The local coefficients nearest to ``start`` with E u = e and G u >= h.
+
+    ``factor`` is of M. Gives too which of G u >= h are met with equality, and hold the coefficients
+    back, a bool each.
+
+    Raises
+    ------
+    InfeasibleError
+        If there are none.
+    """
+    base, toward = np.empty((start.size, 0)), np.empty(0)
+    if equal.size:
+        base, toward = _particular(factor.half_solve(equal.T), equal_to - equal @ start)
+    half = factor.half_solve(at_least.T)
+    short = least - at_least @ start - half.T @ (base @ toward)
+    free = half - base @ (base.T @ half)
+    length = np.sqrt(np.sum(free**2, axis=0))
+    # What equalities decide, or nothing can change: met, or not to be met.
+    fixed = length <= _DEPENDENT * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
+    if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
+        raise InfeasibleError(False)
+    multipliers = np.zeros(least.size)
+    kept = ~fixed
+    if (short[kept] > 0.0).any():
+        found = _least_distance(free[:, kept] / length[kept], short[kept] / length[kept])
+        multipliers[kept] = found / length[kept]
+    step = base @ toward + free @ multipliers
+    return start + factor.back_solve(step), multipliers > 0.0
+
+
+def _particular(columns, right_side):
+    """Orthonormal columns that span the equalities, and the step along them that meets these."""
+    orthonormal, triangle = np.linalg.qr(columns)
+    sizes = np.abs(np.diagonal(triangle))
+    dependent = sizes <= _DEPENDENT * sizes.max(initial=0.0)
+    if dependent.any() or columns.shape[1] > columns.shape[0]:
+        raise InfeasibleError(True)
+    return orthonormal, solve_triangular(triangle, right_side, trans="T")
+
+
+def _least_distance(columns, short):
+    """Multipliers of the shortest t with columns' t >= short."""
+    scale = short.max()
+    rows = np.vstack([columns, short / scale])
+    target = np.zeros(rows.shape[0])
+    target[-1] = 1.0
+    multipliers, distance = nnls(rows, target, maxiter=30 * max(rows.shape))
+    rest = 1.0 - (short / scale) @ multipliers
+    if distance <= _ZERO or rest <= _ZERO**2:
+        raise InfeasibleError(False)
+    return scale * multipliers / rest

@@ -1,0 +1,241 @@
+"""The functions of a .c file, as templates.
+
+The words before a "|" say when a line is there: see ``Source.facts`` in ``_source``.
+"""
+
+__all__ = [
+    "ADD_CHANGE",
+    "ADD_RULE",
+    "ADD_SUPPORT",
+    "FINITE_INPUT",
+    "FUNCTIONS",
+    "PREDICT",
+    "rejection",
+]
+
+_REJECT_UNTOUCHED = """
+/* No outputs: y stays as it is. */
+#define $NAME_REJECT(y, status) ((status) | $NAME_NO_OUTPUT)
+"""
+_REJECT_NAN = """
+/* No outputs: y becomes NaN where there is such a thing, else it stays as it is. */
+static int $name_reject($real *y, int status)
+{
+#ifdef NAN
+    int o;
+    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+        y[o] = ($real)NAN;
+    }
+#else
+    (void)y;
+#endif
+    return status | $NAME_NO_OUTPUT;
+}
+#define $NAME_REJECT(y, status) $name_reject(y, status)
+"""
+# The head of a loop over the inputs.
+FINITE_INPUT = """
+    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+        /* Not (a and b): NaN fails every comparison. */
+        if (!(x[i] >= -$MAX && x[i] <= $MAX)) {
+            return $NAME_REJECT(y, $NAME_NOT_FINITE);
+        }
+"""
+
+# Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
+# left of it would have no digits; so the strongest term's is subtracted first.
+FUNCTIONS = """
+shares        |/* Turns n logarithms into shares that add up to one. */
+shares        |static void $name_normalise($real *l, $int n)
+shares        |{
+shares        |    $int i;
+shares        |    $real top = l[0], sum = 0.0R;
+shares        |    for (i = 1; i < n; ++i) {
+shares        |        if (l[i] > top) {
+shares        |            top = l[i];
+shares        |        }
+shares        |    }
+shares        |    for (i = 0; i < n; ++i) {
+shares        |        l[i] = $EXP(l[i] - top);
+shares        |        sum += l[i];
+shares        |    }
+shares        |    sum = 1.0R / sum;
+shares        |    for (i = 0; i < n; ++i) {
+shares        |        l[i] *= sum;
+shares        |    }
+shares        |}
+shares        |
+linear shares |/* Subtracts from n derivatives their mean by the n shares. */
+linear shares |static void $name_centre($real *s, const $real *share, $int n)
+linear shares |{
+linear shares |    $int i, top = 0;
+linear shares |    $real most, mean = 0.0R;
+linear shares |    for (i = 1; i < n; ++i) {
+linear shares |        if (share[i] > share[top]) {
+linear shares |            top = i;
+linear shares |        }
+linear shares |    }
+linear shares |    most = s[top];
+linear shares |    for (i = 0; i < n; ++i) {
+linear shares |        s[i] -= most;
+linear shares |        mean += share[i] * s[i];
+linear shares |    }
+linear shares |    for (i = 0; i < n; ++i) {
+linear shares |        s[i] -= mean;
+linear shares |    }
+linear shares |}
+linear shares |
+covers        |/* Of a rule in coverage: its share, falling with the distance from its data. */
+covers        |static $real $name_near(const $real *z, const $real *p)
+covers        |{
+covers        |    const $real *centre = p + 2, *factor = p + 2 + $NAME_N_INPUTS;
+covers        |    $real square = 0.0R, beyond;
+covers        |    int i, k;
+covers        |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+covers        |        $real t = 0.0R;
+covers        |        for (k = 0; k <= i; ++k) {
+covers        |            t += *factor++ * (z[k] - centre[k]);
+covers        |        }
+covers        |        square += t * t;
+covers        |    }
+covers        |    if (square <= p[1] * p[1]) {
+covers        |        return p[0];
+covers        |    }
+covers        |    beyond = $SQRT(square) - p[1];
+covers        |    return p[0] * $EXP(-0.5R * beyond * beyond);
+covers        |}
+covers        |
+covers        |/* The coverage in the box, or a part of it that is enough. */
+covers        |static $real $name_coverage($given, $real enough)
+covers        |{
+covers        |    $real covered = 0.0R;
+covers        |    $int $coverage_indices;
+covers        |
+covers        |$add_support
+covers        |    return covered;
+covers        |}
+covers        |
+linear        |/* The derivative of every sum along e. */
+linear        |static void $name_tangent($given, const $real *e, $real *change)
+linear        |{
+linear shares |    $real $tangent_arrays;
+linear        |    $int $tangent_indices;
+linear        |
+linear shares |$strengths_slope
+linear        |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+linear        |        change[o] = 0.0R;
+linear        |    }
+linear        |$add_changes
+linear        |}
+linear        |
+"""
+ADD_SUPPORT = """
+ |if (covered < enough && $name_support[r][0] > 0.0R) {
+ |    covered += $w * $name_near(z, $name_support[r]);
+ |}
+"""
+ADD_RULE = """
+covers |if ($w > top) {
+covers |    top = $w;
+covers |    best = r;
+covers |}
+       |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+       |    $real f = $name_consequents[r][o][0];
+slopes |    for (j = 0; j < $n_slopes; ++j) {
+slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
+slopes |    }
+       |    sum[o] += $w * f;
+       |}
+"""
+ADD_CHANGE = """
+       |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+       |    $real f = $name_consequents[r][o][0], ahead = 0.0R;
+slopes |    for (j = 0; j < $n_slopes; ++j) {
+slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
+slopes |        ahead += $name_consequents[r][o][1 + j] * e[$input];
+slopes |    }
+       |    change[o] += $w * ($s * f + ahead);
+       |}
+"""
+PREDICT = """
+             |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+             |{
+             |    /* z: the input, held in the box, about the reference. */
+             |    $real $arrays;
+covers       |    $real top = 0.0R, enough = $limit;
+covers       |    $int best = 0;
+             |    int status = $NAME_IN_RANGE;
+             |    $int $indices;
+             |
+             |$finite_input
+             |        z[i] = x[i];
+             |        if (z[i] < $name_low[i]) {
+             |            z[i] = $name_low[i];
+             |            status = $NAME_OUT_OF_RANGE;
+             |        } else if (z[i] > $name_high[i]) {
+             |            z[i] = $name_high[i];
+             |            status = $NAME_OUT_OF_RANGE;
+             |        }
+beyond       |        e[i] = x[i] - z[i];
+             |        z[i] -= $name_reference[i];
+             |    }
+silent       |    if (status != $NAME_IN_RANGE) {
+silent       |        return $NAME_REJECT(y, status);
+silent       |    }
+shares       |$strengths_inside
+             |
+             |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+             |        sum[o] = 0.0R;
+             |    }
+             |$add_rules
+beyond       |    if (status != $NAME_IN_RANGE) {
+fades        |        $real distance = 0.0R;
+linear       |        $real scale = 1.0R;
+beyond       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+fades        |            const $real d = e[i] * $name_inverse_spread[i];
+fades        |            distance += d * d;
+linear       |            if (e[i] > $name_reach[i]) {
+linear       |                e[i] = $name_reach[i];
+linear       |            } else if (e[i] < -$name_reach[i]) {
+linear       |                e[i] = -$name_reach[i];
+linear       |            }
+linear       |            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
+beyond       |        }
+fades        |        /* The coverage falls with the distance: more of it is asked for. */
+fades        |        enough = $limit * $EXP(0.5R * distance);
+linear       |        /* First along a part of the way, since products could overflow. */
+linear       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+linear       |            e[i] /= scale;
+linear       |        }
+linear       |        $name_tangent($taken, e, change);
+linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+linear       |            sum[o] += scale * change[o];
+linear       |        }
+beyond       |    }
+covers       |    if (top * $name_near(z, $name_support[best]) < enough
+covers       |        && $name_coverage($taken, enough) < enough) {
+covers       |        status |= $NAME_UNCOVERED;
+covers       |    }
+             |    /* Last, so that y may be x. */
+             |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+             |        y[o] = $name_offset[o] + sum[o];
+held         |        if (y[o] < $name_output_low[o]) {
+held         |            y[o] = $name_output_low[o];
+held         |        } else if (y[o] > $name_output_high[o]) {
+held         |            y[o] = $name_output_high[o];
+held         |        }
+saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+saturates    |        if (!(y[o] >= $name_limits[o][0])) {
+saturates    |            y[o] = $name_limits[o][0];
+saturates    |        } else if (y[o] > $name_limits[o][1]) {
+saturates    |            y[o] = $name_limits[o][1];
+saturates    |        }
+             |    }
+             |    return status;
+             |}
+"""
+
+
+def rejection(policy, std):
+    """Template of the macro REJECT."""
+    return _REJECT_NAN if policy == "nan" and std == "c99" else _REJECT_UNTOUCHED

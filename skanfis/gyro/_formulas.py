@@ -1,0 +1,90 @@
+"""Rules, laws and polynomials as text: what to compute, to the last digit that counts."""
+
+from ..export import fold
+from ..inspection import export_text
+from ._headline import readability_of
+from ._law_text import law_text
+from ._simpler import LAW_AND_LINE
+
+__all__ = ["formula_of", "law_table", "on_board", "rules_text"]
+
+
+def formula_of(calibration, name):
+    """The formula of a simpler compensation, as lines of text."""
+    simple = next(each for each in calibration.simpler if each.name == name)
+    recipe = calibration.recipe
+    if name == LAW_AND_LINE:
+        line = _polynomial("line", simple.model.residual_, recipe.inputs)
+        return f"{law_table(simple.model.base_, recipe)}\n\nTo this rate is added the line:\n{line}"
+    if simple.predicts == "rate":
+        return law_table(simple.model, recipe)
+    rate = f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n"
+    if name == "constant":
+        return f"{rate}error = {float(simple.model.constant_.item()):.9g}"
+    return rate + _polynomial("error", simple.model, recipe.inputs)
+
+
+def rules_text(calibration, found=None):
+    """The rules as sentences, behind what speaks against reading them and the law's formula."""
+    found = readability_of(calibration) if found is None else found
+    caution = ""
+    if found.findings:
+        head = "The rules are not fit to be read one by one:"
+        caution = "\n".join([head, *found.findings, "", ""])
+    estimator = calibration.compensator.estimator
+    # Folded, a model knows of no readability in training, and the text has the caution once.
+    if calibration.recipe.physics:
+        rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
+        law = law_text(estimator.base_, calibration.recipe.inputs, calibration.recipe.output_unit)
+        return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
+    return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
+
+
+def law_table(law, recipe):
+    """The arcsine law as a formula and by its coefficients."""
+    lines = [
+        law_text(law, recipe.inputs, recipe.output_unit),
+        f"at {law.reference_temperature_:.6g} °C; powers of the difference, lowest first",
+    ]
+    for name in ("amplitude_", "sagnac_factor_", "bias_"):
+        values = ", ".join(f"{value:.8g}" for value in getattr(law, name))
+        lines.append(f"{name.rstrip('_').replace('_', ' ')}: {values}")
+    if law.temperature_rate is not None:
+        lines.append(f"lag of the thermometer: {law.thermometer_lag_:.6g} s")
+    return "\n".join(lines)
+
+
+def on_board(compensator):
+    """The steps around the model, as they run on the gyro's processor."""
+    arguments, lines = ", ".join(compensator.inputs), []
+    if "temperature_rate" in compensator.inputs:
+        lines += [
+            "/* at power-on temperature_rate = 0, previous = temperature; then every h seconds */",
+            f"temperature_rate += (1 - exp(-h / {compensator.time_constant:g}))",
+            "    * ((temperature - previous) / h - temperature_rate);",
+            "previous = temperature;",
+        ]
+    if compensator.predicts == "error":
+        lines.append(f"rate = output / {compensator.scale_factor:.9g} - error({arguments});")
+    else:
+        lines.append(f"rate = law({arguments}) + rules({arguments});")
+    return "\n".join(lines)
+
+
+def _polynomial(what, pipeline, inputs):
+    """In standardised inputs, which keep the digits that count in a cubic."""
+    scaler, powers, line = (step for _, step in pipeline.steps)
+    names = [f"z{j + 1}" for j in range(len(inputs))]
+    lines = [
+        f"{name} = ({column} - {mean:.9g}) / {scale:.9g}"
+        for name, column, mean, scale in zip(
+            names, inputs, scaler.mean_, scaler.scale_, strict=True
+        )
+    ]
+    lines.append(f"{what} = {float(line.intercept_):.9g}")
+    for value, row in zip(line.coef_, powers.powers_, strict=True):
+        factors = [
+            f"{name}^{k}" if k > 1 else name for name, k in zip(names, row, strict=True) if k
+        ]
+        lines.append(f"    {value:+.9g} * {' * '.join(factors)}")
+    return "\n".join(lines)

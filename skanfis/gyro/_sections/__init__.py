@@ -1,1 +1,0 @@
-"""The sections of a calibration's report, each a function of the page and the results."""

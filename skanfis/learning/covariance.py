@@ -1,0 +1,127 @@
+r"""The posterior where a fit has ended, by Laplace's method.
+
+The cost of ``objective`` is, in units of sigma^2 / n, minus the logarithm of a posterior (see
+``evidence``). Laplace's method takes it for Gaussian where the fit ends, with the Gauss-Newton
+matrix of consequents beta and displacements x of the premises for its precision,
+
+    n / sigma^2  [ M   C' ]        M = Phi' S Phi / W + P ,
+                 [ C   J  ] ,      J = (D' S D + lambda K) / W + kappa I .
+
+M is factored first, as in the fit; what is left of J is H + kappa I, H the reduced Gauss-Newton
+matrix. sigma^2 is what the residual leaves after the effective number of parameters k, as in
+restricted maximum likelihood and in MacKay (1992), n MSE / (n - k),
+k = tr M^-1 G + tr H (H + kappa)^-1. Every output has a sigma of its own for its noise and its
+consequents; the premises, which all outputs share, have the mean of them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import ndtr
+
+from ..consequent import NormalFactor
+from ..posterior import MOST_PARAMETERS, Posterior, parameter_units
+from .objective import Evaluation, SeparableProblem
+from .premise import Premise
+
+__all__ = ["posterior_of"]
+
+# Where rows leave no freedom, the noise is that of so many.
+_LEAST_FREEDOM = 1.0
+
+
+def posterior_of(
+    problem: SeparableProblem, premise: Premise | None, evaluation: Evaluation, n_rows, robust=None
+) -> Posterior | None:
+    """The posterior in the user's units; None of a model of more than ``MOST_PARAMETERS``.
+
+    ``premise`` is None where the premises were not learnt; ``n_rows`` are rows by weight;
+    ``robust`` are the weights that Huber's loss has left the rows, and its epsilon.
+    """
+    antecedent, rows = evaluation.antecedent, problem.rows
+    n_columns, n_parameters = problem.n_columns, antecedent.parameters.size
+    if n_columns + n_parameters > MOST_PARAMETERS:
+        return None
+    if evaluation.normal is None:
+        # Consequents that were stepped to and not solved for: their own, with that curvature.
+        solved = problem.evaluate(antecedent.parameters, evaluation.coefficients)
+        evaluation = replace(evaluation, normal=solved.normal)
+    normal = evaluation.normal
+    assert normal is not None
+    half = np.ascontiguousarray(normal.factor.half_solve(np.eye(n_columns)))
+    n_effective = n_columns - float(np.sum(half * (half @ normal.penalty)))
+    noise = np.sqrt(_mean_squares(problem, evaluation, robust))
+    premises = np.zeros((0, n_parameters))
+    cross = np.zeros((problem.n_outputs, 0, n_columns))
+    n_varying = max(int(np.count_nonzero(~rows.targets.is_constant)), 1)
+    n_determined = 0.0
+    if premise is not None and premise.size:
+        premises, cross, n_determined = _premises(problem, premise, evaluation)
+    freedom = n_rows - n_effective - n_determined / n_varying
+    noise *= np.sqrt(n_rows / max(freedom, _LEAST_FREEDOM))
+    shared = np.sqrt(np.sum(noise**2) / n_varying)
+    # L^-1 T' is the factor of consequents on [1, z], T the local basis.
+    local = problem.local
+    blocks = half.reshape(n_columns, -1, problem.n_basis)
+    blocks[:, :, 1:] /= local.spread
+    blocks[:, :, 0] -= np.einsum("crj,rj->cr", blocks[:, :, 1:], local.center)
+    blocks[:, :, 1:] /= rows.inputs.scale[problem.consequent_inputs]
+    half /= np.sqrt(n_rows)
+    premises = (
+        premises * (shared / np.sqrt(n_rows)) * parameter_units(antecedent, rows.inputs.scale)
+    )
+    scale = rows.targets.scale
+    cross = cross * (shared * scale)[:, None, None]
+    return Posterior(noise * scale, problem.consequent_inputs, half, premises, cross)
+
+
+def _mean_squares(problem, evaluation, robust):
+    """Weighted mean square of the residual of every standardised output, or what outliers leave.
+
+    By Huber's second proposal (1964): the mean of psi(r)^2, psi = w r, over what it is of a
+    standard normal r.
+    """
+    if robust is None:
+        return problem.mean_squares(evaluation)
+    weights, c = robust
+    total, total_weight = np.zeros(problem.n_outputs), 0.0
+    for part, residual, weight in problem.residuals(evaluation):
+        left = weights[part]
+        weight = np.ones(residual.shape[1]) if weight is None else weight
+        # The rows' weights have Huber's in them already.
+        total += residual**2 @ (weight * left)
+        total_weight += np.sum(weight / left)
+    beyond = 2.0 * ndtr(-c)
+    density = np.exp(-0.5 * c**2) / np.sqrt(2.0 * np.pi)
+    return total / total_weight / (1.0 - beyond - 2.0 * c * density + c**2 * beyond)
+
+
+def _premises(problem, premise, evaluation):
+    """R^-1 by the standardised parameters, R^-1 C L'^-1, and how many data determine.
+
+    All with sigma^2 / n equal to one.
+    """
+    x = premise.displacement(evaluation.antecedent.parameters)
+    raw = problem.curvature(evaluation)
+    identity = np.eye(premise.size)
+    transposed, hessian = premise.pull_back(x, identity, raw.gauss_newton)
+    stiffness = problem.penalty.stiffness
+    try:
+        inverse = NormalFactor(hessian + stiffness * identity).half_solve(identity)
+    except FloatingPointError:
+        inverse = _of_what_is_told(hessian, stiffness)
+    n_determined = len(inverse) - stiffness * float(np.sum(inverse**2))
+    premises = inverse @ transposed
+    cross = np.stack([premises @ half.T for half in raw.cross])
+    return premises, cross, n_determined
+
+
+def _of_what_is_told(hessian, stiffness):
+    """R^-1 of the directions in which a Gauss-Newton matrix is more than rounding.
+
+    It has no negative eigenvalue but for what rounding leaves of large numbers, as beside a row so
+    far off that a rule is its own. Directions of no more than the most negative one are held.
+    """
+    values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
+    told = values > -values[0]
+    return vectors[:, told].T / np.sqrt(values[told] + stiffness)[:, None]

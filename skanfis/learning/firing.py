@@ -1,0 +1,144 @@
+"""Where every rule fires on the rows: sums that coverage, pruning and reports read."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ..antecedent import Antecedent
+from ..blocks import fitting_rows, row_blocks
+from ..consequent import basis
+from ..support import RuleSupport
+from .data import StandardisedData, fingerprint
+from .gram import pair_index, pairs
+
+__all__ = ["FIRES", "RuleFiring", "inverse_factor", "rule_support"]
+
+# Standard deviation added to every standardised input: rows on a line or a surface (two
+# thermometers on one gyro) keep some thickness, and the distance stays finite off it.
+_THICKNESS = 0.1
+# A rule fires on the rows on which it has at least this part of the strongest rule's strength.
+FIRES = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class RuleFiring:
+    """How rules fire on a set of rows, in one pass over them.
+
+    Attributes
+    ----------
+    overlap : ndarray of shape (n_rules, n_rules)
+        Sums of s w_r w_q, s the rows' weights.
+    second : ndarray of shape (n_rules, 1 + n_inputs, 1 + n_inputs)
+        Sums of s w_r [1, z] [1, z]'.
+    strongest : ndarray of shape (n_rules,)
+        Weight of the rows on which each rule is the strongest.
+    peak : ndarray of shape (n_rules,)
+        Largest strength on any row.
+    n_distinct : ndarray of int of shape (n_rules,)
+        Distinct inputs on which each rule is the strongest, up to a limit.
+    """
+
+    overlap: np.ndarray
+    second: np.ndarray
+    strongest: np.ndarray
+    peak: np.ndarray
+    n_distinct: np.ndarray
+
+    @classmethod
+    def of(cls, rows: StandardisedData, antecedent: Antecedent, enough: int):
+        """Of rows; distinct inputs are counted up to ``enough`` of each rule."""
+        (overlap, products, strongest), peak, distinct = rows.reduce(
+            partial(_sums, antecedent=antecedent, enough=enough), partial(_added, enough=enough)
+        )
+        second = products[:, pair_index(int(np.sqrt(2 * products.shape[1])))]
+        return cls(overlap, second, strongest, peak, np.array([len(own) for own in distinct]))
+
+
+def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients: int, firing=None):
+    """The :class:`RuleSupport` of every rule, in the rows' standardised units.
+
+    ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
+    ``n_coefficients``; where it is not given, it takes a pass of its own.
+    """
+    firing = RuleFiring.of(rows, antecedent, n_coefficients) if firing is None else firing
+    n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
+    known = np.flatnonzero(firing.n_distinct)
+    center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))
+    mass = firing.second[known, 0, 0]
+    center[known] = firing.second[known, 0, 1:] / mass[:, None]
+    squares = firing.second[known, 1:, 1:] / mass[:, None, None]
+    factor[known] = inverse_factor(squares, center[known])
+    radius = rows.reduce(
+        partial(_radii, antecedent=antecedent, center=center, factor=factor), np.maximum
+    )
+    return RuleSupport(firing.n_distinct / n_coefficients, center, factor, radius)
+
+
+def inverse_factor(second, center):
+    """Lower triangular W with W' W the inverse of the thickened covariances."""
+    covariance = second - center[:, :, None] * center[:, None, :]
+    covariance += _THICKNESS**2 * np.eye(center.shape[1])
+    return np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def _sums(rows, antecedent, enough):
+    """Sums over rows, largest strengths, and for every rule so many distinct inputs."""
+    n_rules, n_basis = antecedent.n_rules, 1 + rows.X.shape[1]
+    overlap, strongest, peak = np.zeros((n_rules, n_rules)), np.zeros(n_rules), np.zeros(n_rules)
+    products = np.zeros((n_rules, n_basis * (n_basis + 1) // 2))
+    distinct = [np.empty(0)] * n_rules
+    for part in _blocks(rows, antecedent):
+        Z, _, weight = rows.read(part)
+        strengths = antecedent.strengths(Z)
+        best, numbers = strengths.argmax(axis=0), fingerprint(Z)
+        for r in np.unique(best):
+            if len(distinct[r]) < enough:
+                distinct[r] = np.union1d(distinct[r], numbers[best == r])[:enough]
+        strongest += np.bincount(best, weights=weight, minlength=n_rules)
+        np.maximum(peak, strengths.max(axis=1), out=peak)
+        weighted = strengths if weight is None else strengths * weight
+        overlap += weighted @ strengths.T
+        basis_rows = basis(Z)
+        products += weighted @ pairs(basis_rows, basis_rows).T
+    return [overlap, products, strongest], peak, distinct
+
+
+def _added(one, other, enough):
+    """Both together, each distinct input once."""
+    sums = [a + b for a, b in zip(one[0], other[0], strict=True)]
+    distinct = [np.union1d(a, b)[:enough] for a, b in zip(one[2], other[2], strict=True)]
+    return sums, np.maximum(one[1], other[1]), distinct
+
+
+def _radii(rows, antecedent, center, factor):
+    """The largest distance at which each rule fires.
+
+    The farthest row of a block is found by quadratic forms in [1, z], one product for all rules,
+    and measured by the factor itself: what the product rounds away is not lost.
+    """
+    n_rules, n_inputs = center.shape
+    affine = np.concatenate([-factor @ center[:, :, None], factor], axis=2)
+    upper = np.triu_indices(1 + n_inputs)
+    forms = (affine.transpose(0, 2, 1) @ affine)[:, *upper]
+    forms[:, upper[0] != upper[1]] *= 2.0
+    radius, every = np.zeros(n_rules), np.arange(n_rules)
+    for part in _blocks(rows, antecedent):
+        Z, _, _ = rows.read(part)
+        strengths = antecedent.strengths(Z)
+        fires = strengths >= FIRES * strengths.max(axis=0)
+        basis_rows = basis(Z)
+        squares = forms @ pairs(basis_rows, basis_rows)
+        squares *= fires
+        farthest = squares.argmax(axis=1)
+        away = np.einsum("rij,jr->ri", factor, Z[:, farthest] - center.T)
+        distance = np.linalg.norm(away, axis=1)
+        np.maximum(radius, distance, out=radius, where=fires[every, farthest])
+    return radius
+
+
+def _blocks(rows, antecedent):
+    """Slices of rows whose memberships and strengths take a bounded number of bytes."""
+    n_basis = 1 + rows.X.shape[1]
+    n_values = 3 * (antecedent.n_rules + antecedent.n_terms) + n_basis * (n_basis + 9) // 2
+    return row_blocks(rows.n_rows, fitting_rows(n_values))

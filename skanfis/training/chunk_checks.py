@@ -1,0 +1,209 @@
+"""What ``partial_fit`` and ``merge`` refuse, and why: rows are seen but once."""
+
+from dataclasses import replace
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from ..model import TSKModel
+
+__all__ = [
+    "can_learn_from_chunks",
+    "check_begin",
+    "check_distance",
+    "check_forgetting",
+    "check_outputs",
+    "check_same_premises",
+    "check_settings",
+    "faded_weights",
+    "named_premises",
+    "structure_settings",
+]
+
+# What the premises and the columns of the design depend on.
+_STRUCTURE = ("n_mfs", "mf", "order", "premise_features", "consequent_features")
+# Sums of squares of weights, and of standardised rows, stay finite within these.
+_SMALLEST_WEIGHT, _LARGEST = 1e-100, 1e100
+# Parameters that a file has carried agree to their last digits.
+_ROUNDING = 1e-12
+
+
+def check_forgetting(forgetting, window):
+    """Raise ValueError where a forgetting factor or a window is out of range, or both are given."""
+    is_number = isinstance(forgetting, Real) and not isinstance(forgetting, bool)
+    if not is_number or not 0.0 < float(forgetting) <= 1.0:
+        raise ValueError(
+            f"forgetting={forgetting!r} must be a number above 0 and at most 1: the weights of all "
+            "rows before are multiplied by it with every row; 1 forgets nothing."
+        )
+    if window is None:
+        return
+    if isinstance(window, bool) or not isinstance(window, Integral) or window < 1:
+        raise ValueError(
+            f"window={window!r} must be a whole number of 1 or more, the number of calls that "
+            "count, or None for all."
+        )
+    if forgetting != 1.0:
+        raise ValueError(
+            f"window={window} and forgetting={forgetting:g} are two ways to let old rows go: give "
+            "one of them."
+        )
+
+
+def can_learn_from_chunks(estimator: Any) -> bool:
+    """True; AttributeError where a parameter needs all rows again."""
+    wrong = [
+        ("loss", estimator.loss != "squared_error", "weighs rows anew that are no longer there"),
+        ("early_stopping", estimator.early_stopping, "holds out rows for a training that iterates"),
+        ("monotonic_cst", estimator.monotonic_cst is not None, "is proven of the rows of one fit"),
+        ("constraints", estimator.constraints is not None, "are proven of the rows of one fit"),
+    ]
+    for name, is_wrong, why in wrong:
+        if is_wrong:
+            raise AttributeError(
+                f"{name}={getattr(estimator, name)!r} {why}, and partial_fit sees rows but once: "
+                "leave it at its default, or use fit."
+            )
+    return True
+
+
+def structure_settings(estimator):
+    """What must stay as it was at the first call, in a form that can be compared and kept."""
+    return {name: repr(getattr(estimator, name)) for name in _STRUCTURE}
+
+
+def check_settings(estimator, before):
+    """Raise ValueError where what the premises depend on has changed since the first call."""
+    for name, value in structure_settings(estimator).items():
+        if value != before[name]:
+            raise ValueError(
+                f"{name} was {before[name]} at the first partial_fit, which fixed the premises, "
+                f"and is {value} now: set it back, or start anew with fit or a clone."
+            )
+
+
+def check_begin(estimator, n_rows, finds_structure):
+    """Raise ValueError where a first chunk is nothing to begin with."""
+    if n_rows == 0:
+        raise ValueError(
+            "The first chunk has no row with a positive weight: there is nothing to begin with."
+        )
+    imported = getattr(estimator.partition, "model_", estimator.partition)
+    if estimator.max_iter == 0 and isinstance(imported, TSKModel):
+        raise ValueError(
+            "max_iter=0 takes the imported model as it is, and partial_fit learns its "
+            "consequents: use solver='lse'."
+        )
+    if finds_structure and n_rows < 2:
+        raise ValueError(
+            f"The first chunk has {n_rows} row; structure and premises are found on it, which "
+            "takes 2 rows at least and a few hundred to be of use. Gather more, or give a trained "
+            "model as partition with solver='lse'."
+        )
+
+
+def check_outputs(base: TSKModel, n_outputs, names):
+    """Raise ValueError where a chunk has other targets than those before."""
+    if n_outputs != base.n_outputs:
+        raise ValueError(
+            f"y has {n_outputs} outputs, but the chunks before had {base.n_outputs} "
+            f"({', '.join(base.output_names)})."
+        )
+    before = list(base.output_names)
+    if list(names) != before and sorted(names) == sorted(before):
+        raise ValueError(
+            f"The columns of y are {', '.join(names)}, but those of the chunks before were "
+            f"{', '.join(before)}: give them in this order."
+        )
+
+
+def check_distance(base: TSKModel, scale):
+    """Raise ValueError where rows are so far from the premises that their squares overflow."""
+    for j, name in enumerate(base.input_names):
+        for end in (scale.minimum[j], scale.maximum[j]):
+            # Both are divided before: their difference might overflow.
+            away = abs(end / base.spread[j] - base.reference[j] / base.spread[j])
+            if not away <= _LARGEST:
+                raise ValueError(
+                    f"Column {name!r} of X holds {end:.3g}, more than {_LARGEST:.0e} standard "
+                    f"deviations from the rows of the premises (mean {base.reference[j]:.6g}, "
+                    f"deviation {base.spread[j]:.3g}): drop such rows."
+                )
+
+
+def faded_weights(sample_weight, n_rows, forgetting):
+    """Weights of a chunk's rows, the last of which is the newest; None where all are one.
+
+    ValueError where a weight is beyond what sums of squares hold.
+    """
+    if sample_weight is not None and n_rows:
+        outside = (sample_weight < _SMALLEST_WEIGHT) | (sample_weight > _LARGEST)
+        if outside.any():
+            raise ValueError(
+                f"sample_weight holds {sample_weight[np.argmax(outside)]:.3g}; weights that count "
+                f"against those of other chunks must be zero, or lie from {_SMALLEST_WEIGHT:.0e} "
+                f"to {_LARGEST:.0e}."
+            )
+    if forgetting == 1.0:
+        return sample_weight
+    # What is next to nothing stays above it: a row has weight or has not.
+    fading = np.maximum(forgetting ** np.arange(n_rows - 1, -1, -1.0), _SMALLEST_WEIGHT)
+    return fading if sample_weight is None else sample_weight * fading
+
+
+def named_premises(model: TSKModel, data):
+    """An imported model as the base of chunks: its premises, by the names of the data."""
+    n_outputs = data.y.shape[1]
+    return replace(
+        model,
+        initial_antecedent=model.antecedent,
+        coefficients=np.zeros((model.n_rules, model.coefficients.shape[1], n_outputs)),
+        input_names=data.input_names,
+        output_names=data.output_names,
+        posterior=None,
+    )
+
+
+def check_same_premises(one, other, place):
+    """Raise ValueError that says in what the sums of two models differ; ``place`` is the second."""
+    difference = _difference(one, other)
+    if difference:
+        raise ValueError(
+            f"Models 0 and {place} of merge cannot be added: {difference}. Sums over rows add at "
+            "the same premises alone: train each with solver='lse' and the same model as partition."
+        )
+
+
+def _difference(one, other):
+    mine, theirs = one.base, other.base
+    for what in ("inputs", "outputs"):
+        names = [", ".join(getattr(base, f"{what[:-1]}_names")) for base in (mine, theirs)]
+        if names[0] != names[1]:
+            return f"their {what} are {names[0]} and {names[1]}"
+    if mine.n_rules != theirs.n_rules:
+        return f"they have {mine.n_rules} and {theirs.n_rules} rules"
+    inputs = [sums.consequent_inputs for sums in (one, other)]
+    if not np.array_equal(*inputs):
+        names = [", ".join(mine.input_names[j] for j in own) or "none" for own in inputs]
+        return f"their consequents are linear in {names[0]} and in {names[1]}"
+    return _difference_of_terms(mine.memberships(), theirs.memberships()) or (
+        ""
+        if np.array_equal(mine.antecedent.rule_terms, theirs.antecedent.rule_terms)
+        else "their rules combine the terms otherwise"
+    )
+
+
+def _difference_of_terms(mine, theirs):
+    if len(mine) != len(theirs):
+        return f"they have {len(mine)} and {len(theirs)} terms"
+    for place, (a, b) in enumerate(zip(mine, theirs, strict=True)):
+        what = f"term {place}, {a['name']!r} of {a['input']!r},"
+        for key in ("input", "function"):
+            if a[key] != b[key]:
+                return f"{what} has {key} {a[key]!r} in one and {b[key]!r} in the other"
+        for key in (key for key in a if key not in ("input", "name", "function")):
+            size = max(abs(a[key]), abs(b[key]))
+            if abs(a[key] - b[key]) > _ROUNDING * size:
+                return f"{what} has {key} {a[key]:.10g} in one and {b[key]:.10g} in the other"
+    return ""

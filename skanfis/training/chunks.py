@@ -1,0 +1,433 @@
+r"""Sums over rows that come in chunks, at premises that stay, and the model that they make.
+
+    G = sum s phi phi' ,    c = sum s phi y ,    q = sum s y^2 ,    W = sum s ,
+
+with phi = w(x) (x) [1, z], inputs and targets standardised by all rows in the sums. Sums of two
+sets of rows are carried over to the scales of both, exactly since z' = t + g z, and added: the
+order and the size of chunks make no difference, and no digits are lost as a sensor drifts.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..blocks import fitting_rows, row_blocks
+from ..consequent import LocalBasis, basis
+from ..learning.covariance import posterior_of
+from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
+from ..learning.firing import FIRES, inverse_factor
+from ..learning.gram import DesignMoments
+from ..learning.objective import SeparableProblem
+from ..learning.penalty import CommonLine, Penalty
+from ..learning.premise import Premise
+from ..model import TSKModel
+from ..policies import TargetRange
+from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
+from ..support import RuleSupport
+from .chunk_checks import check_distance
+from .pruning import RuleStatistics, redundant_rules
+
+__all__ = ["RowSums", "Solved", "fitted_weights", "joined_scales", "solve"]
+
+# The weights of the penalty that are found where premises stay.
+_FREE = ("agreement", "alpha", "slope")
+# Distinct rows per consequent that are counted: beyond, nothing asks for their number.
+_ROWS_EACH = 2
+# Rows of a rule that are kept because one of them may be its farthest.
+_MOST_FAR = 8
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, eq=False)
+class RowSums:
+    """What is kept of rows: sums of a fixed size; immutable.
+
+    Attributes
+    ----------
+    base : TSKModel
+        Its premises and names hold, its consequents are not used.
+    consequent_inputs : ndarray of int
+    inputs, targets : Scale
+        The scales that the sums are on.
+    n_rows : int
+        Rows with weight, however long ago.
+    weight, squared_weight : float
+        W and the sum of squares of the weights.
+    gram : ndarray of shape (n_columns, n_columns)
+    slope : ndarray of shape (n_columns, n_outputs)
+    square : ndarray of shape (n_outputs,)
+    second : ndarray of shape (n_rules, 1 + n_inputs, 1 + n_inputs)
+        Sums of s w_r [1, z] [1, z]' over all inputs.
+    strongest : ndarray of shape (n_rules,)
+        Weight of the rows on which each rule is the strongest.
+    peak : ndarray of shape (n_rules,)
+        Largest strength on any row.
+    extent : ndarray of shape (n_rules, n_consequent_inputs)
+        Largest sqrt(w_r) |x - a_r|, with a_r the centre that the rule has in ``base``.
+    distinct : ndarray of shape (n, 1)
+        Fingerprints of distinct rows, up to a limit.
+    distinct_inputs : ndarray of shape (n, 2)
+        Rules, and fingerprints of distinct inputs on which they are the strongest.
+    farthest : ndarray of shape (n, 1 + n_inputs)
+        Rules, and the rows on which they fire farthest from their centres.
+    """
+
+    base: TSKModel
+    consequent_inputs: np.ndarray
+    inputs: Scale
+    targets: Scale
+    n_rows: int
+    weight: float
+    squared_weight: float
+    gram: np.ndarray
+    slope: np.ndarray
+    square: np.ndarray
+    second: np.ndarray
+    strongest: np.ndarray
+    peak: np.ndarray
+    extent: np.ndarray
+    distinct: np.ndarray
+    distinct_inputs: np.ndarray
+    farthest: np.ndarray
+
+    @classmethod
+    def of(cls, base: TSKModel, consequent_inputs, X, y, sample_weight=None):
+        """Sum over a chunk, X (n_rows, n_inputs), y (n_rows, n_outputs), weights positive."""
+        rows = StandardisedData.of(X, y, sample_weight)
+        check_distance(base, rows.inputs)
+        check_scales(rows.inputs, rows.targets, base.input_names, base.output_names)
+        antecedent, own, n_inputs = base.antecedent, consequent_inputs, X.shape[1]
+        n_rules, n_basis = antecedent.n_rules, 1 + own.size
+        design = DesignMoments(antecedent.share_counts, n_basis)
+        gram = np.zeros(design.shape, order="F")
+        slope, square = np.zeros((n_rules * n_basis, y.shape[1])), np.zeros(y.shape[1])
+        second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
+        strongest, peak = np.zeros(n_rules), np.zeros(n_rules)
+        centers, extent = _centers(base)[:, own], np.zeros((n_rules, own.size))
+        distinct, distinct_inputs = np.zeros((0, 1)), np.zeros((0, 2))
+        farthest = np.zeros((0, 1 + n_inputs))
+        n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
+        for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
+            raw = np.array(rows.X[part].T, dtype=float, order="C")
+            Z, target, weight = rows.read(part)
+            strengths, shares = antecedent.strengths_and_shares(raw)
+            best, top = strengths.argmax(axis=0), strengths.max(axis=0)
+            strongest += np.bincount(best, weights=weight, minlength=n_rules)
+            peak = np.maximum(peak, strengths.max(axis=1))
+            for j, x in enumerate(raw[own]):
+                distance = np.sqrt(strengths) * np.abs(x - centers[:, j, None])
+                extent[:, j] = np.maximum(extent[:, j], distance.max(axis=1))
+            numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
+            marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
+            distinct = _distinct(np.vstack([distinct, marks[:, None]]), _ROWS_EACH * len(slope))
+            distinct_inputs = _distinct(
+                np.vstack([distinct_inputs, np.column_stack([best, numbers])]), 1 + n_inputs
+            )
+            rule, row = np.nonzero(strengths >= FIRES * top)
+            every = basis(Z)
+            weighted = every if weight is None else every * weight
+            second += np.stack([(own_strength * weighted) @ every.T for own_strength in strengths])
+            farthest = np.vstack([farthest, np.column_stack([rule, raw.T[row]])])
+            farthest = _farthest(farthest, second, rows.inputs)
+            basis_rows = basis(Z[own])
+            weighted = basis_rows if weight is None else basis_rows * weight
+            design.accumulate(gram, shares, basis_rows, weighted)
+            for k, values in enumerate(target):
+                slope[:, k] += (strengths @ (weighted * values).T).ravel()
+                square[k] += weighted[0] @ values**2
+        ones = np.ones(rows.n_rows) if sample_weight is None else sample_weight
+        return cls(
+            base,
+            own,
+            rows.inputs,
+            rows.targets,
+            rows.n_rows,
+            rows.total_weight,
+            float(np.sum(ones**2)),
+            design.gram(gram),
+            slope,
+            square,
+            second,
+            strongest,
+            peak,
+            extent,
+            distinct,
+            distinct_inputs,
+            farthest,
+        )
+
+    @property
+    def n_basis(self):
+        """Columns of the design per rule."""
+        return 1 + self.consequent_inputs.size
+
+    @property
+    def effective_weight(self):
+        """Rows by weight, as the search counts them."""
+        return max(self.weight, self.weight**2 / self.squared_weight)
+
+    def faded(self, factor):
+        """The same rows with all weights times a factor."""
+        return replace(
+            self,
+            weight=factor * self.weight,
+            squared_weight=factor**2 * self.squared_weight,
+            gram=factor * self.gram,
+            slope=factor * self.slope,
+            square=factor * self.square,
+            second=factor * self.second,
+            strongest=factor * self.strongest,
+        )
+
+    def plus(self, other):
+        """The rows of both."""
+        weights = self.weight, other.weight
+        inputs = joined_scales(self.inputs, other.inputs, *weights)
+        targets = joined_scales(self.targets, other.targets, *weights)
+        check_scales(inputs, targets, self.base.input_names, self.base.output_names)
+        one, two = self._on(inputs, targets), other._on(inputs, targets)
+        second = one.second + two.second
+        most, n_inputs = _ROWS_EACH * len(self.slope), second.shape[1] - 1
+        return replace(
+            one,
+            n_rows=one.n_rows + two.n_rows,
+            weight=one.weight + two.weight,
+            squared_weight=one.squared_weight + two.squared_weight,
+            gram=one.gram + two.gram,
+            slope=one.slope + two.slope,
+            square=one.square + two.square,
+            second=second,
+            strongest=one.strongest + two.strongest,
+            peak=np.maximum(one.peak, two.peak),
+            extent=np.maximum(one.extent, two.extent),
+            distinct=_distinct(np.vstack([one.distinct, two.distinct]), most),
+            distinct_inputs=_distinct(
+                np.vstack([one.distinct_inputs, two.distinct_inputs]), 1 + n_inputs
+            ),
+            farthest=_farthest(np.vstack([one.farthest, two.farthest]), second, inputs),
+        )
+
+    def _on(self, inputs: Scale, targets: Scale):
+        """The same sums on other scales."""
+        shift, factor = _change(self.inputs, inputs)
+        t, g = _change(self.targets, targets)
+        own = shift[self.consequent_inputs], factor[self.consequent_inputs]
+        # sum s phi, since strengths sum to one; and sum s y likewise.
+        every = self.gram[:, :: self.n_basis].sum(axis=1)
+        total = self.slope[:: self.n_basis].sum(axis=0)
+        gram = _carried(self.gram, *own)
+        return replace(
+            self,
+            inputs=inputs,
+            targets=targets,
+            gram=_carried(np.ascontiguousarray(gram.T), *own),
+            slope=_carried(g * self.slope + t * every[:, None], *own),
+            square=g**2 * self.square + 2.0 * t * g * total + t**2 * self.weight,
+            second=np.stack(
+                [_carried(_carried(one, shift, factor).T, shift, factor) for one in self.second]
+            ),
+        )
+
+    def support(self):
+        """The support of every rule, in the units of X."""
+        scale = self.inputs
+        n_coefficients = 1 + int(np.sum(~scale.is_constant[self.consequent_inputs]))
+        counts = np.bincount(self.distinct_inputs[:, 0].astype(int), minlength=len(self.second))
+        known = counts > 0
+        center, factor = _places(self.second)
+        center[~known], factor[~known] = 0.0, 0.0
+        radius = np.zeros(known.size)
+        rules, distance = _distances(self.farthest, self.second, scale)
+        np.maximum.at(radius, rules, distance)
+        share = np.minimum(counts, n_coefficients) / n_coefficients
+        return RuleSupport(share, center, factor, radius * known).change_units(
+            scale.offset, scale.scale
+        )
+
+
+def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) -> Scale:
+    """The scale of two sets of rows together, by their weights (Chan, Golub and LeVeque 1979)."""
+    low, high = np.minimum(one.minimum, other.minimum), np.maximum(one.maximum, other.maximum)
+    if other_weight > weight:
+        # From the heavier side: what little is added to it costs no digits.
+        one, other, weight, other_weight = other, one, other_weight, weight
+    share = other_weight / (weight + other_weight)
+    is_constant = low == high
+    # In parts of the range, whose squares neither overflow nor vanish.
+    span = np.where(is_constant, 1.0, high - low)
+    step = (other.offset - one.offset) / span
+    square = (1.0 - share) * _variance(one, span) + share * _variance(other, span)
+    scale = span * np.sqrt(square + share * (1.0 - share) * step**2)
+    return Scale(
+        np.where(is_constant, low, one.offset + share * span * step),
+        np.where(is_constant | (scale == 0.0), 1.0, scale),
+        low,
+        high,
+    )
+
+
+def _variance(scale, span):
+    return np.where(scale.is_constant, 0.0, scale.scale / span) ** 2
+
+
+def _change(old: Scale, new: Scale):
+    """Shift t and factor g of z' = t + g z, from one standardisation to another."""
+    return (old.offset - new.offset) / new.scale, old.scale / new.scale
+
+
+def _carried(sums, shift, factor):
+    """Sums of [1, z] times something, rule by rule along the first axis, on [1, t + g z]."""
+    blocks = sums.reshape(-1, 1 + shift.size, sums.shape[-1]).copy()
+    blocks[:, 1:] *= factor[:, None]
+    blocks[:, 1:] += shift[:, None] * blocks[:, :1]
+    return blocks.reshape(sums.shape)
+
+
+def _centers(base):
+    """Where the rules of a model stand, (n_rules, n_inputs): the same for all chunks."""
+    if base.support is None:
+        return np.tile(base.reference, (base.n_rules, 1))
+    return base.support.center
+
+
+def _distinct(table, most):
+    """Distinct rows of a table, at most so many of every number in the first of two columns."""
+    table = np.unique(table, axis=0)
+    if table.shape[1] == 1:
+        return table[:most]
+    rank = np.arange(len(table)) - np.searchsorted(table[:, 0], table[:, 0])
+    return table[rank < most]
+
+
+def _places(second):
+    """Mean and inverse factor of the covariance of the rows of every rule."""
+    moments = second / np.maximum(second[:, :1, :1], _TINY)
+    center = moments[:, 0, 1:].copy()
+    return center, inverse_factor(moments[:, 1:, 1:], center)
+
+
+def _distances(farthest, second, scale):
+    """The rules of rows that were far, and Mahalanobis' distances from these rules' centres."""
+    rules = farthest[:, 0].astype(int)
+    center, factor = _places(second)
+    away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]
+    return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)
+
+
+def _farthest(rows, second, scale):
+    """Of rows by their rules the few farthest of each: one more row may change who is."""
+    rules, distance = _distances(rows, second, scale)
+    order = np.lexsort((-distance, rules))
+    rank = np.arange(order.size) - np.searchsorted(rules[order], rules[order])
+    return rows[order[rank < _MOST_FAR]]
+
+
+class _ProblemOfSums(SeparableProblem):
+    """The least-squares problem at premises that stay, out of sums; no rows are read."""
+
+    def __init__(self, sums: RowSums, penalty: Penalty):
+        self.antecedent, self.penalty = sums.base.antecedent, penalty
+        # What is asked of the rows: their scales, and how many of them are distinct.
+        none = np.empty((len(sums.distinct), 0))
+        self.rows = StandardisedData(none, none, None, sums.inputs, sums.targets)
+        self.consequent_inputs, self.n_basis = sums.consequent_inputs, sums.n_basis
+        self.n_columns, self.n_outputs = sums.slope.shape
+        self.on_sample = None
+        means = (sums.gram / sums.weight, sums.slope / sums.weight, sums.square / sums.weight)
+        self._sums_at_start = self._means = means
+        self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
+        own = self.consequent_inputs
+        extent = np.maximum(sums.extent / sums.inputs.scale[own], 1.0)
+        slopes = sums.inputs.varying(own)
+        self._common_line = CommonLine(self.local, extent, self.antecedent, slopes)
+
+    def mean_squares(self, evaluation):
+        """Mean squared error of every standardised output."""
+        normal, (_, slope, square) = evaluation.normal, self._means
+        solved = normal.coefficients
+        # By the residual of the normal equations; slope = (G + P) solved.
+        twice = self.local.transform_rows(slope.copy()) + normal.penalty @ solved
+        return np.maximum(square - np.sum(solved * twice, axis=0), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The model of all rows so far."""
+
+    model: TSKModel
+    penalty: Penalty
+    mean_squared_error: float  # of the standardised target, summed over outputs
+    redundant_rules: list[dict] = field(default_factory=list)
+
+
+def fitted_weights(estimator, sums: RowSums):
+    """The weights of the penalty that a fit to these rows has found, times rows, in plain types."""
+    place, n_rows = list(sums.base.input_names).index, sums.effective_weight
+    return {
+        "agreement": n_rows * estimator.agreement_,
+        "alpha": n_rows * estimator.alpha_,
+        "slope": n_rows * estimator.slope_alpha_,
+        "pulls": [
+            ([place(name) for name in one["inputs"]], one["pull"]) for one in estimator.pulls_
+        ],
+        "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
+    }
+
+
+def solve(sums: RowSums, given, first=None) -> Solved:
+    """Solve for the consequents.
+
+    ``given`` are weights of the penalty, by name. The others are those of ``first``, which
+    :func:`fitted_weights` gives; without it, the evidence finds them.
+    """
+    antecedent, none = sums.base.antecedent, np.empty(0)
+    given = {key: given[key] for key in _FREE if key in given}
+    if first is not None:
+        # Relative to a mean over rows, they fall with their number.
+        found = {key: first[key] / sums.effective_weight for key in _FREE}
+        if "alpha" not in given:
+            found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
+            found["slope_pulls"] = dict(first["slope_pulls"])
+        given = found | given
+    free = [key for key in _FREE if key not in given]
+    problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
+    if free:
+        premise = Premise(antecedent, none, none, none, ())
+        tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
+        problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
+    evaluation = problem.evaluate(antecedent.parameters)
+    overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight
+    statistics = RuleStatistics(overlap, sums.strongest / sums.weight, sums.peak)
+    return Solved(
+        _model(sums, problem, evaluation),
+        problem.penalty,
+        evaluation.mean_squared_error,
+        redundant_rules(statistics),
+    )
+
+
+def _model(sums, problem, evaluation):
+    """The model in the user's units."""
+    inputs, targets, own = sums.inputs, sums.targets, sums.consequent_inputs
+    n_outputs = sums.slope.shape[1]
+    solved = evaluation.coefficients.reshape(sums.base.n_rules, -1, n_outputs) * targets.scale
+    solved[:, 0] += targets.offset
+    coefficients = solved
+    if own.size:
+        coefficients = np.zeros((sums.base.n_rules, 1 + inputs.offset.size, n_outputs))
+        coefficients[:, 0] = solved[:, 0]
+        coefficients[:, 1 + own] = solved[:, 1:] / inputs.scale[own, None]
+    return replace(
+        sums.base,
+        coefficients=coefficients,
+        reference=inputs.offset,
+        spread=inputs.scale,
+        minimum=inputs.minimum,
+        maximum=inputs.maximum,
+        rule_weights=evaluation.masses,
+        rule_rows=sums.strongest * (sums.n_rows / sums.weight),
+        support=sums.support(),
+        target=TargetRange(targets.minimum, targets.maximum, targets.scale),
+        # Premises stay: what is not known of them is not counted.
+        posterior=posterior_of(problem, None, evaluation, sums.effective_weight),
+    )

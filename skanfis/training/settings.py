@@ -1,0 +1,82 @@
+"""What the parameters of an estimator ask for: names of columns, families and solvers resolved."""
+
+from sklearn.utils import check_random_state
+
+from .._validation import feature_indices
+from ..learning import SOLVERS, Solver
+from ..membership import TRIED_FAMILIES, membership_families
+from ..model import TSKModel
+from ..search import StructureRequest, check_inputs
+
+__all__ = ["given_weights", "solver_of", "structure_request"]
+
+
+def solver_of(estimator) -> Solver:
+    """The solver, by its word or as it is given."""
+    return SOLVERS[estimator.solver]() if isinstance(estimator.solver, str) else estimator.solver
+
+
+def given_weights(estimator):
+    """The weights of the penalty that are given, by their names in ``Penalty``."""
+    stiffness = solver_of(estimator).stiffness
+    given = {"agreement": estimator.agreement, "alpha": estimator.alpha, "stiffness": stiffness}
+    weights = {key: float(weight) for key, weight in given.items() if not isinstance(weight, str)}
+    if "alpha" in weights:
+        weights["slope"] = weights["alpha"]
+    return weights
+
+
+def structure_request(estimator, names):
+    """What training starts from, with all names of columns and families resolved."""
+    start = _imported(estimator, names)
+    if estimator.order == 0 and estimator.consequent_features is not None:
+        raise ValueError(
+            f"consequent_features={estimator.consequent_features!r} means nothing with order=0, "
+            "whose consequents are constants: leave it at None."
+        )
+    consequent = feature_indices(estimator.consequent_features, names, "consequent_features")
+    # random_state=None stands for one fixed seed: the same data give the same model.
+    state = estimator.random_state
+    tries_families = isinstance(estimator.mf, str) and estimator.mf == "auto"
+    return StructureRequest(
+        n_mfs=estimator.n_mfs,
+        partition=start,
+        families=membership_families(estimator.mf, names),
+        order=estimator.order,
+        premise_inputs=feature_indices(estimator.premise_features, names, "premise_features"),
+        consequent_inputs=consequent if estimator.order == 1 else consequent[:0],
+        weights=given_weights(estimator),
+        premises_move=solver_of(estimator).moves_premises and estimator.max_iter > 0,
+        seed=0 if state is None else check_random_state(state).randint(2**31 - 1),
+        names=names,
+        other_families=TRIED_FAMILIES[1:] if tries_families else (),
+    )
+
+
+def _imported(estimator, names):
+    """``partition``, with the model in place of the estimator that holds it."""
+    given = estimator.partition
+    if isinstance(given, type):
+        raise ValueError(
+            f"partition={given!r} is a class: give an object of it, {given.__name__}(...)."
+        )
+    if isinstance(given, str) or hasattr(given, "fit_predict"):
+        return given
+    model = getattr(given, "model_", given)
+    if not isinstance(model, TSKModel):
+        raise ValueError(
+            f"partition={given!r} has no rules: it has not been fitted, or was cloned, which "
+            "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
+        )
+    check_inputs(model, names, "partition")
+    as_it_is = "means nothing where imported rules are taken as they are (max_iter=0)"
+    refused = [
+        ("monotonic_cst", estimator.max_iter == 0, f"{as_it_is}: use solver='lse', or"),
+        ("constraints", estimator.max_iter == 0, f"{as_it_is}: use solver='lse', or"),
+        ("premise_features", True, "means nothing to imported rules, which have their inputs:"),
+        ("consequent_features", estimator.max_iter == 0, f"{as_it_is}: use solver='lse', or"),
+    ]
+    for name, is_refused, why in refused:
+        if is_refused and getattr(estimator, name) is not None:
+            raise ValueError(f"{name}={getattr(estimator, name)!r} {why} leave it at None.")
+    return model

@@ -1,0 +1,121 @@
+"""``--apply`` piece by piece gives what it gives of a log that is read at once."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.datasets import make_ofog
+from skanfis.gyro import GyroCompensator, _log_file
+from skanfis.gyro.command import main
+from skanfis.gyro.log import read_log
+
+from ..quick import quick
+
+INPUTS = ("time", "temperature", "temperature_rate", "output")
+COLUMNS = ["time", "temperature", "output", "rate"]
+
+
+@pytest.fixture(scope="module")
+def log():
+    """Two devices of two runs, on clocks that begin anew with each."""
+    return make_ofog(n_devices=2, n_runs=2, duration=600.0, sampling_interval=2.0, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def model(log, tmp_path_factory):
+    compensator = GyroCompensator(None, INPUTS)
+    X = compensator.features(log.assign(run=log["device"].astype(str) + log["run"].astype(str)))
+    error = log["output"] - log["rate"]
+    estimator = quick([2, 2, 2, 1]).fit(X, error)
+    path = tmp_path_factory.mktemp("model") / "compensator.json"
+    GyroCompensator(estimator, INPUTS).write_json(path)
+    return path
+
+
+def labelled(log):
+    return log[[*COLUMNS, "device", "run"]]
+
+
+def interleaved(log):
+    """The devices side by side, as one logger writes them."""
+    table = log[[*COLUMNS, "device", "run"]]
+    return table.sort_values(["run", "time", "device"], kind="stable")
+
+
+def told_by_the_clock(log):
+    """No labels: the clock begins anew, and once it jumps."""
+    table = log[log["device"] == log["device"].iloc[0]][COLUMNS].reset_index(drop=True)
+    table.loc[500:, "time"] += 5000.0
+    return table
+
+
+def one_run(log):
+    return log[:300][COLUMNS]
+
+
+@pytest.mark.parametrize("kind", [labelled, interleaved, told_by_the_clock, one_run])
+def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatch, capsys):
+    path = tmp_path / "log.csv"
+    kind(log).to_csv(path, index=False)
+    tables, said = [], []
+    for rows in (100_000, 197):
+        monkeypatch.setattr(_log_file, "_ROWS", rows)
+        target = tmp_path / f"rates{rows}.csv"
+        assert main(["--apply", str(model), str(path), "--output", str(target)]) == 0
+        tables.append(pd.read_csv(target))
+        out, err = capsys.readouterr()
+        notes = [line.partition("note:")[2] for line in err.splitlines() if "note:" in line]
+        said.append(out.splitlines()[1:] + notes)
+    whole, pieces = tables
+    assert said[0] == said[1]
+    assert list(whole.columns) == list(pieces.columns)
+    for name in whole:
+        if whole[name].dtype.kind == "f":
+            np.testing.assert_allclose(pieces[name], whole[name], rtol=1e-9, atol=1e-11)
+        else:
+            assert whole[name].tolist() == pieces[name].tolist()
+    if "run" in kind(log):
+        # By the compensator itself, which knows nothing of files.
+        direct = GyroCompensator.read_json(model).apply(read_log(path))
+        np.testing.assert_allclose(
+            pieces["rate_compensated"], direct["rate_compensated"], rtol=1e-9, atol=1e-11
+        )
+
+
+def spoilt_time(table):
+    table.loc[250, "time"] = table.loc[249, "time"]
+
+
+def spoilt_unit(table):
+    table["time"] /= 1e4
+
+
+def spoilt_output(table):
+    table.loc[203, "output"] = 1e9
+
+
+BAD = {
+    "time": (spoilt_time, r"line 252.*time does not increase"),
+    "unit": (spoilt_unit, "time in a larger unit than s"),
+    "output": (spoilt_output, r"line 205.*not plausible"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_rows_are_named_by_their_place_in_the_file(
+    log, model, case, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(_log_file, "_ROWS", 50)
+    spoil, said = BAD[case]
+    # A run that heats by 20 degrees, of which no 50 rows do.
+    table = one_run(log).reset_index(drop=True)
+    table["temperature"] = np.linspace(20.0, 40.0, len(table))
+    table["run"] = "only"
+    spoil(table)
+    path = tmp_path / "log.csv"
+    table.to_csv(path, index=False)
+    assert main(["--apply", str(model), str(path), "--output", str(tmp_path / "x.csv")]) == 3
+    assert re.search(said, capsys.readouterr().err.replace("\n", " "))
+    assert not (tmp_path / "x.csv").exists()

@@ -1,0 +1,92 @@
+"""Limits of a specification: what may be typed, and which side of a limit a figure is on."""
+
+import hashlib
+from argparse import ArgumentTypeError
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.gyro._options import make_parser
+from skanfis.gyro._report_options import check_limit, parse_limit, report_options
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "unit"),
+    [
+        ("bias=5deg/h", 5.0, "deg/h"),
+        ("residual_rms= 1e-2 °/s", 0.01, "deg/s"),
+        ("reduction_factor=10", 10.0, ""),
+        ("scale_factor_nonlinearity=500ppm", 500.0, "ppm of full scale"),
+        ("scale_factor_error=.5", 0.5, "ppm"),
+        ("bias_ramp_sensitivity=2deg/s/(°C/min)", 2.0, "deg/s/(degC/min)"),
+        ("angle_random_walk=0.1°/√h", 0.1, "deg/sqrt(h)"),
+    ],
+)
+def test_what_may_be_typed(text, value, unit):
+    limit = parse_limit(text)
+    assert (limit.value, limit.unit) == (value, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("bias", "'' must be a number"),
+        ("drift=5deg/h", "must be FIGURE=VALUE, with a figure of merit of: residual_rms"),
+        ("bias=5", "bias is in deg/s or deg/h; found ''"),
+        ("angle_random_walk=1deg/h", r"is in deg/sqrt\(h\); found 'deg/h'"),
+        ("bias=-2:5deg/h", "must be a number, not negative, and a unit, as in bias=5deg/h"),
+        ("reduction_factor=10ppm", "reduction_factor has no unit; found 'ppm'"),
+    ],
+)
+def test_what_may_not(text, message):
+    with pytest.raises(ArgumentTypeError, match=message):
+        parse_limit(text)
+
+
+def table_of(value, low=np.nan, high=np.nan):
+    line = {"figure": "bias", "unit": "deg/h", "after": value, "note": "no rate changes"}
+    return pd.DataFrame([line | {"after_low": low, "after_high": high}]).set_index("figure")
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "result"),
+    [
+        *(("bias=5deg/h", 5.0, "pass"), ("bias=5deg/h", 5.0 + 1e-9, "fail")),
+        *(("bias=5deg/h", -5.0, "pass"), ("bias=5deg/h", -5.0 - 1e-9, "fail")),
+        # 0.001 deg/s is 3.6 deg/h.
+        *(("bias=0.001deg/s", 3.599, "pass"), ("bias=0.001deg/s", 3.601, "fail")),
+        *(("bias=5deg/h", np.nan, "not measured"), ("hysteresis=5deg/h", 1.0, "not measured")),
+    ],
+)
+def test_both_sides_of_a_limit(text, value, result):
+    check = check_limit(parse_limit(text), table_of(value))
+    assert check.result == result
+    assert bool(check.remark) == (result == "not measured")
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "is_sure"), [(1.0, 4.9, True), (1.0, 5.1, False), (-6.0, 1.0, False)]
+)
+def test_an_interval_over_the_limit_is_said(low, high, is_sure):
+    check = check_limit(parse_limit("bias=5deg/h"), table_of(1.0, low, high))
+    assert check.result == "pass"
+    assert (check.remark == "") == is_sure
+
+
+def test_the_files_are_told_as_they_are(tmp_path):
+    content = bytes(range(256)) * 5000
+    (tmp_path / "a b.csv").write_bytes(content)
+    path = tmp_path / "a b.csv"
+    typed = "--min-coverage 0 --serial 7 --operator Ö --limits bias=5deg/h --report-unit=deg/h"
+    found = report_options(make_parser().parse_args([str(path), *typed.split()]), [path])
+    assert found.files == (("a b.csv", len(content), hashlib.sha256(content).hexdigest()),)
+    assert (found.serial, found.operator, found.unit) == ("7", "Ö", "deg/h")
+    assert found.limits == (parse_limit("bias=5deg/h"),)
+    assert {("limits", "bias=5deg/h"), ("min-coverage", "0.0")} <= set(found.options)
+
+
+def test_a_bad_limit_is_told_in_one_line(capsys):
+    with pytest.raises(SystemExit):
+        make_parser().parse_args(["log.csv", "--limits", "bias=5"])
+    assert "bias is in deg/s or deg/h; found ''" in capsys.readouterr().err

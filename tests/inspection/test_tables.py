@@ -1,0 +1,148 @@
+"""Tables of rules and memberships hold the model; explanations add up to its predictions."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.inspection import explain, memberships_table, rules_table
+
+from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, narrow_target, rows_of
+
+ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
+A_GRID = MODELS["grid, order 1, 1 outputs"]
+A_TABLE = MODELS["rule table, order 1, 2 outputs"]
+
+
+def sums(table, model):
+    """Sum of contributions of every row and output, (n_rows, n_outputs)."""
+    by_row = table.groupby(["row", "output"], sort=False)["contribution"].sum(min_count=1)
+    return by_row.to_numpy().reshape(-1, model.n_outputs)
+
+
+@ALL
+def test_rules_table_holds_consequents_and_support(model):
+    table = rules_table(model)
+    assert_array_equal(table.index, np.arange(model.n_rules))
+    assert_array_equal(table["data"]["weight"], model.rule_weights)
+    assert_array_equal(table["data"]["rows"], model.rule_rows)
+    for k, name in enumerate(model.output_names):
+        consequents = table[f"then {name}"]
+        assert list(consequents) == ["constant", *NAMES]
+        assert_allclose(consequents, model.consequents[:, :, k], rtol=1e-12)
+        about_mean = rules_table(model, about="mean")[f"then {name}"]
+        assert_array_equal(about_mean["constant"], model.coefficients[:, 0, k])
+        assert_array_equal(about_mean[list(NAMES)], consequents[list(NAMES)])
+
+
+def test_what_a_rule_does_not_look_at_is_missing():
+    table = rules_table(A_GRID)["if"]
+    assert list(table) == list(NAMES)
+    assert list(table["chip temperature"].iloc[:6]) == ["low"] * 2 + ["medium"] * 2 + ["high"] * 2
+    table = rules_table(A_TABLE)["if"]
+    missing = A_TABLE.antecedent.rule_terms < 0
+    assert missing.any()
+    assert_array_equal(table.isna(), missing)
+    assert list(rules_table(MODELS["scattered on two inputs, order 0, 1 outputs"])["if"]) == [
+        "chip temperature",
+        "rate",
+    ]
+    assert "if" not in rules_table(MODELS["one rule, order 1, 1 outputs"])
+
+
+@ALL
+def test_memberships_table_is_the_list_of_terms(model):
+    for trained in (True, False):
+        table = memberships_table(model, trained=trained)
+        assert table.index.name == "term"
+        terms = model.memberships(trained)
+        assert len(table) == len(terms)
+        for t, term in enumerate(terms):
+            assert table.loc[t].dropna().to_dict() == term
+
+
+def test_a_pipeline_is_told_in_raw_units():
+    g = np.random.default_rng(0)
+    X = pd.DataFrame(g.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"])
+    y = 1e3 + np.sin(X["kelvin"] / 20) + 100 * X["rate"]
+    pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[2, 1], agreement=1.0)).fit(X, y)
+    centers = memberships_table(pipe)["center"]
+    scaled = [term["center"] for term in pipe[-1].memberships_]
+    assert_allclose(centers, pipe[0].mean_[0] + pipe[0].scale_[0] * np.array(scaled), rtol=1e-12)
+    table = rules_table(pipe)
+    mean = table["then y", "constant"] + table["then y"][["kelvin", "rate"]] @ X.mean()
+    assert_allclose(mean, rules_table(pipe, about="mean")["then y", "constant"], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("policy", "min_strength"), [("clip", 0.1), ("linear", 0.0), ("linear", 0.1), ("nan", 0.0)]
+)
+@ALL
+def test_contributions_add_up_to_the_prediction(model, policy, min_strength):
+    model = model.with_out_of_bounds(policy, 0.5)
+    rows = np.vstack([rows_of(model, 1.0, 10), rows_of(model, 2.0, 30)])
+    inside = model.in_bounds(rows)
+    assert 0 < inside.sum() < len(rows)
+    table = explain(model, rows, min_strength=min_strength)
+    expected = model.predict(rows)
+    assert_allclose(sums(table, model), expected, rtol=0, atol=1e-12 * np.nanmax(abs(expected)))
+    strengths = table.groupby(["row", "output"])["strength"].sum()
+    assert_allclose(strengths, 1.0, rtol=1e-12)
+
+
+def test_an_output_that_is_held_has_a_line_for_it():
+    model = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
+    model = replace(model, out_of_bounds="linear")
+    rows = rows_of(model, 1.5)
+    table = explain(model, rows)
+    total = table.groupby(["row", "output"])["contribution"].sum().unstack()
+    assert_allclose(total, model.predict(rows), atol=1e-10)
+    said = replace(model, target=None).predict(rows)
+    low, high = model.output_limits
+    n_held = ((said < low) | (said > high)).sum()
+    assert (table["if"] == "held").sum() == n_held > 0
+
+
+@ALL
+def test_what_rules_say_is_strength_times_value(model):
+    rows = rows_of(model, 1.0, 5)
+    table = explain(model, rows)
+    assert len(table) == 5 * model.n_rules * model.n_outputs
+    strengths, consequents = model.strengths(rows), model.consequents
+    for line in table.itertuples():
+        k = model.output_names.index(line.output)
+        value = consequents[line.rule, 0, k] + rows[line.row] @ consequents[line.rule, 1:, k]
+        assert line.value == pytest.approx(value, rel=1e-9, abs=1e-9)
+        assert line.strength == pytest.approx(strengths[line.row, line.rule], rel=1e-12)
+        assert line.contribution == pytest.approx(line.strength * line.value, rel=1e-12)
+
+
+def test_rules_come_by_falling_strength_and_the_weak_in_one_line():
+    rows = rows_of(A_TABLE, 1.0, 8)
+    table = explain(A_TABLE, rows, min_strength=0.2)
+    for (row, _), lines in table.groupby(["row", "output"]):
+        fired = lines[lines["rule"].notna()]
+        strengths = A_TABLE.strengths(rows[[row]])[0]
+        assert list(fired["rule"]) == [r for r in np.argsort(-strengths) if strengths[r] >= 0.2]
+        others = lines[lines["rule"].isna()]
+        assert list(others["if"]) == ["other rules"]
+        assert others["strength"].item() == pytest.approx(strengths[strengths < 0.2].sum())
+
+
+def test_raise_raises_as_predict_does():
+    rows = rows_of(A_GRID, 2.0)
+    with pytest.raises(ValueError, match="X lies outside the training data: 'time' in"):
+        explain(A_GRID.with_out_of_bounds("raise"), rows)
+
+
+@pytest.mark.parametrize("min_strength", [-0.1, 1.5, "all"])
+def test_parameters_are_checked(min_strength):
+    with pytest.raises(ValueError, match="min_strength="):
+        explain(A_GRID, rows_of(A_GRID, 1.0), min_strength=min_strength)
+    with pytest.raises(ValueError, match="about='here'"):
+        rules_table(A_GRID, about="here")
