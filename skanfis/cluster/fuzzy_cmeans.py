@@ -126,6 +126,8 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
         The exponent.
     n_iter_ : int
         Iterations from the best start.
+    n_features_in_ : int
+    feature_names_in_ : ndarray of shape (n_features,)
 
     Warns
     -----

@@ -92,6 +92,8 @@ class SubtractiveClustering(Clusterer):
         Standard deviation of the Gaussian of the potential, in the units of the data.
     labels_ : ndarray of shape (n_samples,)
         The nearest centre of each row, in units of ``widths_``.
+    n_features_in_ : int
+    feature_names_in_ : ndarray of shape (n_features,)
 
     References
     ----------
