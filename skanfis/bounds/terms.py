@@ -75,7 +75,8 @@ def ranges(group: TermGroup, low, high):
     slope = widened(*slope)
     with np.errstate(invalid="ignore"):
         error = reach * size(slope) + ROUNDINGS * EPS * np.abs(bottom)
-    return TermRanges(bottom, top, *slope, *widened(*_curvature(group, lo, hi)), error)
+    curve_low, curve_high = widened(*_curvature(group, lo, hi))
+    return TermRanges(bottom, top, slope[0], slope[1], curve_low, curve_high, error)
 
 
 def _plateau(group):

@@ -282,7 +282,7 @@ def test_rules_taken_as_they_are_are_not_constrained(rng):
     X, _, y = planted(rng)
     model = ANFISRegressor(**QUICK).fit(X, y).model_
     again = ANFISRegressor(partition=model, max_iter=0, monotonic_cst=[1, 0])
-    with pytest.raises(ValueError, match="mean nothing where imported rules are taken as they are"):
+    with pytest.raises(ValueError, match="means nothing where imported rules are taken as they are"):
         again.fit(X, y)
     learnt = ANFISRegressor(partition=model, solver="lse", monotonic_cst=[1, 0], alpha=1e-3)
     assert monotonicity(learnt.fit(X, y), 0) == 1
