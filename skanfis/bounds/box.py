@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.stats import qmc
 
 from ..model import TSKModel
 from .enclosure import reach_of
 
-__all__ = ["held_box", "input_index", "read_box"]
+__all__ = ["held_box", "input_index", "read_box", "spread_points"]
 
 
 def read_box(box, model: TSKModel):
@@ -83,3 +84,11 @@ def input_index(name, model: TSKModel, parameter):
         f"{parameter} names {name!r}, which is no input of the model; they are "
         f"{', '.join(map(repr, model.input_names))}, at positions 0 to {model.n_inputs - 1}."
     )
+
+
+def spread_points(low, high, n_points, most_inputs):
+    """Rows of a box: ``n_points`` all over it, and of so few inputs all its corners."""
+    unit = qmc.Halton(low.size, scramble=False).random(n_points)
+    if low.size <= most_inputs:
+        unit = np.vstack([np.indices((2,) * low.size).reshape(low.size, -1).T, unit])
+    return np.clip(low + unit * (high - low), low, high)

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from ..model import TSKModel
-from .box import held_box, input_index, read_box
+from .box import held_box, input_index, read_box, spread_points
 from .enclosure import Enclosure
 from .search import largest
 from .terms import is_known
@@ -33,7 +32,6 @@ class Bounds:
     lowest, highest : ndarray of shape (n_outputs,)
         Values that are taken in the box, next to these.
     at_lowest, at_highest : ndarray of shape (n_outputs, n_inputs)
-        Where they are taken.
     box : ndarray of shape (n_inputs, 2)
     n_boxes : int
         Boxes that were looked at.
@@ -166,11 +164,6 @@ def gradient_bounds(
     bounds : Bounds
         Of the slope, in units of the output per unit of the input.
 
-    Raises
-    ------
-    ValueError
-        As :func:`bounds` does; if ``feature`` is no input.
-
     Examples
     --------
     >>> import numpy as np
@@ -216,11 +209,6 @@ def monotonicity(
     sign : ndarray of int of shape (n_outputs,)
         1: no prediction falls as the input rises; -1: none rises; 0: neither has been proven.
 
-    Raises
-    ------
-    ValueError
-        As :func:`gradient_bounds` does.
-
     Examples
     --------
     >>> import numpy as np
@@ -250,12 +238,8 @@ def cuts_of(model):
 
 
 def _enclosed(model, box, low, high, sides_of, tol, max_boxes, names):
-    """The :class:`Bounds` of all outputs.
-
-    ``sides_of`` gives, of an output, a scale of ``tol``, and of its lower and upper side what
-    bounds it on boxes, and its values at rows (n_rows, n_inputs).
-    """
-    X, found = _first_points(low, high), []
+    """Bounds; ``sides_of`` gives the scale of ``tol``, and by side what bounds it, and values."""
+    X, found = spread_points(low, high, _POINTS, _CORNERS), []
     for k in range(model.n_outputs):
         scale, sides = sides_of(k, X)
         for evaluate, values in sides:
@@ -299,12 +283,3 @@ def _checked(model, box, tol, max_boxes):
     if not (np.ndim(max_boxes) == 0 and max_boxes >= 1):
         raise ValueError(f"max_boxes={max_boxes!r} must be 1 or more.")
     return model, read_box(box, model)
-
-
-def _first_points(low, high):
-    """Rows of the box to begin with."""
-    unit = qmc.Halton(low.size, scramble=False).random(_POINTS)
-    if low.size <= _CORNERS:
-        corners = np.indices((2,) * low.size).reshape(low.size, -1).T
-        unit = np.vstack([corners, unit])
-    return np.clip(low + unit * (high - low), low, high)

@@ -131,11 +131,7 @@ def _fall_of_bell(theta, near, far):
 
 
 def _fall(family, near, far):
-    """Range of -d log mu / dt of a profile with a foot.
-
-    It grows up to a top just before the foot, t = 1, is one beyond at the least, and t from there
-    on. A straight flank has its top at the foot, and drops from it to one at once.
-    """
+    """Range of -d log mu / dt of a profile with a foot: it is largest just before it, t = 1."""
     profile = family.profile
     top = _STEEPEST_LINEAR if profile is LinearProfile else _STEEPEST_SPLINE
     at_near, at_far = (-profile.log_value_and_slope(t)[1] for t in (near, far))
