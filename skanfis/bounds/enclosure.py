@@ -130,9 +130,10 @@ class Enclosure:
 
     def _gain_of_slope(self, parts, j):
         """About how much of the range of dP/dx_j goes with each input's width, (n_inputs, n)."""
-        tangent, gain = size(self._tangent(parts, j)), np.zeros_like(parts.half)
+        strength, gain = self._largest_strengths(parts), np.zeros_like(parts.half)
+        tangent = size(self._tangent(parts, j))
         for i, ends in parts.departure.items():
-            gain[i] += (self._largest_strengths(parts) * size(ends) * tangent).sum(axis=self.axes)
+            gain[i] += (strength * size(ends) * tangent).sum(axis=self.axes)
         return gain
 
     def _largest_strengths(self, parts):

@@ -65,8 +65,8 @@ def checked_targets(caller, y, sample_weight, groups):
         targets = check_array(
             y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"
         )
-    names = [f"y{k}" for k in range(targets.reshape(len(targets), -1).shape[1])]
-    check_finite(targets.reshape(len(targets), -1), "y", names)
+    by_output = targets.reshape(len(targets), -1)
+    check_finite(by_output, "y", [f"y{k}" for k in range(by_output.shape[1])])
     if sample_weight is not None:
         sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
         positive_weights(sample_weight, len(targets))

@@ -17,6 +17,7 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 from skanfis import ANFISRegressor
 from skanfis.intervals import ConformalRegressor
 from skanfis.intervals._quantiles import (
+    group_scores,
     n_needed,
     one_row_per_group,
     row_masses,
@@ -120,6 +121,25 @@ def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each():
     assert found == score_quantile(scores, row_masses(scores.size)[0], 0.9)
 
 
+@pytest.mark.theory
+@pytest.mark.parametrize("within", [0.1, 0.7, 1.0])
+def test_rows_and_groups_are_covered_as_often_as_theory_says(within):
+    """29 groups known, whatever they have in common; new groups of many rows."""
+    rng = np.random.default_rng(12)
+    rows, whole = [], []
+    for _ in range(150):
+        known = hierarchical(rng, 29, within)
+        own = np.sqrt(1.0 - within**2) * rng.normal(size=(40, 1))
+        new = np.abs(own + within * rng.normal(size=(40, 50)))
+        rows.append(np.mean(new <= one_row_per_group(*known, 0.9)))
+        limit = score_quantile(*group_scores(*known, 0.8), 0.9)
+        whole.append(np.mean(np.mean(new <= limit, axis=1) >= 0.8))
+    # 27 of 30; the median of the quantiles lies above their mean, by 0.01 where rows are alone.
+    assert 0.89 < np.mean(rows) < 0.925
+    # Groups known have fewer rows than new ones: a part of five or six rows is a larger part.
+    assert np.mean(whole) > 0.89
+
+
 @pytest.mark.parametrize("weighting", ["none", "whole", "parts"])
 def test_leave_one_out_is_that_of_refits(weighting):
     """One rule and no ridge are a line: its residual and deviation without each row, by refits.
@@ -218,6 +238,17 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert abs(covered(model.predict_interval(new, 0.8), truth) - 0.8) < 0.06
     lower, upper = model.predict_interval([[0.0], [1.5], [3.0]])
     assert (np.diff(upper - lower) > 0.0).all()
+
+
+def test_several_outputs_are_each_covered():
+    rng = np.random.default_rng(8)
+    X, y = bent(rng, 160)
+    y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=160)])
+    for method in ("folds", "split"):
+        model = ConformalRegressor(ANFISRegressor(**QUICK), method=method, cv=3).fit(X[:80], y[:80])
+        lower, upper = model.predict_interval(X[80:], 0.8)
+        assert lower.shape == (80, 2)
+        assert (np.abs(np.mean((lower <= y[80:]) & (y[80:] <= upper), axis=0) - 0.8) < 0.13).all()
 
 
 def test_groups_and_weights_reach_a_regressor_in_a_pipeline(metadata_routing):
