@@ -3,30 +3,38 @@
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.stats import qmc
 
 from ..model import TSKModel
 from .enclosure import reach_of
 
-__all__ = ["held_box", "input_index", "read_box"]
+__all__ = ["held_box", "input_index", "read_box", "spread_points"]
 
 
 def read_box(box, model: TSKModel):
-    """The box as an array (n_inputs, 2); None is the range of the training data.
-
-    A mapping gives (low, high) by input name; the others have their range in training.
-    """
+    """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
     found = np.stack([model.minimum, model.maximum], axis=1)
     if box is None:
         return found
+    names = ", ".join(map(repr, model.input_names))
     if isinstance(box, Mapping):
         for name, ends in box.items():
             j = input_index(name, model, "box")
-            given = np.asarray(ends, dtype=float)
-            if given.shape != (2,):
+            if np.shape(ends) != (2,):
                 raise ValueError(f"box[{name!r}]={ends!r} must be two numbers: (low, high).")
-            found[j] = given
+            found[j] = ends
     else:
-        found = _pairs(box, model)
+        try:
+            given = np.array(box, dtype=float)
+            what = f"an array of shape {given.shape}"
+        except (TypeError, ValueError):
+            given, what = np.empty(0), repr(box)
+        if given.shape != found.shape:
+            raise ValueError(
+                f"box must have one (low, high) for each of the {model.n_inputs} inputs ({names}), "
+                f"or be a dict by their names; got {what}."
+            )
+        found = given
     for name, (low, high) in zip(model.input_names, found, strict=True):
         if not low <= high:
             raise ValueError(
@@ -36,27 +44,8 @@ def read_box(box, model: TSKModel):
     return found
 
 
-def _pairs(box, model):
-    """A box that is given as one pair per input."""
-    try:
-        found = np.array(box, dtype=float)
-        what = f"an array of shape {found.shape}"
-    except (TypeError, ValueError):
-        found, what = np.empty(0), repr(box)
-    if found.shape != (model.n_inputs, 2):
-        raise ValueError(
-            f"box must have one (low, high) for each of the {model.n_inputs} inputs "
-            f"({', '.join(map(repr, model.input_names))}), or be a dict by their names; got {what}."
-        )
-    return found
-
-
 def held_box(box, model: TSKModel, beyond=0.0):
-    """Lows and highs of the part of a box in which predictions change.
-
-    Beyond it they are what they are at its edge, or there are none. ``beyond``, relative, leaves a
-    strip of where nothing changes.
-    """
+    """Lows and highs of the part of a box in which predictions change, and a strip ``beyond``."""
     low, high = box.T.copy()
     if model.out_of_bounds in ("nan", "raise"):
         low, high = np.maximum(low, model.minimum), np.minimum(high, model.maximum)
@@ -95,3 +84,11 @@ def input_index(name, model: TSKModel, parameter):
         f"{parameter} names {name!r}, which is no input of the model; they are "
         f"{', '.join(map(repr, model.input_names))}, at positions 0 to {model.n_inputs - 1}."
     )
+
+
+def spread_points(low, high, n_points, most_inputs):
+    """Rows of a box: ``n_points`` all over it, and of so few inputs all its corners."""
+    unit = qmc.Halton(low.size, scramble=False).random(n_points)
+    if low.size <= most_inputs:
+        unit = np.vstack([np.indices((2,) * low.size).reshape(low.size, -1).T, unit])
+    return np.clip(low + unit * (high - low), low, high)

@@ -5,18 +5,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from ..model import TSKModel
-from .box import held_box, input_index, read_box
+from .box import held_box, input_index, read_box, spread_points
 from .enclosure import Enclosure
 from .search import largest
 from .terms import is_known
 
 __all__ = ["Bounds", "bounds", "cuts_of", "gradient_bounds", "monotonicity"]
 
-# Rows that are looked at first: all corners, of so few inputs, and some between. They cost less
-# than a batch of boxes, and the better the first answer, the more boxes need no look.
+# Rows that are looked at first: all corners, of so few inputs, and some between.
 _CORNERS = 6
 _POINTS = 512
 # Of slopes, the strip beyond the edge in which they are zero, as part of the range.
@@ -32,12 +30,9 @@ class Bounds:
     lower, upper : ndarray of shape (n_outputs,)
         Nothing in the box is below, or above.
     lowest, highest : ndarray of shape (n_outputs,)
-        Values that are taken in the box: the true extremes lie between ``lower`` and ``lowest``,
-        and between ``highest`` and ``upper``.
+        Values that are taken in the box, next to these.
     at_lowest, at_highest : ndarray of shape (n_outputs, n_inputs)
-        Where these are taken.
     box : ndarray of shape (n_inputs, 2)
-        Of the inputs, low and high.
     n_boxes : int
         Boxes that were looked at.
     converged : bool
@@ -96,23 +91,19 @@ def bounds(
 ) -> Bounds:
     """Enclose every prediction of a model over a box of inputs, provably.
 
-    By interval arithmetic on the rules, refined by branch and bound, with room for every rounding
-    error. The bounds are of the model; they say nothing of how far it is from the truth.
+    The bounds are of the model, rounding included; :doc:`/bounds` has the proof.
 
     Parameters
     ----------
     model : fitted estimator or TSKModel
-        An ANFIS estimator, or a Pipeline of scalers that ends in one, a TransformedTargetRegressor
-        or a search over these, as :func:`~skanfis.export.export_c` takes them.
+        An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search around one.
     box : array-like of shape (n_inputs, 2) or dict, default=None
-        Low and high of every input, in the units of X; or {name: (low, high)}, the other inputs in
-        the range of the training data. None is that range. Ends may be infinite, but with an
-        infinite ``max_extrapolation``.
+        Low and high of every input, in the units of X, or {name: (low, high)}; ends may be
+        infinite. Others, and None, have the range of the training data.
     tol : float, default=0.01
-        How far bounds and values that are taken may be apart, as part of the range of the output in
-        the box (of slopes: of the largest absolute one); zero or positive.
+        How far bounds and values that are taken may be apart, relative to the output's range.
     max_boxes : int, default=200_000
-        Boxes to look at for each bound, at the most; 1 or more. The bounds hold wherever this ends.
+        Boxes to look at for each bound, at the most. The bounds hold wherever this ends.
 
     Returns
     -------
@@ -122,8 +113,7 @@ def bounds(
     Raises
     ------
     ValueError
-        If the box is none; if nothing bounds the model on it; if a family of memberships is not
-        one of the package, whose ranges are known.
+        If the box is none, nothing bounds the model on it, or its memberships are not skanfis's.
 
     Examples
     --------
@@ -137,13 +127,13 @@ def bounds(
     """
     model, box = _checked(model, box, tol, max_boxes)
     low, high = held_box(box, model)
-    found = []
-    for k in range(model.n_outputs):
+
+    def sides_of(k, X):
         below, above = (Enclosure(model, k, sign) for sign in (-1.0, 1.0))
-        values = above.predict(_first_points(low, high))
-        sides = (below.values, -values), (above.values, values)
-        found.append(_enclosed(model, low, high, sides, tol * float(np.ptp(values)), max_boxes))
-    return _gathered(found, box, model, model.output_names)
+        values = above.predict(X)
+        return float(np.ptp(values)), ((below.values, -values), (above.values, values))
+
+    return _enclosed(model, box, low, high, sides_of, tol, max_boxes, model.output_names)
 
 
 def gradient_bounds(
@@ -156,8 +146,7 @@ def gradient_bounds(
 ) -> Bounds:
     """Enclose the slope of the predictions by one input over a box of inputs, provably.
 
-    Beyond the range of the training data it is the slope of what the model predicts there: of the
-    tangent, and zero where the value is held. Where it jumps the slopes from all sides count.
+    Out of range it is the slope of the policy; where it jumps the slopes from all sides count.
 
     Parameters
     ----------
@@ -166,18 +155,14 @@ def gradient_bounds(
         The input, by name or position.
     box : array-like of shape (n_inputs, 2) or dict, default=None
     tol : float, default=0.01
+        Relative to the largest absolute slope.
     max_boxes : int, default=200_000
-        As in :func:`bounds`.
+        The others as in :func:`bounds`.
 
     Returns
     -------
     bounds : Bounds
         Of the slope, in units of the output per unit of the input.
-
-    Raises
-    ------
-    ValueError
-        As :func:`bounds` does; if ``feature`` is no input.
 
     Examples
     --------
@@ -185,22 +170,21 @@ def gradient_bounds(
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.bounds import gradient_bounds
     >>> x = np.linspace(-1.0, 1.0, 200)[:, None]
-    >>> model = ANFISRegressor(n_mfs=3).fit(x, np.tanh(2.0 * x[:, 0]))
-    >>> slope = gradient_bounds(model, "x0")
+    >>> slope = gradient_bounds(ANFISRegressor(n_mfs=3).fit(x, np.tanh(2.0 * x[:, 0])), "x0")
     >>> bool(slope.lower[0] > 0.0 and slope.upper[0] < 2.2)
     True
     """
     model, box = _checked(model, box, tol, max_boxes)
     j = input_index(feature, model, "feature")
     low, high = held_box(box, model, _BEYOND)
-    X, found = _first_points(low, high).T, []
-    for k in range(model.n_outputs):
-        slopes = [_slope_of(model, k, sign, j) for sign in (-1.0, 1.0)]
-        sides = [(slope, slope(X, X)[2]) for slope in slopes]
-        largest_slope = float(np.max(np.abs([values for _, values in sides])))
-        found.append(_enclosed(model, low, high, sides, tol * largest_slope, max_boxes))
-    name = model.input_names[j]
-    return _gathered(found, box, model, tuple(f"d {y} / d {name}" for y in model.output_names))
+
+    def sides_of(k, X):
+        slopes = [Enclosure(model, k, sign).slope_by(j) for sign in (-1.0, 1.0)]
+        sides = [(slope, slope(X.T, X.T)[2]) for slope in slopes]
+        return max(float(np.abs(values).max()) for _, values in sides), sides
+
+    names = tuple(f"d {y} / d {model.input_names[j]}" for y in model.output_names)
+    return _enclosed(model, box, low, high, sides_of, tol, max_boxes, names)
 
 
 def monotonicity(
@@ -216,21 +200,14 @@ def monotonicity(
     ----------
     model : fitted estimator or TSKModel
     feature : str or int
-        The input, by name or position.
     box : array-like of shape (n_inputs, 2) or dict, default=None
     max_boxes : int, default=200_000
-        As in :func:`bounds`.
+        As in :func:`gradient_bounds`.
 
     Returns
     -------
     sign : ndarray of int of shape (n_outputs,)
-        1: no prediction falls as the input rises, all else held; -1: none rises; 0: neither has
-        been proven: it is not so, or by less than rounding errors, or takes more boxes.
-
-    Raises
-    ------
-    ValueError
-        As :func:`gradient_bounds` does.
+        1: no prediction falls as the input rises; -1: none rises; 0: neither has been proven.
 
     Examples
     --------
@@ -238,8 +215,7 @@ def monotonicity(
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.bounds import monotonicity
     >>> x = np.linspace(-1.0, 1.0, 200)[:, None]
-    >>> model = ANFISRegressor(n_mfs=3).fit(x, np.tanh(2.0 * x[:, 0]))
-    >>> monotonicity(model, "x0")
+    >>> monotonicity(ANFISRegressor(n_mfs=3).fit(x, np.tanh(2.0 * x[:, 0])), "x0")
     array([1])
     """
     model, box = _checked(model, box, 0.0, max_boxes)
@@ -248,7 +224,7 @@ def monotonicity(
     signs = np.zeros(model.n_outputs, dtype=int)
     for k in range(model.n_outputs):
         for sign in (1, -1):
-            slope = _slope_of(model, k, -float(sign), j)
+            slope = Enclosure(model, k, -float(sign)).slope_by(j)
             found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
             if found.bound <= 0.0:
                 signs[k] = sign
@@ -261,32 +237,38 @@ def cuts_of(model):
     return np.stack([model.minimum, model.maximum], axis=1)
 
 
-def _enclosed(model, low, high, sides, tolerance, max_boxes):
-    """What is found of the lower and the upper side of an output, on a box.
-
-    ``sides`` has for both what bounds it on boxes, and its values at the first points.
-    """
-    X, ends = _first_points(low, high), []
-    for evaluate, values in sides:
-        top = int(values.argmax())
-        point = X[top][:, None]
-        bound, _, attained, _ = evaluate(point, point)
-        # Bound and value are apart by rounding, beneath which no bound can go.
-        least = max(tolerance, 8.0 * float(bound[0] - attained[0]))
-        start = X[top], float(values[top])
-        ends.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), start))
-    return ends
-
-
-def _slope_of(model, output, sign, j):
-    enclosure = Enclosure(model, output, sign)
-    return lambda low, high: enclosure.slope(low, high, j)
+def _enclosed(model, box, low, high, sides_of, tol, max_boxes, names):
+    """Bounds; ``sides_of`` gives the scale of ``tol``, and by side what bounds it, and values."""
+    X, found = spread_points(low, high, _POINTS, _CORNERS), []
+    for k in range(model.n_outputs):
+        scale, sides = sides_of(k, X)
+        for evaluate, values in sides:
+            top = int(values.argmax())
+            point = X[top][:, None]
+            bound, _, attained, _ = evaluate(point, point)
+            # Bound and value are apart by rounding, beneath which no bound can go.
+            least = max(tol * scale, 8.0 * float(bound[0] - attained[0]))
+            start = X[top], float(values[top])
+            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), start))
+    below, above = found[::2], found[1::2]
+    return Bounds(
+        lower=np.array([-one.bound for one in below]),
+        upper=np.array([one.bound for one in above]),
+        lowest=np.array([-one.attained for one in below]),
+        highest=np.array([one.attained for one in above]),
+        at_lowest=np.array([one.point for one in below]),
+        at_highest=np.array([one.point for one in above]),
+        box=box,
+        n_boxes=sum(one.n_boxes for one in found),
+        converged=all(one.converged for one in found),
+        input_names=model.input_names,
+        output_names=names,
+    )
 
 
 def _checked(model, box, tol, max_boxes):
     """The frozen model in the user's units, and the box."""
     if not isinstance(model, TSKModel):
-        # What reads estimators stands above the models that training proves things of.
         from ..export import fold
 
         model = fold(model)
@@ -301,29 +283,3 @@ def _checked(model, box, tol, max_boxes):
     if not (np.ndim(max_boxes) == 0 and max_boxes >= 1):
         raise ValueError(f"max_boxes={max_boxes!r} must be 1 or more.")
     return model, read_box(box, model)
-
-
-def _first_points(low, high):
-    """Rows of the box to begin with."""
-    unit = qmc.Halton(low.size, scramble=False).random(_POINTS)
-    if low.size <= _CORNERS:
-        corners = np.indices((2,) * low.size).reshape(low.size, -1).T
-        unit = np.vstack([corners, unit])
-    return np.clip(low + unit * (high - low), low, high)
-
-
-def _gathered(found, box, model, output_names):
-    lowest, highest = (tuple(ends[side] for ends in found) for side in (0, 1))
-    return Bounds(
-        lower=np.array([-one.bound for one in lowest]),
-        upper=np.array([one.bound for one in highest]),
-        lowest=np.array([-one.attained for one in lowest]),
-        highest=np.array([one.attained for one in highest]),
-        at_lowest=np.array([one.point for one in lowest]),
-        at_highest=np.array([one.point for one in highest]),
-        box=box,
-        n_boxes=sum(one.n_boxes for ends in found for one in ends),
-        converged=all(one.converged for ends in found for one in ends),
-        input_names=model.input_names,
-        output_names=output_names,
-    )

@@ -1,43 +1,18 @@
-r"""What a model's output, and its slopes, can be on a box.
+r"""What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
 
-With w the normalised strengths, f_r the consequents, b_rj and a_rj the slopes of f_r and of rule
-r's log-strength along input j, and D_rj = a_rj - sum_s w_s a_sj,
+With E the mean over rules by their strengths, b_rj and a_rj the slopes of consequent f_r and of
+rule r's log-strength, c_rj its curvature, D_rj = a_rj - E a_j and phi whatever all rules share,
 
     g = E f ,    d g / dx_j = E [ b_j + D_j (f - phi) ] ,
+    d^2 g / dx_i dx_j = E [ D_i b_j + D_j b_i + (D_i D_j + [i = j] c_j) (f - g) ] .
 
-    d^2 g / dx_i dx_j = E [ D_i b_j + D_j b_i + (D_i D_j + [i = j] c_j) (f - g) ] ,
-
-with c_rj the second derivative of rule r's log-strength along j,
-where E is the mean over rules with weights w and phi any function of x that is the same for all
-rules, because E D_j = 0: the line that they have in common is taken. Of a grid it may even differ
-with the terms on all other inputs. All of it is enclosed by intervals of f - phi and D and the
-means of ``shares``. Out of the training data, with c the
-nearest point of their box and h the way followed beyond it (see ``model``), the prediction is
-
-    P = g(c) + sum_j h_j dg/dx_j(c) = E [ f + sum_j h_j (b_j + D_j (f - phi)) ] ,
-
-    dP/dx_i = dg/dx_i + sum over j != i of h_j d^2 g / dx_i dx_j    where x_i is in its range,
-            = dg/dx_i where it is beyond, as far as the tangent is followed, and 0 from there on.
-
-c and h are monotone in x, each in its own input: on a box they are intervals. The prediction then
-lies below its mean above, and, by the mean value theorem, below
-
-    P(p) + sum_j max over x_j of (dP/dx_j) (x_j - p_j)
-
-for any p in the box; the p taken is that of the least bound (Baumann 1988), a corner where P is
-monotone. P is piecewise smooth: a slope is the hull of those from all sides.
-
-Bounds are of what is computed: to each is added what computing it, and computing the prediction,
-can be off by. With delta_r the error of log w_r, R rules and n inputs, that is of g at the most
-
-    2 sum_r w_r delta_r |f_r - phi|  +  (32 + R + n) eps max_r F_r ,
-
-    F_r = |a_r| + sum_j |b_rj| (|x_j| + |x0_j|) ,
-
-for an error of the strengths moves f_r against the mean.
+Out of range, with c the nearest point in it and h the way followed beyond, the prediction is
+P = g(c) + sum_j h_j dg/dx_j(c). On a box c and h are intervals. P lies below its mean above, and
+below P(p) + sum_j max (dP/dx_j) (x_j - p_j). What rounding may add is added to each bound.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import prod
 
 import numpy as np
@@ -80,6 +55,7 @@ class Enclosure:
         self.model, self.output, self.sign = model, output, sign
         self.factors = factors(model.antecedent)
         self.counts = model.antecedent.share_counts if self.factors else (1,)
+        self.axes = tuple(range(len(self.counts)))
         coefficients = sign * model.coefficients[:, :, output]
         self.height = coefficients[:, :1]
         self.slopes = np.zeros((model.n_rules, model.n_inputs))
@@ -105,41 +81,37 @@ class Enclosure:
         return np.clip(values, self.lowest, self.highest)
 
     def values(self, low, high):
-        """Bounds of the output on boxes (n_inputs, n_boxes) that nothing in them is above.
+        """Upper bounds on boxes (n_inputs, n_boxes), a point in each, and the output there.
 
-        Then a point in each, (n_inputs, n_boxes), the output there, and what splitting the box
-        along each input promises, (n_inputs, n_boxes).
+        Then what splitting along each input promises, (n_inputs, n_boxes).
         """
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
             natural = largest_mean(self._continued(parts), parts.shares) + parts.slack
             down, up = self._slopes(parts, low, high, range(low.shape[0]))
-            points = _best_centres(down, up, low, high)
+            points, rise = _best_centres(down, up, low, high)
             attained = self.say(points.T)
-            rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
-            rounded_up = 1.0 + EPS * (ROUNDINGS + low.shape[0])
-            by_slopes = attained + rise.sum(axis=0) * rounded_up + 2.0 * parts.slack
+            by_slopes = attained + rise + 2.0 * parts.slack
             bound = np.fmin(np.where(np.isnan(natural), np.inf, natural), by_slopes)
             gain = (up - down) * (high - low)
         return self.hold(bound), points, self.hold(attained), gain
 
-    def slope(self, low, high, j):
-        """Bounds of dP/dx_j on boxes; what is returned is as of :meth:`values`.
+    def slope_by(self, j):
+        """What bounds dP/dx_j on boxes, with returns as of :meth:`values`."""
+        return partial(self.slope, j=j)
 
-        What is attained is so at the boxes' middles, in the limit where a slope jumps there.
-        """
+    def slope(self, low, high, j):
+        """Bounds of dP/dx_j; what is attained is so at a point, in the limit where it jumps."""
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
             natural = self._slopes(parts, low, high, [j])[1][0]
             bends = [self._mixed(parts, i, j) for i in range(len(low))]
             down, up = np.stack([b[0] for b in bends]), np.stack([b[1] for b in bends])
-            points = _best_centres(down, up, low, high)
+            points, rise = _best_centres(down, up, low, high)
             least, most = self._slopes(self._parts(points, points), points, points, [j])
-            rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
-            by_bends = most[0] + rise.sum(axis=0) * (1.0 + EPS * (ROUNDINGS + low.shape[0]))
             # Beyond the range the tangent's own slope changes by what is not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
-            by_bends = np.where(inside.all(axis=0), by_bends, np.inf)
+            by_bends = np.where(inside.all(axis=0), most[0] + rise, np.inf)
             gain = np.where(np.isfinite(by_bends), up - down, self._gain_of_slope(parts, j))
             bound = np.fmin(natural, by_bends)
             # Where the output may be held its slope may be zero.
@@ -158,10 +130,10 @@ class Enclosure:
 
     def _gain_of_slope(self, parts, j):
         """About how much of the range of dP/dx_j goes with each input's width, (n_inputs, n)."""
-        strength, axes = self._largest_strengths(parts), tuple(range(len(self.counts)))
-        tangent, gain = size(self._tangent(parts, j)), np.zeros_like(parts.half)
+        strength, gain = self._largest_strengths(parts), np.zeros_like(parts.half)
+        tangent = size(self._tangent(parts, j))
         for i, ends in parts.departure.items():
-            gain[i] += (strength * size(ends) * tangent).sum(axis=axes)
+            gain[i] += (strength * size(ends) * tangent).sum(axis=self.axes)
         return gain
 
     def _largest_strengths(self, parts):
@@ -172,8 +144,9 @@ class Enclosure:
 
     def _parts(self, low, high):
         model = self.model
-        near, far = self._held(low), self._held(high)
-        way = self._way(low, near), self._way(high, far)
+        edges, reach = (model.minimum[:, None], model.maximum[:, None]), self.reach[:, None]
+        near, far = np.clip(low, *edges), np.clip(high, *edges)
+        way = np.clip(low - near, -reach, reach), np.clip(high - far, -reach, reach)
         middle, half = 0.5 * (near + far), 0.5 * (far - near) * (1.0 + 4.0 * EPS)
         terms = term_ranges(model.antecedent, near, far)
         log_mu = model.antecedent.log_memberships(middle)
@@ -204,22 +177,13 @@ class Enclosure:
         for place, one in enumerate(parts.shares):
             error = self._placed(np.fmin(one.error, 1.0), place)
             moved += 2.0 * strength * error * size(self._centred(parts, place))
-        axes = tuple(range(len(self.counts)))
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
-            slopes[j] += part * (strength * size(ends)).sum(axis=axes) * largest
-            slopes[j] += 2.0 * (size(ends) * moved).sum(axis=axes)
+            slopes[j] += part * (strength * size(ends)).sum(axis=self.axes) * largest
+            slopes[j] += 2.0 * (size(ends) * moved).sum(axis=self.axes)
         ahead = size(parts.way)
         beyond = np.where(ahead > 0.0, ahead * slopes, 0.0).sum(axis=0)
-        return moved.sum(axis=axes) + part * largest + beyond, slopes
-
-    def _held(self, x):
-        """The nearest place in the range of the training data."""
-        return np.clip(x, self.model.minimum[:, None], self.model.maximum[:, None])
-
-    def _way(self, x, inside):
-        reach = self.reach[:, None]
-        return np.clip(x - inside, -reach, reach)
+        return moved.sum(axis=self.axes) + part * largest + beyond, slopes
 
     def _shaped(self, by_rule):
         return by_rule.reshape(*self.counts, by_rule.shape[1])
@@ -241,20 +205,12 @@ class Enclosure:
     def _centred(self, parts, *places):
         """Range of f less its means along the axes of these factors, at the middle's shares."""
         if places not in parts.known:
-            parts.known[places] = self._found_centred(parts, places)
+            middle, radius = self._less_means(parts, parts.middle, places), 0.0
+            for i in np.flatnonzero(self.slopes.any(axis=0)):
+                own = self._less_means(parts, self._shaped(self.slopes[:, i, None]), places)
+                radius = radius + np.abs(own) * parts.half[i]
+            parts.known[places] = middle - radius, middle + radius
         return parts.known[places]
-
-    def _centred_slopes(self, parts, j, *places):
-        """Slopes of the consequents by input j less their means along the axes of these factors."""
-        return self._less_means(parts, self._shaped(self.slopes[:, j, None]), places)
-
-    def _found_centred(self, parts, places):
-        middle = self._less_means(parts, parts.middle, places)
-        radius = 0.0
-        for i in np.flatnonzero(self.slopes.any(axis=0)):
-            own = self._centred_slopes(parts, i, *places)
-            radius = radius + np.abs(own) * parts.half[i]
-        return middle - radius, middle + radius
 
     def _less_means(self, parts, values, places):
         for place in places:
@@ -285,41 +241,38 @@ class Enclosure:
 
     def _slopes(self, parts, low, high, wanted):
         """Range of dP/dx_i for the inputs wanted, (n_wanted, n_boxes) each."""
-        model, found = self.model, []
-        outside = self._ways_out(parts)
+        model, outside = self.model, self._ways_out(parts)
+        downs, ups = [], []
         for i in wanted:
             ends = self._tangent(parts, i)
-            down, up = smallest_mean(ends[0], parts.shares), largest_mean(ends[1], parts.shares)
-            down, up = down - parts.slope_slack[i], up + parts.slope_slack[i]
-            beyond_down, beyond_up = down, up
+            beyond_down = smallest_mean(ends[0], parts.shares) - parts.slope_slack[i]
+            beyond_up = largest_mean(ends[1], parts.shares) + parts.slope_slack[i]
+            down, up = beyond_down, beyond_up
             for j in outside[outside != i]:
                 ahead = parts.way[0][j], parts.way[1][j]
                 least, most = product(ahead, self._mixed(parts, i, j))
                 down, up = down + least, up + most
             goes_in = (low[i] <= model.maximum[i]) & (high[i] >= model.minimum[i])
             goes_out = (low[i] < model.minimum[i]) | (high[i] > model.maximum[i])
-            down = np.where(goes_in, down, np.inf)
-            up = np.where(goes_in, up, -np.inf)
+            down, up = np.where(goes_in, down, np.inf), np.where(goes_in, up, -np.inf)
             down = np.where(goes_out, np.minimum(down, beyond_down), down)
             up = np.where(goes_out, np.maximum(up, beyond_up), up)
-            ends = model.minimum[i] - self.reach[i], model.maximum[i] + self.reach[i]
-            ends_here = (low[i] < ends[0]) | (high[i] > ends[1])
-            down = np.where(ends_here, np.minimum(down, 0.0), down)
-            up = np.where(ends_here, np.maximum(up, 0.0), up)
-            is_held = (high[i] < ends[0]) | (low[i] > ends[1])
-            down, up = np.where(is_held, 0.0, down), np.where(is_held, 0.0, up)
-            found.append(
-                (np.where(np.isnan(down), -np.inf, down), np.where(np.isnan(up), np.inf, up))
-            )
-        down, up = zip(*found, strict=True)
-        return np.stack(down), np.stack(up)
+            first, last = model.minimum[i] - self.reach[i], model.maximum[i] + self.reach[i]
+            ends_here = (low[i] < first) | (high[i] > last)
+            is_held = (high[i] < first) | (low[i] > last)
+            down = np.where(is_held, 0.0, np.where(ends_here, np.minimum(down, 0.0), down))
+            up = np.where(is_held, 0.0, np.where(ends_here, np.maximum(up, 0.0), up))
+            downs.append(np.where(np.isnan(down), -np.inf, down))
+            ups.append(np.where(np.isnan(up), np.inf, up))
+        return np.stack(downs), np.stack(ups)
 
     def _mixed(self, parts, i, j):
         """Range of the second derivative by two inputs, or twice by one."""
         low, high = np.zeros((2, *parts.value[0].shape))
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
-                own = self._centred_slopes(parts, other, self.place[one])
+                own = self._shaped(self.slopes[:, other, None])
+                own = self._less_means(parts, own, [self.place[one]])
                 least, most = product(parts.departure[one], (own, own))
                 low, high = low + least, high + most
         if i in parts.departure and j in parts.departure:
@@ -332,17 +285,17 @@ class Enclosure:
                 both = tuple(a + c for a, c in zip(both, parts.curvature[i], strict=True))
             least, most = product(both, off)
             low, high = low + least, high + most
-        largest = size((low, high)).max(axis=tuple(range(low.ndim - 1)))
+        largest = size((low, high)).max(axis=self.axes)
         slack = EPS * ROUNDINGS * prod(self.counts) * largest
-        return (
-            smallest_mean(low, parts.shares) - slack,
-            largest_mean(high, parts.shares) + slack,
-        )
+        low, high = smallest_mean(low, parts.shares), largest_mean(high, parts.shares)
+        return low - slack, high + slack
 
 
 def _best_centres(down, up, low, high):
-    """The points from which slopes give the least upper bound, in the boxes."""
+    """The points from which slopes give the least upper bound, and how far this is above them."""
     between = (up * high - down * low) / (up - down)
     points = np.where(down >= 0.0, high, np.where(up <= 0.0, low, between))
     points = np.where(np.isfinite(points), points, 0.5 * (low + high))
-    return np.clip(points, low, high)
+    points = np.clip(points, low, high)
+    rise = np.maximum(np.maximum(up * (high - points), down * (low - points)), 0.0)
+    return points, rise.sum(axis=0) * (1.0 + EPS * (ROUNDINGS + low.shape[0]))

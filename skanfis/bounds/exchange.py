@@ -1,26 +1,20 @@
-r"""Constraints held at points, and proven between them: points are added until the proof succeeds.
+"""Constraints held at points, and proven between them: points are added until the proof succeeds.
 
-That an output rises with an input, or stays below a limit, is a linear constraint on the
-consequents at every point of a continuum. It is held at some points, with a margin; violations are
-sought, in a sample first and then by branch and bound; their places are added, until the bounds
-prove that there is none (exchange, as in Remez's and in cutting-plane methods). Where a proof takes
-too many boxes, the margin is raised.
-
-The premises stay as they were learnt without the constraints. The promise is of the range of the
-training data, and so, where predictions are held at its edge, of all inputs; along a tangent it
-would cost too much, for two tangents at a corner add up to slopes that no data have asked for.
+Constraints are held at some points, with a margin; violations are sought in a sample, then by
+branch and bound, and their places added. Where a proof takes too many boxes the margin is raised.
+Premises stay. The promise is of the range of the training data; docs/bounds.rst has more.
 """
 
 from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtri
-from scipy.stats import qmc
 from sklearn.exceptions import ConvergenceWarning
 
 from .._validation import warn_user
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..model import TSKModel
+from .box import spread_points
 from .certified import cuts_of
 from .constraints import Constraints
 from .enclosure import Enclosure
@@ -35,8 +29,7 @@ __all__ = ["constrained"]
 _FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.03, 3.0
 # A bound on time: what is not proven by then is said not to be. One proof takes a second.
 _MOST_ROUNDS, _MOST_BOXES = 40, 30_000
-# A sample is looked at in milliseconds; each point of a round is a row of the quadratic program
-# from there on, so that half of them are the worst, and half are spread over the others.
+# Of each round half of the points are the worst, and half are spread over the others.
 _SAMPLE, _POINTS_A_ROUND = 2048, 40
 # That data which keep the constraints are said to contradict them.
 _CHANCE = 1e-3
@@ -47,14 +40,8 @@ _CORNERS = 8
 def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, in_user_units):
     """The consequents nearest to those of an evaluation that keep all constraints.
 
-    ``model`` is that of ``evaluation`` in the user's units, ``in_user_units`` makes coefficients of
-    a TSKModel from those on [1, z]. Gives the evaluation with its new coefficients, a report (a
-    dict), and a :class:`Solved`.
-
-    Raises
-    ------
-    InfeasibleConstraintsError
-        If no consequents keep the constraints; it says which.
+    ``model`` is in the user's units, ``in_user_units`` brings coefficients on [1, z] to them. Gives
+    the evaluation with its new coefficients, a report (a dict), and a :class:`Solved`.
     """
     exchange = _Exchange(model, problem, constraints, in_user_units)
     solved, is_proven = exchange.proven(evaluation)
@@ -62,7 +49,14 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         # A margin that does not help is not paid for.
         exchange.points.margin = _FIRST_MARGIN
         solved = exchange.on_sample(evaluation)
-        exchange.warn_that_nothing_is_proven()
+        names = ", ".join(one.name for one in exchange.inequalities)
+        why = "" if exchange.is_known else ": the ranges of its memberships are not known"
+        warn_user(
+            f"Not proven to hold everywhere{why}: {names}. It holds on the training data and a "
+            f"sample of {_SAMPLE} points. Use fewer rules, or Gaussian terms; see "
+            "skanfis.bounds.",
+            ConvergenceWarning,
+        )
     normal, local = evaluation.normal, solved.local
     error = 2.0 * solved.cost - float(np.sum(local * (normal.penalty @ local)))
     ended = replace(
@@ -93,13 +87,9 @@ class _Exchange:
         self.points = HeldPoints(free, problem, constraints, _FIRST_MARGIN)
         self.inequalities = self.points.inequalities
         self.is_known = all(is_known(group.family) for group in model.antecedent.groups)
-        low, high = model.minimum, model.maximum
         rows = problem.rows.sample or problem.rows
-        unit = qmc.Halton(low.size, scramble=False).random(_SAMPLE)
-        parts = [low + unit * (high - low), rows.X[:: max(rows.n_rows // _SAMPLE, 1)]]
-        if low.size <= _CORNERS:
-            corners = np.indices((2,) * low.size).reshape(low.size, -1).T
-            parts.append(np.where(corners == 1, high, low))
+        spread = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
+        parts = [spread, rows.X[:: max(rows.n_rows // _SAMPLE, 1)]]
         # A row that is there twice is asked about once.
         self.sample = np.unique(np.vstack(parts), axis=0)
 
@@ -129,22 +119,9 @@ class _Exchange:
             self.points.margin *= _RAISE
         return self._solve(evaluation), False
 
-    def warn_that_nothing_is_proven(self):
-        names = ", ".join(one.name for one in self.inequalities)
-        why = "" if self.is_known else ": the ranges of its memberships are not known"
-        warn_user(
-            f"Not proven to hold everywhere{why}: {names}. It holds on the training data and a "
-            f"sample of {_SAMPLE} points. Use fewer rules, or Gaussian terms; see "
-            "skanfis.bounds.",
-            ConvergenceWarning,
-        )
-
     def warn_of_contradictions(self, evaluation, solved, ended):
-        """Warn where less than one fit in a thousand to such data would have to give up so much.
-
-        What is paid is half a Mahalanobis distance, over sigma^2 / n, in the posterior of the
-        consequents: of so many active points, its tail is no heavier than that of chi-squared.
-        """
+        """Warn where less than one fit in a thousand to such data would have to give up so much."""
+        # What is paid is half a Mahalanobis distance, over sigma^2 / n, in the posterior.
         n_rows, scale = self.problem.rows.total_weight, self.problem.rows.targets.scale
         posterior = self.model.posterior
         for k, name in enumerate(self.model.output_names):
@@ -175,20 +152,18 @@ class _Exchange:
         return any(map(len, worst))
 
     def _solve(self, evaluation):
+        """The nearest consequents, or an error that says which constraints cannot be kept."""
         try:
             return self.points.solve(evaluation)
-        except InfeasibleError as failure:
-            return self._refuse_constraints_of(failure, evaluation)
-
-    def _refuse_constraints_of(self, failure, evaluation):
-        """Say which constraints cannot be kept."""
+        except InfeasibleError as error:
+            failure = error
         if failure.by_equalities:
             n_points = len(self.points.constraints.points)
             raise InfeasibleConstraintsError(
                 f"constraints fixes {self.model.output_names[failure.output]!r} at {n_points} "
                 f"points, which {self.model.n_rules} rules cannot all meet: two are the same, or "
                 "there are more than consequents. Give fewer points, or use more rules."
-            ) from None
+            )
         own = [p for p, one in enumerate(self.inequalities) if one.output == failure.output]
         guilty = []
         for p in own:
@@ -207,7 +182,7 @@ class _Exchange:
         raise InfeasibleConstraintsError(
             f"No consequents of these {self.model.n_rules} rules keep {names}{with_points} all at "
             "once. Drop one of them, or use order=1 or more rules."
-        ) from None
+        )
 
     def _model(self, evaluation, solved):
         inputs = self.problem.rows.inputs
@@ -233,28 +208,25 @@ class _Exchange:
         """Points of violation of every inequality, and whether a proof ran out of boxes."""
         worst, is_undecided = [], False
         for one in self.inequalities:
-            if one.input is not None and _is_constant(model, one.output):
-                # Its slopes are nothing but rounding, which no bound is below.
+            told = model.coefficients[:, :, one.output]
+            if one.input is not None and not told[:, 1:].any() and not np.ptp(told[:, 0]):
+                # Slopes of a constant are nothing but rounding, which no bound is below.
                 worst.append(self.sample[:0])
                 continue
             enclosure = Enclosure(model, one.output, -one.sign)
+            bound_of = enclosure.values if one.input is None else enclosure.slope_by(one.input)
             until = -one.sign * one.limit
-            places: list[np.ndarray] = []
-            values: list[np.ndarray] = []
+            seen: list[tuple] = []
 
-            def evaluate(low, high, one=one, enclosure=enclosure, places=places, values=values):
-                if one.input is None:
-                    found = enclosure.values(low, high)
-                else:
-                    found = enclosure.slope(low, high, one.input)
-                places.append(found[1].T)
-                values.append(found[2])
-                return found
+            def evaluate(low, high, bound_of=bound_of, seen=seen):
+                seen.append(bound_of(low, high))
+                return seen[-1]
 
             low, high = model.minimum, model.maximum
             found = largest(evaluate, low, high, 0.0, _MOST_BOXES, cuts_of(model), until=until)
             self.n_boxes += found.n_boxes
-            worst.append(_worst(np.vstack(places), np.concatenate(values), until))
+            places = np.hstack([one[1] for one in seen]).T
+            worst.append(_worst(places, np.concatenate([one[2] for one in seen]), until))
             is_undecided |= found.bound > until and not len(worst[-1])
         return worst, is_undecided
 
@@ -266,9 +238,3 @@ def _worst(points, excess, above):
     half = _POINTS_A_ROUND // 2
     others = worst[half:][:: max((worst.size - half) // half, 1)][:half]
     return points[np.concatenate([worst[:half], others])]
-
-
-def _is_constant(model, output):
-    """Whether all rules say the same, whatever the row."""
-    coefficients = model.coefficients[:, :, output]
-    return not coefficients[:, 1:].any() and not np.ptp(coefficients[:, 0])

@@ -49,41 +49,25 @@ def inequalities_of(constraints: Constraints, model: TSKModel):
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Consequents that keep what is held, at some premises.
+    """Consequents that keep what is held, at some premises."""
 
-    ``local`` is (n_columns, n_outputs), ``cost`` that with them, the penalty included, and ``paid``
-    how much of it each output pays. ``known`` has for every output what is met with equality:
-    points in the user's units, and those that a slope begins at, or None. ``active`` is how many
-    points of each inequality are met so.
-    """
-
-    local: np.ndarray
-    cost: float
-    paid: np.ndarray
-    known: tuple
-    active: np.ndarray
+    local: np.ndarray  # (n_columns, n_outputs)
+    cost: float  # with them, the penalty included
+    paid: np.ndarray  # how much of it each output pays
+    known: tuple  # by output, what is met with equality: points, and where a slope begins or None
+    active: np.ndarray  # how many points of each inequality are met so
 
 
 class HeldPoints:
-    """Points at which inequalities are held, and the consequents that do so at any premises.
-
-    ``model`` is in the user's units: its range is where inequalities are held, its policy says what
-    it predicts at fixed points beyond. They are held by ``margin``, in standard deviations of the
-    target (and of the input).
-    """
+    """Points at which inequalities are held by a margin, and the consequents that do so."""
 
     def __init__(self, model: TSKModel, problem, constraints: Constraints, margin: float):
         self.model, self.problem, self.constraints = model, problem, constraints
-        self._check_points()
         self.inequalities, self.margin = inequalities_of(constraints, model), margin
         # Of each, points in standardised inputs: where a slope ends, and where it begins.
         nothing = np.empty((0, model.n_inputs))
         self.after, self.before = ([nothing] * len(self.inequalities) for _ in range(2))
-
-    def _check_points(self):
-        """Raise ValueError where a value is asked for and nothing is predicted."""
-        model, points = self.model, self.constraints.points
-        beyond = points[~model.in_bounds(points)]
+        beyond = constraints.points[~model.in_bounds(constraints.points)]
         if len(beyond) and model.out_of_bounds in SILENT:
             raise ValueError(
                 f"constraints has a FixedPoint at {beyond[0]}, where a model with "
@@ -103,10 +87,7 @@ class HeldPoints:
         return (X - inputs.offset) / inputs.scale
 
     def steps(self, X, j):
-        """A small step along j at each point, to both sides of it: a slope may jump there.
-
-        The points before and after, in the range, and the step.
-        """
+        """Points before and after a small step along j, to both sides of each; and the step."""
         step = _STEP * self.model.spread[j]
         low, high = self.model.minimum[j], self.model.maximum[j] - step
         before = np.repeat(X, 2, axis=0)
@@ -118,12 +99,8 @@ class HeldPoints:
 
     def hold(self, place, X):
         """Hold an inequality at these points too."""
-        if not len(X):
-            return
         j = self.inequalities[place].input
-        before, after = X[:0], X
-        if j is not None:
-            before, after, _ = self.steps(X, j)
+        before, after = (X[:0], X) if j is None else self.steps(X, j)[:2]
         self.after[place] = np.vstack([self.after[place], self.standardised(after)])
         self.before[place] = np.vstack([self.before[place], self.standardised(before)])
 
@@ -220,5 +197,4 @@ class HeldPoints:
         """Rows (n, n_columns) by local coefficients from those by global ones."""
         if not len(rows):
             return rows
-        # In place, on a copy.
         return self.problem.local.transform_rows(np.array(rows.T, order="C")).T

@@ -1,18 +1,8 @@
-r"""The nearest consequents that keep linear constraints.
+"""The nearest consequents that keep linear constraints.
 
-With M = Phi' S Phi / W + P = L L' the matrix of the normal equations and u0 their solution, the
-cost at other consequents is
-
-    F(u) = F(u0) + 1/2 (u - u0)' M (u - u0) .
-
-Its minimum over E u = e, G u >= h is sought: in v = L' (u - u0), the point nearest to the origin.
-Equalities are eliminated by a QR factorisation of L^-1 E'; what is left, min |t|^2 over A t >= b,
-is least-distance programming, which is a non-negative least-squares problem (Lawson and Hanson
-1974, chapter 23): with lambda the minimiser of |[A'; b'] lambda - (0, 1)|,
-
-    t = A' lambda / (1 - b' lambda) ,
-
-and there is no such t where the minimum is zero.
+(u - u0)' M (u - u0), with M = L L' the matrix of the normal equations, is to be least over E u = e,
+G u >= h. In v = L' (u - u0) equalities are eliminated by a QR factorisation; the rest is
+least-distance programming by non-negative least squares (Lawson and Hanson 1974, chapter 23).
 """
 
 import numpy as np
@@ -38,19 +28,14 @@ class InfeasibleError(Exception):
 
 
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
-    """The local coefficients nearest to ``start`` with E u = e and G u >= h.
-
-    ``factor`` is of M. Gives too which of G u >= h are met with equality, and hold the coefficients
-    back, a bool each.
-
-    Raises
-    ------
-    InfeasibleError
-        If there are none.
-    """
+    """The u nearest to ``start`` with E u = e and G u >= h, and which of these hold it back."""
     base, toward = np.empty((start.size, 0)), np.empty(0)
     if equal.size:
-        base, toward = _particular(factor.half_solve(equal.T), equal_to - equal @ start)
+        base, triangle = np.linalg.qr(factor.half_solve(equal.T))
+        sizes = np.abs(np.diagonal(triangle))
+        if (sizes <= _DEPENDENT * sizes.max(initial=0.0)).any() or equal.shape[0] > start.size:
+            raise InfeasibleError(True)
+        toward = solve_triangular(triangle, equal_to - equal @ start, trans="T")
     half = factor.half_solve(at_least.T)
     short = least - at_least @ start - half.T @ (base @ toward)
     free = half - base @ (base.T @ half)
@@ -66,16 +51,6 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
         multipliers[kept] = found / length[kept]
     step = base @ toward + free @ multipliers
     return start + factor.back_solve(step), multipliers > 0.0
-
-
-def _particular(columns, right_side):
-    """Orthonormal columns that span the equalities, and the step along them that meets these."""
-    orthonormal, triangle = np.linalg.qr(columns)
-    sizes = np.abs(np.diagonal(triangle))
-    dependent = sizes <= _DEPENDENT * sizes.max(initial=0.0)
-    if dependent.any() or columns.shape[1] > columns.shape[0]:
-        raise InfeasibleError(True)
-    return orthonormal, solve_triangular(triangle, right_side, trans="T")
 
 
 def _least_distance(columns, short):

@@ -2,16 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 __all__ = ["Found", "largest"]
 
-# Boxes that are split at once: enough to keep NumPy busy, few enough not to run ahead of what the
-# next bound would have discarded.
-_BATCH = 1024
-# Where there are fewer, they are split on, unseen: most of the time of so few is that of calls.
-_FEWEST = 64
+# Boxes that are split at once; where there are fewer than the latter, they are split on, unseen.
+_BATCH, _FEWEST = 1024, 64
 
 
 @dataclass(frozen=True)
@@ -25,8 +23,7 @@ class Found:
     converged: bool
 
 
-@dataclass(frozen=True, eq=False)
-class _Boxes:
+class _Boxes(NamedTuple):
     """Boxes (n_inputs, n_boxes), their bounds, and what splitting along each input promises."""
 
     low: np.ndarray
@@ -35,17 +32,10 @@ class _Boxes:
     gain: np.ndarray
 
     def of(self, chosen):
-        return _Boxes(
-            self.low[:, chosen], self.high[:, chosen], self.bound[chosen], self.gain[:, chosen]
-        )
+        return _Boxes(*(one[..., chosen] for one in self))
 
     def with_others(self, others):
-        return _Boxes(
-            np.concatenate([self.low, others.low], axis=1),
-            np.concatenate([self.high, others.high], axis=1),
-            np.concatenate([self.bound, others.bound]),
-            np.concatenate([self.gain, others.gain], axis=1),
-        )
+        return _Boxes(*(np.concatenate(pair, -1) for pair in zip(self, others, strict=True)))
 
     @property
     def is_point(self):
@@ -83,10 +73,8 @@ def largest(
 ) -> Found:
     """Enclose the largest value that a function takes on a box.
 
-    ``evaluate`` gives, of boxes (n_inputs, n_boxes) as two arrays, bounds, points, values attained
-    there, and what splitting along each input promises. Bound and value may be ``tolerance`` apart;
-    boxes are cut at ``cuts`` (n_inputs, 2) first. ``first`` is a point and the value there; it is
-    enough to know whether the largest value is above ``until``.
+    ``evaluate`` is as ``Enclosure.values``. Bound and value may be ``tolerance`` apart, or both on
+    one side of ``until``; boxes are cut at ``cuts`` first. ``first`` is a point and its value.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

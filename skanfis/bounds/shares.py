@@ -1,28 +1,11 @@
 r"""What normalised strengths can be on a box, and what a mean with them as weights can be.
 
-Strengths are products of shares, one of each factor, and the shares of a factor are a softmax,
-nu_k = exp(l_k) / sum_s exp(l_s), of sums l_k of log mu (see ``antecedent``). Two enclosures of each
-share are intersected:
-
-* from the ranges of all l_k, with all others at their worst,
-
-    exp(l_k) / (exp(l_k) + sum over s != k of exp(L_s)) <= nu_k <= ... ,
-
-* by the mean value theorem: with a_kj = d l_k / dx_j and D_kj = a_kj - sum_s nu_s a_sj,
-
-    d log nu_k / dx_j = D_kj ,   |log nu_k(x) - log nu_k(m)| <= sum_j max |D_kj| |x_j - m_j| .
-
-A mean sum_k nu_k v_k with v_k <= V_k is a linear function of shares in their intervals [p, q] that
-sum to one. By weak duality any number t gives an upper bound of it,
-
-    t + sum_k max(p_k (V_k - t), q_k (V_k - t)) ,
-
-because sum_k nu_k (V_k - t) + t does not depend on t; the least over t is the exact optimum of the
-linear programme, and t = sum_k nu_k(m) V_k, which is taken, is next to it. Of a grid the inputs are
-averaged over one after the other.
+Strengths are products of shares, one of each factor: a softmax of sums l_k of log mu. Each share
+is enclosed twice, from the ranges of all l_k, and by the mean value theorem about the middle. A
+mean sum_k nu_k v_k is bounded by weak duality; docs/bounds.rst has the formulas.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,10 +18,9 @@ __all__ = ["Factor", "Shares", "factors", "largest_mean", "smallest_mean", "term
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """Shares that sum to one: which terms each is made of, on which inputs.
+    """Shares that sum to one: by input, positions of the terms (n_shares, n) whose log mu add up.
 
-    ``terms`` holds, for every input that the shares depend on, positions of terms (n_shares, n)
-    whose log mu add up; the number of all terms stands for none.
+    The number of all terms stands for none.
     """
 
     terms: dict[int, np.ndarray]
@@ -72,12 +54,8 @@ def factors(antecedent: Antecedent):
 def term_ranges(antecedent: Antecedent, low, high):
     """Ranges of all terms over boxes (n_inputs, n_boxes), with a row of zeros at the end."""
     parts = [ranges(group, low, high) for group in antecedent.groups]
-    nothing = np.zeros((1, low.shape[1]))
-
-    def stacked(name):
-        return np.concatenate([*(getattr(part, name) for part in parts), nothing])
-
-    return TermRanges(**{field.name: stacked(field.name) for field in fields(TermRanges)})
+    parts.append(TermRanges(*[np.zeros((1, low.shape[1]))] * len(TermRanges._fields)))
+    return TermRanges(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def enclosed(factor: Factor, terms: TermRanges, log_mu, half):

@@ -1,22 +1,21 @@
 """What both clusterers do with rows: check, merge, measure by blocks, give to the nearest centre.
 
-Fitting on the sorted distinct rows, with the weight of all that are equal, makes the result the
-same to the last bit in whatever order the rows come, and whether a row is repeated or weighted.
+Fits see distinct rows, sorted: neither order nor repetition changes the last bit.
 """
 
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
-from sklearn.base import ClusterMixin
+from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .._sklearn import check_sample_weight
+from .._sklearn import check_sample_weight, fit_context
 from .._validation import check_finite, check_not_negative
 from ..blocks import row_blocks
 
-__all__ = ["NearestCenterMixin", "check_rows", "distance_blocks", "distinct_rows", "nearest"]
+__all__ = ["Clusterer", "check_rows", "distance_blocks", "nearest"]
 
 # Distances in a block: a few arrays of this size stay in the cache.
 _BLOCK_SIZE = 32_768
@@ -42,11 +41,7 @@ def distinct_rows(X, sample_weight):
 
 
 def distance_blocks(points, centers):
-    """Blocks of points, as slices, and their squared distances (n_clusters, n_rows_of_block).
-
-    From differences, not from products: where a point coincides with a centre, the distance is an
-    exact zero.
-    """
+    """Blocks of points, as slices, and their squared distances (n_clusters, n_rows_of_block)."""
     for part in row_blocks(points.shape[0], max(1, _BLOCK_SIZE // centers.shape[0])):
         yield part, cdist(centers, points[part], "sqeuclidean")
 
@@ -59,10 +54,31 @@ def nearest(points, centers):
     return labels
 
 
-class NearestCenterMixin(ClusterMixin):
-    """Clusters that a row belongs to by the nearest of ``cluster_centers_``."""
+class Clusterer(ClusterMixin, BaseEstimator):
+    """Finds ``cluster_centers_``, of which the nearest is a row's cluster."""
 
     cluster_centers_: np.ndarray
+    _find_centers: Any
+
+    @fit_context(prefer_skip_nested_validation=True)
+    def fit(self, X: ArrayLike, y: Any = None, sample_weight: ArrayLike | None = None) -> Self:
+        """Find the centres.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+        y : None
+        sample_weight : array-like of shape (n_samples,), default=None
+            Zero or positive; a whole number counts as so many copies of the row.
+
+        Returns
+        -------
+        self : object
+        """
+        X = check_rows(self, X, reset=True)
+        self._find_centers(*distinct_rows(X, sample_weight))
+        self.labels_ = self._labels(X)
+        return self
 
     def predict(self, X: ArrayLike) -> Any:
         """Find the nearest centre.
@@ -73,8 +89,7 @@ class NearestCenterMixin(ClusterMixin):
 
         Returns
         -------
-        labels : ndarray of shape (n_samples,)
-            Positions in ``cluster_centers_``.
+        labels : ndarray of int of shape (n_samples,)
         """
         check_is_fitted(self)
         return self._labels(check_rows(self, X))

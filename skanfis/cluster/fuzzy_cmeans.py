@@ -1,36 +1,29 @@
 r"""Fuzzy c-means by alternating optimisation.
 
 With squared distances D_ik, memberships u_ik of row sum one and weights w_i, the objective (Bezdek
-1981) is J = Σ_i w_i Σ_k u_ik^m D_ik. At fixed centres it is least for
+1981) is J = Σ_i w_i Σ_k u_ik^m D_ik. At fixed centres u_ik ~ D_ik^(-1/(m-1)) is best, at fixed
+memberships c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m. Powers are logarithms, relative to the
+nearest centre and to a cluster's largest weight: as m → 1 they would overflow, or vanish.
 
-    u_ik = D_ik^(-1/(m-1)) / Σ_l D_il^(-1/(m-1)),   u = 1 (shared) where D = 0,
-
-and at fixed memberships for c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m. Both steps are taken in one
-pass over the rows. Distances are relative to the nearest centre's and powers are logarithms: as
-m → 1 they would overflow. There, u^m vanishes on every row for a cluster that is nowhere the
-nearest; its weights are taken relative to its largest, block after block.
-
-All centres at the mean of the data are a fixed point. Linearised there, with z = x - mean, each
-iteration multiplies their displacements by 2 m / (m - 1) F, F = Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i
-w_i. With λ the largest eigenvalue of F they fall together if m > 1 / (1 - 2 λ) (Yu, Cheng and Huang
-2004): without clusters in d columns of equal variance, where λ = 1/d, with m = 2 from d = 5 on.
+All centres at the mean of the data are a fixed point, which attracts if m > 1 / (1 - 2 λ), λ the
+largest eigenvalue of Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i w_i with z = x - mean (Yu et al. 2004).
 """
 
 import warnings
 from numbers import Integral, Real
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import pdist, squareform
-from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, TransformerMixin
+from sklearn.base import ClassNamePrefixFeaturesOutMixin, TransformerMixin
 from sklearn.cluster import kmeans_plusplus
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils import check_array, check_random_state
 from sklearn.utils.validation import check_is_fitted
 
-from .._sklearn import Interval, StrOptions, fit_context
-from ._rows import NearestCenterMixin, check_rows, distance_blocks, distinct_rows
+from .._sklearn import Interval, StrOptions
+from ._rows import Clusterer, check_rows, distance_blocks
 
 __all__ = ["FuzzyCMeans"]
 
@@ -38,16 +31,6 @@ __all__ = ["FuzzyCMeans"]
 _SAME = 0.01
 # Stands for log 0 where differences are taken, for -inf - -inf is not a number.
 _LOG_ZERO = -1e300
-
-
-class Run(NamedTuple):
-    """Where a descent from one start ended."""
-
-    centers: np.ndarray
-    spread: np.ndarray
-    objective: float
-    n_iter: int
-    shift: float
 
 
 def log_memberships(distances, m):
@@ -83,7 +66,7 @@ def alternate(points, weight, centers, m):
 
 
 def descend(points, weight, centers, m, tol, max_iter):
-    """Alternate until no centre moves by more than ``tol``."""
+    """The objective, centres and spreads at the end, the iterations, and the last one's step."""
     shift, n_iter = np.inf, 0
     while shift > tol and n_iter < max_iter:
         old = centers
@@ -91,7 +74,7 @@ def descend(points, weight, centers, m, tol, max_iter):
         shift = float(np.linalg.norm(centers - old, axis=1).max())
         n_iter += 1
     _, spread, objective = alternate(points, weight, centers, m)
-    return Run(centers, spread, objective, n_iter, shift)
+    return objective, centers, spread, n_iter, shift
 
 
 def largest_exponent(points, weight):
@@ -108,33 +91,25 @@ def count_distinct(centers, spread):
     return sum(apart[k, :k].all() for k in range(centers.shape[0]))
 
 
-class FuzzyCMeans(
-    ClassNamePrefixFeaturesOutMixin, TransformerMixin, NearestCenterMixin, BaseEstimator
-):
+class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
     r"""Fuzzy c-means: clusters to which every row belongs by degrees.
 
-    Centres :math:`c_k` and memberships :math:`u_{ik}` minimise [1]_
-
-    .. math:: J = \sum_i w_i \sum_k u_{ik}^m \, \| x_i - c_k \|^2 , \qquad \sum_k u_{ik} = 1 .
-
-    As m tends to 1, this becomes k-means. Distances are Euclidean: bring the columns to one scale
-    before, for instance with a StandardScaler.
+    Minimises :math:`\sum_i w_i \sum_k u_{ik}^m \, \| x_i - c_k \|^2` over centres and memberships
+    of row sum one [1]_. Distances are Euclidean: bring the columns to one scale before.
 
     Parameters
     ----------
     n_clusters : int, default=3
-        Number of clusters, 1 or more.
+        Number of clusters.
     m : "auto" or float, default=2.0
-        Exponent of the memberships, greater than 1: the larger, the fuzzier. From some m on, all
-        centres fall together [2]_, in five columns without clusters from below 2 on. "auto" is half
-        the way from 1 to there, and not more than 2.
+        Exponent, greater than 1: the larger, the fuzzier; near 1 it is k-means. From some m on all
+        centres fall together [2]_. "auto" is half the way from 1 to there, and at most 2.
     tol : float, default=1e-4
-        Stop when no centre moves by more than ``tol`` times the root mean square distance of the
-        data from their mean.
+        Stop when no centre moves by more, relative to the spread of the data.
     max_iter : int, default=1000
         Most iterations from one start.
     n_init : int, default=3
-        Number of starts; the one with the lowest objective counts. An array ``init`` is one start.
+        Number of starts, of which the best counts. An array ``init`` is one start.
     init : {"k-means++"} or array-like of shape (n_clusters, n_features), default="k-means++"
         Centres at the start: rows drawn far from each other, or the array.
     random_state : int, RandomState instance or None, default=None
@@ -143,35 +118,26 @@ class FuzzyCMeans(
     Attributes
     ----------
     cluster_centers_ : ndarray of shape (n_clusters, n_features)
-        Centres in the units of the data.
     inertia_ : float
-        The objective J at ``cluster_centers_``, in squared units of the data.
+        The objective, in squared units of the data.
     labels_ : ndarray of shape (n_samples,)
-        For each row the cluster of largest membership, which is that of the nearest centre.
+        The cluster of largest membership, which is that of the nearest centre.
     m_ : float
         The exponent.
     n_iter_ : int
-        Iterations run from the best start.
+        Iterations from the best start.
     n_features_in_ : int
-        Number of columns.
     feature_names_in_ : ndarray of shape (n_features,)
-        Names of the columns, where X had names that are all strings.
 
     Warns
     -----
     ConvergenceWarning
         If ``max_iter`` was reached first, or if centres coincide.
 
-    See Also
-    --------
-    SubtractiveClustering : Finds the number of clusters too.
-
     References
     ----------
-    .. [1] J. C. Bezdek, "Pattern Recognition with Fuzzy Objective Function Algorithms", Plenum
-       Press, New York, 1981.
-    .. [2] J. Yu, Q. Cheng and H. Huang, "Analysis of the weighting exponent in the FCM", IEEE
-       Transactions on Systems, Man, and Cybernetics B 34 (2004) 634-639.
+    .. [1] J. C. Bezdek, "Pattern Recognition with Fuzzy Objective Function Algorithms", 1981.
+    .. [2] J. Yu et al., IEEE Transactions on Systems, Man, and Cybernetics B 34 (2004) 634-639.
 
     Examples
     --------
@@ -179,8 +145,6 @@ class FuzzyCMeans(
     >>> from skanfis.cluster import FuzzyCMeans
     >>> X, y = make_blobs(centers=[[0, 0], [0, 8]], random_state=0)
     >>> clustering = FuzzyCMeans(n_clusters=2, random_state=0).fit(X)
-    >>> clustering.cluster_centers_.shape
-    (2, 2)
     >>> clustering.transform([[0, 0], [0, 4]]).sum(axis=1).round(6).tolist()
     [1.0, 1.0]
     """
@@ -214,48 +178,40 @@ class FuzzyCMeans(
         self.init = init
         self.random_state = random_state
 
-    @fit_context(prefer_skip_nested_validation=True)
-    def fit(self, X: ArrayLike, y: Any = None, sample_weight: ArrayLike | None = None) -> Self:
-        """Find the centres.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Data, with columns on one scale.
-        y : None
-            Not used.
-        sample_weight : array-like of shape (n_samples,), default=None
-            Weights, zero or positive; a whole number counts as so many copies of the row.
-
-        Returns
-        -------
-        self : FuzzyCMeans
-        """
-        X = check_rows(self, X, reset=True)
-        rows, weight = distinct_rows(X, sample_weight)
+    def _find_centers(self, rows, weight):
         if rows.shape[0] < self.n_clusters:
             raise ValueError(
                 f"n_clusters={self.n_clusters} needs as many distinct rows of positive weight; "
-                f"there are {rows.shape[0]}, with n_samples={X.shape[0]}. Give fewer clusters."
+                f"there are {rows.shape[0]} (n_samples={rows.shape[0]}). Give fewer clusters."
             )
         mean = np.average(rows, axis=0, weights=weight)
         points = rows - mean
         scale = np.sqrt(np.average(np.einsum("ij,ij->i", points, points), weights=weight)) or 1.0
         points /= scale
-        m = self.m
-        if m == "auto":
-            m = min(2.0, 0.5 * (1.0 + largest_exponent(points, weight)))
-        self.m_ = float(m)
+        largest = largest_exponent(points, weight)
+        self.m_ = float(min(2.0, 0.5 * (1.0 + largest)) if self.m == "auto" else self.m)
         starts = self._starts(points, weight, mean, scale)
         runs = [descend(points, weight, c, self.m_, self.tol, self.max_iter) for c in starts]
-        best = min(runs, key=lambda run: run.objective)
-        self._warn_of(best, points, weight)
-        self.cluster_centers_ = mean + scale * best.centers
-        self.inertia_ = scale**2 * best.objective
-        self.n_iter_ = best.n_iter
-        self.labels_ = self._labels(X)
+        objective, centers, spread, self.n_iter_, shift = min(runs, key=lambda run: run[0])
+        n_distinct = count_distinct(centers, spread)
+        if shift > self.tol:
+            warnings.warn(
+                f"FuzzyCMeans did not converge: in iteration max_iter={self.max_iter} a centre "
+                f"moved by {shift:.2g} of the data's spread, tol={self.tol:g}. Raise one of them.",
+                ConvergenceWarning,
+                stacklevel=4,
+            )
+        if n_distinct < self.n_clusters:
+            warnings.warn(
+                f"Only {n_distinct} of n_clusters={self.n_clusters} centres are distinct. Give "
+                f"fewer clusters or a smaller m than {self.m_:g} (on these data centres near the "
+                f"mean fall together from m={largest:.3g} on).",
+                ConvergenceWarning,
+                stacklevel=4,
+            )
+        self.cluster_centers_ = mean + scale * centers
+        self.inertia_ = scale**2 * objective
         self._n_features_out = self.n_clusters
-        return self
 
     def transform(self, X: ArrayLike) -> Any:
         """Find the memberships.
@@ -267,8 +223,7 @@ class FuzzyCMeans(
         Returns
         -------
         memberships : ndarray of shape (n_samples, n_clusters)
-            From 0 to 1, with sum one in every row; one where a row coincides with a centre, or
-            shared equally where it coincides with several.
+            With sum one in every row.
         """
         check_is_fitted(self)
         X = check_rows(self, X)
@@ -291,22 +246,3 @@ class FuzzyCMeans(
         random_state = check_random_state(self.random_state)
         settings = {"sample_weight": weight, "random_state": random_state}
         return [kmeans_plusplus(points, self.n_clusters, **settings)[0] for _ in range(self.n_init)]
-
-    def _warn_of(self, run, points, weight):
-        if run.shift > self.tol:
-            warnings.warn(
-                f"FuzzyCMeans did not converge: in iteration max_iter={self.max_iter} a centre "
-                f"moved by {run.shift:.2g}, relative to the spread of the data, and "
-                f"tol={self.tol:g}. Raise one of them.",
-                ConvergenceWarning,
-                stacklevel=4,
-            )
-        n_distinct = count_distinct(run.centers, run.spread)
-        if n_distinct < self.n_clusters:
-            warnings.warn(
-                f"Only {n_distinct} of n_clusters={self.n_clusters} centres are distinct. Give "
-                f"fewer clusters or a smaller m than {self.m_:g} (on these data centres near the "
-                f"mean fall together from m={largest_exponent(points, weight):.3g} on).",
-                ConvergenceWarning,
-                stacklevel=4,
-            )

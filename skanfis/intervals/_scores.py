@@ -1,21 +1,145 @@
-"""Scores: how many standard deviations rows that a model has not seen lie from its predictions."""
+"""Rows that a model is trained on or has not seen, and how far they lie from its predictions."""
 
 import inspect
 import warnings
+from dataclasses import dataclass
+from numbers import Integral
+from typing import Any
 
 import numpy as np
+from sklearn import get_config
+from sklearn.base import clone
 from sklearn.frozen import FrozenEstimator
+from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, ShuffleSplit, check_cv
 from sklearn.pipeline import Pipeline
+from sklearn.utils import check_array
+from sklearn.utils.metadata_routing import process_routing
+from sklearn.utils.validation import has_fit_parameter
 
-from .._sklearn import safe_indexing
+from .._sklearn import check_sample_weight, safe_indexing
+from .._validation import check_finite, group_numbers, named_refusals, positive_weights
 from ..exceptions import OutOfBoundsWarning
 
-__all__ = ["held_out_scores", "last_step", "least_deviations", "leave_one_out_scores", "predicted"]
+__all__ = [
+    "TrainingSet",
+    "checked_targets",
+    "fit_params",
+    "folds",
+    "held_out_scores",
+    "last_step",
+    "least_deviations",
+    "leave_one_out_scores",
+    "one_part",
+    "predicted",
+]
 
 # An exact fit has no deviation to divide by: of the target's range, what rounding leaves.
 _LEAST_DEVIATION = 1e-12
 # Of a row that a model has to itself.
 _SMALLEST_FREEDOM = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingSet:
+    """What a regressor is trained on, in the user's own tables."""
+
+    X: Any
+    y: Any
+    targets: np.ndarray
+    params: dict
+
+    def fitted(self, regressor, rows=None):
+        """A clone of the regressor, trained on some rows, or on all of None."""
+        if rows is None:
+            return clone(regressor).fit(self.X, self.y, **self.params)
+        params = {name: safe_indexing(value, rows) for name, value in self.params.items()}
+        X, y = safe_indexing(self.X, rows), safe_indexing(self.y, rows)
+        return clone(regressor).fit(X, y, **params)
+
+
+def checked_targets(caller, y, sample_weight, groups):
+    """Targets as an array, positive weights or None, numbers of groups or None."""
+    if y is None:
+        raise ValueError(f"{caller} requires y to be passed, but the target y is None.")
+    with named_refusals(y=y):
+        targets = check_array(
+            y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"
+        )
+    by_output = targets.reshape(len(targets), -1)
+    check_finite(by_output, "y", [f"y{k}" for k in range(by_output.shape[1])])
+    if sample_weight is not None:
+        sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
+        positive_weights(sample_weight, len(targets))
+    if groups is None:
+        return targets, sample_weight, None
+    numbers = group_numbers(groups)
+    if numbers.max() == 0:
+        raise ValueError("groups has a single group; at least 2 are needed to hold one out.")
+    return targets, sample_weight, numbers
+
+
+def fit_params(router, regressor, sample_weight, groups):
+    """What of weights and groups goes to the regressor's ``fit``; ``router`` routes metadata."""
+    given = {"sample_weight": sample_weight, "groups": groups}
+    given = {name: value for name, value in given.items() if value is not None}
+    if get_config()["enable_metadata_routing"]:
+        return dict(process_routing(router, "fit", **given).estimator.fit)
+    if "sample_weight" in given and not has_fit_parameter(regressor, "sample_weight"):
+        raise ValueError(
+            f"sample_weight was given, but the fit of {type(regressor).__name__} does not take "
+            "it. For a Pipeline turn on sklearn.set_config(enable_metadata_routing=True), and "
+            "call set_fit_request(sample_weight=True) on the step that is to have it."
+        )
+    if "groups" in given and not has_fit_parameter(regressor, "groups"):
+        del given["groups"]
+    return given
+
+
+def one_part(regressor, n_rows, groups, fraction, seed):
+    """Rows to train on and rows held out, or groups; ``fraction`` of 1 trains on none."""
+    every = np.arange(n_rows)
+    if fraction == 1.0:
+        if not isinstance(regressor, FrozenEstimator):
+            raise ValueError(
+                "calibration_fraction=1 leaves no row to train on: give the fitted model as "
+                "sklearn.frozen.FrozenEstimator(model), or a smaller fraction."
+            )
+        return every, every
+    kind = ShuffleSplit if groups is None else GroupShuffleSplit
+    splitter = kind(1, test_size=fraction, random_state=seed)
+    try:
+        training, held_out = next(splitter.split(every, groups=groups))
+    except ValueError as error:
+        raise ValueError(
+            f"method='split' with calibration_fraction={fraction:g} leaves nothing to train on "
+            f"of {n_rows} rows: use a smaller fraction, or method='folds'."
+        ) from error
+    return np.sort(training), np.sort(held_out)
+
+
+def folds(cv, targets, groups, seed):
+    """Pairs of rows to train on and rows held out, every row held out once."""
+    n_rows = len(targets)
+    if not isinstance(cv, Integral):
+        splitter = check_cv(cv)
+    elif groups is None:
+        splitter = KFold(min(int(cv), n_rows), shuffle=True, random_state=seed)
+    else:
+        splitter = GroupKFold(min(int(cv), int(groups.max()) + 1))
+    found = list(splitter.split(np.empty((n_rows, 0)), targets, groups))
+    if not found:
+        raise ValueError(
+            f"cv={cv!r} gives no splits. An iterator can be used once only: give list(...) of it, "
+            "or a number of folds."
+        )
+    counts = np.bincount(np.concatenate([held_out for _, held_out in found]), minlength=n_rows)
+    if not (counts == 1).all():
+        row = int(np.argmax(counts != 1))
+        raise ValueError(
+            f"cv={splitter!r} holds out row {row} {counts[row]} times; every row must be held "
+            "out once, as KFold, GroupKFold and LeaveOneGroupOut do."
+        )
+    return found
 
 
 def least_deviations(targets):
@@ -25,13 +149,10 @@ def least_deviations(targets):
 
 
 def predicted(estimator, X, least):
-    """Predictions and deviations, (n_rows, n_outputs); deviations are one where ``least`` is None.
-
-    The deviation of a Pipeline is its last step's, of a search its best estimator's.
-    """
+    """Predictions and deviations, (n_rows, n_outputs); of ``least`` None deviations are one."""
     if least is None:
-        centers = np.asarray(estimator.predict(X), dtype=float)
-        centers = centers.reshape(len(centers), -1)
+        mean = np.asarray(estimator.predict(X), dtype=float)
+        centers = mean.reshape(len(mean), -1)
         return centers, np.ones(centers.shape)
     # By itself: with metadata routing a Pipeline would have to be told of return_std.
     final, X = last_step(estimator, X)
@@ -75,8 +196,10 @@ def leave_one_out_scores(estimator, data, weight, least):
     centers, deviations = predicted(estimator, data.X, floor)
     noise = np.maximum(np.atleast_1d(noise), floor)
     leverage = (deviations / noise) ** 2 - 1.0
-    # Rows that each row counts as in a fit.
-    own = np.ones((1, 1)) if weight is None else weight[:, None] * _rows_per_weight(weight)
+    own = np.ones((1, 1))
+    if weight is not None:
+        # Rows that each row counts as in a fit.
+        own = weight[:, None] * max(1.0, weight.sum() / np.sum(weight**2))
     freedom = np.clip(1.0 - own * leverage, _SMALLEST_FREEDOM, 1.0)
     residual = np.abs(data.targets.reshape(centers.shape) - centers) / freedom
     # The leverage of the row in the model without it is h / (1 - w h).
@@ -94,7 +217,3 @@ def last_step(estimator, X=None):
     for _, step in estimator.steps[:-1] if X is not None else ():
         X = X if step is None or step == "passthrough" else step.transform(X)
     return last_step(estimator.steps[-1][1], X)
-
-
-def _rows_per_weight(weight):
-    return max(1.0, weight.sum() / np.sum(weight**2))

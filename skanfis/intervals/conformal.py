@@ -15,7 +15,6 @@ from sklearn.utils.validation import check_is_fitted
 from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
 from ._quantiles import (
-    check_level,
     group_scores,
     is_enough,
     n_needed,
@@ -23,8 +22,17 @@ from ._quantiles import (
     row_masses,
     score_quantile,
 )
-from ._scores import held_out_scores, least_deviations, leave_one_out_scores, predicted
-from ._training import TrainingSet, checked_targets, fit_params, folds, one_part
+from ._scores import (
+    TrainingSet,
+    checked_targets,
+    fit_params,
+    folds,
+    held_out_scores,
+    least_deviations,
+    leave_one_out_scores,
+    one_part,
+    predicted,
+)
 
 __all__ = ["ConformalRegressor"]
 
@@ -32,32 +40,24 @@ __all__ = ["ConformalRegressor"]
 class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     r"""Prediction intervals that cover, around any regressor.
 
-    How far rows that a model has not seen lie from its predictions says how far a new row will:
-    conformal prediction [1]_. With scores :math:`s_i = |y_i - \hat y(x_i)| / \sigma(x_i)` of such
-    rows, where :math:`\sigma` is the model's own standard deviation, the interval is
-    :math:`\hat y(x) \pm q\, \sigma(x)`, q the smallest score that as many rows as asked do not
-    exceed. If the new row is one like the others, it is covered as often as asked, whatever the
-    model and however wrong its deviation.
+    Conformal prediction [1]_: rows that a model has not seen tell how many of its standard
+    deviations a new row will be off, whatever the model. :doc:`/how_sure` has the formulas.
 
     Parameters
     ----------
     estimator : regressor, default=None
-        What predicts; a Pipeline or a search, for example. None is ``ANFISRegressor()``.
+        A Pipeline or a search, for example. None is ``ANFISRegressor()``.
     method : {"folds", "split", "loo"}, default="folds"
-        Which rows give the scores. "folds": every row, by a model of the folds without it. Near
-        what is asked for, without a guarantee. "split": rows held out, on which the model is never
-        trained. Covers at least as often as asked. "loo": every row, by leave-one-out without a
-        further fit, to first order; for many rows, and for a fitted
-        :class:`~skanfis.ANFISRegressor` or a Pipeline that ends in one.
+        Which rows give the scores. "folds": every row, by a model of the folds without it. "split":
+        rows held out; covers at least as often as asked. "loo": every row, by leave-one-out to
+        first order, of an :class:`~skanfis.ANFISRegressor` or a Pipeline that ends in one.
     scaled : bool, default=True
-        Whether intervals are as wide as ``predict(X, return_std=True)`` says, row by row; else all
-        have one width.
+        Whether intervals are as wide as ``predict(X, return_std=True)`` says, or all of one width.
     cv : int, splitter or iterable of splits, default=10
-        Of "folds": how many, at most; no more than rows, or groups. A splitter of scikit-learn, or
-        splits, must hold out every row once.
+        Of "folds": how many at most, or splits that hold out every row once.
     calibration_fraction : float, default=0.25
-        Of "split": part of the rows, or of the groups, held out. 1 takes all rows given, for a
-        model that is fitted already, as ``FrozenEstimator(model)``.
+        Of "split": part of the rows, or groups, held out. 1, all rows, is for a fitted model, as
+        ``FrozenEstimator(model)``.
     random_state : int, RandomState instance or None, default=None
         Seed of the folds and of the rows held out. None stands for one fixed seed.
     n_jobs : int, default=None
@@ -72,27 +72,15 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     scores_ : ndarray of shape (n_calibration,) or (n_calibration, n_outputs)
         Sorted. NaN where the model gave NaN, which counts as infinite.
     n_units_ : float
-        How many rows, or with ``groups`` groups, the scores come from; of weighted rows, how many
-        of one weight would say as much.
+        How many rows, or groups, the scores come from; of weighted rows, how many of one weight
+        would say as much.
     n_features_in_ : int
-        Number of inputs, if the regressor knows it.
     feature_names_in_ : ndarray of shape (n_features,)
-        Names of the inputs, if the regressor knows them.
-
-    See Also
-    --------
-    skanfis.ANFISRegressor : ``predict(X, return_std=True)`` gives the deviation alone.
-
-    Notes
-    -----
-    With ``groups`` (runs, devices, days) whole groups are held out, and what is covered is a *new*
-    group: a group is one unit, however many rows it has, and 90 % takes 9 groups. :doc:`/how_sure`
-    has the formulas and what K groups can promise.
+        Both if the regressor knows them.
 
     References
     ----------
-    .. [1] V. Vovk, A. Gammerman and G. Shafer, "Algorithmic learning in a random world", Springer,
-       2005.
+    .. [1] V. Vovk, A. Gammerman and G. Shafer, "Algorithmic learning in a random world", 2005.
 
     Examples
     --------
@@ -102,8 +90,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     >>> rng = np.random.default_rng(0)
     >>> X = rng.uniform(-1, 1, size=(400, 1))
     >>> y = np.sin(3 * X[:, 0]) + 0.1 * rng.standard_t(3, size=400)
-    >>> rules = ANFISRegressor(n_mfs=3)
-    >>> model = ConformalRegressor(rules, cv=5).fit(X[:200], y[:200])
+    >>> model = ConformalRegressor(ANFISRegressor(n_mfs=3), cv=5).fit(X[:200], y[:200])
     >>> lower, upper = model.predict_interval(X[200:], coverage=0.9)
     >>> bool(0.85 < np.mean((lower <= y[200:]) & (y[200:] <= upper)) < 0.95)
     True
@@ -168,12 +155,10 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,) or (n_samples, n_outputs)
             Targets.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, zero or positive: those of the regressor's ``fit``, and how much each row's
-            score counts. For a Pipeline turn scikit-learn's metadata routing on.
+            Zero or positive: those of the regressor's ``fit``, and of the scores.
         groups : array-like of shape (n_samples,), default=None
-            The run, device or day that each row belongs to: whole groups are held out, and the
-            intervals are for a row of a new group. Passed to the regressor's ``fit`` if that takes
-            groups (a Pipeline with metadata routing).
+            Run, device or day of each row: whole groups are held out, and intervals are for rows of
+            a new group. Passed to the regressor's ``fit`` if that takes groups.
 
         Returns
         -------
@@ -182,9 +167,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the targets or weights are not finite or of the wrong length; if there are fewer than
-            two groups; if ``cv`` does not hold out every row once; if ``method="loo"`` is given
-            groups; if the regressor has no standard deviation.
+            If the data are not finite, ``cv`` does not hold out every row once, there is one group,
+            or groups with "loo"; if the regressor has no standard deviation.
         """
         X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
         targets, weight, numbers = checked_targets(type(self).__name__, y, sample_weight, groups)
@@ -197,10 +181,10 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         data = TrainingSet(X, y, targets, fit_params(self, regressor, sample_weight, groups))
         least = least_deviations(targets) if self.scaled else None
         held_out, estimators = np.arange(len(targets)), []
+        seed = 0 if self.random_state is None else self.random_state
         if self.method == "split":
             fraction = float(self.calibration_fraction)
-            parts = one_part(regressor, len(targets), numbers, fraction, self._seed())
-            training, held_out = parts
+            training, held_out = one_part(regressor, len(targets), numbers, fraction, seed)
             estimator = data.fitted(regressor, training)
             scores = held_out_scores(estimator, data, held_out, least)
         elif self.method == "loo":
@@ -208,7 +192,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             scores = leave_one_out_scores(estimator, data, weight, least)
         else:
             estimator = data.fitted(regressor)
-            parts = folds(self.cv, targets, numbers, self._seed())
+            parts = folds(self.cv, targets, numbers, seed)
             estimators = Parallel(n_jobs=self.n_jobs)(
                 delayed(data.fitted)(regressor, training) for training, _ in parts
             )
@@ -255,25 +239,24 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         ----------
         X : array-like of shape (n_samples, n_features)
         coverage : float, default=0.9
-            How often a new row's target is to lie in its interval, between 0 and 1; of several
-            outputs, each by itself.
+            How often a new row's target is to lie in its interval; of several outputs, each by
+            itself.
         confidence : float, "auto" or None, default="auto"
-            With groups: how probable it is to be that ``coverage`` of the rows of a new group, or
-            more, lie in their intervals, between 0 and 1. "auto" is as probable as ``coverage``.
-            None promises the coverage on average over the rows of new groups, of which some may be
-            covered much less. Without groups "auto" and None are the same.
+            With groups: how probable it is to be that ``coverage`` of a new group's rows, or more,
+            lie in their intervals. "auto" is as probable as ``coverage``; None promises the
+            coverage on average over new groups.
 
         Returns
         -------
         lower, upper : ndarray of shape (n_samples,) or (n_samples, n_outputs)
-            NaN where the prediction is. Infinite where more than 1 - coverage of the rows held out
-            were predicted as NaN.
+            NaN where the prediction is. Infinite where too many rows held out were predicted as
+            NaN.
 
         Raises
         ------
         ValueError
-            If there are too few rows, or groups, for such a coverage, or confidence: K give
-            K / (K + 1) at most; if a confidence is asked for without groups.
+            If there are too few rows or groups, K giving K / (K + 1) at most; if a confidence is
+            asked for without groups.
         """
         check_is_fitted(self)
         coverage, confidence = self._checked_levels(coverage, confidence)
@@ -296,13 +279,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         q : float or ndarray of shape (n_outputs,)
-            In standard deviations of ``predict(X, return_std=True)``; with ``scaled=False`` in the
-            target's units.
-
-        Raises
-        ------
-        ValueError
-            As :meth:`predict_interval` does.
+            In standard deviations; with ``scaled=False`` in the target's units.
         """
         check_is_fitted(self)
         found = self._quantiles(*self._checked_levels(coverage, confidence))
@@ -323,36 +300,29 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def _regressor(self):
         return ANFISRegressor() if self.estimator is None else self.estimator
 
-    def _seed(self):
-        return 0 if self.random_state is None else self.random_state
-
     def _checked_levels(self, coverage, confidence):
         """Both levels, as far as the rows or groups at hand allow them; None of no groups."""
         if isinstance(confidence, str) and confidence != "auto":
             raise ValueError(f"confidence={confidence!r} must be a number, 'auto' or None.")
-        check_level("coverage", coverage)
-        if confidence is None or (confidence == "auto" and self._groups is None):
-            self._check_enough("coverage", coverage)
-            return float(coverage), None
-        if self._groups is None:
+        name, level = "coverage", coverage
+        if self._groups is None and confidence not in (None, "auto"):
             raise ValueError(
                 "confidence is of whole groups, and fit was given none: give it groups, or None."
             )
-        is_auto = confidence == "auto"
-        level = coverage if is_auto else confidence
-        self._check_enough("coverage" if is_auto else "confidence", level)
-        return float(coverage), float(level)
-
-    def _check_enough(self, name, level):
-        check_level(name, level)
+        by_group = self._groups is not None and confidence is not None
+        if by_group and confidence != "auto":
+            name, level = "confidence", confidence
+        for what, given in (("coverage", coverage), (name, level)):
+            if not (isinstance(given, Real) and 0.0 < float(given) < 1.0):
+                raise ValueError(f"{what}={given!r} must be a number between 0 and 1.")
         total = self.n_units_ / (self.n_units_ + 1.0)
-        if is_enough(total, level):
-            return
-        what = "rows" if self._groups is None else "groups"
-        held_out = " held out" if self.method == "split" else ""
-        more = ", or a larger calibration_fraction" if self.method == "split" else ""
-        raise ValueError(
-            f"{name}={level:g} needs {n_needed(level)} {what}{held_out} or more; there are "
-            f"{self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
-            f"for less, or give more {what}{more}."
-        )
+        if not is_enough(total, level):
+            what = "rows" if self._groups is None else "groups"
+            held_out = " held out" if self.method == "split" else ""
+            more = ", or a larger calibration_fraction" if self.method == "split" else ""
+            raise ValueError(
+                f"{name}={level:g} needs {n_needed(level)} {what}{held_out} or more; there are "
+                f"{self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
+                f"for less, or give more {what}{more}."
+            )
+        return float(coverage), float(level) if by_group else None

@@ -142,13 +142,13 @@ def told_by_outermost(model: TSKModel, rows: StandardisedData) -> float:
     )
     nearest = np.clip(X, low, high)
     is_beyond = (nearest != X).any(axis=1)
-    if not is_beyond.any():
+    # A model too large for a posterior knows of no noise to compare with.
+    if not is_beyond.any() or model.posterior is None:
         return MAX_EXTRAPOLATION
     X, y, nearest, weight = X[is_beyond], y[is_beyond], nearest[is_beyond], weight[is_beyond]
     way = (X - nearest) / model.spread
     free = replace(model, target=None)  # outputs are not held
     values, slopes = free.predict(nearest), free.gradient(nearest) * model.spread[:, None]
-    assert model.posterior is not None
     noise = float(np.sum((model.posterior.noise / rows.targets.scale) ** 2))
 
     def left_by(distance):

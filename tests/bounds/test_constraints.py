@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import lsq_linear
-from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
-from sklearn.model_selection import GridSearchCV
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
@@ -98,15 +94,6 @@ def test_data_that_contradict_are_told(rng):
     # Noise that a fit follows is no contradiction: the other tests turn warnings into errors.
     with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
         ANFISRegressor(**QUICK, monotonic_cst=[-1, 0]).fit(X, y)
-
-
-def test_what_holds_already_is_left_alone(rng):
-    X, truth, _ = planted(rng)
-    free = ANFISRegressor(**QUICK).fit(X, X[:, 0] + 0.1 * truth)
-    held = ANFISRegressor(**QUICK, monotonic_cst=[1, 0]).fit(X, X[:, 0] + 0.1 * truth)
-    assert held.constraints_["certified"]
-    assert held.constraints_["rows"] == 0
-    assert_allclose(held.consequents_, free.consequents_, rtol=1e-12)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
@@ -198,19 +185,6 @@ def test_points_where_nothing_is_predicted_are_refused(rng, policy):
         held.fit(X, y)
 
 
-def test_searches_and_pipelines(rng):
-    X, _, y = planted(rng)
-    known = [OutputLimits(upper=1.2), FixedPoint([0.0, 0.0], 0.0)]
-    step = ANFISRegressor(**QUICK, constraints=known)
-    whole = make_pipeline(StandardScaler(), step)
-    grid = {"anfisregressor__monotonic_cst": [None, [1, 0]]}
-    search = GridSearchCV(whole, grid, cv=2).fit(X, y)
-    assert bounds(search.best_estimator_).highest[0] <= 1.2
-    copy = clone(step)
-    assert copy.get_params()["constraints"][0] == known[0]
-    assert_allclose(copy.fit(X, y).predict([[0.0, 0.0]]), 0.0, atol=1e-9)
-
-
 def test_what_is_not_proven_is_said(rng):
     class Own(Gaussian):
         name = "own"
@@ -276,15 +250,3 @@ def test_what_the_rules_cannot_keep_is_named(rng):
     known = {"constraints": [OutputLimits(lower=5.0)]}
     constant = ANFISRegressor(n_mfs=1, order=0, **known).fit(X, y)
     assert_allclose(constant.predict(X), 5.0, atol=2e-3 * y.std())
-
-
-def test_rules_taken_as_they_are_are_not_constrained(rng):
-    X, _, y = planted(rng)
-    model = ANFISRegressor(**QUICK).fit(X, y).model_
-    again = ANFISRegressor(partition=model, max_iter=0, monotonic_cst=[1, 0])
-    with pytest.raises(
-        ValueError, match="means nothing where imported rules are taken as they are"
-    ):
-        again.fit(X, y)
-    learnt = ANFISRegressor(partition=model, solver="lse", monotonic_cst=[1, 0], alpha=1e-3)
-    assert monotonicity(learnt.fit(X, y), 0) == 1

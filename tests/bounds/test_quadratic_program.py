@@ -35,14 +35,6 @@ def test_it_is_the_minimum(n_equal, n_rows, rng):
     assert nnls(columns, slope)[1] <= 1e-8 * (1.0 + np.linalg.norm(slope))
 
 
-def test_nothing_is_moved_where_nothing_is_violated(rng):
-    matrix, start, equal, equal_to, rows, _ = a_problem(rng, 0, 5)
-    least = rows @ start - 0.1
-    found, is_active = nearest(NormalFactor(matrix), start, equal, equal_to, rows, least)
-    assert_allclose((rows @ found - least)[is_active], 0.0, atol=1e-8)
-    assert_allclose(found, start, atol=1e-14)
-
-
 def test_what_cannot_be_met_is_told_apart(rng):
     matrix, start, *_ = a_problem(rng, 0, 0)
     factor, row = NormalFactor(matrix), rng.normal(size=(1, N))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from skanfis.antecedent import TermGroup
-from skanfis.bounds.terms import is_known, ranges
-from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
+from skanfis.bounds.terms import ranges
+from skanfis.membership import MEMBERSHIPS, Bell
 
 N_TERMS, N_BOXES = 5, 200
 
@@ -92,11 +92,3 @@ def test_ranges_are_no_wider_than_they_must(name, rng):
     seen = slopes.max(axis=1) - slopes.min(axis=1)
     # A foot is steeper than any row will find.
     assert (width[width < 100.0] <= 1.05 * seen[width < 100.0] + 1e-9).all()
-
-
-def test_a_family_of_one_s_own_is_not_known():
-    class Own(Gaussian):
-        name = "own"
-
-    assert is_known(Gaussian)
-    assert not is_known(Own)

@@ -39,7 +39,7 @@ class GyroDisplay:
     _computed: ClassVar[Callable[..., dict[str, pd.DataFrame]]]
     _draw: Callable[..., None]
 
-    def __init__(self, tables: dict[str, pd.DataFrame]):
+    def __init__(self, tables: dict[str, pd.DataFrame]) -> None:
         self._tables = tables
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -109,7 +109,14 @@ class GyroDisplay:
         return cls.computed(rate, before, after, unit, **options).plot(ax)
 
     @classmethod
-    def computed(cls, rate, before, after, unit=None, **options):
+    def computed(
+        cls,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
+        unit: str | None = None,
+        **options: Any,
+    ) -> Self:
         """The display from predictions, undrawn."""
         unit = cls._UNITS[0] if unit is None else unit
         if unit not in cls._UNITS:
@@ -175,7 +182,7 @@ class GyroDisplay:
         after = before - predicted if predicts == "error" else predicted
         return cls.from_predictions(rate, before, after, ax=ax, **options)
 
-    def panels(self, make_figure):
+    def panels(self, make_figure: Callable[..., Any]) -> Any:
         """Axes of a new figure."""
         figure = make_figure(figsize=self._size(), layout="constrained")
         return figure.subplots(**self._PANELS)

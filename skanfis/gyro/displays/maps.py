@@ -99,7 +99,7 @@ class CoverageDisplay(GyroDisplay):
 
     _SIZE = (6.2, 4.0)
 
-    def __init__(self, tables: dict[str, pd.DataFrame], *, min_coverage: float = 0.1):
+    def __init__(self, tables: dict[str, pd.DataFrame], *, min_coverage: float = 0.1) -> None:
         super().__init__(tables)
         self.min_coverage = min_coverage
 
