@@ -209,6 +209,10 @@ def readability(
     >>> readability(ANFISRegressor(n_mfs=2, agreement=1.0).fit(X, y), X, y).findings
     []
     """
+    return _readability(estimator, X, y, sample_weight)
+
+
+def _readability(estimator, X, y, sample_weight):
     model, reader = fold_with_reader(estimator)
     n_rows = X.shape[0] if hasattr(X, "shape") else len(X)
     take = getattr(X, "iloc", X)

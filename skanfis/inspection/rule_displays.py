@@ -103,8 +103,8 @@ class RuleActivationDisplay(Display):
             corners = [j, j + 1, j + 1, j], [i, i, i + 1, i + 1]
             axes.fill(*corners, fill=False, hatch="////", edgecolor="0.6", linewidth=0.0)
         if self.weights.size <= _MOST_NUMBERED:
-            style = {"ha": "center", "va": "center", "fontsize": "small"}
-            style["bbox"] = {"color": "white", "alpha": 0.7, "pad": 1}
+            box = {"color": "white", "alpha": 0.7, "pad": 1}
+            style: dict = {"ha": "center", "va": "center", "fontsize": "small", "bbox": box}
             for i, j in np.argwhere(self.rules >= 0):
                 count = "" if is_empty[i, j] else f"\n{rows_text(self.rows[i, j])}"
                 axes.text(j + 0.5, i + 0.5, f"{percent[i, j]:.1f} %{count}", **style)
@@ -221,18 +221,14 @@ class RuleContributionDisplay(Display):
             As :func:`skanfis.export.fold` takes it.
         feature : int or str, default=0
             The input to follow over its range in training, by position or name.
-        held : dict, default=None
-            Values of other inputs; None and those not named: their mean in training.
-        output : int or str, default=0
-            Which output, by position or name.
+        held, output : dict, int or str
+            Values of other inputs, by default their mean in training; which output.
         baseline : "mean" or float, default="mean"
             What values are compared with: "mean" of the prediction, or 0 as in :func:`explain`.
         n_deviations : float, default=0
             Half the width of a band around the prediction, in standard deviations; 0 draws none.
-        n_points : int, default=201
-            Points of each curve, 2 or more.
-        max_rules : int, default=6
-            Most rules with a line of their own; the others are drawn as their sum.
+        n_points, max_rules : int, default=201 and 6
+            Points of each curve; most rules with a line of their own, beside the others' sum.
         colormap : str, default="viridis"
             Colours of the rules.
         ax : matplotlib Axes, default=None
