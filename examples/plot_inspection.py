@@ -14,9 +14,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.inspection import (
-    LossCurveDisplay,
     MembershipDisplay,
-    ReadabilityDisplay,
     ResponseSurfaceDisplay,
     RuleActivationDisplay,
     RuleContributionDisplay,
@@ -101,12 +99,10 @@ RuleActivationDisplay.from_estimator(warming)
 # Can the rules be read one by one?
 # ---------------------------------
 #
-# How true each term becomes on the rows, and what the strongest rule of each row says alone over
-# what all say together: where rules cancel one another, points lie far off the diagonal.
-# :doc:`/reading_rules` says what to believe of a rule.
+# How far the strongest rule of each row alone is from what all say together, how true each term
+# becomes, and where neighbours cross. :doc:`/reading_rules` says what to believe of a rule.
 
 print(readability(model, X, error))
-ReadabilityDisplay.from_estimator(model, X, error)
 
 # %%
 # Response
@@ -136,7 +132,8 @@ RuleContributionDisplay.from_estimator(model, "rate", held={"temperature": 40.0}
 figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
 for solver in ("varpro", "hybrid", "gradient"):
     model.set_params(anfisregressor__solver=solver)
-    LossCurveDisplay.from_estimator(model.fit(X, error), ax=ax)
-ax.set_xscale("symlog")
+    ax.loglog(model.fit(X, error)[-1].loss_curve_, label=solver)
+ax.set(xlabel="iteration", ylabel="mean squared error, standardised target")
+ax.legend()
 
 plt.show()

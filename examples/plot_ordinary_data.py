@@ -22,7 +22,6 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.inspection import (
     MembershipDisplay,
-    ReadabilityDisplay,
     ResponseSurfaceDisplay,
     explain,
     export_text,
@@ -85,14 +84,11 @@ MembershipDisplay.from_estimator(model, X_train)
 # May they be read?
 # -----------------
 #
-# Where the strongest rule alone says what all say together, points lie on the diagonal. Here they
-# lie near it: each rule is a plane that holds where its terms are true, and only between two of
-# them, at impedances around 500, is what one says alone far off. Where rules mean nothing alone,
-# the report says so, and ``export_text`` warns. :doc:`/reading_rules` says what may be believed of
-# a rule, and when.
+# Here each rule is a plane that holds where its terms are true: the strongest alone is near what
+# all say together. Where rules mean nothing alone, the report says so, and ``export_text`` warns.
+# :doc:`/reading_rules` says what may be believed of a rule, and when.
 
 print(model[-1].readability_)
-ReadabilityDisplay.from_estimator(model, X_train, y_train)
 
 # %%
 # Why this prediction?

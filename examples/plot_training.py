@@ -13,7 +13,6 @@ from sklearn.base import clone
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
-from skanfis.inspection import LossCurveDisplay
 from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping
 
@@ -88,8 +87,12 @@ stopped = ANFISRegressor(
 ).fit(x_noisy, y_noisy)
 
 figure, panel = plt.subplots(figsize=(6, 4), layout="constrained")
-LossCurveDisplay.from_estimator(stopped, ax=panel)
-panel.axvline(1 + stopped.validation_loss_curve_.argmin(), color="grey", linestyle=":")
+panel.semilogy(stopped.loss_curve_, label="rows of training")
+held_out = stopped.validation_loss_curve_
+panel.semilogy(np.arange(1, 1 + len(held_out)), held_out, "--", label="rows held out")
+panel.set(xlabel="iteration", ylabel="mean squared error, standardised target")
+panel.legend()
+panel.axvline(1 + held_out.argmin(), color="grey", linestyle=":")
 
 # %%
 # Outliers

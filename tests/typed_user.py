@@ -44,10 +44,8 @@ from skanfis.gyro import (
     read_log,
 )
 from skanfis.inspection import (
-    LossCurveDisplay,
     MembershipDisplay,
     Readability,
-    ReadabilityDisplay,
     ResponseSurfaceDisplay,
     RuleActivationDisplay,
     explain,
@@ -72,7 +70,6 @@ ANFISRegressor(
 )
 answers: np.ndarray = model.predict([[1.0, 2.0]])
 text: str = export_text(model.rename_terms({"x0": ["low", "medium", "high"]}))
-display: LossCurveDisplay = LossCurveDisplay(loss=model.loss_curve_)
 memberships: MembershipDisplay = MembershipDisplay.from_estimator(model)
 n_findings: int = len(readability(model, X).findings)
 # Were the type lost on the way, there would be nothing to ignore, which is an error too.
@@ -135,7 +132,6 @@ told_short: str = export_text(model, precision=3, max_rules=4, feature_names=["r
 write_json(model, Path("model.json"))
 restored: np.ndarray = read_json("model.json").predict(X)
 found: Readability = readability(model, frame, y, sample_weight=weights)
-ReadabilityDisplay.from_estimator(model, frame, y, max_rows=100).plot(colormap="Greys")
 ResponseSurfaceDisplay.from_estimator(model, frame, features=("x0", "x1"), held={"x1": 0.0})
 RuleActivationDisplay.from_estimator(model, frame)
 sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)

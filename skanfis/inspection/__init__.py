@@ -1,18 +1,14 @@
 """A trained model as text, tables and pictures; whether its rules can be read."""
 
-from .loss import LossCurveDisplay
 from .model_displays import MembershipDisplay, ResponseSurfaceDisplay
 from .readability import Readability, readability
-from .readability_display import ReadabilityDisplay
 from .rule_displays import RuleActivationDisplay, RuleContributionDisplay
 from .tables import explain, memberships_table, rules_table
 from .text import export_text, rules_html
 
 __all__ = [
-    "LossCurveDisplay",
     "MembershipDisplay",
     "Readability",
-    "ReadabilityDisplay",
     "ResponseSurfaceDisplay",
     "RuleActivationDisplay",
     "RuleContributionDisplay",

@@ -1,4 +1,4 @@
-"""What the displays have in common: axes, colours, labels, and rows along one or two inputs."""
+"""What the displays have in common: axes, colours, notes, and rows along one or two inputs."""
 
 from collections.abc import Mapping
 from numbers import Real
@@ -18,7 +18,7 @@ _BRIGHTEST = 0.85
 
 
 class Display:
-    """A picture on one axes: ``from_estimator`` stores arrays, ``plot`` draws them."""
+    """A picture: ``from_estimator`` stores arrays and draws, ``plot`` draws them again."""
 
     def _begin(self, ax, width=5.6, height=4.2):
         """Take ``ax``, or the axes of a new figure of this size in inches."""
@@ -28,31 +28,22 @@ class Display:
         return ax
 
     def _note(self, held, *notes):
-        """What is held, and other notes, in small letters above the picture."""
+        """Write which inputs are held, and other notes, above the picture."""
         values = [f"{as_label(name)} = {value:.4g}" for name, value in held.items()]
         self.ax_.set_title("; ".join([*values, *notes]), fontsize="small", loc="left")
 
 
-def panels(ax, count, width=3.2, height=2.6, columns=3):
-    """So many axes as an array: of a new figure, in the place of one axes, or those given."""
-    plt = _pyplot()
-    columns = min(columns, count)
-    rows = -(-count // columns)
-    if ax is None:
-        figure = plt.figure(figsize=(width * columns, height * rows), layout="constrained")
-        grid = figure.add_gridspec(rows, columns)
-    elif isinstance(ax, plt.Axes):
-        if count == 1:
-            return np.array([ax])
-        figure = ax.figure
-        grid = ax.get_subplotspec().subgridspec(rows, columns)
-        ax.set_axis_off()
-    else:
+def panels(ax, count, columns=3):
+    """So many axes as an array: those given, or of a new figure."""
+    if ax is not None:
         axes = np.ravel(ax)
         if axes.size != count:
             raise ValueError(f"ax has {axes.size} axes; {count} are needed, one per panel.")
         return axes
-    return np.array([figure.add_subplot(grid[i // columns, i % columns]) for i in range(count)])
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    figure = _pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
+    return np.array([figure.add_subplot(rows, columns, i + 1) for i in range(count)])
 
 
 def _pyplot():
@@ -85,9 +76,8 @@ def position(feature, names, what="input"):
 def section(model, inputs, values, held):
     """Rows that have ``values`` (n_rows, n_inputs_varied) on some inputs, with the others held.
 
-    Others are held where ``held`` says, or at their mean in training; without training data, in the
-    middle of their range. Returns the rows, the others' values by name, and the rows' coverage, 1
-    where the model knows of no data.
+    The others take their value in ``held``, or their mean in training; without training data, the
+    middle of their range. Returns the rows, the others' values by name, and the rows' coverage.
     """
     middle = 0.5 * (model.minimum + model.maximum)
     mean = model.reference if has_training_data(model) else middle

@@ -3,12 +3,9 @@ r"""How the rules of a model stand to their sum, in one pass over rows; where te
 With strengths w_r, consequents f_r, the output yhat = sum_r w_r f_r at the nearest point of the box
 of training, and sd the target's standard deviation, the *strongest rule alone* is
 
-    sqrt(mean (f_r* - yhat)^2) / sd ,    r* the strongest rule of the row:
+    sqrt(mean (f_r* - yhat)^2) / sd ,    r* the strongest rule of the row.
 
-how wrong a person is who reads, for each row, the one rule that fires most. Rules that are equally
-strong count in equal parts, so that neither order nor units decide. Means are by the rows' weights.
-All is computed in standard deviations of the target about its mean, block by block: memory does not
-grow with the rows.
+Rules that are equally strong count in equal parts. Means are by the rows' weights.
 """
 
 from dataclasses import dataclass
@@ -24,10 +21,9 @@ __all__ = ["Measures", "TargetScale", "crossings", "distinct_terms", "measure", 
 _EQUALLY_STRONG = 1.0 - 1e-9
 # A target that varies by rounding errors only, as the predictions of a constant do, is constant.
 _CONSTANT = 16.0 * np.finfo(float).eps
-# Digits of parameters, in widths of the term, by which two terms are the same.
+# Digits, in widths, to which equal terms agree: one that came through a file may lose its last.
 _SAME_DIGITS = 7
-# An interval is looked at in so many points, and shrinks to 1/16: from any length to its last digit
-# in so many looks.
+# An interval is searched at so many points, and shrinks to 1/16, so many times.
 _POINTS, _LOOKS = 33, 14
 
 
@@ -58,30 +54,18 @@ class TargetScale:
 
 
 @dataclass(frozen=True, eq=False)
-class Measures:
-    """What was found on rows.
+class Measures(TargetScale):
+    """What was found on rows; errors are in standard deviations of the target."""
 
-    Errors are in standard deviations of the target; NaN where a rule is the strongest on no row.
-    """
-
-    weight: float  # of all rows; their number where none has a weight
-    mean: np.ndarray  # of the target, as the next three, (n_outputs,)
-    deviation: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
     truth: np.ndarray  # greatest membership of each term on a row, (n_terms,)
     rule_weights: np.ndarray  # part of the rows' weight on which each rule fires, (n_rules,)
     rule_rows: np.ndarray  # weight of the rows on which it is the strongest, (n_rules,)
-    rule_alone: np.ndarray  # RMS of f_r - yhat on these, (n_rules, n_outputs)
+    rule_alone: np.ndarray  # RMS of f_r - yhat on these or NaN, (n_rules, n_outputs)
     alone: np.ndarray  # the same of the strongest rule of every row, (n_outputs,)
 
 
 def measure(model, read, n_rows, y=None, sample_weight=None):
-    """Measure the rules of a model on rows.
-
-    ``read`` gives from a slice the rows of the model's inputs, finite and in raw units. Without
-    ``y`` (n_rows, n_outputs) the predictions stand for the target.
-    """
+    """Measure the rules on rows, which ``read`` gives from a slice; y None is the predictions."""
     model = model.with_out_of_bounds("clip")
     blocks = row_blocks(n_rows, LARGE_BLOCK_ROWS) or [slice(0, 0)]
     if y is None:
@@ -96,11 +80,7 @@ def measure(model, read, n_rows, y=None, sample_weight=None):
 
 
 def rule_sums(rows, model, target):
-    """The sums of :func:`measure` over a part of the rows; ``joined`` adds those of another part.
-
-    ``rows`` has X (n_rows, n_inputs) in raw units, and sample_weight (n_rows,) or None; ``target``
-    is the TargetScale of all rows.
-    """
+    """The sums of :func:`measure` over some rows; ``joined`` adds those of others."""
     sums = _Sums(model.with_out_of_bounds("clip"), target)
     sums.add(rows.X, np.ones(len(rows.X)) if rows.sample_weight is None else rows.sample_weight)
     return sums
@@ -156,11 +136,7 @@ class _Sums:
         with np.errstate(divide="ignore", invalid="ignore"):
             rule_alone = np.sqrt(self.alone / self.rows[:, None])
         return Measures(
-            weight=target.weight,
-            mean=target.mean,
-            deviation=target.deviation,
-            low=target.low,
-            high=target.high,
+            **vars(target),
             truth=np.exp(self.truth),
             rule_weights=self.mass / target.weight,
             rule_rows=self.rows,
@@ -170,16 +146,12 @@ class _Sums:
 
 
 def distinct_terms(antecedent):
-    """By input, the positions of its terms from the lowest to the highest.
-
-    Terms that are the very same are one: the first of them stands for all.
-    """
+    """By input, its terms from the lowest to the highest; of equal ones the first."""
     found: dict[tuple, int] = {}
     t = 0
     for group in antecedent.groups:
         kinds = [parameter.kind for parameter in group.family.parameters]
         width = np.exp(group.theta[kinds.index("log_width")])
-        # Rules that came through a file may share a term but for its last digits.
         rounded = np.round([group.theta[0] / width, *group.theta[1:]], _SAME_DIGITS)
         for j, theta in zip(group.inputs.tolist(), rounded.T.tolist(), strict=True):
             found.setdefault((j, group.family.name, *theta), t)
@@ -194,9 +166,7 @@ def distinct_terms(antecedent):
 def crossings(antecedent):
     """The height at which each term crosses the next one of its input, shape (n_terms,).
 
-    That is the greatest value of the smaller of both memberships between the two locations, found
-    by looking at points along the interval, and again between the neighbours of the best. For two
-    Gaussians of deviations s and t whose centers lie D apart it is exp(-(D / (s + t))^2 / 2). NaN
+    That is the greatest value of the smaller of both memberships between the two locations. NaN
     for the last term of an input, and for terms that another stands for.
     """
     heights = np.full(antecedent.n_terms, np.nan)

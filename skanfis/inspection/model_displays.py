@@ -16,8 +16,8 @@ __all__ = ["MembershipDisplay", "ResponseSurfaceDisplay"]
 
 # Beyond so many terms, a legend is longer than the picture is high.
 _MOST_NAMED = 7
-# Characters of a legend that a panel has room for; line and gaps take so many per name.
-_LEGEND_WIDTH, _LEGEND_GAP = 42, 5
+# Characters of a legend that a panel has room for.
+_LEGEND_WIDTH = 42
 # Contours that can still be told apart by colour.
 _LEVELS = 15
 
@@ -28,27 +28,23 @@ class InputTerms(NamedTuple):
     input_name: str
     term_names: tuple[str, ...]
     grid: np.ndarray  # (n_points,)
-    before: np.ndarray  # (n_terms, n_points)
-    after: np.ndarray  # (n_terms, n_points)
+    before: np.ndarray  # (n_terms, n_points), as after
+    after: np.ndarray
     edges: np.ndarray | None  # of the bins of the data, (n_bins + 1,)
     counts: np.ndarray | None  # rows in each bin, (n_bins,)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class MembershipDisplay:
+class MembershipDisplay(Display):
     """Membership functions before and after training, over a histogram of the data.
+
+    ``axes_`` (n_inputs,) and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
     inputs : list of InputTerms
-        For each input its "input_name", the "term_names", a "grid" of values, the memberships
-        "before" and "after" training at these, of shape (n_terms, n_points), and the "edges" and
-        "counts" of the data's histogram, or None.
-
-    Attributes
-    ----------
-    figure_, axes_ : matplotlib Figure, ndarray of matplotlib Axes of shape (n_inputs,)
-        The figure and its panels, once drawn.
+        For each input "input_name", "term_names", a "grid" of values, the memberships "before" and
+        "after" training, (n_terms, n_points), "edges" and "counts" of the histogram, or None.
 
     Examples
     --------
@@ -93,7 +89,7 @@ class MembershipDisplay:
         colormap : str, default="viridis"
             Colours of the terms, from the lowest to the highest.
         ax : matplotlib Axes or sequence of Axes, default=None
-            Where to draw: None makes a figure; one axes is divided; a sequence has one per input.
+            One for each input; None makes a figure.
         """
         check_count("n_points", n_points, 2)
         check_count("bins", bins, 1)
@@ -101,12 +97,11 @@ class MembershipDisplay:
         with_terms = np.unique(model.antecedent.term_inputs).tolist()
         if not with_terms:
             raise ValueError("The model has no terms: nothing to draw.")
-        chosen = with_terms
-        if features is not None:
-            chosen = [position(feature, model.input_names) for feature in features]
-            for j in chosen:
-                if j not in with_terms:
-                    raise ValueError(f"Input {model.input_names[j]!r} has no terms.")
+        names = model.input_names
+        chosen = with_terms if features is None else [position(j, names) for j in features]
+        for j in chosen:
+            if j not in with_terms:
+                raise ValueError(f"Input {names[j]!r} has no terms.")
         display = cls(inputs=[_terms_on(model, j, n_points, rows, bins) for j in chosen])
         return display.plot(ax=ax, show_before=show_before, colormap=colormap)
 
@@ -124,81 +119,54 @@ class MembershipDisplay:
 
 
 def _terms_on(model, j, n_points, rows, bins):
-    """The terms of input j over the box of the training data."""
     grid = np.linspace(model.minimum[j], model.maximum[j], n_points)
     own = np.flatnonzero(model.antecedent.term_inputs == j)
     Z = np.zeros((model.n_inputs, n_points))
     Z[j] = grid
+    names = tuple(model.term_names[t] for t in own)
+    before = np.exp(model.initial_antecedent.log_memberships(Z)[own])
+    after = np.exp(model.antecedent.log_memberships(Z)[own])
     counts, edges = (None, None) if rows is None else np.histogram(rows[:, j], bins)
-    return InputTerms(
-        model.input_names[j],
-        tuple(model.term_names[t] for t in own),
-        grid,
-        np.exp(model.initial_antecedent.log_memberships(Z)[own]),
-        np.exp(model.antecedent.log_memberships(Z)[own]),
-        edges,
-        counts,
-    )
+    return InputTerms(model.input_names[j], names, grid, before, after, edges, counts)
 
 
 def _draw_terms(axes, terms, show_before, colormap):
+    names = [as_label(name) for name in terms.term_names]
     if terms.counts is not None:
         heights = terms.counts / max(terms.counts.max(), 1)
         axes.stairs(heights, terms.edges, fill=True, color="0.9", zorder=0)
     # Colours in the order of places: scattered terms come in the order of their rules.
     rank = np.argsort(np.argsort(terms.after.argmax(axis=1), kind="stable"))
-    shades = colors(len(terms.term_names), colormap)[rank]
-    curves = zip(terms.term_names, terms.before, terms.after, shades, strict=True)
-    for name, before, after, shade in curves:
+    shades = colors(len(names), colormap)[rank]
+    for name, before, after, shade in zip(names, terms.before, terms.after, shades, strict=True):
         if show_before:
             axes.plot(terms.grid, before, "--", color=shade, linewidth=1.0, alpha=0.7)
-        axes.plot(terms.grid, after, color=shade, linewidth=1.8, label=as_label(name))
+        axes.plot(terms.grid, after, color=shade, linewidth=1.8, label=name)
     axes.set(xlabel=as_label(terms.input_name), ylabel="membership", ylim=(0.0, 1.05))
     axes.set_xlim(terms.grid[0], terms.grid[-1])
-    if len(terms.term_names) <= _MOST_NAMED:
-        most = max(_LEGEND_WIDTH // (max(map(len, terms.term_names)) + _LEGEND_GAP), 1)
-        n_lines = -(-len(terms.term_names) // most)
-        axes.legend(
-            loc="lower center",
-            bbox_to_anchor=(0.5, 1.0),
-            ncols=-(-len(terms.term_names) // n_lines),
-            frameon=False,
-            fontsize="small",
-            handlelength=1.2,
-            columnspacing=1.0,
-            borderaxespad=0.1,
-        )
+    if len(names) <= _MOST_NAMED:
+        columns = max(_LEGEND_WIDTH // (max(map(len, names)) + 5), 1)
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
+        axes.legend(ncols=columns, fontsize="small", frameon=False, handlelength=1.2, **place)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ResponseSurfaceDisplay(Display):
     """Prediction over two inputs with the rest held; it fades where no data cover it.
 
+    ``ax_``, ``figure_`` and ``surface_`` are matplotlib's, once drawn.
+
     Parameters
     ----------
-    xx0, xx1, response : ndarray of shape (grid_resolution, grid_resolution)
-        Values of the two inputs, as of ``numpy.meshgrid``, and the prediction there.
-    coverage : ndarray of shape (grid_resolution, grid_resolution)
-        How well the training data cover each point, from 0 to 1; 1 where none are known.
-    input_names : tuple of str
-        Names of the two inputs.
-    output_name : str
-        Name of the output.
+    xx0, xx1, response, coverage : ndarray of shape (grid_resolution, grid_resolution)
+        Values of the two inputs, as of ``numpy.meshgrid``, the prediction, and how well the
+        training data cover each point, from 0 to 1; 1 where none are known.
+    input_names, output_name : tuple of two str, str
+        Names of the two inputs and of the output.
     held : dict
         Value of every other input by its name.
     points : ndarray of shape (n_samples, 2), default=None
         Rows of data on these inputs.
-
-    Attributes
-    ----------
-    figure_, ax_ : matplotlib Figure, matplotlib Axes
-        Once drawn.
-    surface_ : matplotlib ContourSet or QuadMesh
-        The surface, once drawn.
-
-    See Also
-    --------
-    sklearn.inspection.PartialDependenceDisplay : The same averaged over the other inputs.
 
     Examples
     --------
@@ -241,14 +209,9 @@ class ResponseSurfaceDisplay(Display):
         estimator : fitted estimator or TSKModel
             As :func:`skanfis.export.fold` takes it.
         X : array-like of shape (n_samples, n_features), default=None
-            Rows to show as points, wherever they lie on the inputs that are held.
-        features : pair of int or str, default=(0, 1)
-            The inputs across and up, by position or name.
-        held : dict, default=None
-            Values of other inputs; those not named are held at their mean in training, or in the
-            middle of their range in a model that knows of no data.
-        output : int or str, default=0
-            Which output, by position or name.
+            Rows to show as points.
+        features, held, output : pair of int or str, dict, int or str
+            Inputs across and up; values of others, by default their mean; which output.
         grid_resolution : int, default=60
             Points on each axis, 2 or more.
         plot_method : {"contourf", "pcolormesh"}, default="contourf"
@@ -259,7 +222,7 @@ class ResponseSurfaceDisplay(Display):
             None makes a figure.
         """
         check_count("grid_resolution", grid_resolution, 2)
-        model, table = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
+        model, points = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
         if isinstance(features, str) or len(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:
@@ -271,8 +234,8 @@ class ResponseSurfaceDisplay(Display):
         if both[0] == both[1]:
             raise ValueError(f"features={features!r} is the same input twice.")
         k = position(output, model.output_names, "output")
-        x, y = np.linspace(model.minimum[both], model.maximum[both], grid_resolution).T
-        xx0, xx1 = np.meshgrid(x, y)
+        ends = model.minimum[both], model.maximum[both]
+        xx0, xx1 = np.meshgrid(*np.linspace(*ends, grid_resolution).T)
         values = np.column_stack([xx0.ravel(), xx1.ravel()])
         rows, others, coverage = section(model, both, values, held)
         display = cls(
@@ -283,7 +246,7 @@ class ResponseSurfaceDisplay(Display):
             input_names=tuple(model.input_names[j] for j in both),
             output_name=model.output_names[k],
             held=others,
-            points=None if table is None else table[:, both],
+            points=None if points is None else points[:, both],
         )
         return display.plot(plot_method=plot_method, colormap=colormap, ax=ax)
 
@@ -295,7 +258,10 @@ class ResponseSurfaceDisplay(Display):
         axes = self._begin(ax)
         x, y = self.xx0[0], self.xx1[:, 0]
         grid = (x, y, self.response)
-        low, high = self._range_covered(x, y)
+        # Extrapolation shall not set the colours.
+        seen = self.response[self.coverage >= COVERED]
+        seen = seen if seen.size > 1 else self.response
+        low, high = np.min(seen), np.max(seen)
         if plot_method == "contourf":
             from matplotlib.ticker import MaxNLocator
 
@@ -315,14 +281,3 @@ class ResponseSurfaceDisplay(Display):
         is_pale = np.any(self.coverage < COVERED)
         self._note(self.held, *(["pale: few training data"] if is_pale else []))
         return self
-
-    def _range_covered(self, x, y):
-        """Range of the prediction where data are: extrapolation shall not set the colours."""
-        seen = self.response[self.coverage >= COVERED]
-        if self.points is not None:
-            i = np.rint((self.points[:, 1] - y[0]) / (y[1] - y[0])).astype(int)
-            j = np.rint((self.points[:, 0] - x[0]) / (x[1] - x[0])).astype(int)
-            on_grid = (i >= 0) & (i < y.size) & (j >= 0) & (j < x.size)
-            seen = self.response[i[on_grid], j[on_grid]]
-        seen = seen if seen.size > 1 else self.response
-        return np.min(seen), np.max(seen)

@@ -18,21 +18,19 @@ from ..model import TSKModel
 from .measures import Measures, crossings, distinct_terms, measure
 from .rules import premise_texts, rules_frame, writable
 
-__all__ = ["Readability", "checked_rows", "readability", "readability_of_rows"]
+__all__ = ["Readability", "readability", "readability_of_rows"]
 
 # Rules of the notebook's table.
 _MOST_LINES = 10
-# A sentence names so many terms or pairs; beyond, it counts them.
+# A sentence names so many terms or pairs, and counts the others.
 _MOST_NAMED = 5
-_NOTHING_FOUND = "Nothing measured here speaks against reading the rules one by one."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Readability:
     """Whether the rules of a model can be read one by one, and what speaks against it.
 
-    :func:`skanfis.inspection.readability` makes it; in a notebook it shows itself. The page "What
-    to believe of a rule" of the documentation says what the figures mean.
+    :func:`skanfis.inspection.readability` makes it; in a notebook it shows itself.
 
     Parameters
     ----------
@@ -44,23 +42,16 @@ class Readability:
     Attributes
     ----------
     terms : DataFrame
-        One row per term, from the lowest to the highest of each input; equal terms count once.
-        Columns: "input"; "term", its name; "greatest_truth", its greatest membership on a row;
-        "crossing", the height at which it crosses the next, missing for the last.
+        One row per term: "input"; "term"; "greatest_truth", its greatest membership on a row;
+        "crossing", the height at which it crosses the next one. Equal terms count once.
     rules : DataFrame
-        One row per rule and output. Columns: "if", the rule's terms; "output"; "weight", the part
-        of the rows' weight on which it fires; "rows", the weight of the rows on which it is the
-        strongest; "alone", the RMS difference between its value and the model on these, in standard
-        deviations of the target, missing where there are none.
-    summary : Series
-        "strongest_alone", that difference over all rows, of the worst output; "least_truth" and
-        "greatest_crossing" of the terms, missing where there are none, or no two on an input.
-    limits : dict
-        By entry of ``summary`` the least truth that passes, and the most of the others.
-    findings : list of str
-        What is not fit to be read, in sentences; an empty list if all is well.
-    line : str
-        The summary in one line.
+        One row per rule and output: "if", its terms; "output"; "weight", the part of the rows'
+        weight on which it fires; "rows", the weight of the rows on which it is the strongest;
+        "alone", the RMS of its value less the model on these, in sd of the target.
+    summary, limits : Series, dict
+        The worst "strongest_alone", "least_truth" and "greatest_crossing", and what just passes.
+    findings, line : list of str, str
+        What is not fit to be read, in sentences, empty if all is well; the summary in one line.
 
     Examples
     --------
@@ -69,12 +60,8 @@ class Readability:
     >>> from skanfis.inspection import readability
     >>> X, y = make_jang_sinc()
     >>> found = readability(ANFISRegressor(n_mfs=[3, 1], solver="lse").fit(X, y), X, y)
-    >>> found.terms[["input", "term"]]
-         input    term
-    term
-    0       x0     low
-    1       x0  medium
-    2       x0    high
+    >>> list(found.terms["term"])
+    ['low', 'medium', 'high']
     """
 
     model: TSKModel
@@ -88,7 +75,7 @@ class Readability:
 
     @property
     def terms(self) -> Any:
-        """The terms; see the class."""
+        """One row per term; see the class."""
         model, antecedent = writable(self.model), self.model.antecedent
         own = [t for terms in distinct_terms(antecedent).values() for t in terms]
         inputs = antecedent.term_inputs
@@ -162,8 +149,8 @@ class Readability:
         return "\n".join(self._lines())
 
     def _lines(self):
-        line = self.line
-        return [f"{line[0].upper()}{line[1:]}.", *(self.findings or [_NOTHING_FOUND])]
+        nothing = "Nothing measured here speaks against reading the rules one by one."
+        return [f"{self.line[0].upper()}{self.line[1:]}.", *(self.findings or [nothing])]
 
     def _repr_html_(self):
         rules = self.rules.sort_values("weight", ascending=False, kind="stable")
@@ -176,13 +163,7 @@ class Readability:
         return f'<div style="{style}">{"".join(parts)}</div>'
 
     def html(self) -> str:
-        """The summary and the findings as HTML.
-
-        Returns
-        -------
-        html : str
-            A ``<div>`` for each, with names escaped.
-        """
+        """Write the summary and the findings as HTML, a ``<div>`` for each."""
         return "".join(f"<div>{escape(line)}</div>" for line in self._lines())
 
 
@@ -193,72 +174,45 @@ def readability(
     *,
     sample_weight: ArrayLike | None = None,
 ) -> Readability:
-    r"""Measure whether the rules can be read one by one, and say what speaks against it.
+    """Measure whether the rules can be read one by one, and say what speaks against it.
 
-    The model is the mean of its rules by their strengths, :math:`\hat y = \sum_r w_r f_r`. Nothing
-    but the sum need be right: rules may say anything as long as others cancel it. Measured are how
-    far the strongest rule of a row lies from the model,
-
-    .. math:: \sqrt{\operatorname{mean} (f_{r^*} - \hat y)^2} \; / \; \mathrm{sd}(y) ,
-
-    how true each term becomes on the rows, and where neighbouring terms cross.
+    Measured are how far the strongest rule of a row lies from the model, how true each term
+    becomes on the rows, and where neighbouring terms cross; see :doc:`/reading_rules`.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     X : array-like of shape (n_samples, n_features)
-        Rows, as ``estimator.predict`` takes them. They are read block by block, and may be
-        memory-mapped. A row outside the training range is taken at the nearest point in it.
+        Rows, read block by block; those outside the range count at its nearest point.
     y : array-like of shape (n_samples,) or (n_samples, n_outputs), default=None
-        The target; None takes the standard deviation of the predictions. That of a constant counts
-        as one.
+        The target, whose standard deviation is the unit; None takes the predictions.
     sample_weight : array-like of shape (n_samples,), default=None
         Weights, zero or positive; a whole number counts as so many copies of the row.
 
     Returns
     -------
     readability : Readability
-        With the tables ``terms`` and ``rules``, the ``summary``, and the ``findings`` in sentences,
-        an empty list if all is well.
+        Tables, summary and findings.
 
     Raises
     ------
     ValueError
-        If X, y or the weights are not finite, of different lengths, or of other columns than in
-        training; if weights are negative or leave fewer than two rows; if a step of a pipeline
-        cannot be folded.
-
-    See Also
-    --------
-    ReadabilityDisplay : The same as a picture.
+        If X, y or the weights do not fit the model, or a step of a pipeline cannot be folded.
 
     Examples
     --------
-    Rules of a straight line, and the same with 30 added to one and taken from the other:
-
-    >>> from dataclasses import replace
-    >>> import numpy as np
     >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import readability
-    >>> X = np.linspace(0.0, 10.0, 101).reshape(-1, 1)
-    >>> y = 2.0 * X[:, 0] + 1.0
-    >>> model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, y).model_
-    >>> readability(model, X, y).findings
+    >>> X, y = make_jang_sinc()
+    >>> readability(ANFISRegressor(n_mfs=2, agreement=1.0).fit(X, y), X, y).findings
     []
-    >>> change = np.zeros_like(model.coefficients)
-    >>> change[:, 0, 0] = [30.0, -30.0]
-    >>> apart = replace(model, coefficients=model.coefficients + change)
-    >>> for sentence in readability(apart, X, y).findings:
-    ...     print(sentence)
-    No rule can be read without the others: the strongest alone misses the model by ... (limit 0.5).
     """
-    model, *rows = checked_rows(estimator, X, y, sample_weight)
-    return Readability(model, measure(model, *rows))
+    return _readability(estimator, X, y, sample_weight)
 
 
-def checked_rows(estimator, X, y, sample_weight):
-    """The model, and the arguments of :func:`measure`; rows are checked as they are read."""
+def _readability(estimator, X, y, sample_weight):
     model, reader = fold_with_reader(estimator)
     n_rows = X.shape[0] if hasattr(X, "shape") else len(X)
     take = getattr(X, "iloc", X)
@@ -284,11 +238,11 @@ def checked_rows(estimator, X, y, sample_weight):
         sample_weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
         positive_weights(sample_weight, n_rows)
     check_consistent_length(X, y, sample_weight)
-    return model, read, n_rows, y, sample_weight
+    return Readability(model, measure(model, read, n_rows, y, sample_weight))
 
 
 def readability_of_rows(model, X, y=None, sample_weight=None):
-    """Measure a model on arrays that have been checked; X may be memory-mapped."""
+    """Measure a model on arrays that have been checked."""
     return Readability(model, measure(model, lambda part: X[part], X.shape[0], y, sample_weight))
 
 
@@ -298,30 +252,28 @@ def _on_truth(terms):
         return []
     what = "A term is" if len(never) == 1 else f"{len(never)} of {len(terms)} terms are"
     named = _named(
-        f"{line.term!r} of {line.input!r} ({_figure(line.greatest_truth)})"
-        for line in never.itertuples(index=False)
+        [f"{t.term!r} of {t.input!r} ({_figure(t.greatest_truth)})" for t in never.itertuples()]
     )
     return [f"{what} never truer than {LEAST_TRUTH} on any row: {named}."]
 
 
 def _on_crossings(terms):
-    lines = list(terms.itertuples(index=False))
-    pairs = [(a, b) for a, b in pairwise(lines) if a.input == b.input]
-    too_high = [(a, b) for a, b in pairs if a.crossing > GREATEST_CROSSING]
-    if not too_high:
+    pairs = [(a, b) for a, b in pairwise(terms.itertuples()) if a.input == b.input]
+    found = [
+        f"{a.term!r} and {b.term!r} of {a.input!r} ({_figure(a.crossing)})"
+        for a, b in pairs
+        if a.crossing > GREATEST_CROSSING
+    ]
+    if not found:
         return []
-    many = f"{len(too_high)} of {len(pairs)} pairs of neighbouring terms"
-    named = _named(
-        f"{a.term!r} and {b.term!r} of {a.input!r} ({_figure(a.crossing)})" for a, b in too_high
-    )
+    many = f"{len(found)} of {len(pairs)} pairs of neighbouring terms"
     return [
-        f"{many if len(too_high) > 1 else 'Two terms'} can hardly be told apart, for they cross "
-        f"above {GREATEST_CROSSING}: {named}."
+        f"{many if len(found) > 1 else 'Two terms'} can hardly be told apart, for they cross "
+        f"above {GREATEST_CROSSING}: {_named(found)}."
     ]
 
 
 def _named(parts):
-    parts = list(parts)
     if len(parts) <= _MOST_NAMED:
         return ", ".join(parts)
     return f"{', '.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"

@@ -19,7 +19,7 @@ __all__ = ["RuleActivationDisplay", "RuleContributionDisplay"]
 
 # A cell is empty where its rule is the strongest on less than half a row.
 _EMPTY = 0.5
-# With more cells than these, numbers in them cannot be read.
+# Beyond so many cells, numbers in them cannot be read.
 _MOST_NUMBERED = 100
 
 
@@ -27,17 +27,14 @@ _MOST_NUMBERED = 100
 class RuleActivationDisplay(Display):
     """Map of the rules: how much of the data each fires on, with empty cells hatched.
 
-    Rules over shared terms are laid out as a table, with a cell for every combination of terms; the
-    terms of the first inputs run down, those of the last ones across. Scattered rules, which have
-    terms of their own, are listed, the weightiest first. What a rule says that is the strongest on
-    no row is extrapolation.
+    Rules over shared terms are a table with a cell for every combination of terms; scattered rules
+    are a list, the weightiest first. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
-    weights : ndarray of shape (n_down, n_across)
-        Part of the data's weight on which the rule of each cell fires; NaN where there is no rule.
-    rows : ndarray of shape (n_down, n_across)
-        Number of rows on which the rule of each cell is the strongest; NaN where there is no rule.
+    weights, rows : ndarray of shape (n_down, n_across)
+        Part of the data's weight on which the rule of each cell fires, and number of rows on which
+        it is the strongest; NaN where there is no rule.
     rules : ndarray of int of shape (n_down, n_across)
         Number of each cell's rule; -1 where there is none.
     labels_down, labels_across : list of str
@@ -45,18 +42,13 @@ class RuleActivationDisplay(Display):
     inputs_down, inputs_across : tuple of str
         The inputs that these terms are of.
 
-    Attributes
-    ----------
-    figure_, ax_ : matplotlib Figure, matplotlib Axes
-        Once drawn.
-
     Examples
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import RuleActivationDisplay
-    >>> X, y = make_jang_sinc()
-    >>> display = RuleActivationDisplay.from_estimator(ANFISRegressor(n_mfs=[3, 2]).fit(X, y))
+    >>> model = ANFISRegressor(n_mfs=[3, 2]).fit(*make_jang_sinc())
+    >>> display = RuleActivationDisplay.from_estimator(model)
     >>> display.labels_down, display.labels_across
     (['low', 'medium', 'high'], ['low', 'high'])
     """
@@ -80,7 +72,7 @@ class RuleActivationDisplay(Display):
         estimator : fitted estimator or TSKModel
             As :func:`skanfis.export.fold` takes it.
         X : array-like of shape (n_samples, n_features), default=None
-            Rows to count; None is the training data, as the model remembers them.
+            Rows to count; None is the training data.
         colormap : str, default="Blues"
             Colours of the weights.
         ax : matplotlib Axes, default=None
@@ -111,29 +103,19 @@ class RuleActivationDisplay(Display):
             corners = [j, j + 1, j + 1, j], [i, i, i + 1, i + 1]
             axes.fill(*corners, fill=False, hatch="////", edgecolor="0.6", linewidth=0.0)
         if self.weights.size <= _MOST_NUMBERED:
+            box = {"color": "white", "alpha": 0.7, "pad": 1}
+            style: dict = {"ha": "center", "va": "center", "fontsize": "small", "bbox": box}
             for i, j in np.argwhere(self.rules >= 0):
-                red, green, blue, _ = image.cmap(image.norm(percent[i, j]))
-                is_dark = 0.3 * red + 0.6 * green + 0.1 * blue < 0.5
                 count = "" if is_empty[i, j] else f"\n{rows_text(self.rows[i, j])}"
-                axes.text(
-                    j + 0.5,
-                    i + 0.5,
-                    f"{percent[i, j]:.1f} %{count}",
-                    ha="center",
-                    va="center",
-                    fontsize="small",
-                    color="white" if is_dark else "black",
-                    bbox={"color": "white", "alpha": 0.7, "pad": 1} if is_empty[i, j] else None,
-                )
+                axes.text(j + 0.5, i + 0.5, f"{percent[i, j]:.1f} %{count}", **style)
         axes.set_xticks(np.arange(across) + 0.5, list(map(as_label, self.labels_across)))
         axes.set_yticks(np.arange(down) + 0.5, list(map(as_label, self.labels_down)))
-        if max(map(len, self.labels_across), default=0) * across > 60:
-            for label in axes.get_xticklabels():
-                label.set(rotation=45, rotation_mode="anchor", ha="right")
+        if max(map(len, self.labels_across)) * across > 60:
+            axes.tick_params("x", rotation=45)
         axes.invert_yaxis()
         axes.tick_params(length=0)
-        axes.set_xlabel(as_label(", ".join(self.inputs_across)))
-        axes.set_ylabel(as_label(", ".join(self.inputs_down)))
+        names = [as_label(", ".join(own)) for own in (self.inputs_across, self.inputs_down)]
+        axes.set(xlabel=names[0], ylabel=names[1])
         self._note({}, *(["hatched: strongest on no row"] if np.any(is_empty) else []))
         return self
 
@@ -176,24 +158,18 @@ def _layout(model, weights, rows):
 class RuleContributionDisplay(Display):
     """Contributions of the rules to the prediction along one input, the rest held.
 
-    A rule contributes its strength times the distance of its value from a baseline; the sum of the
-    contributions and the baseline is the prediction, before it is held at the limits of its
-    training.
+    A rule contributes its strength times the distance of its value from a baseline; contributions
+    and baseline add up to the prediction, before it is held at the limits of its training.
+    ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
-    grid : ndarray of shape (n_points,)
-        Values of the input.
-    contributions : ndarray of shape (n_rules, n_points)
-        Strength times value less baseline, for every rule.
-    baseline : float
-        What the rules' values are compared with.
-    coverage : ndarray of shape (n_points,)
-        How well the training data cover each point, from 0 to 1; 1 where none are known.
-    rule_terms : list of str
-        The terms of each rule, on the "premise_inputs" one after the other.
-    premise_inputs : tuple of str
-        Inputs that rules look at.
+    grid, coverage : ndarray of shape (n_points,)
+        Values of the input, and how well the training data cover each, from 0 to 1.
+    contributions, baseline : ndarray of shape (n_rules, n_points), float
+        Strength times value less baseline, for every rule; what values are compared with.
+    rule_terms, premise_inputs : list of str, tuple of str
+        The terms of each rule, on these inputs one after the other.
     input_name, output_name : str
         Names of the input and the output.
     held : dict
@@ -201,31 +177,20 @@ class RuleContributionDisplay(Display):
     band : ndarray of shape (n_points,), default=None
         Half the width of a band around the prediction.
 
-    Attributes
-    ----------
-    figure_, ax_ : matplotlib Figure, matplotlib Axes
-        Once drawn.
-
-    See Also
-    --------
-    skanfis.inspection.explain : The same as a table, for given rows.
-
     Examples
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import RuleContributionDisplay
-    >>> X, y = make_jang_sinc()
-    >>> model = ANFISRegressor(n_mfs=[4, 1]).fit(X, y)
-    >>> display = RuleContributionDisplay.from_estimator(model, "x0")
-    >>> display.rule_terms
+    >>> model = ANFISRegressor(n_mfs=[4, 1]).fit(*make_jang_sinc())
+    >>> RuleContributionDisplay.from_estimator(model, "x0").rule_terms
     ['very low', 'low', 'high', 'very high']
     """
 
     grid: np.ndarray
+    coverage: np.ndarray
     contributions: np.ndarray
     baseline: float
-    coverage: np.ndarray
     rule_terms: Sequence[str]
     premise_inputs: Sequence[str]
     input_name: str
@@ -256,21 +221,14 @@ class RuleContributionDisplay(Display):
             As :func:`skanfis.export.fold` takes it.
         feature : int or str, default=0
             The input to follow over its range in training, by position or name.
-        held : dict, default=None
-            Values of other inputs; those not named are held at their mean in training, or in the
-            middle of their range in a model that knows of no data.
-        output : int or str, default=0
-            Which output, by position or name.
+        held, output : dict, int or str
+            Values of other inputs, by default their mean in training; which output.
         baseline : "mean" or float, default="mean"
-            What the rules' values are compared with. "mean" is the mean of the prediction along the
-            line drawn; 0 gives the contributions of :func:`skanfis.inspection.explain`.
+            What values are compared with: "mean" of the prediction, or 0 as in :func:`explain`.
         n_deviations : float, default=0
-            Half the width of a band around the prediction, in its standard deviations
-            (``predict(X, return_std=True)``), zero or positive; 0 draws none.
-        n_points : int, default=201
-            Points of each curve, 2 or more.
-        max_rules : int, default=6
-            Most rules with a line of their own, 1 or more; the others are drawn as their sum.
+            Half the width of a band around the prediction, in standard deviations; 0 draws none.
+        n_points, max_rules : int, default=201 and 6
+            Points of each curve; most rules with a line of their own, beside the others' sum.
         colormap : str, default="viridis"
             Colours of the rules.
         ax : matplotlib Axes, default=None
@@ -315,44 +273,34 @@ class RuleContributionDisplay(Display):
         axes = self._begin(ax, width=7.5)
         most = np.argsort(-np.abs(self.contributions).mean(axis=1), kind="stable")
         chosen = np.sort(most[:max_rules])
-        total = self.baseline + self.contributions.sum(axis=0)
+        lines, total = self.baseline + self.contributions, self.contributions.sum(axis=0)
+        total += self.baseline
         axes.axhline(self.baseline, color="0.6", linewidth=0.8)
         for r, shade in zip(chosen, colors(chosen.size, colormap), strict=True):
             label = as_label(f"{r}: {self.rule_terms[r]}")
-            line = self.baseline + self.contributions[r]
-            axes.plot(self.grid, line, color=shade, linewidth=1.5, label=label)
+            axes.plot(self.grid, lines[r], color=shade, linewidth=1.5, label=label)
         if chosen.size < len(self.contributions):
             others = self.baseline + np.delete(self.contributions, chosen, axis=0).sum(axis=0)
             label = f"{len(self.contributions) - chosen.size} other rules"
             axes.plot(self.grid, others, ":", color="0.5", linewidth=1.5, label=label)
-        band = 0.0 if self.band is None else self.band
         if self.band is not None:
-            ends = total - band, total + band
+            ends = total - self.band, total + self.band
             axes.fill_between(self.grid, *ends, color="black", alpha=0.15, label="deviation")
+            lines = np.vstack([lines, *ends])
         axes.plot(self.grid, total, color="black", linewidth=2.2, label="prediction")
-        axes.set_xlabel(as_label(self.input_name))
-        axes.set_ylabel(f"{as_label(self.output_name)}: {self.baseline:.4g} + contribution")
-        axes.set_xlim(self.grid[0], self.grid[-1])
+        label = f"{as_label(self.output_name)}: {self.baseline:.4g} + contribution"
+        axes.set(xlabel=as_label(self.input_name), ylabel=label, xlim=self.grid[[0, -1]])
         covered = self.coverage >= COVERED
         is_grey = covered.any() and not covered.all()
         if is_grey:
-            # What is said where there are no data does not set the limits.
-            lines = [self.baseline + self.contributions, total - band, total + band]
-            seen = np.vstack(lines)[:, covered]
+            # Extrapolation does not set the limits.
+            seen = np.vstack([lines, total])[:, covered]
             if margin := 0.1 * np.ptp(seen):
                 axes.set_ylim(seen.min() - margin, seen.max() + margin)
-            across = axes.get_xaxis_transform()
-            axes.fill_between(
-                self.grid, 0.0, 1.0, where=~covered, color="0.93", transform=across, zorder=0
-            )
+            style = {"color": "0.93", "zorder": 0, "transform": axes.get_xaxis_transform()}
+            axes.fill_between(self.grid, 0.0, 1.0, where=~covered, **style)
         self._note(self.held, *(["grey: few training data"] if is_grey else []))
-        axes.legend(
-            loc="upper left",
-            bbox_to_anchor=(1.0, 1.0),
-            frameon=False,
-            fontsize="small",
-            title=as_label("rule: " + ", ".join(self.premise_inputs)),
-            title_fontsize="small",
-            alignment="left",
-        )
+        title = as_label("rule: " + ", ".join(self.premise_inputs))
+        place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "alignment": "left"}
+        axes.legend(title=title, fontsize="small", title_fontsize="small", frameon=False, **place)
         return self

@@ -1,12 +1,13 @@
 """The rules as one frame, from which text, tables, HTML and pictures are made."""
 
+import warnings
 from dataclasses import replace
 from numbers import Real
 
 import numpy as np
 import pandas as pd
 
-from .._validation import check_choice, check_count, warn_user
+from .._validation import check_choice, check_count
 from ..exceptions import ReadabilityWarning
 from ..export import last_step
 from ..model import TSKModel
@@ -24,14 +25,11 @@ __all__ = [
     "writable",
 ]
 
-SORT_BY = ("weight", "rows", "rule")
-
 
 def rules_frame(model, reference):
     """A row per rule: ("if", input), ("data", "weight" or "rows"), ("then output", coefficient).
 
-    The term of an input is None where the rule does not look at it. Consequents are by the inputs'
-    distances from ``reference``, their "constant" being the value there.
+    Consequents are by the inputs' distances from ``reference``; no term is None.
     """
     model = writable(model)
     inputs, names = model.antecedent.term_inputs, model.term_names
@@ -69,14 +67,11 @@ def premise_texts(frame):
 
 def choose_rules(frame, sort_by, max_rules, min_weight):
     """The rules to show, in the order to show them."""
-    check_choice("sort_by", sort_by, SORT_BY)
+    check_choice("sort_by", sort_by, ("weight", "rows", "rule"))
     if max_rules is not None:
         check_count("max_rules", max_rules, 1)
     if not isinstance(min_weight, Real) or not 0.0 <= float(min_weight) <= 1.0:
-        raise ValueError(
-            f"min_weight={min_weight!r} must be a number from 0 to 1: a part of the weight of the "
-            "training data."
-        )
+        raise ValueError(f"min_weight={min_weight!r} must be a number from 0 to 1.")
     if sort_by != "rule":
         # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
         size = np.round(frame["data", sort_by].to_numpy(), 9)
@@ -105,9 +100,8 @@ def rounded_reference(model):
 
 def readability_in_training(estimator, model):
     """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
-    if isinstance(estimator, TSKModel):
-        return None
-    found = getattr(last_step(estimator), "readability_", None)
+    last = None if isinstance(estimator, TSKModel) else last_step(estimator)
+    found = getattr(last, "readability_", None)
     return None if found is None else replace(found, model=model)
 
 
@@ -123,18 +117,16 @@ def warn_of_findings(estimator, model):
             "inputs (premise_features, consequent_features). skanfis.inspection.readability has "
             "the figures.",
         ]
-        warn_user("\n".join(lines), ReadabilityWarning)
+        warnings.warn("\n".join(lines), ReadabilityWarning, stacklevel=3)
 
 
 def writable(model):
     """The model with names that pandas and files take: lone surrogates become escapes."""
-    names = {
-        kind: tuple(
-            name.encode("utf-8", "backslashreplace").decode() for name in getattr(model, kind)
-        )
-        for kind in ("input_names", "output_names", "term_names")
-    }
-    return replace(model, **names)
+    written = {}
+    for kind in ("input_names", "output_names", "term_names"):
+        names = [name.encode("utf-8", "backslashreplace") for name in getattr(model, kind)]
+        written[kind] = tuple(name.decode() for name in names)
+    return replace(model, **written)
 
 
 def rename(model, feature_names, output_names):
@@ -149,11 +141,10 @@ def rename(model, feature_names, output_names):
 
 
 def _checked_names(parameter, names, count, what):
-    names = tuple(names) if not isinstance(names, str) else names
     if isinstance(names, str) or not all(isinstance(name, str) for name in names):
         raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
     if len(names) != count:
         raise ValueError(f"{parameter} has {len(names)} names; the model has {count} {what}.")
     if len(set(names)) != len(names):
         raise ValueError(f"{parameter} repeats a name: {list(names)!r}.")
-    return names
+    return tuple(names)

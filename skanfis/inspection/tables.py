@@ -29,19 +29,17 @@ def rules_table(
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     about : {"origin", "mean"}, default="origin"
-        Where the constants of the consequents are the rule's value: at the origin, as in textbooks,
-        or at the mean of the training inputs, with more digits. The slopes are the same.
+        Where the constants are the rule's value: at the origin, or the mean of the training inputs.
     sort_by, max_rules, min_weight : {"rule", "weight", "rows"}, int or None, float
-        Which rules, and in which order, as :func:`export_text` takes them; all by their number.
+        Which rules, in which order, as of :func:`export_text`; all by their number.
 
     Returns
     -------
     table : DataFrame
-        One row per rule, labelled by its number, with two levels of columns. ``"if"``: the term on
-        each input that rules look at, missing where the rule does not. ``"data"``: "weight", the
-        part of the weight of the training data on which the rule fires, and "rows", the number of
-        training rows, by their weight, on which it is the strongest. ``"then y"``, for each output
-        by its name: the "constant", and the slope by each input.
+        One row per rule, by its number, with two levels of columns. ``"if"``: the term on each
+        input, missing where the rule does not look at it. ``"data"``: "weight", the part of the
+        training data on which it fires, and "rows", the number of rows on which it is the
+        strongest. ``"then y"``, per output: the "constant", and the slope by each input.
 
     Raises
     ------
@@ -58,17 +56,9 @@ def rules_table(
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import rules_table
-    >>> X, y = make_jang_sinc()
-    >>> rules = rules_table(ANFISRegressor(n_mfs=2).fit(X, y))
-    >>> rules["if"]
-            x0    x1
-    rule
-    0      low   low
-    1      low  high
-    2     high   low
-    3     high  high
-    >>> float(rules["data"]["weight"].sum())
-    1.0
+    >>> rules = rules_table(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()))
+    >>> list(rules["if", "x1"])
+    ['low', 'high', 'low', 'high']
     >>> list(rules["then y"])
     ['constant', 'x0', 'x1']
     """
@@ -92,22 +82,16 @@ def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
     Returns
     -------
     table : DataFrame
-        One row per term, labelled by its number, with columns "input", "name", "function" and one
-        for every parameter, in the units of the input (a bell's "slope" has none); missing where a
-        family has no such parameter.
-
-    Raises
-    ------
-    ValueError
-        If a step of a pipeline cannot be folded.
+        One row per term, by its number: "input", "name", "function", and every parameter in the
+        units of the input, missing where a family has none such.
 
     Examples
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import memberships_table
-    >>> X, y = make_jang_sinc()
-    >>> memberships_table(ANFISRegressor(n_mfs=[2, 1]).fit(X, y), trained=False)
+    >>> model = ANFISRegressor(n_mfs=[2, 1]).fit(*make_jang_sinc())
+    >>> memberships_table(model, trained=False)
          input  name  function  center  width
     term
     0       x0   low  gaussian   -10.0   9.89
@@ -133,24 +117,17 @@ def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     Returns
     -------
     table : DataFrame
-        The strongest rule first, for each row and output. Columns: "row", its position in X;
-        "output", its name; "rule", the rule's number; "if", its terms; "strength", its part in the
-        row, which sums to one over the rules; "value", what it says there; "contribution", strength
-        times value. **The sum of the contributions to a row's output is the prediction**, to
-        rounding errors.
-
-        Lines without a number: "other rules" (see ``min_strength``); "held", where the output is
-        held at the limits of its training, with the difference to what the rules say; and of a
-        row outside the training range, which is explained at the nearest point in it, "beyond x"
-        for each input that is outside, with ``out_of_bounds="linear"``: its "value" is the slope
-        there, its "contribution" the slope times the distance, or times ``max_extrapolation``
-        standard deviations where that is less. With "nan" such rows have missing values.
+        For each row and output the strongest rule first: "row", its position in X; "output";
+        "rule", its number; "if", its terms; "strength", its part in the row; "value", what it says
+        there; "contribution", strength times value. **The sum of the contributions is the
+        prediction**. Lines without a number are "other rules", "held" at the limits of training,
+        and "beyond x", the way from the nearest point of the range along the tangent. With
+        ``out_of_bounds="nan"`` rows outside have missing values.
 
     Raises
     ------
     ValueError
-        If X is not finite, or has other columns than in training; if it is outside the training
-        range and ``out_of_bounds="raise"``; if a step of a pipeline cannot be folded.
+        If X does not fit the model, or lies outside the range with ``out_of_bounds="raise"``.
 
     Examples
     --------
@@ -160,9 +137,8 @@ def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     >>> X, y = make_jang_sinc()
     >>> model = ANFISRegressor(n_mfs=2).fit(X, y)
     >>> table = explain(model, X[:1])
-    >>> table.drop(columns=["value", "contribution"])
-       row output  rule                        if  strength
-    0    0      y     0      x0 is low AND x1 is low   ...
+    >>> table["if"][0]
+    'x0 is low AND x1 is low'
     >>> bool(abs(table["contribution"].sum() - model.predict(X[:1])[0]) < 1e-12)
     True
     """
@@ -177,61 +153,45 @@ def explain(estimator: Any, X: ArrayLike, *, min_strength: float = 0.0) -> Any:
     values = rule_values(model, nearest)
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
-    lines = _rule_lines(model, strengths, values, min_strength)
-    said = np.einsum("nr,nro->no", strengths, values)
+    order = np.argsort(-strengths, axis=1, kind="stable")
+    sorted_strengths = np.take_along_axis(strengths, order, axis=1)
+    sorted_values = np.take_along_axis(values, order[:, :, None], axis=1)
+    weak = strengths < min_strength
+    n_rows, (n_rules, n_inputs) = len(rows), (model.n_rules, model.n_inputs)
+    way, gradient = np.zeros((n_rows, n_inputs)), np.zeros((n_rows, n_inputs, model.n_outputs))
     if model.out_of_bounds == "linear" and not inside.all():
         way, gradient = model.way_out(rows), model.gradient(nearest)
-        beyond = way[:, :, None] * gradient
-        row, j, output = np.nonzero(np.repeat(way[:, :, None] != 0.0, model.n_outputs, axis=2))
-        names = np.array([f"beyond {name}" for name in model.input_names], dtype=object)
-        cell = (row, j, output)
-        lines.append(_lines(row, output, names[j], beyond[cell], value=gradient[cell]))
-        said += beyond.sum(axis=1)
+    beyond = way[:, :, None] * gradient
+    said = np.einsum("nr,nro->no", strengths, values) + beyond.sum(axis=1)
     held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
-    row, output = np.nonzero(held)
-    lines.append(_lines(row, output, "held", held[row, output]))
-    # Sorted by row and output alone, lines stay in the order in which they were made.
-    table = pd.concat([part for part in lines if len(part)] or lines[:1], ignore_index=True)
-    table = table.sort_values(["row", "output"], kind="stable", ignore_index=True)
-    table["output"] = np.array(model.output_names, dtype=object)[table["output"]]
-    return table
-
-
-def _rule_lines(model, strengths, values, min_strength):
-    """A line for each rule that fires on a row, by falling strength, and one for all others."""
-    premises = np.array(premise_texts(rules_frame(model, model.reference)), dtype=object)
-    contributions = strengths[:, :, None] * values
-    order = np.argsort(-strengths, axis=1, kind="stable")
-    fires = np.take_along_axis(strengths, order, axis=1) >= min_strength
-    row, place, output = np.nonzero(np.repeat(fires[:, :, None], model.n_outputs, axis=2))
-    rule = order[row, place]
-    cell = (row, rule, output)
-    fired = _lines(
-        row,
-        output,
-        premises[rule],
-        contributions[cell],
-        rule=rule,
-        strength=strengths[row, rule],
-        value=values[cell],
+    others = np.einsum("nr,nro->no", weak, strengths[:, :, None] * values)
+    # By row, and for all that may have a line there: the rules, others, beyond each input, held.
+    missing = np.full((n_rows, 1), np.nan)
+    strength = np.hstack(
+        [sorted_strengths, (strengths * weak).sum(axis=1, keepdims=True), np.nan * way, missing]
     )
-    weak = strengths < min_strength
-    row, output = np.nonzero(np.repeat(weak.any(axis=1)[:, None], model.n_outputs, axis=1))
-    total = np.einsum("nr,nro->no", weak, contributions)[row, output]
-    others = _lines(row, output, "other rules", total, strength=(strengths * weak).sum(axis=1)[row])
-    return [fired, others]
-
-
-def _lines(row, output, what, contribution, *, rule=None, strength=np.nan, value=np.nan):
-    """Lines of an explanation."""
+    unknown = np.full((n_rows, 1, model.n_outputs), np.nan)
+    value = np.hstack([sorted_values, unknown, gradient, unknown])
+    contribution = np.hstack(
+        [sorted_strengths[:, :, None] * sorted_values, others[:, None], beyond, held[:, None]]
+    )
+    has_line = np.hstack([sorted_strengths >= min_strength, weak.any(axis=1)[:, None], way != 0.0])
+    has_line = np.repeat(has_line[:, :, None], model.n_outputs, axis=2)
+    has_line = np.hstack([has_line, held[:, None] != 0.0])
+    row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
+    # Numbers of rules first, then those of the other lines.
+    source = np.hstack([order, np.tile(np.arange(n_rules, strength.shape[1]), (n_rows, 1))])
+    source = source[row, place]
+    texts = premise_texts(rules_frame(model, model.reference))
+    texts += ["other rules", *(f"beyond {name}" for name in model.input_names), "held"]
     return pd.DataFrame(
         {
             "row": row,
-            "output": output,
-            "rule": pd.array([pd.NA] * len(row) if rule is None else rule, dtype="Int64"),
-            "if": np.full(len(row), what, dtype=object) if isinstance(what, str) else what,
-            "strength": strength,
-            "value": value,
-            "contribution": contribution,
+            "output": np.array(model.output_names, dtype=object)[output],
+            "rule": pd.Series(source, dtype="Int64").where(source < n_rules),
+            "if": np.array(texts, dtype=object)[source],
+            "strength": strength[row, place],
+            "value": value[row, place, output],
+            "contribution": contribution[row, place, output],
         }
     )

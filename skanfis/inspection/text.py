@@ -49,39 +49,29 @@ def export_text(
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     precision : int, default=4
-        Significant digits of the numbers, from 1 to 17. Places on an input's axis get as many more
-        as it takes to tell them to this part of the term's width. Slopes that move the output by
-        less than these digits over the whole range of their input are left out.
+        Significant digits, from 1 to 17. Slopes that move no such digit are left out.
     about : {"mean", "origin"}, default="mean"
-        "mean": consequents by the inputs' distances from a round number near their mean,
-        ``1.2 + 0.3 * (temperature - 290)``. "origin": the textbook form of ``consequents_``,
-        ``-85.8 + 0.3 * temperature``.
+        Consequents by the inputs' distances from a round number near their mean, ``1.2 + 0.3 *
+        (temperature - 290)``, or in the textbook form, ``-85.8 + 0.3 * temperature``.
     sort_by : {"weight", "rows", "rule"}, default="weight"
-        First the rules that fire on more of the training data, or that are the strongest on more
-        rows, or as they are numbered.
-    max_rules : int, default=None
-        Most rules to write; None is all. A last line says what was left out.
-    min_weight : float, default=0.0
-        Least part of the weight of the training data on which a rule fires, from 0 to 1.
+        By the part of the training data, or the rows, that each rule has, or by number.
+    max_rules, min_weight : int or None, float
+        Most rules to write, and the least part of the training data that a rule fires on.
     show_terms : bool, default=True
-        Whether to write the terms' parameters, the ranges of the inputs, the policy outside them,
-        and the noise, where a fit has found it.
+        Whether to write the terms' parameters, the ranges, the policy outside them, and the noise.
     feature_names, output_names : sequence of str, default=None
         Other names of the inputs and the outputs; None for the model's.
 
     Returns
     -------
     text : str
-        Rules by their number, from 0, as in ``rules_``; with the part of the weight of the training
-        data on which each fires, and the number of rows on which it is the strongest, unless the
-        model knows of no data.
+        Rules by their number, with the part of the training data on which each fires, and the
+        number of rows on which it is the strongest. A last line says what was left out.
 
     Raises
     ------
-    ValueError
-        If a parameter is out of its range, or a step of a pipeline cannot be folded.
-    TypeError
-        If ``estimator`` has no rules.
+    ValueError, TypeError
+        If a parameter is out of its range, a step cannot be folded, or there are no rules.
 
     Warns
     -----
@@ -96,24 +86,16 @@ def export_text(
     >>> hours = np.linspace(0.0, 10.0, 41).reshape(-1, 1)
     >>> drift = 0.1 * hours[:, 0] + 5.0 * np.exp(-hours[:, 0])
     >>> model = ANFISRegressor(n_mfs=2, solver="lse", agreement=0.1).fit(hours, drift)
-    >>> print(export_text(model, precision=3, feature_names=["hours"], output_names=["drift"]))
+    >>> print(export_text(model, precision=3, feature_names=["hours"], show_terms=False))
     2 rules, 1 input.
     <BLANKLINE>
     Rule 0, 50 % of the weight, strongest on 21 rows:
       IF hours is low
-      THEN drift = 0.338 - 0.555 * (hours - 5)
+      THEN y = 0.338 - 0.555 * (hours - 5)
     <BLANKLINE>
     Rule 1, 50 % of the weight, strongest on 20 rows:
       IF hours is high
-      THEN drift = 0.649 + 0.195 * (hours - 5)
-    <BLANKLINE>
-    Terms:
-      hours, trained from 0 to 10
-        low:  gaussian, center 0, width 4.95
-        high: gaussian, center 10, width 4.95
-    Outside these ranges: out_of_bounds='linear', max_extrapolation=0.5.
-    Held within the limits of its training: drift, 0.023 to 5.469.
-    Standard deviation of the noise about the rules: drift 0.548.
+      THEN y = 0.649 + 0.195 * (hours - 5)
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
     check_choice("about", about, ("mean", "origin"))
@@ -130,8 +112,7 @@ def export_text(
             rows = rows_text(model.rule_rows[r])
             share = f"{100.0 * model.rule_weights[r]:.3g} %"
             heading += f", {share} of the weight, strongest on {rows}"
-        pairs = zip(model.output_names, consequents[r], strict=True)
-        then = "\n   AND ".join(f"{name} = {formula}" for name, formula in pairs)
+        then = "\n   AND ".join(f"{name} = {texts[r]}" for name, texts in consequents.items())
         parts.append(f"{heading}:\n  IF {premise}\n  THEN {then}")
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
@@ -155,27 +136,19 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     Returns
     -------
     html : str
-        One ``<div>``, with names escaped, without script or anything to load. A fitted
-        ANFISRegressor shows it by itself in notebooks. Below the rules stands what its
-        ``readability_`` says.
+        One ``<div>``, with names escaped, and nothing to run or to load; ``readability_`` below.
 
     Raises
     ------
-    ValueError
-        If a step of a pipeline cannot be folded, or a number is out of its range.
-    TypeError
-        If ``estimator`` has no rules.
+    ValueError, TypeError
+        If a number is out of its range, a step cannot be folded, or there are no rules.
 
     Examples
     --------
-    >>> from IPython.display import HTML  # doctest: +SKIP
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import rules_html
-    >>> X, y = make_jang_sinc()
-    >>> page = rules_html(ANFISRegressor(n_mfs=3).fit(X, y))
-    >>> HTML(page)  # doctest: +SKIP
-    >>> page.count("</tr>")
+    >>> rules_html(ANFISRegressor(n_mfs=3).fit(*make_jang_sinc())).count("</tr>")
     11
     """
     check_count("precision", precision, 1, _MOST_DIGITS)
@@ -192,8 +165,8 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     for name in chosen.get("if", ()):
         low, high = range_text(model, model.input_names.index(name), precision)
         cells["if", f"{name}, {low} to {high}"] = chosen["if", name].fillna("any")
-    for k, name in enumerate(model.output_names):
-        cells["then", name] = [consequents[r][k] for r in chosen.index]
+    for name, texts in consequents.items():
+        cells["then", name] = [texts[r] for r in chosen.index]
     with pd.option_context("display.max_colwidth", None):
         table = pd.DataFrame(cells, index=list(chosen.index))
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
@@ -208,16 +181,15 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
 
 
 def _consequent_texts(model, frame, reference, precision):
-    """Of each rule and output "a + b * (x - x0) + ...", a list of lists."""
-    texts: list[list[str]] = [[] for _ in range(model.n_rules)]
+    """By output and rule "a + b * (x - x0) + ..."."""
+    texts = {}
     for output in model.output_names:
         values = frame[f"then {output}"].to_numpy(copy=True)
         # Slopes that move the output by less than the last digit written.
         change = np.abs(values[:, 1:]) * (model.maximum - model.minimum)
         scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
         values[:, 1:][change < 10.0 ** -(precision + 2) * scale] = 0.0
-        for of_rule, coefficients in zip(texts, values, strict=True):
-            of_rule.append(_formula(coefficients, model.input_names, reference, precision))
+        texts[output] = [_formula(row, model.input_names, reference, precision) for row in values]
     return texts
 
 
@@ -255,9 +227,8 @@ def _legend(model, precision):
             lines.append(f"Held within the limits of its training: {name}, {ends}.")
         elif np.isfinite([low, high]).any():
             side, end = ("above", low) if np.isfinite(low) else ("below", high)
-            lines.append(
-                f"Held {side} the limit of its training: {name}, {number(end, precision)}."
-            )
+            end = number(end, precision)
+            lines.append(f"Held {side} the limit of its training: {name}, {end}.")
     if model.posterior is not None:
         noise = zip(model.output_names, model.posterior.noise, strict=True)
         values = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
