@@ -170,7 +170,7 @@ class Results:
         if self.time is None:
             return "the log has no time"
         if self.calibration.is_thinned:
-            return "only some of the rows are held: see --average"
+            return "only some of the rows are used"
         steps = self.steps
         if not steps.size or np.ptp(steps) > _UNEVEN * np.median(steps):
             return "the rows are not evenly spaced in time"

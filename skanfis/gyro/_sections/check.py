@@ -20,8 +20,7 @@ def check(page, results):
         page.paragraph(
             f"The log has {calibration.n_rows:,} rows. All were read and looked at for errors; "
             f"what is said here is of {len(calibration.log):,} of them, every k-th of each run. "
-            "Figures that need every row, of bias stability and Allan's deviation, are left out: "
-            "see --average."
+            "Figures that need every row, of bias stability and Allan's deviation, are left out."
         )
     page.paragraph(
         f"Every row was compensated by a model that had not seen its group: "
