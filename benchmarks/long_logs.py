@@ -26,7 +26,7 @@ def run(options):
         for millions in sorted({1, max(options.rows // _MILLION, 1)}):
             log, n_runs = f"log{millions}.parquet", _N_RUNS * millions
             n_rows = alone(write_log, folder / log, n_runs)
-            ways = {"": (log,), "--average 10": (log, "--average", "10")}
+            ways = {"": (log,)}
             if millions == 1:
                 alone(write_log, folder / "log.csv", n_runs)
                 ways = {"of CSV": ("log.csv",)} | ways

@@ -8,11 +8,13 @@ import pandas as pd
 from ..export.c.status import STATUS
 from ._checks import RowChecks
 from ._columns import SIGNALS
-from ._console import UsageError, refuse_existing, say, staged, usage_errors
-from ._log_file import LogFile, RunFinder
+from ._console import refuse_existing, say, staged, usage_errors
+from ._log_file import LogFile
 from ._options import request_of
+from ._runs import RunFinder
 from .compensator import GyroCompensator, features
-from .log import check_device, check_different, find_logs, pieces_of
+from .errors import UsageError
+from .log import check_different, find_logs, pieces_of
 
 __all__ = ["apply"]
 
@@ -29,33 +31,27 @@ def apply(options, tell):
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
-    if options.average is not None:
-        needed.add("time")
     request = request_of(options, sorted(needed))
     check_different(paths)
-    summary, files = _Summary(target), []
+    tallies = []
     with staged(target.parent) as folder, usage_errors():
         with open(folder / target.name, "w", encoding="utf-8", newline="") as written:
             for number, path in enumerate(paths, start=1):
                 tell(f"compensating {path} ({number} of {len(paths)})")
-                files.append(file := LogFile(path, request))
-                stem = Path(path).stem if len(paths) > 1 else ""
-                for log, compensated in _compensated(
-                    file, compensator, options.max_gap, stem, tell
-                ):
+                file, stem = LogFile(path, request), Path(path).stem if len(paths) > 1 else ""
+                for log, rates in _compensated(file, compensator, stem, tell):
                     labels = [name for name in ("device", "run", "time") if name in log]
-                    table = log[labels].join(compensated)
                     # Twelve digits are beyond any gyro, and short beside the 17 of a double.
-                    is_first = summary.n_rows == 0
-                    table.to_csv(written, index=False, header=is_first, float_format="%.12g")
-                    summary.add(log, compensated)
-        check_device(files, request)
+                    log[labels].join(rates).to_csv(
+                        written, index=False, header=not tallies, float_format="%.12g"
+                    )
+                    tallies.append(_tally(log, rates))
         tell(f"writing {target}")
-    say(summary.lines())
+    say(_summary(target, tallies))
     tell("done")
 
 
-def _compensated(file, compensator, max_gap, stem, tell):
+def _compensated(file, compensator, stem, tell):
     """Pieces of a log, with labels of their runs, and what the compensator makes of them."""
     unit, due = file.layout.units["output"], compensator.output_unit
     if (unit if unit in SIGNALS else "deg/s") != due:
@@ -63,7 +59,7 @@ def _compensated(file, compensator, max_gap, stem, tell):
             f"the model was calibrated for an output in {due}; this is in {unit} "
             f"(--units output={due})."
         )
-    finder, checks = RunFinder(max_gap), RowChecks(file.layout.units)
+    finder, checks = RunFinder(by_clock=True), RowChecks(file.layout.units)
     inputs_of = _Inputs(compensator.inputs, compensator.time_constant)
     for log in pieces_of(file, 0, finder, checks, tell):
         compensated = compensator._compensated(inputs_of(log), compensator.indicated(log))
@@ -113,39 +109,23 @@ class _Inputs:
         return X
 
 
-class _Summary:
-    """Counts and squared errors over all rows."""
+def _tally(log, rates):
+    """Numbers of rows by status; where the true rate is known, sums of squared errors too."""
+    tally = pd.DataFrame({"rows": 1}, index=rates.index)
+    if "rate" in log:
+        for name in ("indicated", "compensated"):
+            tally[name] = (rates[f"rate_{name}"] - log["rate"]) ** 2
+    return tally.groupby(rates["status"]).sum()
 
-    def __init__(self, target):
-        self._target = target
-        self.n_rows = 0
-        self._by_status = pd.Series(dtype=int)
-        # Squares before and after, and how many, of the rows where all is well and of others.
-        self._squares = {False: np.zeros(3), True: np.zeros(3)}
 
-    def add(self, log, compensated):
-        status = compensated["status"]
-        self.n_rows += len(log)
-        self._by_status = self._by_status.add(status.value_counts(), fill_value=0)
-        if "rate" not in log:
-            return
-        errors = compensated[["rate_indicated", "rate_compensated"]].sub(log["rate"], axis=0)
-        errors = (errors.dropna() ** 2).assign(count=1.0)
-        for is_flagged, sums in errors.groupby(status[errors.index] != 0):
-            self._squares[is_flagged] += sums.sum().to_numpy()
-
-    def lines(self):
-        """The summary."""
-        counts = self._by_status.astype(int)
-        n_flagged = counts[counts.index != 0].sum()
-        yield f"written        {self._target}: {self.n_rows:,} rows, {n_flagged:,} flagged"
-        for name, bit in STATUS.items():
-            if count := counts[(counts.index & bit) != 0].sum():
-                yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
-        for is_flagged, (before, after, n_rows) in self._squares.items():
-            if n_rows:
-                kind = "flagged" if is_flagged else "all is well"
-                yield (
-                    f"RMS error      {np.sqrt(before / n_rows):.4g} deg/s before, "
-                    f"{np.sqrt(after / n_rows):.4g} after ({kind})"
-                )
+def _summary(target, tallies):
+    counts = pd.concat(tallies).groupby(level=0).sum() if tallies else pd.DataFrame({"rows": []})
+    rows, status = counts["rows"], counts.index
+    n_flagged = rows[status != 0].sum()
+    yield f"written        {target}: {rows.sum():,} rows, {n_flagged:,} flagged"
+    for name, bit in STATUS.items():
+        if len(rows) and (count := rows[(status & bit) != 0].sum()):
+            yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
+    if "compensated" in counts and 0 in status:
+        before, after = np.sqrt(counts.loc[0, ["indicated", "compensated"]] / rows.loc[0])
+        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after (rows with status 0)"

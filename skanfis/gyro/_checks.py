@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._columns import CANONICAL, SIGNALS, convert, declared_units, plausible_units, units_of
+from ._columns import CANONICAL, SIGNALS, convert, declared_units, units_of
 from .errors import LogError
 
 __all__ = [
@@ -57,8 +57,7 @@ def check_log(
     log : DataFrame of shape (n_rows, n_parts)
         As :func:`read_log` returns it. Without a column "run" all rows are one run.
     inputs : sequence of str, default=("temperature", "output")
-        What the compensator is to learn from: of "time", "temperature", "temperature_rate" and
-        "output". They must change enough.
+        Of "time", "temperature", "temperature_rate" and "output"; they must change enough.
     units : dict of str to str, default=None
         Units of the file, as for :func:`read_log`, which tell a raw signal from a rate.
     min_temperature_span : float, default=10.0
@@ -72,8 +71,8 @@ def check_log(
     Raises
     ------
     LogError
-        If values are missing, infinite or implausible, time does not increase within a run, a range
-        is too small, or the output does not follow the rate. The message names column and row.
+        If a value is missing or implausible, time does not increase within a run, a range is too
+        small, or the output does not follow the rate.
 
     Examples
     --------
@@ -92,10 +91,22 @@ def check_log(
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
     RowChecks(units).add(log)
-    if "run" in log and len(inputs):
-        _check_runs(log["run"])
+    n_runs = log["run"].nunique() if "run" in log and len(inputs) else 1
+    if n_runs * _FEWEST_ROWS_PER_RUN > len(log):
+        raise LogError(
+            f"{n_runs} runs in {len(log)} rows are too many; is it a counter of rows? A run lasts "
+            f"from one power-on to the next; at least {_FEWEST_ROWS_PER_RUN} rows of each are due.",
+            "run",
+        )
     if {"temperature", "temperature_rate"} & set(inputs):
-        _check_temperature_span(log["temperature"], min_temperature_span)
+        low, high = log["temperature"].min(), log["temperature"].max()
+        if high - low < min_temperature_span:
+            raise LogError(
+                f"the temperature spans {high - low:.3g} degC only ({low:.4g} to {high:.4g}); "
+                f"at least {min_temperature_span:g} degC are needed to learn from it. Log over a "
+                "wider range, or leave temperature and temperature_rate out of the inputs.",
+                "temperature",
+            )
     if "output" in inputs and "rate" in log:
         _check_output_follows_rate(log, units)
     return log
@@ -230,38 +241,26 @@ def _check_plausible(values, part, unit):
     if not bad.any():
         return
     row = int(np.argmax(bad))
-    others = plausible_units(values, part, unit, low, high)
     # More than half: the unit; few: glitches of the measurement.
     advice = ""
-    if others and bad.mean() > 0.5:
-        advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+    if bad.mean() > 0.5:
+        zero, one = convert(np.array([0.0, 1.0]), part, unit)
+        ends = (np.array([values.min(), values.max()]) - zero) / (one - zero)
+        others = [
+            other
+            for other in units_of(part)
+            if other not in (unit, *SIGNALS)
+            and low <= convert(ends[0], part, other)
+            and convert(ends[1], part, other) <= high
+        ]
+        if others:
+            advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
     raise LogError(
         f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
         f"are outside {low:g} to {high:g}){advice}.",
         part,
         row,
     )
-
-
-def _check_runs(run):
-    n_runs = run.nunique()
-    if n_runs * _FEWEST_ROWS_PER_RUN > len(run):
-        raise LogError(
-            f"{n_runs} runs in {len(run)} rows are too many; is it a counter of rows? A run lasts "
-            f"from one power-on to the next; at least {_FEWEST_ROWS_PER_RUN} rows of each are due.",
-            "run",
-        )
-
-
-def _check_temperature_span(temperature, least):
-    low, high = temperature.min(), temperature.max()
-    if high - low < least:
-        raise LogError(
-            f"the temperature spans {high - low:.3g} degC only ({low:.4g} to {high:.4g}); "
-            f"at least {least:g} degC are needed to learn from it. Log over a wider range, or "
-            "leave temperature and temperature_rate out of the inputs.",
-            "temperature",
-        )
 
 
 def _check_output_follows_rate(log, units):

@@ -1,7 +1,6 @@
 """Columns and their units: checks of columns and numbers, and units with their spellings.
 
-A log is in s, degC and deg/s. A raw signal (counts, volts) keeps its unit: a scale factor turns it
-into a rate later.
+A log is in s, degC and deg/s. A raw signal (counts, volts) keeps its unit.
 """
 
 import math
@@ -26,68 +25,55 @@ __all__ = [
     "evenly_chosen",
     "in_rate_unit",
     "label_texts",
-    "plausible_units",
     "rate_unit_of",
     "unit_in",
-    "unit_named",
     "units_of",
 ]
 
-_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
-_RATE = {
-    "deg/s": 1.0,
-    "deg/h": 1 / 3600.0,
-    "rad/s": 180.0 / math.pi,
-    "mrad/s": 0.18 / math.pi,
-    "rpm": 6.0,
-}
-_TEMPERATURE = {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0}
-_ZERO = {"K": -273.15, "degF": -160.0 / 9.0}  # of each scale, in degC
-SIGNALS = ("counts", "V", "mV")
-
-_UNITS = {
-    "time": _TIME,
-    "temperature": _TEMPERATURE,
-    "rate": _RATE,
-    "output": {**_RATE, **dict.fromkeys(SIGNALS, 1.0)},
-}
-CANONICAL = {"time": "s", "temperature": "degC", "rate": "deg/s", "output": "deg/s"}
-PER_HOUR = 3600.0  # 1 deg/s in deg/h
-RATE_UNITS = {"deg/s": 1.0, "deg/h": PER_HOUR}  # of each in 1 deg/s
-# Spellings in lower case, without blanks, of units that are understood.
-_SPELLINGS = {
+# Of each unit: its factor to the canonical one, and spellings in lower case, without blanks.
+_TABLE = {
     "time": {
-        "s": "s sec secs second seconds",
-        "ms": "ms msec millis millisecond milliseconds",
-        "us": "us µs μs usec micros microsecond microseconds",
-        "ns": "ns nsec nanos nanosecond nanoseconds",
-        "min": "min minute minutes",
-        "h": "h hr hrs hour hours",
+        "s": (1.0, "sec secs second seconds"),
+        "ms": (1e-3, "msec millis millisecond milliseconds"),
+        "us": (1e-6, "µs μs usec micros microsecond microseconds"),
+        "ns": (1e-9, "nsec nanos nanosecond nanoseconds"),
+        "min": (60.0, "minute minutes"),
+        "h": (3600.0, "hr hrs hour hours"),
     },
     "temperature": {
-        "degC": "degc °c ℃ c celsius deg_c cel",
-        "K": "k kelvin degk °k",
-        "degF": "degf °f ℉ f fahrenheit deg_f",
+        "degC": (1.0, "°c ℃ c celsius deg_c cel"),
+        "K": (1.0, "kelvin degk °k"),
+        "degF": (5.0 / 9.0, "°f ℉ f fahrenheit deg_f"),
     },
     "rate": {
-        "deg/s": "deg/s °/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec",
-        "deg/h": "deg/h °/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg/hour",
-        "rad/s": "rad/s rad_s rads radps rad/sec rad_sec rad_per_s",
-        "mrad/s": "mrad/s mrad_s mradps",
-        "rpm": "rpm",
+        "deg/s": (1.0, "°/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec"),
+        "deg/h": (1 / 3600.0, "°/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg/hour"),
+        "rad/s": (180.0 / math.pi, "rad_s rads radps rad/sec rad_sec rad_per_s"),
+        "mrad/s": (0.18 / math.pi, "mrad_s mradps"),
+        "rpm": (6.0, ""),
     },
     "signal": {
-        "counts": "counts count cnts cnt lsb lsbs digits raw adc codes",
-        "V": "v volt volts",
-        "mV": "mv millivolt millivolts",
+        "counts": (1.0, "count cnts cnt lsb lsbs digits raw adc codes"),
+        "V": (1.0, "volt volts"),
+        "mV": (1.0, "millivolt millivolts"),
     },
 }
 _MEANT = {
     spelling: (quantity, unit)
-    for quantity, units in _SPELLINGS.items()
-    for unit, spellings in units.items()
-    for spelling in spellings.split()
+    for quantity, units in _TABLE.items()
+    for unit, (_, spellings) in units.items()
+    for spelling in (unit.casefold(), *spellings.split())
 }
+_FACTORS = {
+    quantity: {unit: factor for unit, (factor, _) in units.items()}
+    for quantity, units in _TABLE.items()
+}
+SIGNALS = tuple(_FACTORS.pop("signal"))
+_FACTORS["output"] = {**_FACTORS["rate"], **dict.fromkeys(SIGNALS, 1.0)}
+_ZERO = {"K": -273.15, "degF": -160.0 / 9.0}  # of each scale, in degC
+CANONICAL = {"time": "s", "temperature": "degC", "rate": "deg/s", "output": "deg/s"}
+PER_HOUR = 3600.0  # 1 deg/s in deg/h
+RATE_UNITS = {"deg/s": 1.0, "deg/h": PER_HOUR}  # of each in 1 deg/s
 
 
 def unit_in(text):
@@ -96,43 +82,26 @@ def unit_in(text):
 
 
 def units_of(quantity):
-    """Names of the units that a quantity may be given in."""
-    return tuple(_UNITS[quantity])
-
-
-def unit_named(quantity, name):
-    """The unit's usual name; ValueError where the quantity has no such unit."""
-    _, unit = unit_in(str(name)) or (None, name)
-    if not isinstance(name, str) or unit not in _UNITS[quantity]:
-        raise ValueError(
-            f"{quantity} has no unit {name!r}: it may be in {', '.join(units_of(quantity))}."
-        )
-    return unit
+    return tuple(_FACTORS[quantity])
 
 
 def convert(values, quantity, unit):
     """Values in the canonical unit; those of a raw signal as they are."""
-    return values * _UNITS[quantity][unit] + _ZERO.get(unit, 0.0)
-
-
-def plausible_units(values, quantity, unit, low, high):
-    """Other units in which the values, already converted from ``unit``, would be plausible."""
-    given = (np.array([values.min(), values.max()]) - _ZERO.get(unit, 0.0)) / _UNITS[quantity][unit]
-    found = []
-    for other in units_of(quantity):
-        smallest, largest = convert(given, quantity, other)
-        if other not in (unit, *SIGNALS) and low <= smallest and largest <= high:
-            found.append(other)
-    return found
+    return values * _FACTORS[quantity][unit] + _ZERO.get(unit, 0.0)
 
 
 def declared_units(units):
     """``units`` with the usual name of each; ValueError where there is no such unit."""
-    for quantity in units or {}:
+    found = {}
+    for quantity, name in (units or {}).items():
         if quantity not in CANONICAL:
             known = ", ".join(CANONICAL)
             raise ValueError(f"units: there is no {quantity!r}; it may be one of {known}.")
-    return {quantity: unit_named(quantity, unit) for quantity, unit in (units or {}).items()}
+        found[quantity] = (unit_in(str(name)) or (None, name))[1]
+        if not isinstance(name, str) or found[quantity] not in units_of(quantity):
+            known = ", ".join(units_of(quantity))
+            raise ValueError(f"{quantity} has no unit {name!r}: it may be in {known}.")
+    return found
 
 
 def rate_unit_of(unit):
@@ -158,7 +127,7 @@ def check_number(value, name, *, zero=False):
 
 
 def check_column(values, name, n_rows=None) -> np.ndarray:
-    """Return ``values`` as a float array of shape (n_rows,), or raise ValueError that names it."""
+    """``values`` as a float array of shape (n_rows,), or ValueError."""
     try:
         column = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -174,7 +143,6 @@ def check_column(values, name, n_rows=None) -> np.ndarray:
 
 
 def check_labels(values, name, n_rows) -> np.ndarray:
-    """Return labels, of any type, as an array of shape (n_rows,)."""
     labels = np.asarray(values)
     _check_shape(labels, name, n_rows)
     return labels
@@ -206,10 +174,7 @@ def _check_shape(column, name, n_rows):
 
 
 def column_position(names, role, given) -> int:
-    """Position of the column that a parameter gives by position or name, or ValueError.
-
-    ``names`` has an entry for every column of X: its name, or its position where it has none.
-    """
+    """Position of a column given by position or name; ``names`` are those of X, or positions."""
     if isinstance(given, str):
         if given not in names:
             has_names = any(isinstance(name, str) for name in names)

@@ -8,22 +8,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..inspection.labels import printable
-from .errors import LogError
+from .errors import ExistsError, LogError, UsageError
 
-__all__ = [
-    "ExistsError",
-    "Progress",
-    "UsageError",
-    "refuse_existing",
-    "say",
-    "say_error",
-    "staged",
-    "usage_errors",
-]
-
-
-class UsageError(ValueError):
-    """Options that make no sense."""
+__all__ = ["Progress", "refuse_existing", "say", "say_error", "staged", "usage_errors"]
 
 
 @contextmanager
@@ -35,10 +22,6 @@ def usage_errors():
         raise
     except ValueError as error:
         raise UsageError(str(error)) from error
-
-
-class ExistsError(Exception):
-    """A file that would be replaced."""
 
 
 class Progress:
@@ -62,18 +45,12 @@ def say(lines):
 
 
 def say_error(program, error, code):
-    """An error, to stderr; returns the exit code."""
-    _write_to(sys.stderr, f"{program}: {printable(told(error))}\n")
+    """An error in one sentence, to stderr; returns the exit code."""
+    told = str(error) or type(error).__name__
+    if isinstance(error, OSError) and error.filename is not None and error.strerror is not None:
+        told = f"{error.filename}: {error.strerror}."
+    _write_to(sys.stderr, f"{program}: {printable(told)}\n")
     return code
-
-
-def told(error):
-    """An error in one sentence."""
-    if isinstance(error, LogError) or not isinstance(error, OSError):
-        return str(error) or type(error).__name__
-    if error.filename is None or error.strerror is None:
-        return str(error)
-    return f"{error.filename}: {error.strerror}."
 
 
 def _write_to(stream, text):
@@ -102,10 +79,8 @@ def staged(folder):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".skanfis-", dir=folder) as name:
             yield Path(name)
-            for path in sorted(path for path in Path(name).rglob("*") if path.is_file()):
-                target = folder / path.relative_to(name)
-                target.parent.mkdir(exist_ok=True)
-                os.replace(path, target)
+            for path in sorted(Path(name).iterdir()):
+                os.replace(path, folder / path.name)
     except BaseException:
         for path in made:
             with suppress(OSError):  # another program has put something there

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from ._checks import PARTS
-from ._clock import is_clock, is_time
 from ._columns import CANONICAL, unit_in
+from ._values import Clock, as_numbers
 from .errors import LogError
 
 __all__ = ["Layout", "Request", "settle"]
@@ -72,7 +72,10 @@ _FULL = {"g": "gyro", "w": "omega", "gyr": "gyro", "a": "acc", "m": "mag"}
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a reading; the command guesses, :func:`read_log` takes names as they are."""
+    """What is asked of a reading.
+
+    With ``guess``, columns are guessed and rows that lack a value left out, as the command does.
+    """
 
     columns: dict = field(default_factory=dict)
     units: dict = field(default_factory=dict)
@@ -81,22 +84,15 @@ class Request:
     decimal: str | None = None
     encoding: str | None = None
     guess: bool = False
-    drop_missing: bool = False
-    average: float | None = None
-    device: str | None = None
 
 
 @dataclass
 class Layout:
-    """Places of the parts in a file and their units there.
-
-    ``date`` is the place of a date beside a clock. ``reasons`` are those of guesses.
-    """
+    """Places of the parts in a file and their units there; ``reasons`` are those of guesses."""
 
     header: list
     places: dict
     units: dict
-    date: int | None = None
     notes: list = field(default_factory=list)
     reasons: dict = field(default_factory=dict)
 
@@ -118,10 +114,10 @@ def settle(source, request, first=None):
         place = _place(source, names[part], told)
         if place is not None:
             layout.places[part] = place
+            if names[part] not in (part, layout.name(part)):
+                layout.notes.append(f"{layout.name(part)!r} is taken for {names[part]!r}")
         elif part in request.columns:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
-        if place is not None and names[part] not in (part, layout.name(part)):
-            layout.notes.append(f"{layout.name(part)!r} is taken for {names[part]!r}")
     if request.guess:
         _guess(source, request, layout, is_first=first is None)
     for part in request.require:
@@ -139,12 +135,11 @@ def _guess(source, request, layout, is_first):
     # Of the first file, a column that is called rate may be the gyro's own.
     is_told = "rate" in request.columns or not is_first
     own_rate = None if is_told else layout.places.pop("rate", None)
-    sample = next(source.pieces(dict.fromkeys(range(len(source.header)), str), _SAMPLE_ROWS), None)
-    if sample is None:
-        sample = pd.DataFrame({place: pd.Series(dtype=str) for place in range(len(source.header))})
+    places = range(len(source.header))
+    sample = next(source.pieces(places, _SAMPLE_ROWS), pd.DataFrame(columns=places, dtype=float))
     columns = [
-        _Column(place, name, unit, sample[place], source.decimal)
-        for place, (name, unit) in enumerate(zip(source.header, source.units, strict=True))
+        _Column(place, name, sample[place], source.decimal)
+        for place, name in enumerate(source.header)
     ]
     for part in _WORDS:
         if part == "output" and not any(column.is_named("output") for column in columns):
@@ -154,31 +149,24 @@ def _guess(source, request, layout, is_first):
     for part, words in _LABELS.items():
         for column in columns:
             said = column.words & set(words.split())
-            if (
-                part not in layout.places
-                and said
-                and not column.words - said - set(_OF_LABELS.split())
-            ):
-                layout.places[part] = column.place
+            if said and not column.words - said - set(_OF_LABELS.split()):
+                layout.places.setdefault(part, column.place)
     _by_unit(columns, layout)
     if own_rate is not None and own_rate not in layout.places.values():
         layout.places.setdefault("rate", own_rate)
     _settle_units(columns, layout, request)
-    if "time" in layout.places and is_clock(columns[layout.places["time"]].texts):
-        days = [c.place for c in columns if c.words & {"date", "datum", "day", "日期"}]
-        layout.date = next((k for k in days if k != layout.places["time"]), None)
     layout.notes += _sentences(layout, request)
 
 
 class _Column:
-    """A column's name, read (its words, unit, what that is a unit of, axis), and first values."""
+    """A column's name, read (its words, unit, what that is a unit of), and its first values."""
 
-    def __init__(self, place, name, unit_line, texts, decimal):
+    def __init__(self, place, name, values, decimal):
         self.place = place
-        meant, rest = unit_in(unit_line.strip("[](){} ")), name.strip()
+        meant, rest = None, name.strip()
         bracketed = _BRACKETED.search(rest)
         if bracketed and (found := unit_in(bracketed[1] or bracketed[2] or "")):
-            meant, rest = meant or found, rest[: bracketed.start()]
+            meant, rest = found, rest[: bracketed.start()]
         words: list[str] = []
         for word in map(str.casefold, _WORD.findall(rest)):
             fused = _FUSED.match(word)
@@ -189,20 +177,19 @@ class _Column:
                 # A name that is a unit and nothing else keeps it as its word too.
                 meant, words = found, words[:-length] or words
         axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
-        self.axis = axes[-1] if axes else ""
-        self.words = set(words) - {self.axis}
-        self.quantity = meant[0] if meant else None
-        self.unit = meant[1] if meant else None
-        self.texts = texts.dropna()
-        numbers = pd.to_numeric(self.texts.str.replace(decimal, "."), errors="coerce")
-        self.numbers = numbers[np.isfinite(numbers)].to_numpy()
-        if self.numbers.size <= 0.5 * len(texts):
+        self.words = set(words) - set(axes[-1:])
+        self.quantity, self.unit = meant or (None, None)
+        numbers = as_numbers(values, decimal)
+        self.numbers = numbers[np.isfinite(numbers)]
+        self.is_time = False
+        if self.numbers.size <= 0.5 * len(values):
             self.numbers = np.empty(0)
+            self.is_time = Clock(values).form != ""
 
     def can_be(self, part):
         """Whether the values do not speak against a part."""
         if part == "time" and self.numbers.size == 0:
-            return is_time(self.texts)
+            return self.is_time
         if part == "time":
             return self.numbers.size == 1 or np.mean(np.diff(self.numbers) >= 0.0) > 0.9
         # A flag or a trend takes a few whole values.
@@ -252,7 +239,7 @@ def _by_unit(columns, layout):
     _alone_in("temperature", ("temperature",), columns, layout)
     _alone_in("time", ("time",), columns, layout)
     _alone_in("output", ("signal",), columns, layout)
-    moments = [c.place for c in columns if c.numbers.size == 0 and c.can_be("time")]
+    moments = [column.place for column in columns if column.is_time]
     if "time" not in layout.places and len(moments) == 1:
         layout.places["time"] = moments[0]
         layout.reasons["time"] = ["because it holds times"]
@@ -315,11 +302,8 @@ def _sentences(layout, request):
             continue
         unit = f" in {layout.units[part]}" if part in layout.units else ""
         told.append(f"{part} = {name!r}{unit}" + (f" ({'; '.join(reasons)})" if reasons else ""))
-    if layout.date is not None:
-        told.append(f"the date of the time = {layout.header[layout.date]!r}")
-    if not told:
-        return []
-    return [f"columns, as guessed: {'; '.join(told)}. Say otherwise with --columns and --units"]
+    say = "columns, as guessed: {}. Say otherwise with --columns and --units"
+    return [say.format("; ".join(told))] if told else []
 
 
 def _place(source, name, taken):

@@ -8,19 +8,18 @@ from .. import __version__
 from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import units_of
-from ._console import UsageError, usage_errors
+from ._console import usage_errors
 from ._guess import Request
 from ._report_options import add_report_options
 from ._split import KINDS
 from .compensator import INPUTS
-from .errors import shortened
+from .errors import UsageError, shortened
 from .log import checked_request
 
 __all__ = ["PROGRAM", "make_parser", "parse_box", "request_of"]
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
-_MOST_JOBS = 1024  # more threads than any machine has cores for
 
 _UNITS_OF_PARTS = ("\n" + 28 * " ").join(
     f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES
@@ -33,21 +32,13 @@ power-on. The result is checked on whole runs, devices or rate levels that the m
 Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
 (report.html), and the rules as text (rules.txt).
 
-LOG: text with a header, such as CSV, or Parquet: one log, or one file per run; a folder or a
-pattern such as 'logs/*.csv' stands for its files
+LOG: text with a header, such as CSV, or Parquet: one log, or one file per run
 
 reading the log:
   --columns PART=NAME ...   names of the columns; parts: {", ".join(PARTS)}.
-                            Parts that are not named are guessed by names and units. Needed are
-                            temperature and output, and the rate (the truth) unless at rest
+                            Parts that are not named are guessed by names and units
   --units PART=UNIT ...     units, by default those in the names, or s, degC and deg/s
                             {_UNITS_OF_PARTS}
-  --encoding NAME           of the text, such as gbk (UTF-8, UTF-16 or Windows-1252)
-  --device NAME             use the rows of this device only
-  --max-gap S               a longer step of the time begins a new run, where no column tells runs
-                            apart; inf for none (auto: a minute, and 50 usual steps)
-  --average S               average the rows over so many seconds while they are read
-  --at-rest                 the gyro did not turn: learn the bias; no rate is needed
   --scale-factor K          of a raw signal at rest, which does not tell it: counts per deg/s
 
 the model:
@@ -57,27 +48,21 @@ the model:
                             'auto' leaves them to ANFISRegressor
   --physics                 fit the arcsine law of open-loop fiber-optic gyros first, and let the
                             fuzzy rules learn what it leaves
-  --jobs N                  threads for a fit (1); -1 is one per core
 
 where it holds, and how it is checked:
-  --outside POLICY          for rows outside the range of the calibration, which are flagged in any
-                            case: hold the edge value (clip), go on along the tangent for a limited
-                            way (linear, default), or give no rate (nan)
-  --max-extrapolation SD    how far the rules follow the tangent beyond the range of an input, in
-                            standard deviations; inf for without end (auto)
+  --outside POLICY          beyond the range of the calibration: hold the value at its edge (clip),
+                            go on along the tangent for a while (linear, default), or give no rate
+                            (nan); such rows are flagged in any case
   --min-coverage SHARE      rows that the data cover less are flagged ({Recipe.min_coverage:g})
-  --box INPUT=LOW:HIGH ...  box, such as temperature=-40:85, over which the report proves how large
-                            the compensation can be, in s, degC, degC/s, and the output's unit
-  --groups KIND             what to hold out in the check:
-                            {", ".join(KINDS)}
+  --box INPUT=LOW:HIGH ...  where the report proves how large the compensation can be
+  --groups KIND             what to hold out: {", ".join(KINDS)}
 
 output:
   --apply MODEL             compensate the logs by this compensator.json instead of calibrating
   --output PATH             folder to write to (LOG-compensator); with --apply the file
                             (LOG-compensated.csv)
   --c STD                   also write the model as C, compensator.h and .c, by c99 or c89
-  --saturate                with --c: hold what the rules give between the limits that the report
-                            has proven for the box (--box)
+  --saturate                with --c: hold what the rules give between the proven limits
   --force                   replace files that exist
   --quiet                   no progress on stderr
   --version, --help         the version; this page
@@ -87,16 +72,10 @@ _EPILOG = """\
 examples:
   python -m skanfis.gyro log.csv
   python -m skanfis.gyro cold.csv warm.csv hot.csv --output gyro7
-  python -m skanfis.gyro logs/ --average 1 --output gyro7
+  python -m skanfis.gyro logs/*.csv --output gyro7
   python -m skanfis.gyro log.csv --columns time=t_ms temperature=temp output=counts rate=table \\
       --units time=ms output=counts
   python -m skanfis.gyro --apply gyro7/compensator.json flight.csv --output flight-rates.csv
-
-status of a row in what --apply writes, the same bits as in the C code of skanfis.export:
-  0  all is well
-  1  an input lies outside the range of the calibration; the policy --outside was followed
-  4  hardly any calibration data lie near the inputs (coverage below --min-coverage)
-  8  the policy gives no rate
 
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
@@ -123,27 +102,21 @@ def request_of(options, require):
         columns=_pairs(options.columns, "--columns"),
         units=_pairs(options.units, "--units"),
         require=tuple(require),
-        encoding=options.encoding,
         guess=True,
-        drop_missing=True,
-        average=options.average,
-        device=options.device,
     )
     with usage_errors():
         return checked_request(request)
 
 
-def _number(kind, is_valid, what, *words):
-    """A type of option: a number for which ``is_valid`` holds, or one of the words."""
+def _number(is_valid, what):
+    """A type of option: a number for which ``is_valid`` holds."""
 
     def parse(text):
-        if text in words:
-            return text
         try:
-            value = kind(text)
+            value = float(text)
         except ValueError:
-            value = None
-        if value is None or not is_valid(value):
+            value = math.nan
+        if not is_valid(value):
             raise argparse.ArgumentTypeError(f"{shortened(text)} must be {what}")
         return value
 
@@ -184,17 +157,9 @@ def parse_box(text):
     return name, low, high
 
 
-_SECONDS = _number(float, lambda s: 1e-9 <= s <= 1e9, "a number from 1e-9 to 1e9")
-_SHARE = _number(float, lambda s: 0 <= s <= 1, "a number from 0 to 1")
-_GAP = _number(float, lambda s: s > 0, "auto, a positive number, or inf", "auto")
-_EXTENT = _number(float, lambda s: s >= 0, "a number, zero or positive, or inf, or auto", "auto")
-_JOBS = _number(
-    int,
-    lambda n: 1 <= n <= _MOST_JOBS or n == -1,
-    f"a whole number, 1 or more, or -1 for one per core; at most {_MOST_JOBS}",
-)
+_SHARE = _number(lambda s: 0 <= s <= 1, "a number from 0 to 1")
 _FACTOR = _number(
-    float, lambda k: 1e-30 <= abs(k) <= 1e30, "a number from 1e-30 to 1e30, or such a negative one"
+    lambda k: 1e-30 <= abs(k) <= 1e30, "a number from 1e-30 to 1e30, or such a negative one"
 )
 
 
@@ -219,23 +184,17 @@ def make_parser():
     add("logs", nargs="+", metavar="LOG")
     add("--columns", **several)
     add("--units", **several)
-    add("--encoding")
-    add("--device")
-    add("--max-gap", type=_GAP, default="auto")
-    add("--average", type=_SECONDS)
     add("--scale-factor", type=_FACTOR)
     add("--inputs", nargs="+", choices=INPUTS)
     add("--terms", type=_terms, default="search")
-    add("--jobs", type=_JOBS)
     add("--outside", choices=("clip", "linear", "nan"), default=Recipe.outside)
-    add("--max-extrapolation", type=_EXTENT, default=Recipe.max_extrapolation)
     add("--min-coverage", type=_SHARE, default=Recipe.min_coverage)
     add("--box", type=parse_box, **several)
     add("--groups", choices=KINDS, default="auto")
     add("--apply")
     add("--output", type=Path)
     add("--c", choices=("c99", "c89"))
-    for flag in ("--at-rest", "--physics", "--saturate", "--force", "--quiet"):
+    for flag in ("--physics", "--saturate", "--force", "--quiet"):
         add(flag, action="store_true")
     add_report_options(parser)
     return parser

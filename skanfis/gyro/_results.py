@@ -80,7 +80,7 @@ class Results:
         if self.time is None:
             return "the log has no time"
         if self.calibration.is_thinned:
-            return "only some of the rows are held: see --check-rows and --average"
+            return "only some of the rows are used"
         try:
             rows, interval = rows_for_allan(self.time, self.run, self.in_range)
         except ValueError as reason:

@@ -3,15 +3,14 @@
 import codecs
 import csv
 import re
-from functools import partial
 from itertools import islice
 
 import pandas as pd
 
-from ._columns import unit_in
+from ._values import NO_VALUE
 from .errors import LogError
 
-__all__ = ["NO_VALUE", "ParquetSource", "TextSource", "open_source"]
+__all__ = ["ParquetSource", "TextSource", "open_source"]
 
 _LONGEST_FIELD = 2**31 - 1  # the largest limit that the module csv takes on every system
 _HEAD_BYTES = 2**16
@@ -28,8 +27,6 @@ _MARKS = {
 }
 _KINDS = {b"\x1f\x8b": "compressed", b"PK\x03\x04": "an archive or a workbook", b"PAR1": "Parquet"}
 _CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f\x81\x8d\x8f\x90\x9d\ufffd]")
-# What loggers write where there is no value, beside what pandas knows.
-NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?$")
 _MOMENT = re.compile(r"[0-9]{1,4}([:./-])[0-9]{1,2}(\1[0-9]|[T ,:]|$)")
 
@@ -44,11 +41,8 @@ def open_source(path, separator=None, decimal=None, encoding=None):
 class TextSource:
     """A text file with a header and one record per line; what is None is found out.
 
-    ``header`` are names, ``units`` those of a line of units below it, else empty; ``notes`` are
-    sentences on what was found out.
+    ``header`` are the names of the columns; ``notes`` tell what was found out.
     """
-
-    in_seconds: frozenset = frozenset()
 
     def __init__(self, path, separator=None, decimal=None, encoding=None):
         self.path, self.notes = path, []
@@ -93,28 +87,21 @@ class TextSource:
         return ","
 
     def _place_header(self, head):
-        """Find the header: the last line before the first of numbers, lines of units apart."""
-        first = next((k for k, (_, values) in enumerate(head) if _is_data(values)), None)
+        """Find the header: the last line before the first of numbers."""
+        rows = [values for _, values in head]
+        first = next((k for k, values in enumerate(rows) if _is_data(values)), 1)
         if first == 0:
             raise LogError(
                 f"{self.path}, line {head[0][0]}: has numbers where the names of the columns are "
                 "due; give the file a header."
             )
-        place = 0
-        if first is not None:
-            n_fields = len(head[first][1])
-            fits = [k for k, (_, values) in enumerate(head[:first]) if len(values) == n_fields]
-            place = max(fits, default=0)
+        n_fields = len(rows[first]) if first < len(rows) else len(rows[0])
+        place = max((k for k in range(first) if len(rows[k]) == n_fields), default=0)
         self._n_above = place + 1
-        self.units = [""] * len(head[place][1])
-        if place and _are_units(head[place][1]) and len(head[place - 1][1]) == len(self.units):
-            self.units, place = [cell.strip() for cell in head[place][1]], place - 1
+        self._n_lines = head[place + 1][0] - 1 if place + 1 < len(head) else None
+        self.header = rows[place]
         if place:
-            lines = f"{place} lines above the header are" if place > 1 else "1 line above it is"
-            self.notes.append(f"{lines} passed over")
-        self.header = head[place][1]
-        below = head[self._n_above :]
-        self._n_lines = below[0][0] - 1 if below else None
+            self.notes.append(f"the header is line {head[place][0]}")
 
     def _records(self):
         """First line, from 1, and values of every record that is not blank; quotes hide line ends.
@@ -130,7 +117,7 @@ class TextSource:
                     if len(values) > 1 or "".join(values).strip():
                         yield line, values
                     line = reader.line_num + 1
-        except (UnicodeError, LookupError) as error:
+        except UnicodeError as error:
             raise _no_text(self.path) from error
         except (csv.Error, ValueError) as error:
             raise LogError(f"{self.path}, line {line}: is no table: {error}.") from error
@@ -142,10 +129,10 @@ class TextSource:
         lines = (line for line, _ in self._records())
         return f"line {next(islice(lines, row + self._n_above, None), row + self._n_above + 1)}"
 
-    def pieces(self, kinds, n_rows):
-        """Tables of so many rows: columns by their places; ``kinds`` is float or str by place.
+    def pieces(self, places, n_rows, labels=()):
+        """Tables of so many rows: columns by their places, those of ``labels`` as texts.
 
-        LogError where the file is no such table; ValueError where a number is none.
+        LogError where the file is no such table.
         """
         if self._n_lines is None:
             return
@@ -161,9 +148,10 @@ class TextSource:
                     index_col=False,
                     header=None,
                     names=range(len(self.header)),
-                    usecols=list(kinds),
-                    dtype=kinds,
-                    na_values={k: NO_VALUE for k, kind in kinds.items() if kind is float},
+                    usecols=list(places),
+                    dtype=dict.fromkeys(labels, str),
+                    na_values=dict.fromkeys(set(places) - set(labels), NO_VALUE),
+                    low_memory=False,
                     chunksize=n_rows,
                 )
         except pd.errors.EmptyDataError:
@@ -176,15 +164,8 @@ class TextSource:
     def check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut without a word."""
         n_columns = len(self.header)
-        try:
-            with open(self.path, encoding=self.encoding, newline="") as file:
-                # Counting is fast, and right as long as there are no quotes.
-                if all(line.count(self.separator) < n_columns and '"' not in line for line in file):
-                    return
-        except UnicodeError as error:
-            raise _no_text(self.path) from error
         for line, values in islice(self._records(), self._n_above, None):
-            if any(value.strip() for value in values[n_columns:]):
+            if len(values) > n_columns and "".join(values[n_columns:]).strip():
                 raise LogError(
                     f"{self.path}, line {line}: has {len(values)} values, more than the "
                     f"{n_columns} columns of the header."
@@ -192,7 +173,7 @@ class TextSource:
 
 
 class ParquetSource:
-    """As :class:`TextSource`, of Parquet; times that are such, ``in_seconds``, come in seconds."""
+    """As :class:`TextSource`, of Parquet."""
 
     decimal = "."
 
@@ -203,59 +184,38 @@ class ParquetSource:
         except ImportError as error:
             message = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
             raise ImportError(message) from error
-        self.path = path
-        self.notes: list[str] = []
+        self.path, self.notes = path, []
         self._errors = (pyarrow.ArrowException, OSError)
         with open(path, "rb"):
             pass  # what cannot be opened is told as of any other file
         try:
             # Not buffered ahead: what was read would stay as long as the file is open.
             self._file = parquet.ParquetFile(path, pre_buffer=False)
-            schema = self._file.schema_arrow
+            self.header = list(self._file.schema_arrow.names)
         except (*self._errors, ValueError) as error:
             raise self._damaged(error) from error
-        self.header = list(schema.names)
         if len(set(self.header)) < len(self.header):
             raise LogError(f"{path}: two columns have one name; rename one of them.")
-        self.units = [""] * len(self.header)
-        self.in_seconds = frozenset(
-            place for place, kind in enumerate(schema.types) if pyarrow.types.is_temporal(kind)
-        )
 
     def _damaged(self, error):
         reason = str(error).strip().partition("\n")[0].removesuffix(".")
         return LogError(f"{self.path}: is no Parquet that can be read: {reason}.")
 
     def place_of(self, row):
-        """In words, where a row is."""
         return f"row {row}"
 
     def check_lengths(self):
         """Every row of such a file has every column."""
 
-    def pieces(self, kinds, n_rows):
+    def pieces(self, places, n_rows, labels=()):
         """Tables of so many rows at most, as of :class:`TextSource`."""
-        names = {place: self.header[place] for place in kinds}
+        names = [self.header[place] for place in places]
         try:
-            for batch in self._file.iter_batches(n_rows, columns=list(names.values())):
-                table = {k: _plain(batch.column(name).to_pandas()) for k, name in names.items()}
-                yield pd.DataFrame(
-                    {
-                        k: values.astype(float if kinds[k] is float else "string")
-                        for k, values in table.items()
-                    }
-                )
+            for batch in self._file.iter_batches(n_rows, columns=names):
+                table = {k: batch.column(self.header[k]).to_pandas() for k in places}
+                yield pd.DataFrame(table).astype(dict.fromkeys(labels, "string"))
         except self._errors as error:
             raise self._damaged(error) from error
-
-
-def _plain(column):
-    """Moments and durations in seconds; all else as it is."""
-    if isinstance(column.dtype, pd.DatetimeTZDtype):
-        column = column.dt.tz_convert("UTC").dt.tz_localize(None)
-    if column.dtype.kind == "M":
-        return (column - pd.Timestamp(0)) / pd.Timedelta(seconds=1)
-    return column / pd.Timedelta(seconds=1) if column.dtype.kind == "m" else column
 
 
 def _find_encoding(path):
@@ -267,21 +227,17 @@ def _find_encoding(path):
     for mark, kind in _KINDS.items():
         if head.startswith(mark):
             raise LogError(f"{path}: is {kind}, not text; export it as CSV.")
-    if b"\x00" not in head and _is_utf8(path):
-        return "utf-8-sig"
+    try:
+        with open(path, encoding="utf-8") as file:
+            while b"\x00" not in head and file.read(_HEAD_BYTES):
+                pass
+        if b"\x00" not in head:
+            return "utf-8-sig"
+    except UnicodeDecodeError:
+        pass
     if _CONTROL.search(head.decode("cp1252", errors="replace")):
         raise _no_text(path)
     return "cp1252"
-
-
-def _is_utf8(path):
-    try:
-        with open(path, encoding="utf-8") as file:
-            for _ in iter(partial(file.read, _HEAD_BYTES), ""):
-                pass
-    except UnicodeDecodeError:
-        return False
-    return True
 
 
 def _no_text(path):
@@ -296,8 +252,3 @@ def _is_data(values):
     filled = [cell[:_LONGEST_NUMBER] for cell in map(str.strip, values) if cell]
     numbers = sum(bool(_NUMBER.match(cell) or _MOMENT.match(cell)) for cell in filled)
     return 2 * numbers >= max(len(filled), 1)
-
-
-def _are_units(values):
-    filled = [cell for cell in map(str.strip, values) if cell]
-    return bool(filled) and all(unit_in(cell.strip("[](){}")) for cell in filled)

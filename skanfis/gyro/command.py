@@ -11,18 +11,9 @@ from ..inspection.labels import printable
 from ._apply import apply
 from ._budget import proven_bounds
 from ._calibration import Recipe, calibrate
-from ._checks import LARGEST_AT_REST, check_at_rest, check_log
+from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._console import (
-    ExistsError,
-    Progress,
-    UsageError,
-    refuse_existing,
-    say,
-    say_error,
-    staged,
-    usage_errors,
-)
+from ._console import Progress, refuse_existing, say, say_error, staged, usage_errors
 from ._formulas import rules_text
 from ._headline import errors_and_verdict
 from ._options import PROGRAM, make_parser, request_of
@@ -30,9 +21,9 @@ from ._report_options import report_options
 from ._split import choose_split
 from .c_code import export_c_physics
 from .compensator import INPUTS
-from .errors import LogError
+from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
-from .log import check_different, find_logs, read
+from .log import find_logs, read
 from .metrics import hysteresis
 
 __all__ = ["main"]
@@ -43,7 +34,6 @@ INTERRUPTED = 130  # as a shell says of Ctrl-C
 _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _MOST_ROWS = 1_000_000  # that are held
-_MOST_NAMED = 3  # of several logs in a line
 
 
 def main(arguments=None):
@@ -76,7 +66,7 @@ def main(arguments=None):
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
     with staged(folder) as written:
-        tell(f"reading {_named(paths)}")
+        tell(f"reading {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
         reading, inputs = _read(options, paths, tell)
         recipe = _recipe(options, inputs, reading.units["output"])
         split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
@@ -111,25 +101,24 @@ def _where_from_and_to(options):
     names = (*_FILES, *(_C_FILES if options.c else ()))
     refuse_existing([folder / name for name in names], options.force)
     check_installed()
-    check_different(paths)
     return folder, paths
 
 
 def _read(options, paths, tell):
     """The checked log; returns its reading and the inputs. What was found out is told."""
     required = ["temperature", "output"]
-    if {"time", "temperature_rate"} & set(options.inputs or ()) or options.average is not None:
+    if {"time", "temperature_rate"} & set(options.inputs or ()):
         required.append("time")
     request = request_of(options, required)
     with usage_errors():
-        reading = read(
-            paths, request, max_gap=options.max_gap, tell=tell, most_rows=_MOST_ROWS, check=True
-        )
+        reading = read(paths, request, by_clock=True, tell=tell, most_rows=_MOST_ROWS, check=True)
     for note in reading.notes:
         tell(f"note: {note}")
-    tell(f"{reading.n_rows:,} rows{_counts(reading.log)}")
+    numbers = {"row": reading.n_rows}
+    numbers |= {name: reading.log[name].nunique() for name in LABELS if name in reading.log}
+    tell(", ".join(f"{n:,} {name}{'s' if n > 1 else ''}" for name, n in numbers.items()))
     try:
-        at_rest = _settle_rest(options, reading, tell)
+        at_rest = _settle_rest(reading, tell)
         inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
         _check_options(options, inputs, reading.units["output"], at_rest)
         check_log(reading.log, units=reading.units, inputs=inputs)
@@ -138,30 +127,22 @@ def _read(options, paths, tell):
     return reading, inputs
 
 
-def _settle_rest(options, reading, tell):
-    """Whether the gyro was at rest, as told or as found; the log then has a rate of zero."""
-    log, unit = reading.log, reading.units["output"]
-    has_rate = "rate" in log
-    still = has_rate and np.abs(log["rate"]).max() <= LARGEST_AT_REST
-    if not options.at_rest:
-        if has_rate and not still:
+def _settle_rest(reading, tell):
+    """Whether the gyro was at rest; the log then has a rate of zero."""
+    log = reading.log
+    try:
+        check_at_rest(log, reading.units["output"])
+    except LogError as error:
+        if "rate" in log:
             return False
-        try:
-            check_at_rest(log, unit)
-        except LogError as error:
-            if has_rate:
-                return False
-            raise LogError(
-                f"there is no column 'rate' for the true rate among "
-                f"{', '.join(map(repr, reading.files[0].layout.header[:20]))}, and the output "
-                f"{error.reason} Say which it is (--columns rate=NAME)."
-            ) from error
-        what = "the rate is zero throughout" if has_rate else "there is no column for the rate"
-        note = f"{what}, and the output does not move: taken as at rest (--at-rest)"
-        reading.notes.append(note)
-        tell(f"note: {note}")
-    else:
-        check_at_rest(log, unit)
+        raise LogError(
+            f"there is no column 'rate' for the true rate among "
+            f"{', '.join(map(repr, reading.files[0].layout.header[:20]))}, and the output "
+            f"{error.reason} Say which it is (--columns rate=NAME)."
+        ) from error
+    what = "the rate is zero throughout" if "rate" in log else "there is no column for the rate"
+    reading.notes.append(f"{what}, and the output does not move: taken as at rest")
+    tell(f"note: {reading.notes[-1]}")
     reading.log = log.assign(rate=0.0)
     return True
 
@@ -194,15 +175,6 @@ def _default_inputs(log, at_rest):
     return tuple(name for name in inputs if not (at_rest and name == "output"))
 
 
-def _counts(log):
-    parts = [
-        f", {log[name].nunique():,} {name}{'s' if log[name].nunique() > 1 else ''}"
-        for name in ("run", "device")
-        if name in log
-    ]
-    return "".join(parts)
-
-
 def _recipe(options, inputs, unit):
     """What the options ask for, of a log whose output is in a unit."""
     for name, *_ in options.box:
@@ -215,18 +187,9 @@ def _recipe(options, inputs, unit):
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
-        max_extrapolation=options.max_extrapolation,
         min_coverage=options.min_coverage,
-        n_jobs=options.jobs,
         box=tuple(options.box),
     )
-
-
-def _named(paths):
-    """Some files, in few words."""
-    if len(paths) <= _MOST_NAMED:
-        return ", ".join(map(str, paths))
-    return f"{paths[0]} to {paths[-1]}, {len(paths):,} files"
 
 
 def _write(calibration, options, paths, folder):

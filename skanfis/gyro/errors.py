@@ -1,6 +1,6 @@
-"""LogError: a log from which no compensator should be learnt."""
+"""Errors: of a log, of options, of files that exist."""
 
-__all__ = ["LogError", "shortened"]
+__all__ = ["ExistsError", "LogError", "UsageError", "shortened"]
 
 _LONGEST_SHOWN = 60  # of a value in a message
 
@@ -13,7 +13,7 @@ class LogError(ValueError):
     reason : str
         What was found and what would do.
     column : str, default=None
-        The column's part in the log: "time", "temperature", "output", "rate", "run" or "device".
+        The column's part: "time", "temperature", "output", "rate", "run" or "device".
     row : int, default=None
         Position of the first bad row, counted from 0.
 
@@ -34,6 +34,14 @@ class LogError(ValueError):
         place = [] if self.column is None else [f"column {self.column!r}"]
         place += [] if self.row is None else [f"row {self.row}"]
         return f"{', '.join(place)}: {self.reason}" if place else self.reason
+
+
+class UsageError(ValueError):
+    """Options that make no sense."""
+
+
+class ExistsError(Exception):
+    """A file that would be replaced."""
 
 
 def shortened(value, show=repr):

@@ -5,24 +5,24 @@ The columns of a log play parts: ``time``, ``temperature``, ``output`` (the gyro
 A log that has been read has its columns by these names, in s, degC and deg/s.
 """
 
-import codecs
-import glob
 import hashlib
 import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from glob import glob
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ._checks import PARTS, RowChecks
+from ._checks import LABELS, PARTS, RowChecks
 from ._columns import declared_units
 from ._guess import Request
-from ._log_file import LogFile, RunFinder
-from .errors import LogError, shortened
+from ._log_file import LogFile
+from ._runs import RunFinder
+from .errors import LogError
 
 __all__ = [
     "Reading",
@@ -33,9 +33,6 @@ __all__ = [
     "read",
     "read_log",
 ]
-
-# Of a folder: tables first; what may as well be a note only where there is no table.
-_SUFFIXES = ((".csv", ".tsv", ".parquet", ".pq"), (".txt", ".dat", ".log"))
 
 
 def read_log(
@@ -63,7 +60,6 @@ def read_log(
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
         and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be in counts, V or mV.
-        By default s, degC and deg/s. Dates and clocks come in seconds by themselves.
     require : sequence of str, default=None
         Parts without which the log is refused; None stands for temperature, output and rate.
     separator, decimal, encoding : str, default=None
@@ -78,8 +74,8 @@ def read_log(
     Raises
     ------
     LogError
-        If a file is no such table, or there twice; if a column that is required is not there; if a
-        value is missing or no number. The message names the file, its column and line.
+        If a file is no table or there twice, a required column or a value is missing, or a value
+        is no number.
     ValueError
         If an argument names an unknown part or unit, or is no single sign.
     OSError
@@ -138,19 +134,19 @@ class Reading:
         return self.files[0].located(error, where=where)
 
 
-def read(paths, request, *, max_gap=None, tell=None, most_rows=None, check=False):
+def read(paths, request, *, by_clock=False, tell=None, most_rows=None, check=False):
     """Read files as :func:`read_log` does; returns a :class:`Reading`.
 
-    ``max_gap`` is as for RunFinder. ``tell`` is called with a line of text now and then. With
-    ``check``, every row is checked by :class:`RowChecks`. Of more than ``most_rows`` rows every
-    k-th of each run is held, with k a power of two.
+    With ``by_clock``, a file without labels is split where its clock tells new runs. ``tell`` is
+    called with a line of text now and then. With ``check``, every row is checked. Of more than
+    ``most_rows`` rows every k-th of each run is held, with k a power of two.
     """
     request = checked_request(request)
     if not paths:
         raise ValueError("paths: at least one file is needed.")
     check_different(paths)
     files: list[LogFile] = []
-    finder, checks, thinned = RunFinder(max_gap), None, Thinned(most_rows)
+    finder, checks, thinned = RunFinder(by_clock), None, _Thinned(most_rows)
     for number, path in enumerate(paths):
         file = LogFile(path, request, files[0] if files else None)
         files.append(file)
@@ -160,11 +156,19 @@ def read(paths, request, *, max_gap=None, tell=None, most_rows=None, check=False
             thinned.add(piece.drop(columns="device", errors="ignore"))
         if tell is not None and len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
-    check_device(files, request)
-    notes = notes_of(files)
-    notes += [finder.note] if finder.note else []
-    notes += [thinned.note] if thinned.note else []
-    return _reading(thinned, finder, files, notes)
+    if not thinned.n_rows:
+        raise LogError(f"{paths[0]}: has no rows with values.")
+    table, parts = pd.concat(thinned.pieces, ignore_index=True), files[0].layout.places
+    code, runs = table["run"].to_numpy(), finder.runs
+    log = table[[part for part in parts if part not in LABELS]].copy()
+    names = finder.names(_short_names(paths), "run" in parts)
+    if names is not None:
+        log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
+    if "device" in parts:
+        log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
+    notes = [*_notes_of(files), *filter(None, [finder.note, thinned.note])]
+    file, row = runs["file"].to_numpy()[code], table["row"].to_numpy()
+    return Reading(log, file, row, files, notes, thinned.n_rows)
 
 
 def pieces_of(file, number, finder, checks=None, tell=None):
@@ -179,13 +183,13 @@ def pieces_of(file, number, finder, checks=None, tell=None):
         yield piece
 
 
-class Thinned:
+class _Thinned:
     """The rows of a log that comes in pieces; of too many, every k-th of each run."""
 
     def __init__(self, most_rows):
         self._most = np.inf if most_rows is None else most_rows
         self._every = 1
-        self._pieces: list = []
+        self.pieces: list = []
         self._counts = pd.Series(dtype=int)  # rows so far, by run
         self.n_rows = 0
 
@@ -194,66 +198,34 @@ class Thinned:
         place = before + piece.groupby("run").cumcount()
         self._counts = self._counts.add(piece["run"].value_counts(), fill_value=0)
         self.n_rows += len(piece)
-        self._pieces.append(piece.assign(place=place)[place % self._every == 0])
-        if sum(map(len, self._pieces)) > self._most:
+        self.pieces.append(piece.assign(place=place)[place % self._every == 0])
+        if sum(map(len, self.pieces)) > self._most:
             self._every *= 2
-            self._pieces = [held[held["place"] % self._every == 0] for held in self._pieces]
-
-    def table(self):
-        return pd.concat(self._pieces, ignore_index=True) if self._pieces else None
+            self.pieces = [held[held["place"] % self._every == 0] for held in self.pieces]
 
     @property
     def note(self):
         if self._every == 1:
             return ""
-        n_held = sum(map(len, self._pieces))
-        return (
-            f"of {self.n_rows:,} rows {n_held:,} are held, one in {self._every} of each run; "
-            "--average makes means of all"
-        )
+        n_used = sum(map(len, self.pieces))
+        return f"of {self.n_rows:,} rows {n_used:,} are used, one in {self._every} of each run"
 
 
-def _reading(thinned, finder, files, notes):
-    parts = files[0].layout.places
-    table = thinned.table()
-    if table is None:
-        table = pd.DataFrame({name: pd.Series(dtype=float) for name in (*parts, "run")})
-        table = table.assign(row=0).astype({"run": int})
-    code, runs = table["run"].to_numpy(), finder.runs
-    names = finder.names(short_names([file.path for file in files]), "run" in parts)
-    log = table[[part for part in parts if part not in ("run", "device")]].copy()
-    if names is not None:
-        log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
-    if "device" in parts:
-        log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
-    log = log[[part for part in PARTS if part in log]]
-    file = runs["file"].to_numpy()[code]
-    return Reading(log, file, table["row"].to_numpy(), files, notes, thinned.n_rows)
-
-
-def short_names(paths):
+def _short_names(paths):
     """Names of the files without folders and endings, where these tell them apart."""
     stems = [Path(path).stem for path in paths]
     return stems if len(set(stems)) == len(stems) else [os.fspath(path) for path in paths]
 
 
-def notes_of(files):
+def _notes_of(files):
     """What was found out about the files; what holds for all is said once."""
     counts = Counter(note for file in files for note in file.notes)
-    return list(
-        dict.fromkeys(
-            note if counts[note] == len(files) else f"{file.path}: {note}"
-            for file in files
-            for note in file.notes
-        )
-    )
-
-
-def check_device(files, request):
-    """ValueError where the device that is asked for is none of those of the files."""
-    devices = {device for file in files for device in file.devices}
-    if devices and request.device not in devices:
-        raise ValueError(f"--device {request.device}: the log has {', '.join(sorted(devices))}.")
+    notes = [
+        note if counts[note] == len(files) else f"{file.path}: {note}"
+        for file in files
+        for note in file.notes
+    ]
+    return list(dict.fromkeys(notes))
 
 
 def checked_request(request):
@@ -263,67 +235,31 @@ def checked_request(request):
             if part not in PARTS:
                 known = ", ".join(PARTS)
                 raise ValueError(f"{name}: there is no {part!r}; it may be one of {known}.")
-    names = list(({part: part for part in PARTS} | request.columns).values())
-    shared = [name for name in names if names.count(name) > 1]
-    if shared and not request.guess:
-        raise LogError(f"two parts cannot be the same column of the file, {shared[0]!r}.")
     for name, sign in (("separator", request.separator), ("decimal", request.decimal)):
         if sign is None:
             continue
         if not isinstance(sign, str) or len(sign) != 1 or sign.isalnum() or sign in '\r\n"':
             raise ValueError(f"{name}={sign!r} must be one character, such as a comma.")
-    if request.encoding is not None:
-        try:
-            decoder = codecs.lookup(request.encoding).incrementaldecoder()
-            is_text = isinstance(decoder.decode(b""), str)
-        except (LookupError, ValueError, TypeError):
-            is_text = False
-        if not is_text:
-            raise ValueError(f"{shortened(request.encoding)} is no encoding of text that is known.")
+    try:
+        "".encode(request.encoding or "utf-8")
+    except (LookupError, ValueError) as error:
+        raise ValueError(f"encoding: {error}.") from error
     return replace(request, units=declared_units(request.units))
 
 
 def find_logs(arguments):
-    """The files that are named, folders and patterns filled in; those of each in order.
-
-    A name that is no pattern stays as it is, whether there is such a file or not.
-    """
-    found: list[str] = []
-    for argument in arguments:
-        if os.path.isdir(argument):
-            found += _logs_in(argument)
-        elif glob.has_magic(argument) and not os.path.lexists(argument):
-            found += sorted(glob.glob(argument, recursive=True))
-            if not found:
-                raise LogError(f"{argument}: no file matches this pattern.")
-        else:
-            found.append(argument)
-    return found
-
-
-def _logs_in(folder):
-    paths = [os.path.join(folder, name) for name in os.listdir(folder) if name[0] != "."]
-    for suffixes in _SUFFIXES:
-        logs = [path for path in paths if path.lower().endswith(suffixes) and os.path.isfile(path)]
-        if logs:
-            return sorted(logs)
-    known = ", ".join(suffix for suffixes in _SUFFIXES for suffix in suffixes)
-    raise LogError(f"{folder}: is a folder without logs ({known}).")
+    """The files that are named, with patterns filled in for a shell that does not."""
+    return [
+        path
+        for argument in arguments
+        for path in (not os.path.lexists(argument) and sorted(glob(argument))) or [argument]
+    ]
 
 
 def check_different(paths):
     """LogError where one log is there twice: as two runs, each would be tested by the other."""
     seen: dict = {}
-    sizes = [os.path.getsize(path) if os.path.isfile(path) else 0 for path in paths]
-    for path, size in zip(paths, sizes, strict=True):
-        if not size:
-            continue  # said when it is read
-        file = os.path.realpath(path)
-        if file in seen:
-            raise LogError(f"{path}: is the same file as {seen[file]}; name every log once.")
-        seen[file] = path
-        if sizes.count(size) == 1:
-            continue
+    for path in filter(os.path.isfile, paths):
         with open(path, "rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").digest()
         if digest in seen:

@@ -149,7 +149,7 @@ def test_names_of_columns_up_to_blanks_and_capitals(tmp_path):
 def test_one_file_twice_is_refused(tmp_path, log):
     path = table(tmp_path, log)
     for again in (path, tmp_path / "." / "log.csv", str(path)):
-        with pytest.raises(LogError, match=r"log.csv: is the same file as .*log.csv"):
+        with pytest.raises(LogError, match=r"log.csv: holds the same bytes as .*log.csv"):
             read_log([path, again])
 
 
@@ -172,6 +172,7 @@ def test_files_with_different_columns_are_refused(tmp_path, log):
         ({"separator": "\n"}, "must be one character"),
         ({"decimal": "5"}, "decimal='5' must be one character"),
         ({"decimal": ","}, "separator and decimal are both ','"),
+        ({"encoding": "klingon"}, "klingon"),
     ],
 )
 def test_unknown_names_are_no_matter_of_the_log(tmp_path, log, options, message):

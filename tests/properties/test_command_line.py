@@ -37,19 +37,12 @@ _VALUES = {
     "--inputs": ["time", "temperature", "temperature_rate", "output", "rate", ""],
     "--terms": ["search", "auto", "1,2", "99999999,1,1,1", "0", "1,1,1,1", "9" * 5000, ",", ""],
     "--groups": ["auto", "run", "device", "level", "run+level", "leg", "piece", "week"],
-    "--encoding": ["utf-8", "utf-16", "cp1252", "klingon", "base64", "idna", "punycode", "\x00"],
     "--outside": ["clip", "linear", "nan", "error"],
     "--c": ["c99", "c89", "c23"],
-    "--device": ["0", "", "\udcff"],
-    **dict.fromkeys(
-        [
-            "--jobs", "--min-coverage", "--max-gap", "--max-extrapolation", "--average",
-            "--scale-factor",
-        ],
-        _NUMBERS,
-    ),
-}  # fmt: skip
-_FLAGS = ["--at-rest", "--physics", "--force"]
+    "--min-coverage": _NUMBERS,
+    "--scale-factor": _NUMBERS,
+}
+_FLAGS = ["--physics", "--force"]
 _FILES = {
     "good.csv": None,
     "empty.csv": b"",
