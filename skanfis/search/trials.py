@@ -37,7 +37,7 @@ _MOST_ROWS, _MOST_ROWS_IN_GROUPS = 2000, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 2
 # Turns of weights and premises of a candidate.
-_TURNS = 3
+_TURNS = 2
 # As cross-validation has by custom: more cost time, and tell little more.
 _MOST_FOLDS = 5
 # Places between rows; each half-way between a row and the nearest of so many others, for between
