@@ -133,20 +133,13 @@ def test_units_and_origin_of_inputs_and_target(case):
     assert_array_equal(scaled.rules_, case.plain.rules_)
 
 
-@pytest.mark.parametrize(
-    ("column", "factor"),
+@pytest.mark.parametrize("column", [1, 2, 3])
+def test_direction_of_a_single_column(column):
     # Where the first input runs backwards, 2e-4 of the span remain: gaps count from its first term
     # on, and the solver takes other steps to a flat minimum.
-    [
-        *((column, factor) for column in range(4) for factor in (1e6, 1e-6)),
-        *((column, -1.0) for column in (1, 2, 3)),
-    ],
-)
-def test_unit_of_a_single_column(column, factor):
-    # Which of them leaks; what the evidence makes of units is asked above, of all at once.
     case = plain_case()
     factors = np.ones(4)
-    factors[column] = factor
+    factors[column] = -1.0
     found = case.fit(case.X * factors[:3], case.y * factors[3]).predict(case.X * factors[:3])
     case.assert_same(found / factors[3])
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from skanfis.inspection import Readability
+
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("quickstart", "from_matlab")
 # How many lines of code there are at least: a page that lost them is no page that works.
@@ -50,3 +52,14 @@ def test_page_with_prompts(page, tmp_path, monkeypatch):
     failed, tried = doctest.testfile(path, module_relative=False, optionflags=LOOSELY)
     assert tried > WITH_PROMPTS[page]
     assert failed == 0
+
+
+def test_limits_of_reading_rules_are_those_of_the_package():
+    page = (DOCS / "reading_rules.rst").read_text(encoding="utf-8")
+    table, limits = page.partition("list-table")[2], Readability.limits
+    for measure, limit in (
+        ("greatest truth of a term", f"{limits['least_truth']} or more"),
+        ("crossing of neighbours", f"{limits['greatest_crossing']} or less"),
+        ("strongest rule alone", f"{limits['strongest_alone']} standard deviations"),
+    ):
+        assert re.search(rf"\* - {measure}\n     - {re.escape(limit)}\n", table)

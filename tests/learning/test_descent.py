@@ -1,7 +1,6 @@
 """Jang's rule against a transcription of his paper that shares nothing with the package."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -268,19 +267,3 @@ class TestEnd:
         best = int(result.loss_curve.argmin())
         assert best < 25
         assert_allclose(result.evaluation.mean_squared_error, result.loss_curve[best])
-
-    def test_length_of_a_step_is_the_step_size(self):
-        rows, premise, *_ = planted("scattered", 0, displaced=0.5, noise=0.1)
-        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
-        at = [premise.antecedent]
-        hybrid(
-            problem,
-            premise,
-            max_iter=3,
-            tol=0.0,
-            step_size=0.02,
-            on_iteration=lambda n, evaluation: at.append(evaluation.antecedent),
-        )
-        numbers = [a.groups[0].family.natural(a.groups[0].theta) for a in at]
-        for one, other in pairwise(numbers):
-            assert_allclose(np.linalg.norm(other - one), 0.02, rtol=1e-9)

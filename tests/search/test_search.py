@@ -13,7 +13,7 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
-from skanfis.membership import TRIED_FAMILIES, Bell, Gaussian
+from skanfis.membership import TRIED_FAMILIES, Gaussian
 from skanfis.search import search
 from skanfis.search.candidates import Candidate, terms_asked_for
 from skanfis.search.trials import Trials
@@ -184,19 +184,6 @@ def test_more_noise_never_gives_more_rules(rng, partition):
     assert found == sorted(found, reverse=True)
     assert found[0] > 3
     assert found[-1] == 1
-
-
-def test_repeated_rows_are_weighted_rows(rng):
-    X = inputs(rng, 120)
-    y = np.sin(3.0 * X[:, 0]) + 0.5 * rng.standard_normal(120)
-    times = rng.integers(1, 4, 120)
-    often, heavy = (ANFISRegressor(partition="grid") for _ in range(2))
-    often.fit(np.repeat(X, times, axis=0), np.repeat(y, times))
-    heavy.fit(X, y, sample_weight=times)
-    for one, other in zip(often.structures_, heavy.structures_, strict=True):
-        assert one["structure"] == other["structure"]
-        assert_allclose(one["expected_error"], other["expected_error"], rtol=1e-6)
-    assert_allclose(often.predict(X), heavy.predict(X), atol=1e-6)
 
 
 def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
@@ -410,17 +397,3 @@ def test_searched_structure_is_tried_with_every_family(rng):
     # What is trained is what promised most.
     name = model.model_.antecedent.groups[0].family.name
     assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"
-
-
-@pytest.mark.parametrize(
-    ("candidate", "words"),
-    [
-        (Candidate((1, 3)), "grid [1, 3]"),
-        (Candidate((1, 3), family=Bell), "grid [1, 3], bell"),
-        (Candidate(None, 5, "k-means"), "5 scattered rules"),
-        (Candidate(None, 3, "fcm", family=Bell), "3 fuzzy clusters, bell"),
-        (Candidate(None, 0.5, "subtractive"), "clusters of radius 0.5"),
-    ],
-)
-def test_in_words(candidate, words):
-    assert candidate.describe() == words
