@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
-from sklearn.datasets import make_friedman1
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
@@ -48,7 +47,6 @@ DATA = {
     "gyro": gyro,
     "sinc": make_jang_sinc,
     "mackey-glass": lambda: tuple(part[:120] for part in make_mackey_glass()),
-    "friedman": lambda: make_friedman1(80, n_features=5, noise=1.0, random_state=0),
 }
 KMEANS = KMeans(n_clusters=4, n_init=2, random_state=0)
 # The points of the sinc lie on a symmetric grid: there rounding would decide ties of a clustering.
@@ -211,7 +209,7 @@ def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
 # ---------------------------------------------------------------------- every part of the estimator
 
 
-@pytest.mark.parametrize("name", ["gyro", "sinc", "friedman"])
+@pytest.mark.parametrize("name", ["gyro", "sinc"])
 def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()

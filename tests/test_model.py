@@ -118,21 +118,6 @@ def test_consequents_are_those_of_the_rules(frozen, rng):
     assert frozen.consequents.shape == (frozen.n_rules, 4, frozen.n_outputs)
 
 
-def test_memberships_before_training_are_told_too():
-    before, after = grid(), grid().with_parameters(grid().parameters + 0.25)
-    frozen = build(after, initial_antecedent=before)
-    for one, other in zip(frozen.memberships(trained=False), frozen.memberships(), strict=True):
-        assert one["input"] == other["input"]
-        assert_allclose(other["center"], one["center"] + 0.25, rtol=1e-12)
-        assert_allclose(other["width"], one["width"] * np.exp(0.25), rtol=1e-12)
-    assert [t["function"] for t in frozen.memberships()] == ["gaussian"] * 2 + ["bell"] * 3 + [
-        "gaussian"
-    ] * 2
-    assert [t["input"] for t in frozen.memberships()] == ["time"] * 2 + ["temperature"] * 3 + [
-        "rate"
-    ] * 2
-
-
 @ALL
 def test_blocks_give_what_the_whole_gives(frozen, rng, monkeypatch):
     X = around(frozen, rng, 333)

@@ -8,11 +8,18 @@ from pathlib import Path
 import pytest
 
 from skanfis.inspection import Readability
+from skanfis.membership import MEMBERSHIPS
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("quickstart", "from_matlab")
 # How many lines of code there are at least: a page that lost them is no page that works.
-WITH_PROMPTS = {"files": 5, "how_sure": 15, "reading_rules": 15, "training": 20}
+WITH_PROMPTS = {
+    "add_a_membership": 5,
+    "files": 5,
+    "how_sure": 15,
+    "reading_rules": 15,
+    "training": 20,
+}
 if not (DOCS / f"{PAGES[0]}.rst").is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
 
@@ -63,3 +70,10 @@ def test_limits_of_reading_rules_are_those_of_the_package():
         ("strongest rule alone", f"{limits['strongest_alone']} standard deviations"),
     ):
         assert re.search(rf"\* - {measure}\n     - {re.escape(limit)}\n", table)
+
+
+def test_every_family_is_on_the_page():
+    page = (DOCS / "memberships.rst").read_text(encoding="utf-8")
+    for family in MEMBERSHIPS.values():
+        assert f'``"{family.name}"``' in page
+        assert all(parameter.name in page for parameter in family.parameters)

@@ -27,6 +27,7 @@ from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS
 
 from . import oracles
+from .quick import with_few_candidates
 
 NAMES = ["time", "temperature", "rate"]
 KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
@@ -309,15 +310,18 @@ def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
     "settings",
     # Every solver takes the same passes over the rows: one that asks for all of them, and Jang's.
     [
+        {},
+        {"n_mfs": 2, "loss": "huber"},
         {"partition": KMEANS, "mf": "bell", "solver": VariableProjection(stiffness=1e-3)},
         {"n_mfs": 2, "solver": Hybrid(stiffness=1e-3)},
     ],
-    ids=["clusters", "hybrid"],
+    ids=["default", "huber", "clusters", "hybrid"],
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
     monkeypatch.setattr(objective, "_FEWEST_ROWS", 16)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
+    with_few_candidates(monkeypatch)
     threads, read = set(), StandardisedData.read
 
     def read_and_remember(self, part):

@@ -189,3 +189,13 @@ def test_what_watches_can_end_the_training(name):
     assert result.converged
     assert [n for n, _ in seen] == [1, 2, 3]
     assert_array_equal(result.loss_curve[1:], [loss for _, loss in seen])
+
+
+def test_least_squares_moves_no_premise(rng):
+    rows, premise = noisy()
+    for start in (np.zeros(premise.size), 0.1 * rng.normal(size=premise.size)):
+        result = solve("lse", rows, premise, start=start)
+        assert result.n_iter == 1
+        assert result.loss_curve[0] == result.loss_curve[1] == result.evaluation.mean_squared_error
+        found = result.evaluation.antecedent.parameters
+        assert_array_equal(found, premise.parameters(start))

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.learning import Hybrid
 from skanfis.learning.data import Scale, StandardisedData
-from skanfis.learning.descent import NaturalPremise, StepSize
+from skanfis.learning.descent import NaturalPremise
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
@@ -159,23 +159,6 @@ def percentage_error(result, X, y):
     parameters = evaluation.antecedent.parameters
     phi = oracles.dense_design(evaluation.antecedent, parameters, X.T, 1)
     return 100.0 * np.mean(np.abs(y - (phi @ evaluation.coefficients)[:, 0]) / np.abs(y))
-
-
-class TestStepSize:
-    def sizes(self, errors):
-        rule, sizes = StepSize(1.0, errors[0]), []
-        for error in errors[1:]:
-            rule.follow(error)
-            sizes.append(rule.size)
-        return np.array(sizes)
-
-    def test_grows_after_four_falls_and_again_after_four_more(self):
-        sizes = self.sizes([9, 8, 7, 6, 5, 4, 3, 2, 1])
-        assert_allclose(sizes, [1, 1, 1, 1.1, 1.1, 1.1, 1.1, 1.21])
-
-    def test_a_fall_may_end_one_pattern_and_begin_the_other(self):
-        sizes = self.sizes([5, 6, 5, 6, 5, 4, 3, 2])
-        assert_allclose(sizes, [1, 1, 1, 0.9, 0.9, 0.9, 0.99])
 
 
 KINDS = ["one input", "two families", "scattered", *MEMBERSHIPS]

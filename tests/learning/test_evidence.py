@@ -1,4 +1,4 @@
-"""The evidence against integrals: sums over grids, the normal distribution's own, quadrature."""
+"""The evidence against integrals: the normal distribution's own, and quadrature."""
 
 from dataclasses import replace
 
@@ -270,45 +270,6 @@ class TestReestimated:
                 slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
                 assert np.abs(slopes).max() < 2e-3
 
-    @pytest.mark.parametrize("block", BLOCKS)
-    @pytest.mark.parametrize("seed", [1, 2, 4, 8])
-    def test_step_of_the_pulls_is_where_what_is_paid_for_them_is_made_good(self, seed, block):
-        at, penalty = at_fixed_premises(seed)
-        now, stepped = at(penalty), reestimated(at(penalty), [block])
-        own = slice(2, 2 + len(now.line.slopes))
-        if block == "alpha":
-            own = slice(own.stop, None)
-        cost = now.n_rows / now.noise_variance * now.paid[own]
-        determined = now.n_outputs * (now.held_before - now.held_after)[own]
-        before, after = logs_of(penalty, block), logs_of(stepped, block)
-        pulls = before - before.mean()
-        slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
-        # The prior has a part in it, 2 log(pull) / s^2, whose mean is zero.
-        expected = cost - determined + 2.0 * pulls / LIKENESS**2
-        assert_allclose(slopes, expected, rtol=1e-4, atol=1e-5)
-        assert_allclose(after.mean(), np.log(getattr(stepped, block)), rtol=1e-10)
-        step = after - before
-        left = cost * np.exp(step) - determined + 2.0 * (pulls + step) / LIKENESS**2
-        moved = np.abs(step) < np.log(100.0) - 1e-9
-        assert_allclose(left[moved], 0.0, atol=1e-8 * max(cost.max(), 1.0))
-        assert moved.any()
-        others = {block: getattr(penalty, block), BLOCKS[block]: getattr(penalty, BLOCKS[block])}
-        assert replace(stepped, **others) == penalty
-
-    @pytest.mark.parametrize("seed", [1, 2, 8])
-    def test_step_is_up_the_evidence_and_by_its_derivative(self, seed):
-        # d(-2 log p) / d log tau is what is paid less what is determined: their ratio is the step.
-        at, penalty = at_fixed_premises(seed)
-        now = at(penalty)
-        stepped = reestimated(now, ["agreement"])
-        cost = now.n_rows / now.noise_variance * now.paid[0]
-        determined = now.n_outputs * (now.held_before - now.held_after)[0]
-        slope = slope_of(lambda p: at(p).minus_twice_log, penalty, "agreement")
-        assert_allclose(cost - determined, slope, rtol=1e-4, atol=1e-5)
-        ratio = np.clip(determined / cost, 0.01, 100.0)
-        assert_allclose(stepped.agreement / penalty.agreement, ratio, rtol=1e-6)
-        assert replace(stepped, agreement=penalty.agreement) == penalty
-
     def test_no_weight_falls_below_its_own_least_or_moves_by_more_than_a_step(self):
         at, penalty = at_fixed_premises(1)
         found = at(penalty)
@@ -330,37 +291,15 @@ class TestReestimated:
 STEPS = np.array([-0.01, 0.0, 0.01])
 
 
-class TestExtrapolated:
-    """Logarithms of a weight that come nearer to their limit by the same factor every step."""
-
-    line = SeparableProblem(
-        oracles.bumpy_rows(np.random.default_rng(0), 20, 1), ONE_RULE, 1, FIRST
-    ).common_line
-
-    @staticmethod
-    def steps(ratio, first=1e-3, limit=2.0):
-        """Three penalties on the way to a limit, of the agreement."""
-        logs = np.log(limit) + np.log(first / limit) * ratio ** np.arange(3)
-        return [Penalty(agreement=float(np.exp(one)), alpha=1.0, slope=1.0) for one in logs]
-
-    @pytest.mark.parametrize("ratio", [0.55, 0.7])
-    def test_a_geometric_sequence_is_taken_to_its_limit(self, ratio):
-        found = extrapolated(
-            self.line, *self.steps(ratio, limit=0.05), ("agreement", "alpha"), None
-        )
-        assert_allclose(found.agreement, 0.05, rtol=1e-12)
-        assert found.alpha == 1.0
-
-    def test_a_long_way_is_a_hundredfold_and_within_limits(self):
-        before, now, after = (Penalty(agreement=a, alpha=1.0) for a in (1e-4, 2e-4, 4e-4))
-        assert_allclose(
-            extrapolated(self.line, before, now, after, ("agreement",), None).agreement, 2e-2
-        )
-        downward = extrapolated(
-            self.line, after, now, before, ("agreement",), Penalty(1e-5, slope=0.0)
-        )
-        assert downward.agreement == 1e-5
-        assert extrapolated(self.line, before, now, after, (), None) == after
+@pytest.mark.parametrize("ratio", [0.55, 0.7])
+def test_logarithms_that_shrink_by_one_factor_are_taken_to_their_limit(ratio):
+    rows = oracles.bumpy_rows(np.random.default_rng(0), 20, 1)
+    line = SeparableProblem(rows, ONE_RULE, 1, FIRST).common_line
+    agreements = 0.05 * 0.02 ** (ratio ** np.arange(3))
+    three = [Penalty(agreement=float(one), alpha=1.0, slope=1.0) for one in agreements]
+    found = extrapolated(line, *three, ("agreement", "alpha"), None)
+    assert_allclose(found.agreement, 0.05, rtol=1e-12)
+    assert found.alpha == 1.0
 
 
 class OneWidth:

@@ -148,16 +148,6 @@ class TestCommonLine:
         assert_allclose(model.beta[1], common, atol=1e-8)
         assert np.abs(model.beta[0] - common).max() > 1e-3
 
-    @pytest.mark.parametrize("slope", [1e-3, 1e-1])
-    def test_ridge_on_its_slopes_turns_rules_without_rows(self, slope):
-        # They have a part in the line: the line's slopes are made smaller at their expense.
-        model = self.model_with_a_dead_rule(Penalty(agreement=0.1, alpha=0.01, slope=slope))
-        departures, common = self.parts(model)
-        dense = oracles.DenseProblem(model.rows, model.antecedent, 1, Penalty())
-        pull = np.linalg.solve(dense.line.T @ dense.line, np.concatenate([[[0.0]], common[1:]]))
-        expected = -slope / 0.01 * dense.blocks[1] @ pull
-        assert_allclose(departures.reshape(4, 3, 1)[1], expected, rtol=1e-6, atol=1e-12)
-
     def test_pull_is_without_end_the_ridge_of_one_line(self):
         model = Model("grid", 1)
         solved = model.evaluate(Penalty(alpha=1e7, slope=0.3)).coefficients.reshape(6, 3)

@@ -224,8 +224,9 @@ class TestOnRuleBases:
         assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
 
     @pytest.mark.theory
-    @pytest.mark.parametrize("kind", ["grid", "two families", "scattered"])
-    @pytest.mark.parametrize("agreement", [0.0, 0.1])
+    @pytest.mark.parametrize(
+        ("kind", "agreement"), [("grid", 0.1), ("two families", 0.0), ("scattered", 0.1)]
+    )
     def test_result_is_stationary(self, kind, agreement):
         # By the dense gradient, pulled back by finite differences: nothing of the solver's own.
         rows, premise, *_ = planted(kind, 0, displaced=0.5, noise=0.1, n_outputs=2)

@@ -19,12 +19,12 @@ FAMILIES = pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMB
 @FAMILIES
 def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     rng = np.random.default_rng(3)
-    antecedent = oracles.random_grid(rng, [family] * 2, [3, 3])
+    antecedent = oracles.random_grid(rng, [family] * 2, [2, 2])
     X = rng.uniform(-1.0, 1.0, (60, 2))
     rows = StandardisedData.of(X, np.sin(3.0 * X[:, :1]) * np.cos(2.0 * X[:, 1:]))
     # Some term reaches every row by the textbook: the dense problem has no floor.
     Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
-    mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 3, -1)
+    mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 2, -1)
     assert mu.max(axis=1).min() > 0.01
     penalty = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
     problem = SeparableProblem(rows, antecedent, 1, penalty)

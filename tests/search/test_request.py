@@ -26,7 +26,7 @@ from skanfis.membership import Gaussian
 from skanfis.search import StructureRequest
 from skanfis.search.start import Start
 
-from ..quick import quick
+from ..quick import quick, with_few_candidates
 
 # Its default changes: to be quiet, newer versions have to be told.
 HDBSCAN_TAKES_COPY = "copy" in signature(HDBSCAN).parameters
@@ -177,7 +177,8 @@ def test_number_of_fuzzy_clusters_is_reported(data):
 
 
 @pytest.mark.theory
-def test_families_may_differ_from_input_to_input(data):
+def test_families_may_differ_from_input_to_input(data, monkeypatch):
+    with_few_candidates(monkeypatch)
     X, y = (part[:150] for part in data)
     mixed = ["bell", "gaussian", "triangular"]
     for settings in ({"n_mfs": 2}, {"partition": KMeans(3, random_state=0)}, {}):

@@ -1,9 +1,8 @@
-"""What candidates are worth: expected errors, rows left out, places between rows, idle terms."""
+"""What candidates are worth: expected errors, rows beyond the range, places between rows, gaps."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.spatial.distance import pdist, squareform
 
 from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
@@ -108,24 +107,6 @@ def three_runs(rng, temperatures):
     return np.column_stack([time, temperature]), truth + 1e-4 * rng.standard_normal(time.size)
 
 
-def test_places_are_half_way_to_others_that_are_near(rng):
-    X = rng.standard_normal((60, 3))
-    rows = rows_of(X, X[:, 0])
-    distance = squareform(pdist(rows.X))
-    middle = 0.5 * (rows.X[:, None] + rows.X)
-    ranks, owners = [], set()
-    for place in trials._places_between(rows).T:
-        apart = np.abs(middle - place).sum(axis=2)
-        apart[np.diag_indices(60)] = np.inf  # no row is half-way to itself
-        one, other = np.unravel_index(np.argmin(apart), apart.shape)
-        assert_allclose(middle[one, other], place, atol=1e-12)
-        owners |= {int(one), int(other)}
-        ranks.append(np.sum(distance[one] < distance[one, other]) / 60)
-    assert len(ranks) == len(owners) == 60
-    # The least of twenty of a uniform distribution has the mean 1/21.
-    assert 0.02 < np.mean(ranks) < 0.1
-
-
 def test_leverage_is_that_of_the_dense_design(rng):
     X, y = three_runs(rng, THREE)
     found = search_of(X, y)
@@ -166,10 +147,9 @@ def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatur
     assert bool(np.isfinite(found.score(Candidate((4, 3))))) is is_known
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules(seed):
+def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     # Half-way between two rows the product is not that of the factors: no new row lies there.
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 800, 3))
     noise = 1e-3
 
@@ -184,6 +164,6 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules(seed):
     fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
     model = ANFISRegressor().fit(X, truth(X) + noise * rng.standard_normal(800))
     errors = model.predict(fresh) - truth(fresh)
-    # 4.0 to 4.3 times the noise where the smaller model is not asked what it knows; and on seed 1
-    # where three candidates of a round are trained.
+    # 4 times the noise where the smaller model is not asked what it knows, and where three
+    # candidates of a round are trained.
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
