@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.learning.premise import Premise
-from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.membership import MEMBERSHIPS
 
 from ..premises import (
     HIGH,
@@ -69,18 +69,6 @@ def test_widths_go_with_the_mean_distance_to_the_neighbours(antecedent, rng):
                 kinds = np.array([p.kind for p in family.parameters])
                 expected = expected + np.where(kinds == "log_width", widening, 0.0)
                 assert_allclose(found[1:], expected[1:], rtol=1e-10, atol=1e-10)
-
-
-@pytest.mark.parametrize("counts", [2, 3, 5])
-def test_gaussians_are_half_true_to_nearly_true_half_way_to_a_neighbour(counts):
-    places = np.linspace(-1.5, 2.0, counts)
-    distance = places[1] - places[0]
-    theta = Gaussian.start(places, np.full(counts, distance), 0.6)
-    premise = Premise.of(GridAntecedent.build([Gaussian], [0], [theta]), LOW[:1], HIGH[:1])
-    for edge, truth in ((premise.lower, 0.5), (premise.upper, 0.9)):
-        sigma = np.exp(theta[1] + edge[counts:])
-        # The factors are looked for on a grid.
-        assert_allclose(sigma, 0.5 * distance / np.sqrt(-2.0 * np.log(truth)), rtol=0.012)
 
 
 def truth_between(left, right):

@@ -72,19 +72,6 @@ def test_clusterer_without_weights_sees_repeated_rows():
     assert_array_equal(Remembers.seen[0], table[[0, 0, 1, 2, 2, 2]])
 
 
-def test_clusters_are_sought_in_standardised_inputs_and_target():
-    Remembers.seen = ()
-    X, y = data()
-    ANFISRegressor(partition=Remembers(), solver=VariableProjection(tol=0.1)).fit(
-        X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0
-    )
-    (table,) = Remembers.seen
-    expected = StandardScaler().fit_transform(np.column_stack([X, y]))
-    order = np.lexsort(expected.T[::-1])
-    # A column of 1e-6 beside an offset of 3 has ten digits left.
-    assert_allclose(table[np.lexsort(np.round(table, 6).T[::-1])], expected[order], atol=1e-8)
-
-
 def test_clusterer_itself_is_left_as_it_was():
     clusterer = KMeans(n_clusters=3, n_init=1, random_state=0)
     model = quick(partition=clusterer).fit(*data())
