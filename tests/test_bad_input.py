@@ -1,7 +1,6 @@
 """Everything a user can get wrong: the message says where, what was found and what would do."""
 
 import re
-import time
 import tracemalloc
 from functools import cache
 
@@ -35,6 +34,7 @@ def table(n_rows=N_ROWS):
 
 X, Y = table()
 FRAME = pd.DataFrame(X, columns=NAMES)
+METHODS = ["predict", "coverage", "strengths", "in_bounds"]
 
 
 def with_entry(array, place, value):
@@ -71,7 +71,7 @@ def test_entry_of_x_that_is_not_finite(value, kind, as_frame):
     said = [f"Input X contains {kind}", f"{name!r}", "row 7", "2 of its 60", "Drop", "impute"]
     with refused(ValueError, *said):
         fit(bad)
-    for method in ("predict", "coverage", "strengths", "in_bounds"):
+    for method in METHODS:
         with refused(ValueError, *said):
             getattr(line(as_frame), method)(bad)
 
@@ -157,11 +157,6 @@ def test_table_of_times_alone_is_no_table_of_nanoseconds():
         ANFISRegressor().fit(TIMES.to_numpy().reshape(-1, 1), Y)
 
 
-def test_array_of_text_is_named_by_place():
-    with refused(ValueError, "X holds text in column 'x1', first at row 2", "'b'"):
-        ANFISRegressor().fit([[1.0, 2.0], [3.0, 4.0], [5.0, "b"]], Y[:3])
-
-
 @pytest.mark.parametrize(
     ("targets", "said"),
     [
@@ -188,13 +183,6 @@ def test_two_columns_of_one_name():
         ANFISRegressor().fit(twice, Y)
     with refused(ValueError, "X has 2 columns of the name 'rate'"):
         ANFISRegressor(**QUICK).fit(FRAME, Y).predict(twice)
-
-
-@pytest.mark.parametrize("fill", [0.0, np.nan])
-def test_sparse_frame(fill):
-    frame = FRAME.astype(pd.SparseDtype(float, fill))
-    with refused(TypeError, "Sparse data was passed for X", "X.sparse.to_dense()"):
-        ANFISRegressor().fit(frame, Y)
 
 
 def test_masked_values_are_not_taken_for_what_lies_beneath():
@@ -235,47 +223,35 @@ def test_groups_of_any_one_kind_serve(groups):
         ANFISRegressor(**QUICK).fit(X, Y[:-1], groups=groups)
 
 
-@pytest.mark.parametrize("form", [sparse.csr_matrix, sparse.csr_array])
-def test_sparse_x(form):
-    with refused(TypeError, "Sparse data was passed for X", "toarray", "sparse_output=False"):
-        ANFISRegressor().fit(form(X), Y)
-    with refused(TypeError, "Sparse data was passed for X", "toarray"):
-        ANFISRegressor(**QUICK).fit(X, Y).predict(form(X))
+@pytest.mark.parametrize(
+    ("form", "remedy"),
+    [
+        (sparse.csr_matrix, "toarray"),
+        (sparse.csr_array, "sparse_output=False"),
+        (lambda X: pd.DataFrame(X).astype(pd.SparseDtype(float, 0.0)), "X.sparse.to_dense()"),
+        (lambda X: pd.DataFrame(X).astype(pd.SparseDtype(float, np.nan)), "X.sparse.to_dense()"),
+    ],
+)
+def test_sparse_x(form, remedy):
+    for act in (lambda X: fit(X), line().predict):
+        with refused(TypeError, "Sparse data was passed for X", remedy):
+            act(form(X))
 
 
 # ------------------------------------------------------------------------------------------- shapes
 
 
-@pytest.mark.parametrize("method", ["predict", "coverage", "strengths", "in_bounds"])
-def test_before_fit(method):
+@pytest.mark.parametrize("name", [*METHODS, "n_rules_", "rules_", "memberships_", "consequents_"])
+def test_before_fit(name):
     with refused(NotFittedError, "not fitted yet", "fit"):
-        getattr(ANFISRegressor(), method)(X)
+        getattr(ANFISRegressor(), name)(X)
+    assert hasattr(ANFISRegressor(), name) is (name in METHODS)
 
 
-@pytest.mark.parametrize("name", ["n_rules_", "rules_", "memberships_", "consequents_"])
-def test_attribute_before_fit(name):
-    with refused(NotFittedError, "not fitted yet", "fit"):
-        getattr(ANFISRegressor(), name)
-    assert not hasattr(ANFISRegressor(), name)
-
-
-@pytest.mark.parametrize("method", ["predict", "coverage", "strengths", "in_bounds"])
-@pytest.mark.parametrize("n_columns", [1, 2, 4])
-def test_wrong_number_of_columns_after_training(method, n_columns):
-    model = ANFISRegressor(**QUICK).fit(X, Y)
-    wide = np.column_stack([X, X])
-    with refused(ValueError, f"X has {n_columns} features", "expecting 3 features"):
-        getattr(model, method)(wide[:, :n_columns])
-
-
-def test_one_row_of_one_dimension_after_training():
-    with refused(ValueError, "Expected 2D array, got 1D array", "reshape(1, -1)"):
-        ANFISRegressor(**QUICK).fit(X, Y).predict(X[0])
-
-
-def test_no_rows_after_training():
-    with refused(ValueError, "0 sample(s)", "minimum of 1"):
-        ANFISRegressor(**QUICK).fit(X, Y).predict(X[:0])
+@pytest.mark.parametrize("method", METHODS)
+def test_wrong_number_of_columns_after_training(method):
+    with refused(ValueError, "X has 2 features", "expecting 3 features"):
+        getattr(line(), method)(X[:, :2])
 
 
 # ----------------------------------------------------------------------------- data without content
@@ -353,72 +329,50 @@ def test_constant_target_is_predicted_everywhere(settings):
     assert_allclose(model.predict(2.0 * X - X.mean(axis=0)), 7.1, rtol=1e-14)
 
 
-@cache
-def plain():
-    return ANFISRegressor(n_mfs=2).fit(X, Y)
-
-
-@pytest.mark.parametrize("scale", [1e-100, 1e100])
-@pytest.mark.parametrize("column", [0, 3])
-def test_numbers_near_the_ends_of_the_range_of_floats(scale, column):
-    # Column 3 is the target.
-    factors = np.ones(4)
-    factors[column] = scale
-    scaled = ANFISRegressor(n_mfs=2).fit(X * factors[:3], Y * factors[3])
-    found = scaled.predict(X * factors[:3]) / factors[3]
-    assert_allclose(found, plain().predict(X), rtol=0, atol=1e-6 * np.ptp(Y))
-
-
 # -------------------------------------------------------------------------------------------- n_mfs
 
-
-@pytest.mark.parametrize("n_mfs", [[2, 2], (2, 2, 2, 2), np.array([3]), []])
-def test_wrong_number_of_numbers_of_terms(n_mfs):
-    with refused(ValueError, "n_mfs=", f"{len(n_mfs)} entries", "3 columns (time, temperature, r"):
-        ANFISRegressor(n_mfs=n_mfs).fit(FRAME, Y)
-
-
-@pytest.mark.parametrize("n_mfs", [0, -1, [2, 0, 2], [2, 2, -3]])
-def test_fewer_than_one_term(n_mfs):
-    with refused(ValueError, f"n_mfs={n_mfs!r} must be 1 or more", "1 means"):
-        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
-
-
-@pytest.mark.parametrize("n_mfs", [True, False, np.array(2), [[2, 2, 2]], {"time": 2}])
-def test_number_of_terms_that_is_no_number(n_mfs):
-    with refused(TypeError, "n_mfs=", "'auto', a whole number, or one whole number per input"):
-        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+COUNT = "must be 'auto', a whole number, or one whole number per input"
 
 
 @pytest.mark.parametrize(
-    "n_mfs",
+    ("n_mfs", "error", "said"),
     [
-        [2, 2.5, 2],
-        ["2", 2, 2],
-        [True, 2, 2],
-        [None, 2, 2],
-        np.array([2.0, 2.0, 2.0]),
-        np.array([True, True, True]),
+        ([2, 2], ValueError, ["has 2 entries", "3 columns (time, temperature, rate)"]),
+        (np.array([3]), ValueError, ["has 1 entries", "3 columns"]),
+        ([], ValueError, ["has 0 entries", "3 columns"]),
+        (0, ValueError, ["n_mfs=0 must be 1 or more", "1 means"]),
+        ([2, 2, -3], ValueError, ["n_mfs=[2, 2, -3] must be 1 or more", "1 means"]),
+        (True, TypeError, [COUNT]),
+        (np.array(2), TypeError, [COUNT]),
+        ([[2, 2, 2]], TypeError, [COUNT]),
+        ({"time": 2}, TypeError, [COUNT]),
+        ([2, 2.5, 2], TypeError, ["n_mfs=[2, 2.5, 2]", "whole numbers only"]),
+        (["2", 2, 2], TypeError, ["whole numbers only"]),
+        ([None, 2, 2], TypeError, ["whole numbers only"]),
+        (np.array([True, True, True]), TypeError, ["whole numbers only"]),
+        ("3", ValueError, ["'n_mfs' parameter of ANFISRegressor", "'auto'", "Got '3'"]),
+        (2.0, ValueError, ["'n_mfs' parameter", "'auto'", "Got 2.0"]),
+        (None, ValueError, ["'n_mfs' parameter", "'auto'", "Got None"]),
     ],
+    ids=repr,
 )
-def test_numbers_of_terms_that_are_not_whole(n_mfs):
-    with refused(TypeError, "n_mfs=", "whole numbers only"):
-        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+def test_number_of_terms_that_cannot_be(n_mfs, error, said):
+    with refused(error, *said):
+        ANFISRegressor(n_mfs=n_mfs).fit(FRAME, Y)
 
 
-@pytest.mark.parametrize("n_mfs", ["3", "many", 2.0, 2.5, None, np.nan])
-def test_number_of_terms_of_the_wrong_type(n_mfs):
-    with refused(ValueError, "'n_mfs' parameter of ANFISRegressor", "'auto'", f"Got {n_mfs!r}"):
-        ANFISRegressor(n_mfs=n_mfs).fit(X, Y)
+LIMIT = "limit is 1.07 GB (sklearn.set_config(working_memory"
 
 
 @pytest.mark.parametrize(
     ("n_inputs", "settings", "said"),
     [
         # 3^10 rules, with 11 coefficients each.
-        (10, {"n_mfs": 3}, ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "47.3 TB"]),
+        (10, {"n_mfs": 3}, ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "47.3 TB", LIMIT]),
         (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^18 bytes"]),
+        (8, {"n_mfs": 3}, ["6,561 rules with 59,049", LIMIT, "n_mfs=2 makes 256 rules"]),
         (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^18 bytes"]),
+        (400, {"n_mfs": 3}, ["n_mfs=3 on 400 inputs", "10^18 bytes"]),
         (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^18 bytes"]),
     ],
 )
@@ -426,17 +380,14 @@ def test_more_rules_than_memory(n_inputs, settings, said):
     rng = np.random.default_rng(0)
     wide = rng.normal(size=(50, n_inputs))
     tracemalloc.start()
-    start = time.perf_counter()
     try:
-        with refused(ValueError, *said, "limit is 1.07 GB", "working_memory", "KMeans"):
+        with refused(ValueError, *said, "KMeans"):
             ANFISRegressor(**settings).fit(wide, wide[:, 0])
-        seconds = time.perf_counter() - start
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    # Of a thousand and more. Half a second is for a busy machine: 20 ms otherwise.
+    # Of a thousand and more.
     assert peak < 2e6
-    assert seconds < 0.5
 
 
 # --------------------------------------------------------------------------------- other parameters

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.consequent import LocalBasis, NormalFactor, rule_masses
+from skanfis.consequent import LocalBasis, NormalFactor
 
 N_RULES, N_INPUTS, N_ROWS = 4, 3, 200
 
@@ -55,13 +55,6 @@ def positive_definite(rng, n=12, condition=1e4):
     return (q * np.geomspace(1.0, 1.0 / condition, n)) @ q.T
 
 
-@pytest.mark.parametrize("order", [0, 1])
-def test_masses_are_the_weight_on_which_rules_fire(strengths, Z, weight, order):
-    masses = rule_masses(gram_of(strengths, Z, weight, order), N_RULES)
-    assert_allclose(masses, strengths @ weight, rtol=1e-12)
-    assert_allclose(masses.sum(), 1.0, rtol=1e-12)
-
-
 def test_local_basis_holds_weighted_moments(strengths, Z, weight):
     local = LocalBasis.from_gram(gram_of(strengths, Z, weight, 1), N_RULES)
     for r, w in enumerate(strengths * weight):
@@ -86,16 +79,6 @@ def test_rule_that_fires_on_one_spot_has_a_spread(Z, weight, strengths):
     assert_array_equal(local.spread[0], 0.05)
 
 
-def test_gram_of_the_local_design_is_found_without_the_rows(strengths, Z, weight):
-    gram = gram_of(strengths, Z, weight, 1)
-    local = LocalBasis.from_gram(gram, N_RULES)
-    rows = []
-    for r, w in enumerate(strengths):
-        rows += [w, *(w * ((Z.T - local.center[r]) / local.spread[r]).T)]
-    rows = np.array(rows)
-    assert_allclose(local.transform_gram(gram), (rows * weight) @ rows.T, rtol=1e-10, atol=1e-14)
-
-
 def test_transforms_are_the_explicit_matrix(rng):
     local, gram = random_local(rng), positive_definite(rng, N_RULES * (1 + N_INPUTS))
     T = explicit(local)
@@ -109,14 +92,6 @@ def test_transforms_are_the_explicit_matrix(rng):
     expected = T.T @ rows
     assert local.transform_rows(rows) is rows
     assert_allclose(rows, expected, rtol=1e-12, atol=1e-13)
-
-
-def test_local_and_global_coefficients_are_inverse(rng):
-    local, beta = random_local(rng), rng.normal(size=(N_RULES * (1 + N_INPUTS), 3))
-    before = beta.copy()
-    assert_allclose(local.to_local(local.to_global(beta)), beta, rtol=1e-13, atol=1e-13)
-    assert_allclose(local.to_global(local.to_local(beta)), beta, rtol=1e-13, atol=1e-13)
-    assert_array_equal(beta, before)
 
 
 def test_local_basis_spares_the_gram_matrix_its_condition(rng):
@@ -141,13 +116,6 @@ def test_factor_solves_the_normal_equations(rng, alpha):
     assert 0.0 < factor.shift <= rounding(matrix)
     assert_array_equal(matrix, before)
     assert_allclose(factor.solve(right), np.linalg.solve(matrix, right), rtol=1e-9)
-
-
-def test_solution_and_projector_come_from_one_matrix(rng):
-    matrix, right = positive_definite(rng), rng.normal(size=(12, 3))
-    factor = NormalFactor(matrix)
-    half = factor.half_solve(right)
-    assert_allclose(half.T @ half, right.T @ factor.solve(right), rtol=1e-10)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -214,18 +182,3 @@ def test_singular_matrix_is_factorised_at_any_scale(rng, scale):
     assert factor.shift <= 1e-10 * scale * np.trace(gram / scale)
     solution = factor.solve(gram @ np.ones((30, 1)))
     assert_allclose(gram @ solution, gram @ np.ones((30, 1)), rtol=1e-6, atol=1e-9 * scale)
-
-
-def test_shift_grows_with_what_rounding_needs_and_is_told():
-    # An eigenvalue of -1e-13, as a sum of many rows may leave it.
-    factor = NormalFactor(np.diag([1.0, -1e-13]))
-    assert 1e-13 < factor.shift < 1e-11
-    assert_allclose(
-        factor.solve(np.array([0.0, 1.0])), [0.0, 1.0 / (factor.shift - 1e-13)], rtol=1e-6
-    )
-
-
-def test_empty_matrix_has_the_solution_zero():
-    factor = NormalFactor(np.zeros((3, 3)))
-    assert_array_equal(factor.solve(np.zeros((3, 1))), 0.0)
-    assert factor.trace(np.zeros((3, 3))) == 0.0

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
-from sklearn.datasets import make_friedman1
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
@@ -48,7 +47,6 @@ DATA = {
     "gyro": gyro,
     "sinc": make_jang_sinc,
     "mackey-glass": lambda: tuple(part[:120] for part in make_mackey_glass()),
-    "friedman": lambda: make_friedman1(80, n_features=5, noise=1.0, random_state=0),
 }
 KMEANS = KMeans(n_clusters=4, n_init=2, random_state=0)
 # The points of the sinc lie on a symmetric grid: there rounding would decide ties of a clustering.
@@ -133,20 +131,13 @@ def test_units_and_origin_of_inputs_and_target(case):
     assert_array_equal(scaled.rules_, case.plain.rules_)
 
 
-@pytest.mark.parametrize(
-    ("column", "factor"),
+@pytest.mark.parametrize("column", [1, 2, 3])
+def test_direction_of_a_single_column(column):
     # Where the first input runs backwards, 2e-4 of the span remain: gaps count from its first term
     # on, and the solver takes other steps to a flat minimum.
-    [
-        *((column, factor) for column in range(4) for factor in (1e6, 1e-6)),
-        *((column, -1.0) for column in (1, 2, 3)),
-    ],
-)
-def test_unit_of_a_single_column(column, factor):
-    # Which of them leaks; what the evidence makes of units is asked above, of all at once.
     case = plain_case()
     factors = np.ones(4)
-    factors[column] = factor
+    factors[column] = -1.0
     found = case.fit(case.X * factors[:3], case.y * factors[3]).predict(case.X * factors[:3])
     case.assert_same(found / factors[3])
 
@@ -218,7 +209,7 @@ def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
 # ---------------------------------------------------------------------- every part of the estimator
 
 
-@pytest.mark.parametrize("name", ["gyro", "sinc", "friedman"])
+@pytest.mark.parametrize("name", ["gyro", "sinc"])
 def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()

@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent
-from skanfis.learning import VariableProjection
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS, TargetRange
@@ -81,10 +80,6 @@ MODELS = {
 ALL = pytest.mark.parametrize("frozen", MODELS.values(), ids=list(MODELS))
 
 
-def linear(**changes):
-    return build(GridAntecedent((), counts=()), **changes)
-
-
 def inside(frozen, rng, n=50):
     return rng.uniform(frozen.minimum, frozen.maximum, (n, frozen.n_inputs))
 
@@ -95,34 +90,10 @@ def around(frozen, rng, n=200):
     return rng.uniform(frozen.minimum - 2 * span, frozen.maximum + 2 * span, (n, frozen.n_inputs))
 
 
-def fitted(X, y, **settings):
-    return ANFISRegressor(**({"solver": VariableProjection(tol=1e-2)} | settings)).fit(X, y)
-
-
-@pytest.fixture(scope="module")
-def gyro():
-    """A regressor on columns far from the origin: time stamps, kelvins, raw counts; two targets."""
-    g = np.random.default_rng(4)
-    X = np.column_stack(
-        [1e9 + np.sort(g.uniform(0, 600, 400)), g.uniform(250, 330, 400), 1e-3 * g.normal(size=400)]
-    )
-    z = (X - X.mean(axis=0)) / X.std(axis=0)
-    y = np.column_stack([np.sin(z[:, 0]) + z[:, 1] * z[:, 2], 1e4 + z[:, 1] ** 2])
-    y += 0.01 * g.normal(size=y.shape)
-    return X, fitted(X, y, n_mfs=[2, 2, 1]), fitted(X, y, n_mfs=2, mf="bell", order=0)
-
-
 @ALL
 def test_prediction_is_the_textbook_formula(frozen, rng):
     X = inside(frozen, rng)
     assert_allclose(frozen.predict(X), naive(frozen, X), rtol=1e-10, atol=1e-10)
-
-
-@pytest.mark.parametrize("which", [1, 2])
-def test_fitted_model_is_the_textbook_formula_in_the_users_units(gyro, which):
-    X, frozen = gyro[0][::7], gyro[which].model_
-    # p0 holds -p1 * 1e9 beside values of order one: the textbook form has seven digits left.
-    assert_allclose(naive(frozen, X), frozen.predict(X), atol=1e-6)
 
 
 def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses():
@@ -137,15 +108,6 @@ def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses
     assert_allclose(far.predict(X + 2.0**30), near.predict(X), atol=1e-5)
 
 
-def test_without_terms_the_model_is_linear(rng):
-    frozen = linear(n_outputs=2)
-    X = inside(frozen, rng)
-    a, b = frozen.coefficients[0, 0], frozen.coefficients[0, 1:]
-    assert_allclose(frozen.predict(X), a + (X - frozen.reference) @ b, rtol=1e-12)
-    assert frozen.memberships() == []
-    assert_array_equal(frozen.strengths(X), 1.0)
-
-
 @ALL
 def test_consequents_are_those_of_the_rules(frozen, rng):
     X = inside(frozen, rng, 5)
@@ -154,21 +116,6 @@ def test_consequents_are_those_of_the_rules(frozen, rng):
     expected = a + (np.einsum("nj,rjo->rno", X - frozen.reference, b) if frozen.order else 0.0)
     assert_allclose(by_rule, np.broadcast_to(expected, by_rule.shape), rtol=1e-11, atol=1e-12)
     assert frozen.consequents.shape == (frozen.n_rules, 4, frozen.n_outputs)
-
-
-def test_memberships_before_training_are_told_too():
-    before, after = grid(), grid().with_parameters(grid().parameters + 0.25)
-    frozen = build(after, initial_antecedent=before)
-    for one, other in zip(frozen.memberships(trained=False), frozen.memberships(), strict=True):
-        assert one["input"] == other["input"]
-        assert_allclose(other["center"], one["center"] + 0.25, rtol=1e-12)
-        assert_allclose(other["width"], one["width"] * np.exp(0.25), rtol=1e-12)
-    assert [t["function"] for t in frozen.memberships()] == ["gaussian"] * 2 + ["bell"] * 3 + [
-        "gaussian"
-    ] * 2
-    assert [t["input"] for t in frozen.memberships()] == ["time"] * 2 + ["temperature"] * 3 + [
-        "rate"
-    ] * 2
 
 
 @ALL
@@ -256,29 +203,12 @@ def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rn
     assert_allclose(frozen.gradient(X), frozen.gradient(nearest), rtol=1e-12)
 
 
-@pytest.mark.parametrize("limit", [-0.1, np.nan, "far", None])
-def test_limit_is_checked(limit):
-    frozen = build(grid())
-    if limit is None:
-        assert frozen.with_out_of_bounds("linear").max_extrapolation == frozen.max_extrapolation
-        return
-    with pytest.raises(ValueError, match=r"max_extrapolation=.* must be a number"):
-        frozen.with_out_of_bounds("linear", limit)
-
-
 def test_auto_is_what_the_rows_told_and_what_is_set_where_there_were_none():
     far = build(grid()).with_out_of_bounds("linear", 2.0)
     assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 2.0
     told = replace(far, told_extrapolation=3.0)
     assert told.n_rules > 1
     assert told.with_out_of_bounds("linear", "auto").max_extrapolation == 3.0
-
-
-def test_policy_as_it_is_set():
-    frozen = build(grid())
-    assert frozen.policy == "out_of_bounds='clip'"
-    far = frozen.with_out_of_bounds("linear", 2)
-    assert far.policy == "out_of_bounds='linear', max_extrapolation=2.0"
 
 
 @ALL

@@ -7,10 +7,19 @@ from pathlib import Path
 
 import pytest
 
+from skanfis.inspection import Readability
+from skanfis.membership import MEMBERSHIPS
+
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("quickstart", "from_matlab")
 # How many lines of code there are at least: a page that lost them is no page that works.
-WITH_PROMPTS = {"files": 5, "how_sure": 15, "reading_rules": 15, "training": 20}
+WITH_PROMPTS = {
+    "add_a_membership": 5,
+    "files": 5,
+    "how_sure": 15,
+    "reading_rules": 15,
+    "training": 20,
+}
 if not (DOCS / f"{PAGES[0]}.rst").is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
 
@@ -50,3 +59,21 @@ def test_page_with_prompts(page, tmp_path, monkeypatch):
     failed, tried = doctest.testfile(path, module_relative=False, optionflags=LOOSELY)
     assert tried > WITH_PROMPTS[page]
     assert failed == 0
+
+
+def test_limits_of_reading_rules_are_those_of_the_package():
+    page = (DOCS / "reading_rules.rst").read_text(encoding="utf-8")
+    table, limits = page.partition("list-table")[2], Readability.limits
+    for measure, limit in (
+        ("greatest truth of a term", f"{limits['least_truth']} or more"),
+        ("crossing of neighbours", f"{limits['greatest_crossing']} or less"),
+        ("strongest rule alone", f"{limits['strongest_alone']} standard deviations"),
+    ):
+        assert re.search(rf"\* - {measure}\n     - {re.escape(limit)}\n", table)
+
+
+def test_every_family_is_on_the_page():
+    page = (DOCS / "memberships.rst").read_text(encoding="utf-8")
+    for family in MEMBERSHIPS.values():
+        assert f'``"{family.name}"``' in page
+        assert all(parameter.name in page for parameter in family.parameters)

@@ -62,33 +62,6 @@ def with_policy(estimator, policy):
     return clone(estimator).set_params(out_of_bounds=policy).fit(FRAME, Y)
 
 
-def test_clip_holds_the_value_at_the_edge(trained):
-    model = with_policy(trained, "clip")
-    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1)
-    assert_array_equal(model.predict(OUTSIDE), model.predict(nearest))
-    assert_allclose(model.strengths(OUTSIDE), model.strengths(nearest), rtol=1e-14)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-def test_linear_goes_on_along_the_tangent_of_the_edge(trained):
-    model = with_policy(trained, "linear").set_params(out_of_bounds=LinearExtrapolation(math.inf))
-    nearest = OUTSIDE.clip(FRAME.min(), FRAME.max(), axis=1).to_numpy()
-    slope = model.model_.gradient(nearest)[:, :, 0]
-    expected = trained.model_.predict(nearest)[:, 0]
-    expected += ((OUTSIDE.to_numpy() - nearest) * slope).sum(axis=1)
-    assert_allclose(model.predict(OUTSIDE), expected, rtol=1e-9)
-    edge = OUTSIDE.assign(temperature=FRAME["temperature"].max(), time=900.0, rate=0.0)
-    beyond = edge.assign(temperature=edge["temperature"] + 1e-9)
-    assert_allclose(model.predict(beyond), model.predict(edge), rtol=1e-9)
-
-
-def test_nan_marks_the_rows_out_of_bounds_alone(trained):
-    model = with_policy(trained, "nan")
-    found = model.predict(OUTSIDE)
-    assert_array_equal(np.isnan(found), [False, True, True, True])
-    assert_allclose(found[0], trained.predict(OUTSIDE[:1])[0], rtol=1e-14)
-
-
 def test_raise_names_the_columns(trained):
     model = with_policy(trained, "raise")
     with pytest.raises(ValueError, match=r"'temperature' in 2 of 4 rows .*'rate' in 1 of 4 rows"):

@@ -14,7 +14,7 @@ from sklearn.base import clone
 from sklearn.cluster import AgglomerativeClustering, KMeans
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
-from sklearn.metrics import get_scorer, r2_score
+from sklearn.metrics import get_scorer
 from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -27,6 +27,7 @@ from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS
 
 from . import oracles
+from .quick import with_few_candidates
 
 NAMES = ["time", "temperature", "rate"]
 KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
@@ -245,13 +246,6 @@ def test_max_iter_reached_is_said():
     assert "max_iter" in model.status_
 
 
-def test_score_is_the_coefficient_of_determination():
-    model = ANFISRegressor(**SHORT).fit(X, Y)
-    weight = np.linspace(0, 1, len(X))
-    expected = r2_score(Y, model.predict(X), sample_weight=weight)
-    assert_allclose(model.score(X, Y, weight), expected, rtol=1e-14)
-
-
 # ------------------------------------------------------------------------------------------ outputs
 
 
@@ -273,16 +267,6 @@ def test_same_target_twice():
     assert_allclose(found[:, 0], alone.predict(X), rtol=0, atol=1e-7 * np.ptp(Y))
 
 
-@pytest.mark.theory
-def test_same_target_twice_is_twice_the_evidence_and_nearly_the_same_fit():
-    data, target = surface(noise=0.01)
-    alone = ANFISRegressor(n_mfs=2).fit(data, target)
-    found = ANFISRegressor(n_mfs=2).fit(data, np.column_stack([target, target])).predict(data)
-    assert_array_equal(found[:, 0], found[:, 1])
-    # The premises may be twice as sure; that is far less than the noise.
-    assert np.sqrt(np.mean((found[:, 0] - alone.predict(data)) ** 2)) < 0.3 * 0.01
-
-
 def test_outputs_share_the_premises_and_have_their_own_consequents():
     targets = np.column_stack([Y, -5e6 * Y + 1.0, np.cos(X[:, 1] / 40.0)])
     model = ANFISRegressor(n_mfs=2, **FREE).fit(X, targets)
@@ -295,13 +279,6 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
     assert np.abs(error).max() < 1e-6
     for found in (model, ANFISRegressor(**SHORT).fit(X, targets)):
         assert_allclose(found.predict(X)[:, 1], -5e6 * found.predict(X)[:, 0] + 1.0, rtol=1e-9)
-
-
-def test_order_of_the_outputs_does_not_matter():
-    targets = np.column_stack([Y, np.cos(X[:, 1] / 40.0)])
-    one, other = (ANFISRegressor(**SHORT).fit(X, t) for t in (targets, targets[:, ::-1]))
-    error = (one.predict(X) - other.predict(X)[:, ::-1]) / np.ptp(targets, axis=0)
-    assert np.abs(error).max() < 1e-7
 
 
 # ----------------------------------------------------------------------------------------- coverage
@@ -325,26 +302,7 @@ def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
     assert coverage.min() < 0.4
 
 
-def test_coverage_decays_with_the_distance_from_the_data():
-    data, target = l_shaped()
-    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(stiffness=1.0)).fit(data, target)
-    edge = np.array([data[:, 0].max(), 0.3])
-    deviations = np.linspace(0.0, 3.0, 7)
-    beyond = edge + np.outer(deviations * data[:, 0].std(), [1.0, 0.0])
-    expected = model.coverage(edge[None]) * np.exp(-0.5 * deviations**2)
-    assert_allclose(model.coverage(beyond), expected, rtol=1e-12)
-
-
 # ------------------------------------------------------------------------------ the same every time
-
-
-def test_another_fit_in_between_changes_nothing():
-    other = surface(150, seed=5)
-    model = ANFISRegressor(**SHORT).fit(X, Y)
-    first = pickle.loads(pickle.dumps(model))
-    model.fit(other[0][:, :2], np.column_stack([other[1], other[1]]))
-    same_bits(model.fit(X, Y), first)
-    same_bits(clone(model).fit(X, Y), first)
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
@@ -352,15 +310,18 @@ def test_another_fit_in_between_changes_nothing():
     "settings",
     # Every solver takes the same passes over the rows: one that asks for all of them, and Jang's.
     [
+        {},
+        {"n_mfs": 2, "loss": "huber"},
         {"partition": KMEANS, "mf": "bell", "solver": VariableProjection(stiffness=1e-3)},
         {"n_mfs": 2, "solver": Hybrid(stiffness=1e-3)},
     ],
-    ids=["clusters", "hybrid"],
+    ids=["default", "huber", "clusters", "hybrid"],
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
     monkeypatch.setattr(objective, "_FEWEST_ROWS", 16)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
+    with_few_candidates(monkeypatch)
     threads, read = set(), StandardisedData.read
 
     def read_and_remember(self, part):
@@ -429,8 +390,7 @@ def test_memory_map_is_as_good_as_memory(tmp_path, dtype):
     assert model.predict(mapped).dtype == np.float64
 
 
-def frames():
-    return [pytest.param("pandas"), pytest.param("polars")]
+LIBRARIES = pytest.mark.parametrize("library", ["pandas", "polars"])
 
 
 def frame_of(library, data, names):
@@ -438,7 +398,7 @@ def frame_of(library, data, names):
     return library.DataFrame({name: data[:, j] for j, name in enumerate(names)})
 
 
-@pytest.mark.parametrize("library", frames())
+@LIBRARIES
 def test_data_frame_gives_names_to_the_terms(library):
     frame = frame_of(library, X, NAMES)
     model = ANFISRegressor(**SHORT).fit(frame, frame_of(library, Y[:, None], ["error"])["error"])
@@ -449,7 +409,7 @@ def test_data_frame_gives_names_to_the_terms(library):
     assert_allclose(model.predict(frame), expected, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("library", frames())
+@LIBRARIES
 def test_columns_in_another_order_are_refused(library):
     model = ANFISRegressor(**SHORT).fit(frame_of(library, X, NAMES), Y)
     turned = frame_of(library, X[:, ::-1], NAMES[::-1])
@@ -458,7 +418,7 @@ def test_columns_in_another_order_are_refused(library):
             method(turned)
 
 
-@pytest.mark.parametrize("library", frames())
+@LIBRARIES
 def test_names_pass_through_a_scaler(library):
     frame = frame_of(library, X, NAMES)
     pipeline = make_pipeline(StandardScaler(), ANFISRegressor(**SHORT)).set_output(
@@ -479,15 +439,6 @@ def test_frame_without_names_that_are_text_is_an_array():
 
 
 # -------------------------------------------------------------- parameters and scikit-learn's tools
-
-
-def test_parameters_are_got_and_set_as_given():
-    n_mfs = [2, 3, 2]
-    model = ANFISRegressor(n_mfs=n_mfs, alpha=1e-6)
-    assert model.get_params()["n_mfs"] is n_mfs
-    assert clone(model).get_params() == model.get_params()
-    assert model.set_params(mf="bell", n_mfs=2) is model
-    assert (model.mf, model.n_mfs, model.alpha) == ("bell", 2, 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -530,13 +481,6 @@ def test_grid_search_over_runs_left_out():
     assert search.best_params_ == {"anfisregressor__n_mfs": [4, 1]}
     again = clone(search.best_estimator_).fit(data, target)
     assert_array_equal(search.predict(data), again.predict(data))
-    held_out = [
-        clone(search.best_estimator_)
-        .fit(data[run != k], target[run != k])
-        .score(data[run == k], target[run == k])
-        for k in range(4)
-    ]
-    assert_allclose(search.best_score_, np.mean(held_out), rtol=1e-12)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

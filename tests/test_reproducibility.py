@@ -55,14 +55,3 @@ def digest(name, n_rows=100, **more):
 def test_nothing_fitted_before_matters(name, fresh_process):
     # There every digest comes of a process that has fitted none, in reverse order.
     assert digest(name) == fresh_process["digests"][name]
-
-
-@pytest.mark.parametrize("name", ["default", pytest.param("huber", marks=pytest.mark.theory)])
-def test_number_of_workers_does_not_matter(name, monkeypatch):
-    # Here, because fresh_process.py imports this file by itself.
-    from .quick import with_few_candidates
-
-    with_few_candidates(monkeypatch)
-    # Enough for several chunks of rows, so that workers have something to share.
-    settings = {"n_rows": 9_000, "max_iter": 3}
-    assert digest(name, n_jobs=2, **settings) == digest(name, **settings)

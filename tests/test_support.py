@@ -74,23 +74,6 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
         assert_allclose(found.radius[r], radius, rtol=1e-9)
 
 
-def test_units_change_as_inputs_do(rng):
-    found = oracles.random_support(rng, 4, 3)
-    offset, scale = np.array([1e6, 0.0, -3.0]), np.array([1e3, 1e-6, 2.0])
-    Z = rng.normal(size=(3, 50))
-    moved = found.change_units(offset, scale)
-    X = offset[:, None] + scale[:, None] * Z
-    assert_allclose(moved.by_rule(X), found.by_rule(Z), rtol=1e-6)
-
-
-@pytest.mark.parametrize("order", [[2, 0, 1], [1, 0, 2], [0, 1, 2]])
-def test_order_of_the_inputs(order, rng):
-    found, Z = oracles.random_support(rng, 4, 3), rng.normal(size=(3, 50))
-    moved = found.reordered(np.array(order))
-    assert_allclose(moved.by_rule(Z[order]), found.by_rule(Z), rtol=1e-9)
-    assert_array_equal(moved.factor, np.tril(moved.factor))
-
-
 def inputs_of(kind, rng, n_rows=1500):
     normal = rng.normal(size=(n_rows, 3))
     return {
@@ -152,17 +135,3 @@ def test_inputs_that_repeat_are_counted_once(rng):
     with pytest.warns():
         one = ANFISRegressor(n_mfs=1).fit(np.array([[0.0, 0.0], [1.0, 1e-3]]), y[:2])
     assert_allclose(one.model_.support.share, 2.0 / 3.0)
-
-
-def test_coverage_does_not_depend_on_units_or_the_order_of_inputs(rng):
-    X = inputs_of("clusters", rng)
-    y = np.sin(X[:, 0]) + X[:, 1] * X[:, 2]
-    grid = rng.uniform(X.min(axis=0) - 1.0, X.max(axis=0) + 1.0, (500, 3))
-    settings = {"solver": "lse", "alpha": 1e-6}
-    plain = ANFISRegressor(n_mfs=[3, 2, 2], **settings).fit(X, y).coverage(grid)
-    factors, offset = np.array([1e6, 1e-6, 3.0]), np.array([1e4, -1e-4, 0.0])
-    scaled = ANFISRegressor(n_mfs=[3, 2, 2], **settings).fit(X * factors + offset, y)
-    assert_allclose(scaled.coverage(grid * factors + offset), plain, atol=1e-7)
-    order = [2, 0, 1]
-    turned = ANFISRegressor(n_mfs=[2, 3, 2], **settings).fit(X[:, order], y)
-    assert_allclose(turned.coverage(grid[:, order]), plain, atol=1e-7)

@@ -1,31 +1,12 @@
 """``py.typed`` promises types: public signatures carry them."""
 
 import inspect
-from importlib import import_module
 
 import skanfis
 
-MODULES = [
-    "bounds",
-    "cluster",
-    "dask",
-    "datasets",
-    "export",
-    "gyro",
-    "inspection",
-    "intervals",
-    "learning",
-    "options",
-]
+from .test_public_api import public_names, resolve
 
-
-def public():
-    yield skanfis.ANFISRegressor
-    for module in MODULES:
-        exported = import_module(f"skanfis.{module}")
-        for name in exported.__all__:
-            if callable(getattr(exported, name)):
-                yield getattr(exported, name)
+PUBLIC = [resolve(name) for name in public_names()]
 
 
 def own_functions(named):
@@ -45,7 +26,7 @@ def functions_of(named):
 
 
 def test_what_is_public_says_what_it_returns():
-    functions = [function for named in public() for function in functions_of(named)]
+    functions = [function for named in PUBLIC for function in functions_of(named)]
     assert len(functions) > 100
     assert [f.__qualname__ for f in functions if "return" not in f.__annotations__] == []
 
@@ -54,7 +35,7 @@ def test_what_is_public_says_what_it_takes():
     # The method solve() of a solver takes what training gives it, and is none of the user's.
     untyped = [
         f"{function.__qualname__}: {name}"
-        for named in public()
+        for named in PUBLIC
         if not named.__module__.startswith("skanfis.learning")
         for function in map(inspect.unwrap, functions_of(named))
         for name, parameter in inspect.signature(function).parameters.items()

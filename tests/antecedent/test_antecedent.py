@@ -72,59 +72,6 @@ def test_rule_terms_are_those_by_hand(antecedent):
 
 
 @ALL
-def test_log_memberships_are_those_of_every_term(antecedent, Z):
-    expected = np.log(oracles.memberships(antecedent, antecedent.parameters, Z))
-    assert_allclose(antecedent.log_memberships(Z), expected, rtol=1e-11, atol=1e-15)
-    both, _ = antecedent.log_memberships_and_gradient(Z)
-    assert_allclose(both, expected, rtol=1e-11, atol=1e-15)
-
-
-@ALL
-def test_gradient_of_log_memberships_is_laid_out_as_the_parameters(antecedent, Z):
-    _, gradients = antecedent.log_memberships_and_gradient(Z)
-    numeric = (
-        oracles.complex_step(lambda p: oracles.memberships(antecedent, p, Z), antecedent.parameters)
-        / oracles.memberships(antecedent, antecedent.parameters, Z)[:, :, None]
-    )
-    found = np.concatenate([gradient.reshape(-1, Z.shape[1]) for gradient in gradients])
-    # A parameter acts on the log mu of its own term alone: the sum over terms is that term's.
-    assert_allclose(found.T, numeric.sum(axis=0), rtol=1e-10, atol=1e-13)
-
-
-@ALL
-def test_shares_are_the_strength_that_a_term_holds_on_its_input(antecedent, Z):
-    strengths, shares = antecedent.normalise(antecedent.log_memberships(Z))
-    if isinstance(antecedent, GridAntecedent):
-        rules = antecedent.rule_terms
-        expected = [
-            strengths[(rules == t).any(axis=1)].sum(axis=0) for t in range(antecedent.n_terms)
-        ]
-        assert_allclose(shares, expected, rtol=1e-12)
-    else:
-        assert_array_equal(shares, strengths)
-
-
-@ALL
-def test_term_sensitivity_is_the_derivative_by_log_membership(antecedent, Z, rng):
-    values = rng.normal(size=(antecedent.n_rules, Z.shape[1]))
-    rules = antecedent.rule_terms
-    log_mu = antecedent.log_memberships(Z)
-
-    def output(shift):
-        """y = sum_r w_r f_r with every row's log mu shifted alike."""
-        firing = np.array(
-            [np.prod(np.exp(log_mu + shift[:, None])[rule[rule >= 0]], axis=0) for rule in rules]
-        )
-        return np.sum(firing * values, axis=0) / firing.sum(axis=0)
-
-    numeric = oracles.complex_step(output, np.zeros(antecedent.n_terms))
-    strengths, shares = antecedent.normalise(log_mu.copy())
-    by_rule = strengths * values
-    found = antecedent.term_sensitivity(by_rule, by_rule.sum(axis=0), shares)
-    assert_allclose(found.T, numeric, rtol=1e-10, atol=1e-13)
-
-
-@ALL
 def test_parameters_make_the_round_trip(antecedent, Z, rng):
     new = antecedent.parameters + 0.1 * rng.normal(size=antecedent.parameters.size)
     moved = antecedent.with_parameters(new)

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor
 from skanfis.blocks import BLOCK_ROWS
-from skanfis.learning import VariableProjection
 from skanfis.learning.data import (
     _BLOCKS_PER_CHUNK,
     StandardisedData,
@@ -54,41 +52,6 @@ def test_columns_far_from_the_origin_lose_no_digits(rng, offset):
     assert_allclose(far.offset - offset, close.offset, atol=0.6 * np.spacing(abs(offset)))
 
 
-def test_whole_weights_are_repeated_rows(rng):
-    values, weight = table(rng, 500), rng.integers(1, 30, 500)
-    repeated = np.repeat(values, weight, axis=0)
-    assert_allclose(
-        fields(column_statistics(values, weight.astype(float))),
-        fields(column_statistics(repeated)),
-        rtol=1e-12,
-        atol=1e-15,
-    )
-
-
-def test_scale_of_the_weights_does_not_matter(rng):
-    values, weight = table(rng, 500), rng.uniform(0.1, 1.0, 500)
-    assert_allclose(
-        fields(column_statistics(values, weight)),
-        fields(column_statistics(values, 1e9 * weight)),
-        rtol=1e-13,
-    )
-
-
-def test_row_without_weight_is_as_good_as_absent(rng):
-    # Far out, so that the range, the mean and the deviation would all show it.
-    X = np.vstack([rng.normal(size=(60, 2)), np.full((2, 2), 1e6)])
-    y = X @ [1.0, 2.0] + np.sin(X[:, 0])
-    weight = np.append(rng.uniform(0.5, 1.0, 60), [0.0, 0.0])
-    order = rng.permutation(62)
-    settings = {"n_mfs": 2, "solver": VariableProjection(tol=0.1)}
-    whole = ANFISRegressor(**settings).fit(X[order], y[order], weight[order]).model_
-    kept = order[order < 60]
-    part = ANFISRegressor(**settings).fit(X[kept], y[kept], weight[kept]).model_
-    for name in ("minimum", "maximum", "reference", "spread", "coefficients", "rule_weights"):
-        assert_array_equal(getattr(whole, name), getattr(part, name))
-    assert_array_equal(whole.rule_rows, part.rule_rows)
-
-
 def test_constant_column_has_scale_one_and_its_own_value(rng):
     # 0.1 is no binary fraction: the mean of many copies need not be 0.1 to the last bit.
     values = np.column_stack([np.full(N_ROWS, 0.1), rng.normal(size=N_ROWS), np.zeros(N_ROWS)])
@@ -96,14 +59,6 @@ def test_constant_column_has_scale_one_and_its_own_value(rng):
     assert_array_equal(found.is_constant, [True, False, True])
     assert_array_equal(found.offset[[0, 2]], [0.1, 0.0])
     assert_array_equal(found.scale[[0, 2]], 1.0)
-
-
-def test_column_that_changes_once_is_not_constant():
-    values = np.ones((N_ROWS, 1))
-    values[-1] = 1.0 + 1e-9
-    found = column_statistics(values)
-    assert not found.is_constant[0]
-    assert_allclose(found.scale, 1e-9 / np.sqrt(N_ROWS), rtol=1e-3)
 
 
 def test_column_that_varies_by_less_than_floats_can_halve_has_scale_one():
@@ -133,14 +88,6 @@ def test_part_of_the_rows_keeps_scales_weights_and_groups(rng):
     assert plain.groups is None
 
 
-def test_single_precision_is_summed_in_double(rng):
-    values = (rng.normal(size=(N_ROWS, 1)) + 1e4).astype(np.float32)
-    found = column_statistics(values)
-    exact = values.astype(float)
-    assert_allclose(found.offset, exact.mean(axis=0), rtol=1e-14)
-    assert_allclose(found.scale, exact.std(axis=0), rtol=1e-12)
-
-
 def test_read_standardises_and_transposes(rng):
     X, y, weight = table(rng, 100), rng.normal(size=(100, 2)) * 5 + 3, rng.uniform(0.1, 2.0, 100)
     data = StandardisedData.of(X, y, weight)
@@ -156,15 +103,6 @@ def test_read_standardises_and_transposes(rng):
     assert StandardisedData.of(X, y).read(part)[2] is None
 
 
-def test_standardised_data_have_mean_zero_and_deviation_one(rng):
-    X, y, weight = table(rng, 1000), rng.normal(size=(1000, 1)), rng.uniform(0.1, 2.0, 1000)
-    Z, target, _ = StandardisedData.of(X, y, weight).read(slice(None))
-    for columns in (Z, target):
-        # -1e7 + 1e6 z, and 1e-3 + 1e-6 z: z is read with twelve digits.
-        assert_allclose(np.average(columns, axis=1, weights=weight), 0.0, atol=1e-11)
-        assert_allclose(np.average(columns**2, axis=1, weights=weight), 1.0, rtol=1e-11)
-
-
 @pytest.mark.parametrize("n_columns", [1, 4])
 def test_fingerprints_tell_rows_apart_and_know_them_again(rng, n_columns):
     few = rng.normal(size=(n_columns, 300))
@@ -176,35 +114,6 @@ def test_fingerprints_tell_rows_apart_and_know_them_again(rng, n_columns):
     assert_array_equal(numbers[:7], fingerprint(np.asfortranarray(few[:, repeated[:7]])))
 
 
-def test_data_are_only_read(rng, tmp_path):
-    X, y, weight = table(rng, 50), rng.normal(size=(50, 1)), rng.uniform(0.1, 2.0, 50)
-    before = [array.copy() for array in (X, y, weight)]
-    for array in (X, y, weight):
-        array.flags.writeable = False
-    data = StandardisedData.of(X, y, weight)
-    data.read(slice(None))
-    data.table(slice(None))
-    for array, copy in zip((X, y, weight), before, strict=True):
-        assert_array_equal(array, copy)
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize("layout", ["C", "F"])
-def test_memory_map_reads_as_the_array_itself(rng, tmp_path, dtype, layout):
-    X = np.asarray(rng.normal(size=(N_ROWS, 3)) + 10.0, dtype=dtype, order=layout)
-    np.save(tmp_path / "X.npy", X)
-    mapped = np.load(tmp_path / "X.npy", mmap_mode="r")
-    assert isinstance(mapped, np.memmap)
-    y = X[:, :1].astype(float)
-    from_map, from_array = StandardisedData.of(mapped, y), StandardisedData.of(X, y)
-    assert_array_equal(fields(from_map.inputs), fields(from_array.inputs))
-    part = slice(100, 5000)
-    Z = from_map.read(part)[0]
-    assert type(Z) is np.ndarray
-    assert Z.dtype == np.float64
-    assert_array_equal(Z, from_array.read(part)[0])
-
-
 @pytest.mark.parametrize("n_rows", [1, 127, 128, 129, 5000])
 @pytest.mark.parametrize("block_rows", [1, 128, 10_000])
 def test_chunks_cover_every_row_once_in_order(n_rows, block_rows):
@@ -214,9 +123,3 @@ def test_chunks_cover_every_row_once_in_order(n_rows, block_rows):
     assert_array_equal(np.concatenate([np.arange(n_rows)[p] for p in parts]), np.arange(n_rows))
     assert max(p.stop - p.start for p in parts) <= block_rows
     assert max(map(len, chunks)) <= _BLOCKS_PER_CHUNK
-
-
-def test_total_weight_is_the_sum_or_the_number_of_rows(rng):
-    X, y, weight = table(rng, 50), rng.normal(size=(50, 1)), rng.uniform(size=50)
-    assert StandardisedData.of(X, y).total_weight == 50.0
-    assert_allclose(StandardisedData.of(X, y, weight).total_weight, weight.sum(), rtol=1e-14)

@@ -9,7 +9,6 @@ from numpy.testing import assert_allclose
 from skanfis.antecedent import GridAntecedent
 from skanfis.consequent import NormalFactor
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.departures import Departures
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
@@ -99,13 +98,6 @@ class TestComponents:
         factor = NormalFactor(root @ root.T)
         assert_allclose(one.line.traces(factor), expected, rtol=1e-9, atol=1e-12)
 
-    def test_weights_of_one_are_no_weights(self, case):
-        one = Problem(case)
-        plain = Penalty(alpha=0.3, slope=0.2)
-        pulls = dict.fromkeys(one.components, 1.0)
-        equal = one.line.pull(replace(plain, pulls=pulls))
-        assert_allclose(equal, one.line.pull(plain), atol=1e-12)
-
 
 def of_a_function(value, slopes):
     """Squares of every component of rules that follow a function; rows are a grid, evenly."""
@@ -139,12 +131,6 @@ class TestKnownFunctions:
         )
         self.only(squares, (0,), (1,))
 
-    def test_a_product_of_two_inputs_with_terms(self):
-        squares = of_a_function(lambda x, y, z: x * y, lambda x, y, z: [y, x, 0.0 * z])
-        # Where terms are not in the middle, x * y has a part in x alone: that of the mean of y.
-        assert squares[0, 1] > 10.0 * (squares[0,] + squares[1,])
-        assert squares[()] + squares[0, 2] + squares[1, 2] < 1e-20 * squares[0, 1]
-
     def test_a_slope_by_an_input_without_terms_that_changes(self):
         # Such as a scale factor that depends on temperature.
         squares = of_a_function(
@@ -152,31 +138,3 @@ class TestKnownFunctions:
         )
         # How far a rule stands for rows, the unit of its slopes, may depend on more.
         self.only(squares, (0, 2), atol=1e-4)
-
-    def test_what_concerns_three_inputs_is_the_rest(self):
-        def slope(x, y):
-            return (x - x.mean()) * (y - y.mean())
-
-        squares = of_a_function(
-            lambda x, y, z: 0.0 * x, lambda x, y, z: [0.0 * x, 0.0 * y, slope(x, y)]
-        )
-        self.only(squares, (), atol=1e-4)
-
-
-def components(antecedent, slopes):
-    n_basis = 1 + len(slopes)
-    zeros = np.zeros((antecedent.n_rules * n_basis, n_basis))
-    return Departures(zeros[:, 0], zeros, zeros, antecedent, slopes).components
-
-
-def test_inputs_of_components():
-    g = np.random.default_rng(0)
-    grid = oracles.random_grid(g, [Gaussian] * 2, [3, 2], [0, 2])
-    assert components(grid, [0, 1, 2]) == [(0,), (2,), (0, 1), (0, 2), (1, 2), ()]
-    assert components(grid, []) == [(0,), (2,), (0, 2), ()]
-    scattered = oracles.random_scattered(g, Gaussian, 4, [0, 1])
-    assert components(scattered, [0, 2]) == [(0,), (2,), ()]
-    assert components(GridAntecedent((), counts=()), [0, 1, 2]) == [()]
-    # What is constant has no slope to depart, and no component.
-    assert components(grid, [0, None, 2]) == components(grid, [0, 2])
-    assert components(scattered, [0, None, 2]) == components(scattered, [0, 2])

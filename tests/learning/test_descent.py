@@ -1,7 +1,6 @@
 """Jang's rule against a transcription of his paper that shares nothing with the package."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.datasets import make_jang_three_input, make_mackey_glass
 from skanfis.learning import Hybrid
 from skanfis.learning.data import Scale, StandardisedData
-from skanfis.learning.descent import NaturalPremise, StepSize
+from skanfis.learning.descent import NaturalPremise
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
@@ -162,23 +161,6 @@ def percentage_error(result, X, y):
     return 100.0 * np.mean(np.abs(y - (phi @ evaluation.coefficients)[:, 0]) / np.abs(y))
 
 
-class TestStepSize:
-    def sizes(self, errors):
-        rule, sizes = StepSize(1.0, errors[0]), []
-        for error in errors[1:]:
-            rule.follow(error)
-            sizes.append(rule.size)
-        return np.array(sizes)
-
-    def test_grows_after_four_falls_and_again_after_four_more(self):
-        sizes = self.sizes([9, 8, 7, 6, 5, 4, 3, 2, 1])
-        assert_allclose(sizes, [1, 1, 1, 1.1, 1.1, 1.1, 1.1, 1.21])
-
-    def test_a_fall_may_end_one_pattern_and_begin_the_other(self):
-        sizes = self.sizes([5, 6, 5, 6, 5, 4, 3, 2])
-        assert_allclose(sizes, [1, 1, 1, 0.9, 0.9, 0.9, 0.99])
-
-
 KINDS = ["one input", "two families", "scattered", *MEMBERSHIPS]
 
 
@@ -268,19 +250,3 @@ class TestEnd:
         best = int(result.loss_curve.argmin())
         assert best < 25
         assert_allclose(result.evaluation.mean_squared_error, result.loss_curve[best])
-
-    def test_length_of_a_step_is_the_step_size(self):
-        rows, premise, *_ = planted("scattered", 0, displaced=0.5, noise=0.1)
-        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
-        at = [premise.antecedent]
-        hybrid(
-            problem,
-            premise,
-            max_iter=3,
-            tol=0.0,
-            step_size=0.02,
-            on_iteration=lambda n, evaluation: at.append(evaluation.antecedent),
-        )
-        numbers = [a.groups[0].family.natural(a.groups[0].theta) for a in at]
-        for one, other in pairwise(numbers):
-            assert_allclose(np.linalg.norm(other - one), 0.02, rtol=1e-9)

@@ -4,20 +4,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.learning.premise import Premise
-from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.membership import MEMBERSHIPS
 
 from ..premises import (
-    FACTOR,
     HIGH,
     LOW,
     MARGIN,
     ON_ORDERED,
-    OUTER,
-    RATIO,
     UNIT,
     distances,
     in_the_box,
@@ -74,18 +71,6 @@ def test_widths_go_with_the_mean_distance_to_the_neighbours(antecedent, rng):
                 assert_allclose(found[1:], expected[1:], rtol=1e-10, atol=1e-10)
 
 
-@pytest.mark.parametrize("counts", [2, 3, 5])
-def test_gaussians_are_half_true_to_nearly_true_half_way_to_a_neighbour(counts):
-    places = np.linspace(-1.5, 2.0, counts)
-    distance = places[1] - places[0]
-    theta = Gaussian.start(places, np.full(counts, distance), 0.6)
-    premise = Premise.of(GridAntecedent.build([Gaussian], [0], [theta]), LOW[:1], HIGH[:1])
-    for edge, truth in ((premise.lower, 0.5), (premise.upper, 0.9)):
-        sigma = np.exp(theta[1] + edge[counts:])
-        # The factors are looked for on a grid.
-        assert_allclose(sigma, 0.5 * distance / np.sqrt(-2.0 * np.log(truth)), rtol=0.012)
-
-
 def truth_between(left, right):
     """The truth half-way of the one that falls there (of most families, both do)."""
     middle = np.array([[0.5 * (left[2][0] + right[2][0])]])
@@ -104,26 +89,3 @@ def test_neighbours_as_far_apart_as_at_the_start_can_be_told_apart(family, overl
     (own,) = terms(antecedent, premise.parameters(at_most)).values()
     highest = max(truth_between(*pair) for pair in pairwise(own))
     assert overlap + 0.1 < highest <= 0.9 + 1e-3
-
-
-@ON_ORDERED
-def test_box_of_ordered_terms(antecedent):
-    premise, kinds = Premise.of(antecedent, LOW, HIGH), kind_of(antecedent)
-    start = locations(antecedent, antecedent.parameters)
-    at = np.cumsum(np.ones(premise.size)) - 1.0
-    for j, own in terms(antecedent, at).items():
-        own = np.array([int(t[0]) for _, _, t in own])
-        ends = span(start[j], j, MARGIN)
-        ratios = np.diff(np.log(np.diff(np.concatenate([ends[:1], start[j], ends[1:]]))))
-        low, high = np.full(ratios.size, -RATIO), np.full(ratios.size, RATIO)
-        low[0], high[-1] = -OUTER, OUTER
-        high[0], low[-1] = ratios[0] + FACTOR, ratios[-1] - FACTOR
-        # What is out of bounds at the start can just move.
-        low, high = np.minimum(low, ratios - 0.01), np.maximum(high, ratios + 0.01)
-        assert_allclose(premise.lower[own], (low - ratios) / UNIT, rtol=1e-9)
-        assert_allclose(premise.upper[own], (high - ratios) / UNIT, rtol=1e-9)
-    assert (premise.lower[kinds == "log_width"] < 0.0).all()
-    assert (premise.upper[kinds == "log_width"] <= FACTOR).all()
-    assert_array_equal(premise.lower[kinds == "log_shape"], -FACTOR)
-    # Sharper corners make a term truer next to its neighbour.
-    assert_array_equal(premise.upper[kinds == "log_shape"], np.log(1.5))

@@ -5,10 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 from sklearn.linear_model import LinearRegression, Ridge
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
-from skanfis.learning.data import StandardisedData
+from skanfis.antecedent import ScatteredAntecedent
 from skanfis.learning.objective import SeparableProblem
-from skanfis.learning.penalty import CommonLine, Penalty, disagreement_matrix
+from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
 
 from .. import oracles
@@ -19,8 +18,8 @@ BUILD = {
     "table": lambda g: oracles.random_table(g, inputs=2),
 }
 ON_ALL = pytest.mark.parametrize("kind", BUILD)
-ORDERS = pytest.mark.parametrize("order", [0, 1])
 ALL_AT_ONCE = Penalty(agreement=0.3, alpha=0.02, slope=0.1)
+ORDERS = pytest.mark.parametrize("order", [0, 1])
 
 
 class Model:
@@ -71,30 +70,6 @@ class TestDisagreement:
         joint = model.problem(Penalty(agreement=1.0)).joint(model.antecedent.parameters, model.flat)
         assert_allclose(2.0 * joint.evaluation.cost, model.share @ local.sum(axis=1), rtol=1e-11)
 
-    def test_matrix_gives_it_for_any_consequents(self, kind, order, n_outputs):
-        model = Model(kind, order, n_outputs)
-        design = (model.w[:, None] * model.basis).reshape(-1, 200)
-        gram = (design * model.share) @ design.T
-        before = gram.copy()
-        basis = model.problem(Penalty()).local
-        matrix, local_gram = disagreement_matrix(gram, model.antecedent.n_rules, basis)
-        assert_allclose(gram, before, rtol=0, atol=0)
-        assert_allclose(local_gram, basis.transform_gram(gram), rtol=1e-12, atol=1e-14)
-        local = basis.to_local(model.flat)
-        assert_allclose(np.sum(local * (matrix @ local)), model.disagreement, rtol=1e-11)
-        assert_allclose(matrix, matrix.T, atol=1e-14)
-        assert np.linalg.eigvalsh(matrix).min() > -1e-14
-
-    def test_cost_has_it_times_its_weight(self, kind, order, n_outputs):
-        model = Model(kind, order, n_outputs)
-        costs = [
-            model.problem(Penalty(agreement=agreement))
-            .joint(model.antecedent.parameters, model.flat)
-            .evaluation.cost
-            for agreement in (0.0, 0.7)
-        ]
-        assert_allclose(costs[1] - costs[0], 0.35 * model.disagreement, rtol=1e-10)
-
 
 @ON_ALL
 @ORDERS
@@ -140,29 +115,6 @@ class TestCommonLine:
 
     @ON_ALL
     @ORDERS
-    def test_departures_from_it_and_its_slopes(self, kind, order):
-        model = Model(kind, order, 2)
-        line = model.problem(Penalty()).common_line
-        local = model.problem(Penalty()).local.to_local(model.flat)
-        departures, common = self.parts(model)
-        paid = np.sum(local * (line.departures.together @ local))
-        assert_allclose(paid, np.sum(departures**2), rtol=1e-10)
-        assert_allclose(line.to_slopes @ local, common[1:], rtol=1e-9, atol=1e-12)
-
-    @ON_ALL
-    @ORDERS
-    def test_rules_on_one_line_pay_for_its_slopes_alone(self, kind, order):
-        model = Model(kind, order)
-        model.beta[:] = model.beta[0]
-        problem = model.problem(Penalty())
-        local = problem.local.to_local(model.flat)
-        paid = np.sum(local * (problem.common_line.departures.together @ local))
-        assert_allclose(paid, 0.0, atol=1e-12)
-        paid = np.sum((problem.common_line.to_slopes @ local) ** 2)
-        assert_allclose(paid, np.sum(model.beta[0, 1:] ** 2), rtol=1e-10, atol=1e-14)
-
-    @ON_ALL
-    @ORDERS
     def test_height_is_free(self, kind, order):
         # And nothing else is: along every other direction something is paid.
         model = Model(kind, order)
@@ -196,78 +148,8 @@ class TestCommonLine:
         assert_allclose(model.beta[1], common, atol=1e-8)
         assert np.abs(model.beta[0] - common).max() > 1e-3
 
-    @pytest.mark.parametrize("slope", [1e-3, 1e-1])
-    def test_ridge_on_its_slopes_turns_rules_without_rows(self, slope):
-        # They have a part in the line: the line's slopes are made smaller at their expense.
-        model = self.model_with_a_dead_rule(Penalty(agreement=0.1, alpha=0.01, slope=slope))
-        departures, common = self.parts(model)
-        dense = oracles.DenseProblem(model.rows, model.antecedent, 1, Penalty())
-        pull = np.linalg.solve(dense.line.T @ dense.line, np.concatenate([[[0.0]], common[1:]]))
-        expected = -slope / 0.01 * dense.blocks[1] @ pull
-        assert_allclose(departures.reshape(4, 3, 1)[1], expected, rtol=1e-6, atol=1e-12)
-
     def test_pull_is_without_end_the_ridge_of_one_line(self):
         model = Model("grid", 1)
         solved = model.evaluate(Penalty(alpha=1e7, slope=0.3)).coefficients.reshape(6, 3)
         ridge = Ridge(alpha=0.3, tol=1e-12).fit(model.Z.T, model.y[:, 0], model.share)
         assert_allclose(solved, np.tile([ridge.intercept_, *ridge.coef_], (6, 1)), atol=1e-5)
-
-    def test_extent_is_the_unit_of_a_departing_slope(self):
-        # A rule that stands for rows far away may not turn by as much: what counts is where it
-        # ends. One slope changed by t of two rules departs by half of it each, and so do values.
-        model = Model("scattered", 1)
-        problem = model.problem(Penalty())
-        rules = model.antecedent, [0, 1]
-        wide = CommonLine(problem.local, 10.0 * np.ones((4, 2)), *rules)
-        narrow = CommonLine(problem.local, np.ones((4, 2)), *rules)
-        model.beta[:] = 0.0
-        model.beta[0, 1], model.beta[1, 1] = 1.0, -1.0
-        centers = problem.local.center
-        # No values at the centers: departures of slopes alone, whose mean is zero.
-        model.beta[:, 0] = -np.sum(centers * model.beta[:, 1:, 0], axis=1)[:, None]
-        local = problem.local.to_local(model.flat)
-        paid = [np.sum(local * (line.departures.together @ local)) for line in (narrow, wide)]
-        assert_allclose(paid, [2.0, 200.0], rtol=1e-10)
-
-
-class TestOneRule:
-    @pytest.mark.parametrize("alpha", [1e-3, 0.1, 10.0])
-    @pytest.mark.parametrize("weighted", [False, True])
-    def test_it_is_ridge_with_a_free_intercept(self, rng, alpha, weighted):
-        data = oracles.bumpy_rows(rng, 120, 3, 2, weighted)
-        moved = StandardisedData.of(data.X, data.y + 1e3, data.sample_weight)
-        weight = np.ones(120) if data.sample_weight is None else data.sample_weight
-        for rows in (data, moved):
-            problem = SeparableProblem(
-                rows, GridAntecedent((), counts=()), 1, Penalty(agreement=0.5, alpha=alpha)
-            )
-            z = (rows.X - rows.inputs.offset) / rows.inputs.scale
-            y = (rows.y - rows.targets.offset) / rows.targets.scale
-            # scikit-learn's penalty is relative to a sum over rows, this one to their mean.
-            ridge = Ridge(alpha=alpha * weight.sum(), solver="cholesky")
-            ridge.fit(z, y, sample_weight=weight)
-            solved = problem.evaluate(np.empty(0)).coefficients
-            assert_allclose(solved[1:], ridge.coef_.T, rtol=1e-9)
-            assert_allclose(solved[0], ridge.intercept_, atol=1e-12)
-
-
-@ON_ALL
-@ORDERS
-class TestInvariance:
-    def prediction(self, model, rows, antecedent):
-        evaluation = SeparableProblem(rows, antecedent, model.order, ALL_AT_ONCE).evaluate(
-            antecedent.parameters
-        )
-        Z = rows.inputs.apply(rows.X.T, np.empty(rows.X.T.shape))
-        design = oracles.dense_design(antecedent, antecedent.parameters, Z, model.order)
-        return evaluation.cost, design @ evaluation.coefficients
-
-    def test_units(self, kind, order):
-        model = Model(kind, order)
-        rows = model.rows
-        moved = StandardisedData.of(
-            1e6 * rows.X - 3e5, 1e-6 * rows.y + 2.0, 1e3 * rows.sample_weight
-        )
-        one, other = (self.prediction(model, r, model.antecedent) for r in (rows, moved))
-        assert_allclose(one[0], other[0], rtol=1e-8)
-        assert_allclose(one[1], other[1], atol=1e-7)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, TermGroup
+from skanfis.antecedent import RuleTableAntecedent, TermGroup
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 
@@ -112,38 +112,3 @@ def test_pull_back_is_the_chain_rule(antecedent, rng):
         assert_allclose(slope, jacobian.T @ gradient, rtol=1e-8, atol=1e-8)
         half = root @ jacobian
         assert_allclose(curvature, half.T @ half, rtol=1e-7, atol=1e-7)
-
-
-@ALL
-def test_nothing_is_changed_in_place(antecedent, rng):
-    premise = Premise.of(antecedent, LOW, HIGH)
-    displacement = rng.uniform(premise.lower, premise.upper)
-    copies = displacement.copy(), antecedent.parameters.copy()
-    parameters = premise.parameters(displacement)
-    premise.displacement(parameters)
-    premise.pull_back(displacement, np.ones(premise.size), np.eye(premise.size))
-    assert_array_equal(displacement, copies[0])
-    assert_array_equal(parameters, premise.parameters(displacement))
-    assert_array_equal(antecedent.parameters, copies[1])
-
-
-@pytest.mark.parametrize(("offset", "scale"), [(3.0, 1e-4), (-1e3, 1e5)])
-def test_units_do_not_matter(offset, scale, rng):
-    antecedent = ORDERED["gaussians"]
-    moved = antecedent.change_units(np.full(3, offset), np.full(3, scale))
-    one = Premise.of(antecedent, LOW, HIGH)
-    other = Premise.of(moved, offset + scale * LOW, offset + scale * HIGH)
-    assert_allclose(other.lower, one.lower, rtol=1e-6)
-    assert_allclose(other.upper, one.upper, rtol=1e-6)
-    for displacement in in_the_box(one, rng, 3):
-        at = antecedent.with_parameters(one.parameters(displacement))
-        expected = at.change_units(np.full(3, offset), np.full(3, scale)).parameters
-        found = other.parameters(displacement)
-        assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * scale)
-
-
-def test_without_terms_there_is_nothing_to_move():
-    premise = Premise.of(GridAntecedent((), counts=()), LOW, HIGH)
-    assert premise.size == 0
-    assert premise.parameters(np.empty(0)).size == 0
-    assert premise.displacement(np.empty(0)).size == 0

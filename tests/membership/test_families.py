@@ -253,17 +253,3 @@ def test_families_are_given_by_name_or_class_for_all_inputs_or_for_each():
     assert membership_families("bell", names) == [Bell, Bell]
     assert membership_families(Bell, names) == [Bell, Bell]
     assert membership_families(("bell", Gaussian), names) == [Bell, Gaussian]
-
-
-@pytest.mark.parametrize(
-    ("mf", "message"),
-    [
-        (["bell"], r"mf=\['bell'\] has 1 entries, but X has 2 columns \(time, rate\)"),
-        (["bell", "gbellmf"], "mf='gbellmf' is MATLAB's name for it: give mf='bell'"),
-        ("bells", "mf holds 'bells': it must be one of 'gaussian', 'bell', "),
-        ([Bell, int], "mf holds <class 'int'>: it must be one of"),
-    ],
-)
-def test_families_that_are_none_are_named(mf, message):
-    with pytest.raises(ValueError, match=message):
-        membership_families(mf, ["time", "rate"])

@@ -5,13 +5,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
-from skanfis.membership import MEMBERSHIPS
 from skanfis.membership.flanked import (
     PiShaped,
     Trapezoidal,
     Triangular,
 )
-from skanfis.membership.profiles import GaussianProfile, LinearProfile, SplineProfile
+from skanfis.membership.profiles import LinearProfile, SplineProfile
 
 WITH_FOOT = pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped])
 
@@ -19,16 +18,6 @@ WITH_FOOT = pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped
 def theta_of(*numbers):
     """One term: a location, and lengths that become logarithms."""
     return np.array([[numbers[0]], *[[np.log(length)] for length in numbers[1:]]])
-
-
-@pytest.mark.parametrize("name", ["trapezoidal", "pi_shaped", "two_sided_gaussian"])
-def test_on_the_plateau_there_is_nothing_to_learn(name, rng):
-    family = MEMBERSHIPS[name]
-    log_mu, gradient = family.log_value_and_gradient(
-        rng.uniform(2.01, 3.99, (1, 20)), theta_of(3, 1, 4, 2)
-    )
-    assert_array_equal(log_mu, 0.0)
-    assert_array_equal(gradient, 0.0)
 
 
 def strengths_on_a_line(family, theta, x):
@@ -66,14 +55,7 @@ def test_where_no_term_reaches_the_nearest_speaks(family):
 
 
 FLOOR = 1e-10
-PROFILES = pytest.mark.parametrize("profile", [GaussianProfile, LinearProfile, SplineProfile])
 FOOTED = pytest.mark.parametrize("profile", [LinearProfile, SplineProfile])
-
-
-@PROFILES
-@pytest.mark.parametrize("mu", [0.01, 0.3, 0.5, 0.6, 0.99])
-def test_reach_is_the_inverse_of_the_value(profile, mu):
-    assert_allclose(profile.value(profile.reach(mu)), mu, rtol=1e-12)
 
 
 @FOOTED

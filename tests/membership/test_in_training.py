@@ -7,51 +7,24 @@ from numpy.testing import assert_allclose
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
-from skanfis.learning.premise import Premise
 from skanfis.membership import MEMBERSHIPS
 
 from .. import oracles
 from ..quick import quick
 
 FAMILIES = pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-BUILD = {
-    "grid": lambda rng, family: oracles.random_grid(rng, [family] * 2, [3, 2]),
-    "scattered": lambda rng, family: oracles.random_scattered(rng, family, 4, [0, 1]),
-}
-
-
-@pytest.mark.theory
-@FAMILIES
-@pytest.mark.parametrize("kind", BUILD)
-def test_gradient_of_the_cost_by_the_displacements(family, kind):
-    rng = np.random.default_rng(3)
-    antecedent, rows = BUILD[kind](rng, family), oracles.bumpy_rows(rng, 100, weighted=True)
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(agreement=0.1, alpha=1e-4))
-    premise = Premise.of(antecedent, *oracles.box(rows))
-    x = rng.uniform(0.2 * premise.lower, 0.2 * premise.upper)
-
-    def cost(displacement):
-        return problem.evaluate(premise.parameters(displacement)).cost
-
-    evaluation = problem.evaluate(premise.parameters(x))
-    raw = problem.linearise(evaluation)
-    gradient, _ = premise.pull_back(x, raw.gradient, raw.gauss_newton)
-    # So small a step that no row passes a corner on it, or only next to nothing of a row.
-    numeric = oracles.central_difference(cost, x, 1e-6)
-    assert np.abs(numeric).max() > 1e-3
-    assert_allclose(gradient, numeric, rtol=0, atol=1e-6 * np.abs(numeric).max())
 
 
 @pytest.mark.theory
 @FAMILIES
 def test_gradient_and_curvature_are_those_of_the_dense_problem(family):
     rng = np.random.default_rng(3)
-    antecedent = oracles.random_grid(rng, [family] * 2, [3, 3])
+    antecedent = oracles.random_grid(rng, [family] * 2, [2, 2])
     X = rng.uniform(-1.0, 1.0, (60, 2))
     rows = StandardisedData.of(X, np.sin(3.0 * X[:, :1]) * np.cos(2.0 * X[:, 1:]))
     # Some term reaches every row by the textbook: the dense problem has no floor.
     Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
-    mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 3, -1)
+    mu = oracles.memberships(antecedent, antecedent.parameters, Z).reshape(2, 2, -1)
     assert mu.max(axis=1).min() > 0.01
     penalty = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
     problem = SeparableProblem(rows, antecedent, 1, penalty)

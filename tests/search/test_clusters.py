@@ -54,25 +54,6 @@ class TestRules:
         for one, other in zip(rule_parameters(found, 2), rule_parameters(expected, 2), strict=True):
             assert_allclose(one, other)
 
-    @pytest.mark.parametrize("weighted", [False, True])
-    @pytest.mark.parametrize("n_inputs", [1, 2])
-    def test_centers_and_widths_are_weighted_moments_of_the_clusters(self, rng, weighted, n_inputs):
-        X, y, labels, weight = blobs(rng, n_inputs=n_inputs)
-        rows = StandardisedData.of(X, y, weight if weighted else None)
-        theta = rule_parameters(rules_of(Gaussian, rows, by_k_means), n_inputs)
-        z = (X - rows.inputs.offset) / rows.inputs.scale
-        expected = []
-        for blob in range(3):
-            members = z[labels == blob]
-            w = weight[labels == blob] if weighted else None
-            mean = np.average(members, axis=0, weights=w)
-            deviation = np.sqrt(np.average((members - mean) ** 2, axis=0, weights=w))
-            assert (deviation > 0.1).all()  # wider than the least width
-            expected.append([mean, deviation * np.sqrt(n_inputs)])
-        expected = np.array(sorted(expected, key=lambda rule: rule[0][0])).transpose(1, 0, 2)
-        assert_allclose(theta[0], expected[0], rtol=1e-10, atol=1e-12)
-        assert_allclose(np.exp(theta[1]), expected[1], rtol=1e-10)
-
     # "At least" and "at most" hold beyond the blob too.
     @pytest.mark.parametrize("name", sorted(set(MEMBERSHIPS) - {"s_shaped", "z_shaped"}))
     def test_each_rule_rules_its_own_blob(self, rng, name):
@@ -83,18 +64,6 @@ class TestRules:
         strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
         # The same partition under other names.
         assert len(set(zip(strongest.tolist(), labels.tolist(), strict=True))) == 3
-
-    def test_clusters_are_sought_in_inputs_and_target_together(self, rng):
-        rows = StandardisedData.of(rng.normal(size=(50, 2)), rng.normal(size=(50, 3)))
-        seen = []
-
-        def label(table, weight):
-            seen.append(table)
-            return np.arange(len(table)) % 2
-
-        rules_of(Gaussian, rows, label)
-        expected = rows.table(slice(None))
-        assert_array_equal(seen[0], expected[np.lexsort(expected.T[::-1])])
 
     def test_noise_belongs_to_no_rule(self, rng):
         # Without the far rows that are labelled -1, the rules are those of the rest.
@@ -109,25 +78,6 @@ class TestRules:
         )
         assert_allclose(np.sort(rule_parameters(noisy, 2)[0, :, 0]), means, rtol=1e-10)
 
-    def test_labels_may_be_any_integers(self, rng):
-        X, y, _, _ = blobs(rng)
-        rows = StandardisedData.of(X, y)
-        plain = rules_of(Gaussian, rows, by_k_means)
-        odd = rules_of(Gaussian, rows, lambda t, w: 7 * by_k_means(t, w) + 3)
-        assert_array_equal(odd.parameters, plain.parameters)
-
-    def test_one_cluster_is_a_linear_model(self, rng):
-        rows = StandardisedData.of(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
-        antecedent = rules_of(Gaussian, rows, lambda t, w: np.zeros(len(t), dtype=int))
-        assert antecedent.n_rules == 1
-        assert antecedent.parameters.size == 0
-        assert_array_equal(antecedent.strengths(np.zeros((2, 5))), 1.0)
-
-    def test_no_cluster_is_an_error_that_says_why(self, rng):
-        rows = StandardisedData.of(rng.normal(size=(50, 2)), rng.normal(size=(50, 1)))
-        with pytest.raises(ValueError, match=r"partition found no cluster: .* noise.*standardised"):
-            rules_of(Gaussian, rows, lambda t, w: np.full(len(t), -1))
-
     def test_cluster_on_one_spot_has_a_term_of_some_width(self, rng):
         X = np.vstack([np.full((30, 2), 5.0), rng.normal(size=(30, 2))])
         rows = StandardisedData.of(X, X[:, :1])
@@ -135,14 +85,6 @@ class TestRules:
         assert_allclose(
             np.exp(rule_parameters(antecedent, 2)[1, 1]), 0.1 * np.sqrt(2.0), rtol=1e-12
         )
-
-    def test_constant_input_gets_no_terms_and_widens_none(self, rng):
-        X, y, _, _ = blobs(rng)
-        padded = StandardisedData.of(np.insert(X, 1, 7.0, axis=1), y)
-        plain = rules_of(Gaussian, StandardisedData.of(X, y), by_k_means)
-        other = rules_of(Gaussian, padded, by_k_means)
-        assert {int(j) for group in other.groups for j in group.inputs} == {0, 2}
-        assert_allclose(other.parameters, plain.parameters, rtol=1e-12, atol=1e-14)
 
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
     def test_clusters_of_the_target_alone_leave_one_rule(self):

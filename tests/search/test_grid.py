@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from skanfis.learning.data import StandardisedData
-from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, SigmoidDifference, SigmoidProduct
+from skanfis.membership import MEMBERSHIPS, Gaussian, SigmoidDifference, SigmoidProduct
 from skanfis.search import Spacing, grid_antecedent
 from skanfis.search.grid import _EDGE, _QUANTISER
 
@@ -65,28 +65,6 @@ def test_neighbours_cross_half_way_at_the_overlap(family, overlap, count):
         assert_allclose(top, 1.0, rtol=1e-12)
 
 
-def test_equal_terms_share_alike_half_way():
-    spacing, low, high = evenly(2)
-    antecedent = grid_antecedent([Gaussian, Bell], [2, 2], spacing, 0.6)
-    middle = np.full((2, 1), 0.5 * (low + high))
-    assert_allclose(antecedent.strengths(middle), 0.25, rtol=1e-9)
-
-
-def test_every_input_has_its_own_family_and_inputs_without_terms_are_left_out():
-    families = [Bell, Gaussian, Bell, Gaussian]
-    antecedent = grid_antecedent(families, [2, 1, 3, 2], evenly(4)[0], 0.6)
-    found = [(j, family) for j, family, _ in terms(antecedent)]
-    assert found == [(0, Bell)] * 2 + [(2, Bell)] * 3 + [(3, Gaussian)] * 2
-    assert len(antecedent.groups) == 2  # the bells of two inputs are computed together
-
-
-def test_one_term_everywhere_is_one_rule_without_terms(rng):
-    antecedent = grid_antecedent([Gaussian] * 3, [1, 1, 1], evenly(3)[0], 0.6)
-    assert antecedent.n_rules == 1
-    assert antecedent.n_terms == 0
-    assert_array_equal(antecedent.strengths(rng.normal(size=(3, 5))), 1.0)
-
-
 class TestSpacing:
     def test_terms_stand_at_even_steps_of_the_gaps_to_the_power_of_two_thirds(self):
         # No outer quantile falls away from so few rows: G is 1, 8^(2/3), 27^(2/3) and so on.
@@ -107,27 +85,6 @@ class TestSpacing:
         assert _QUANTISER == 2.0 / 3.0
         assert_allclose(found, expected, rtol=1e-2)
 
-    @pytest.mark.parametrize("draw", ["lognormal", "standard_cauchy", "normal"])
-    def test_units_and_direction_of_an_input_make_no_difference(self, rng, draw):
-        x = getattr(rng, draw)(size=500)
-        plain, other, mirrored = rows_of(x), rows_of(1e4 + 250.0 * x), rows_of(-x)
-        for count in (2, 3, 6):
-            centers = Spacing(plain).centers(0, count)
-            assert_allclose(Spacing(other).centers(0, count), centers, rtol=1e-7, atol=1e-7)
-            assert_allclose(
-                -Spacing(mirrored).centers(0, count)[::-1], centers, rtol=1e-7, atol=1e-7
-            )
-
-    def test_order_repeats_and_weights_of_rows_make_no_difference_but_by_the_quantiles(self, rng):
-        x = rng.lognormal(size=200)
-        times = rng.integers(1, 5, 200)
-        turn = rng.permutation(200)
-        weighted = Spacing(rows_of_one(x, times)).centers(0, 5)
-        turned = Spacing(rows_of_one(x[turn], times[turn])).centers(0, 5)
-        repeated = Spacing(rows_of_one(np.repeat(x, times))).centers(0, 5)
-        assert_allclose(turned, weighted, rtol=1e-9)
-        assert_allclose(repeated, weighted, rtol=1e-9)
-
     def test_a_single_far_row_draws_no_term_to_it(self, rng):
         x = np.append(rng.uniform(size=500), 1000.0)
         rows = rows_of(x)
@@ -147,9 +104,3 @@ class TestSpacing:
         rows = rows_of(x ^ flip)
         found = Spacing(rows).centers(0, 2) * rows.inputs.scale + rows.inputs.offset
         assert_allclose(found, [0.0, 1.0], atol=1e-9)
-
-
-def rows_of_one(x, times=None):
-    """One input, and a target that goes with it."""
-    weight = None if times is None else times.astype(float)
-    return StandardisedData.of(x[:, None], np.sin(x)[:, None], weight)

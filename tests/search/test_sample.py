@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.cluster import KMeans
 
-from skanfis import ANFISRegressor
-from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
 from skanfis.search import representative_rows
 from skanfis.search.sample import effective_weight, n_distinct_inputs, search_sample
@@ -19,43 +16,17 @@ def many(rng, n_rows=300):
     return X, y, rng.integers(1, 6, n_rows)
 
 
-def standing_for(X, y, weight=None, most=10_000):
-    """Table in the user's units, and weight as part of the whole."""
-    rows = StandardisedData.of(X, y, None if weight is None else weight.astype(float))
-    table, share, _ = representative_rows(rows, most)
-    scales = np.concatenate([rows.inputs.scale, rows.targets.scale])
-    return table * scales + np.concatenate(
-        [rows.inputs.offset, rows.targets.offset]
-    ), share / share.sum()
-
-
 class TestRepresentativeRows:
-    @pytest.mark.parametrize("most", [10_000, 100])
-    def test_order_of_the_rows_does_not_matter(self, rng, most):
-        X, y, weight = many(rng)
-        turn = rng.permutation(len(X))
-        table, share = standing_for(X, y, weight, most)
-        turned, turned_share = standing_for(X[turn], y[turn], weight[turn], most)
-        assert_allclose(turned, table, atol=1e-9)
-        assert_allclose(turned_share, share, rtol=1e-9)
-
-    @pytest.mark.parametrize("most", [100_000, 100])
-    def test_weight_is_repetition(self, rng, most):
-        # Both more than ``most`` rows, or both fewer.
-        X, y, times = many(rng)
-        table, share = standing_for(X, y, times, most)
-        repeated = standing_for(
-            np.repeat(X, times, axis=0), np.repeat(y, times, axis=0), None, most
-        )
-        assert_allclose(repeated[0], table, atol=1e-9)
-        assert_allclose(repeated[1], share, rtol=1e-9)
-
     def test_few_rows_stand_for_themselves(self, rng):
         X, y, times = many(rng)
-        table, share = standing_for(X, y, times)
+        rows = StandardisedData.of(X, y, times.astype(float))
+        table, share, _ = representative_rows(rows, 10_000)
+        table = table * np.append(rows.inputs.scale, rows.targets.scale)
+        table += np.append(rows.inputs.offset, rows.targets.offset)
         expected, group = np.unique(np.hstack([X, y]), axis=0, return_inverse=True)
         assert_allclose(table, expected, atol=1e-9)
-        assert_allclose(share, np.bincount(group.ravel(), weights=times) / times.sum(), rtol=1e-12)
+        own = np.bincount(group.ravel(), weights=times) / times.sum()
+        assert_allclose(share / share.sum(), own, rtol=1e-12)
         assert len(table) < len(X)
 
     def test_many_rows_are_thinned_evenly(self, rng):
@@ -80,18 +51,6 @@ class TestRepresentativeRows:
         assert_allclose(
             share[heavy].sum() / share.sum(), weight[X[:, 0] > 0.0].sum() / weight.sum(), atol=0.01
         )
-
-    def test_a_fit_by_clusters_does_not_see_the_order_of_the_rows(self, rng, monkeypatch):
-        monkeypatch.setattr(representative_rows, "__defaults__", (200,))
-        X = rng.uniform(-1.0, 1.0, (900, 2))
-        y = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2 + 0.1 * rng.normal(size=900)
-        turn = rng.permutation(900)
-        partition = KMeans(3, n_init=2, random_state=0)
-        one = ANFISRegressor(partition=partition, solver=VariableProjection(tol=0.01)).fit(X, y)
-        other = ANFISRegressor(partition=partition, solver=VariableProjection(tol=0.01)).fit(
-            X[turn], y[turn]
-        )
-        assert_allclose(other.predict(X), one.predict(X), atol=1e-6)
 
 
 class TestCounts:

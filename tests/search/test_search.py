@@ -13,7 +13,7 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
-from skanfis.membership import TRIED_FAMILIES, Bell, Gaussian
+from skanfis.membership import TRIED_FAMILIES, Gaussian
 from skanfis.search import search
 from skanfis.search.candidates import Candidate, terms_asked_for
 from skanfis.search.trials import Trials
@@ -77,8 +77,8 @@ def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
 
 
 def test_expected_error_of_the_linear_model_is_that_of_rows_left_out(rng):
-    X = inputs(rng, 150)
-    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(150)
+    X = inputs(rng, 80)
+    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(80)
     model = ANFISRegressor(
         partition="grid", agreement=0.0, alpha=0.0, solver=VariableProjection(stiffness=0.0)
     ).fit(X, y)
@@ -103,8 +103,8 @@ def test_expected_error_is_that_on_new_rows(rng):
 
 
 def test_what_is_given_is_not_searched_for(rng):
-    X = inputs(rng)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    X = inputs(rng, 100)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
     model = ANFISRegressor(partition="grid", alpha=3e-5).fit(X, y)
     assert (model.alpha_, model.slope_alpha_) == (3e-5, 3e-5)
     assert {c["alpha"] for c in model.structures_} == {3e-5}
@@ -118,8 +118,8 @@ def test_what_is_given_is_not_searched_for(rng):
 
 
 def test_grid_tries_no_scattered_rules(rng):
-    X = inputs(rng)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    X = inputs(rng, 100)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
     tried = {
         c["structure"].split()[0] for c in ANFISRegressor(partition="grid").fit(X, y).structures_
     }
@@ -141,21 +141,21 @@ KEYS = {
 def test_log_evidence_is_that_of_a_linear_model_averaged_out(rng):
     # With agreement and alpha given, the linear model has no prior but on its slopes, alpha: the
     # data are normal with covariance sigma^2 (I + Z Z' / (n alpha)), sigma^2 at its best.
-    X = inputs(rng)
-    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(400)
+    X = inputs(rng, 100)
+    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(100)
     scores = []
     z = (X - X.mean(axis=0)) / X.std(axis=0)
     t = (y - y.mean()) / y.std()
     for alpha in (1e-3, 1e-1):
         model = ANFISRegressor(partition="grid", agreement=0.1, alpha=alpha).fit(X, y)
         linear = next(c for c in model.structures_ if c["structure"] == "grid [1, 1, 1]")
-        covariance = np.eye(400) + z @ z.T / (400 * alpha)
+        covariance = np.eye(100) + z @ z.T / (100 * alpha)
         sign, logarithm = np.linalg.slogdet(covariance)
         # The constant takes one row's worth.
         scores.append(
             [
                 linear["log_evidence"],
-                -0.5 * (logarithm + 399 * np.log(t @ np.linalg.solve(covariance, t))),
+                -0.5 * (logarithm + 99 * np.log(t @ np.linalg.solve(covariance, t))),
             ]
         )
         assert sign == 1.0
@@ -164,8 +164,8 @@ def test_log_evidence_is_that_of_a_linear_model_averaged_out(rng):
 
 
 def test_candidates_are_listed_from_the_best(rng):
-    X = inputs(rng)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    X = inputs(rng, 100)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
     model = ANFISRegressor().fit(X, y)
     errors = [c["expected_error"] for c in model.structures_]
     assert errors == sorted(errors)
@@ -178,25 +178,11 @@ def test_more_noise_never_gives_more_rules(rng, partition):
     X = inputs(rng, 200, 2)
     truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(200)
     found = [
-        ANFISRegressor(partition=partition).fit(X, truth + s * noise).n_rules_
-        for s in ((0.02, 1.0, 30.0) if partition == "auto" else (0.1, 30.0))
+        ANFISRegressor(partition=partition).fit(X, truth + s * noise).n_rules_ for s in (0.02, 30.0)
     ]
     assert found == sorted(found, reverse=True)
     assert found[0] > 3
     assert found[-1] == 1
-
-
-def test_repeated_rows_are_weighted_rows(rng):
-    X = inputs(rng, 120)
-    y = np.sin(3.0 * X[:, 0]) + 0.5 * rng.standard_normal(120)
-    times = rng.integers(1, 4, 120)
-    often, heavy = (ANFISRegressor(partition="grid") for _ in range(2))
-    often.fit(np.repeat(X, times, axis=0), np.repeat(y, times))
-    heavy.fit(X, y, sample_weight=times)
-    for one, other in zip(often.structures_, heavy.structures_, strict=True):
-        assert one["structure"] == other["structure"]
-        assert_allclose(one["expected_error"], other["expected_error"], rtol=1e-6)
-    assert_allclose(often.predict(X), heavy.predict(X), atol=1e-6)
 
 
 def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
@@ -366,15 +352,15 @@ def test_score_of_groups_is_that_of_trainings_without_them():
 
 
 def test_a_single_group_says_nothing():
-    X, y, run = runs(2)
+    X, y, run = runs(2, 40)
     grid = ANFISRegressor(partition="grid")
     one, none = (clone(grid).fit(X, y, groups=g) for g in (np.zeros(run.size), None))
     assert_array_equal(one.predict(X), none.predict(X))
 
 
 def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_start(rng):
-    X = inputs(rng)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    X = inputs(rng, 100)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
     model = ANFISRegressor(partition="grid", max_iter=0).fit(X, y)
     assert model.n_rules_ > 1
     assert model.memberships_ == model.initial_memberships_
@@ -410,17 +396,3 @@ def test_searched_structure_is_tried_with_every_family(rng):
     # What is trained is what promised most.
     name = model.model_.antecedent.groups[0].family.name
     assert model.structures_[0]["structure"].endswith(name) or name == "gaussian"
-
-
-@pytest.mark.parametrize(
-    ("candidate", "words"),
-    [
-        (Candidate((1, 3)), "grid [1, 3]"),
-        (Candidate((1, 3), family=Bell), "grid [1, 3], bell"),
-        (Candidate(None, 5, "k-means"), "5 scattered rules"),
-        (Candidate(None, 3, "fcm", family=Bell), "3 fuzzy clusters, bell"),
-        (Candidate(None, 0.5, "subtractive"), "clusters of radius 0.5"),
-    ],
-)
-def test_in_words(candidate, words):
-    assert candidate.describe() == words

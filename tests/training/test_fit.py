@@ -64,42 +64,12 @@ class Remembers(ClusterMixin, BaseEstimator):
         return self
 
 
-class Weighted(Remembers):
-    """The same, of weighted rows."""
-
-    def fit(self, X, y=None, sample_weight=None):
-        type(self).seen = (*self.seen, np.array(sample_weight))
-        self.labels_ = (X[:, 0] > 0).astype(int)
-        return self
-
-
 def test_clusterer_without_weights_sees_repeated_rows():
     Remembers.seen = ()
     table, weight = np.array([[1.0, 5.0], [-1.0, 6.0], [2.0, 7.0]]), np.array([2.0, 1.0, 3.0])
     labels = _labeller(Remembers(), weighted=False)(table, weight)
     assert_array_equal(labels, [1, 0, 1])
     assert_array_equal(Remembers.seen[0], table[[0, 0, 1, 2, 2, 2]])
-
-
-@pytest.mark.parametrize("weighted", [False, True])
-def test_clusterer_with_weights_is_given_them(weighted):
-    Weighted.seen = ()
-    labels = _labeller(Weighted(), weighted)(np.array([[1.0], [-1.0]]), np.array([0.25, 4.0]))
-    assert_array_equal(labels, [1, 0])
-    assert_array_equal(Weighted.seen[0], [0.25, 4.0])
-
-
-def test_clusters_are_sought_in_standardised_inputs_and_target():
-    Remembers.seen = ()
-    X, y = data()
-    ANFISRegressor(partition=Remembers(), solver=VariableProjection(tol=0.1)).fit(
-        X * [1e6, 1e-6] + 3.0, 1e3 * y - 7.0
-    )
-    (table,) = Remembers.seen
-    expected = StandardScaler().fit_transform(np.column_stack([X, y]))
-    order = np.lexsort(expected.T[::-1])
-    # A column of 1e-6 beside an offset of 3 has ten digits left.
-    assert_allclose(table[np.lexsort(np.round(table, 6).T[::-1])], expected[order], atol=1e-8)
 
 
 def test_clusterer_itself_is_left_as_it_was():
@@ -139,20 +109,6 @@ def test_weights_given_are_obeyed():
     assert (model.alpha_, model.slope_alpha_) == (0.02, 0.02)
     assert model.agreement_ > 0.0
     assert model.stiffness_ > 0.0
-
-
-@pytest.mark.theory
-def test_automatic_weights_count_rows_by_weight_and_not_distinct_ones():
-    X, y = data(60)
-    y = y + 0.3 * np.random.default_rng(1).normal(size=60)
-    once = ANFISRegressor(n_mfs=2).fit(X, y)
-    tiled = ANFISRegressor(n_mfs=2).fit(np.tile(X, (10, 1)), np.tile(y, 10))
-    weighted = ANFISRegressor(n_mfs=2).fit(X, y, sample_weight=np.full(60, 10.0))
-    for name in WEIGHTS:
-        assert_allclose(getattr(weighted, name), getattr(tiled, name), rtol=1e-6)
-    assert_allclose(weighted.predict(X), tiled.predict(X), rtol=0, atol=1e-8)
-    # Ten rows where there was one: the prior counts for less.
-    assert tiled.stiffness_ < 0.5 * once.stiffness_
 
 
 @pytest.mark.parametrize("n_rows", [11, 12])

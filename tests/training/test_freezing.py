@@ -98,12 +98,6 @@ def test_weights_are_copies_and_order_is_of_no_account(rng):
     assert_array_equal(told, told[0])
 
 
-def test_rows_that_are_all_within_the_quartiles_tell_nothing():
-    X = np.repeat([[0.0], [1.0]], 20, axis=0)
-    model = ANFISRegressor(n_mfs=1).fit(X, X[:, 0])
-    assert model.model_.told_extrapolation == MAX_EXTRAPOLATION
-
-
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_however_far_it_is_followed_answers_stay_within_a_quarter_of_the_range(rng):
     X = far_rows(rng)

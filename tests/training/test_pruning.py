@@ -47,12 +47,6 @@ def test_rules_far_away_and_rules_alike_are_found():
     assert found[0]["weight"] > 0.1
 
 
-def test_sound_rules_are_left_alone():
-    rows = oracles.bumpy_rows(np.random.default_rng(0), 300, 2)
-    grid = oracles.random_grid(np.random.default_rng(0), [Gaussian] * 2, [3, 3])
-    assert redundant_rules(statistics(rows, grid)) == []
-
-
 def gap(seed=0, n_rows=400):
     """Two clumps of rows on the diagonal: half of a grid's cells are empty."""
     g = np.random.default_rng(seed)
