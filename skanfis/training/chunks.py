@@ -25,12 +25,15 @@ from ..policies import TargetRange
 from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
 from ..support import RuleSupport
 from .chunk_checks import check_distance
+from .freezing import in_user_units
 from .pruning import RuleStatistics, redundant_rules
 
 __all__ = ["RowSums", "Solved", "fitted_weights", "joined_scales", "solve"]
 
 # The weights of the penalty that are found where premises stay.
 _FREE = ("agreement", "alpha", "slope")
+# What adds up over rows, each with its weight.
+_SUMS = ("weight", "gram", "slope", "square", "second", "strongest")
 # Distinct rows per consequent that are counted: beyond, nothing asks for their number.
 _ROWS_EACH = 2
 # Rows of a rule that are kept because one of them may be its farthest.
@@ -168,16 +171,8 @@ class RowSums:
 
     def faded(self, factor):
         """The same rows with all weights times a factor."""
-        return replace(
-            self,
-            weight=factor * self.weight,
-            squared_weight=factor**2 * self.squared_weight,
-            gram=factor * self.gram,
-            slope=factor * self.slope,
-            square=factor * self.square,
-            second=factor * self.second,
-            strongest=factor * self.strongest,
-        )
+        sums = {name: factor * getattr(self, name) for name in _SUMS}
+        return replace(self, squared_weight=factor**2 * self.squared_weight, **sums)
 
     def plus(self, other):
         """The rows of both."""
@@ -186,25 +181,19 @@ class RowSums:
         targets = joined_scales(self.targets, other.targets, *weights)
         check_scales(inputs, targets, self.base.input_names, self.base.output_names)
         one, two = self._on(inputs, targets), other._on(inputs, targets)
-        second = one.second + two.second
-        most, n_inputs = _ROWS_EACH * len(self.slope), second.shape[1] - 1
+        names = (*_SUMS, "n_rows", "squared_weight")
+        both = replace(one, **{name: getattr(one, name) + getattr(two, name) for name in names})
+        distinct, distinct_inputs, farthest = (
+            np.vstack([getattr(one, name), getattr(two, name)])
+            for name in ("distinct", "distinct_inputs", "farthest")
+        )
         return replace(
-            one,
-            n_rows=one.n_rows + two.n_rows,
-            weight=one.weight + two.weight,
-            squared_weight=one.squared_weight + two.squared_weight,
-            gram=one.gram + two.gram,
-            slope=one.slope + two.slope,
-            square=one.square + two.square,
-            second=second,
-            strongest=one.strongest + two.strongest,
+            both,
             peak=np.maximum(one.peak, two.peak),
             extent=np.maximum(one.extent, two.extent),
-            distinct=_distinct(np.vstack([one.distinct, two.distinct]), most),
-            distinct_inputs=_distinct(
-                np.vstack([one.distinct_inputs, two.distinct_inputs]), 1 + n_inputs
-            ),
-            farthest=_farthest(np.vstack([one.farthest, two.farthest]), second, inputs),
+            distinct=_distinct(distinct, _ROWS_EACH * len(self.slope)),
+            distinct_inputs=_distinct(distinct_inputs, both.second.shape[1]),
+            farthest=_farthest(farthest, both.second, inputs),
         )
 
     def _on(self, inputs: Scale, targets: Scale):
@@ -408,18 +397,11 @@ def solve(sums: RowSums, given, first=None) -> Solved:
 
 def _model(sums, problem, evaluation):
     """The model in the user's units."""
-    inputs, targets, own = sums.inputs, sums.targets, sums.consequent_inputs
-    n_outputs = sums.slope.shape[1]
-    solved = evaluation.coefficients.reshape(sums.base.n_rules, -1, n_outputs) * targets.scale
-    solved[:, 0] += targets.offset
-    coefficients = solved
-    if own.size:
-        coefficients = np.zeros((sums.base.n_rules, 1 + inputs.offset.size, n_outputs))
-        coefficients[:, 0] = solved[:, 0]
-        coefficients[:, 1 + own] = solved[:, 1:] / inputs.scale[own, None]
+    inputs, targets, slopes = sums.inputs, sums.targets, sums.consequent_inputs
+    order = 1 if slopes.size else 0
     return replace(
         sums.base,
-        coefficients=coefficients,
+        coefficients=in_user_units(evaluation.coefficients, inputs, targets, slopes, order),
         reference=inputs.offset,
         spread=inputs.scale,
         minimum=inputs.minimum,

@@ -34,7 +34,7 @@ from ..search import (
 from .data import Fitted, ValidatedData
 from .pruning import redundant_rules, rule_statistics
 
-__all__ = ["ModelBuilder", "as_given", "told_by_outermost"]
+__all__ = ["ModelBuilder", "as_given", "in_user_units", "told_by_outermost"]
 
 _DISTANCES = (MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST)
 # Less of the squared error is more than chance: with a half in place of a quarter, one fit in
@@ -90,17 +90,23 @@ class ModelBuilder:
 
     def in_user_units(self, coefficients):
         """Consequents about the inputs' means, from those on [1, z] of standardised data."""
-        inputs, targets = self.rows.inputs, self.rows.targets
-        slopes = self.request.consequent_inputs
-        n_basis = 1 + slopes.size if self.request.order == 1 else 1
-        solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
-        solved[:, 0] += targets.offset
-        if self.request.order == 0:
-            return solved
-        found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
-        found[:, 0] = solved[:, 0]
-        found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
-        return found
+        inputs, targets, request = self.rows.inputs, self.rows.targets, self.request
+        return in_user_units(
+            coefficients, inputs, targets, request.consequent_inputs, request.order
+        )
+
+
+def in_user_units(coefficients, inputs, targets, slopes, order):
+    """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data."""
+    n_basis = 1 + slopes.size if order == 1 else 1
+    solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
+    solved[:, 0] += targets.offset
+    if order == 0:
+        return solved
+    found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
+    found[:, 0] = solved[:, 0]
+    found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
+    return found
 
 
 def as_given(estimator, data, model) -> Fitted:
