@@ -13,7 +13,7 @@ from ..inspection.readability import Readability
 from ..learning.sampling import is_many
 from ..options import policy_of
 from ..regressor import ANFISRegressor
-from .rows import ClusterData, Partitions, add_each, is_collection, reduce_partitions
+from .rows import ClusterData, Partitions, add_each, computed, is_collection, reduce_partitions
 
 __all__ = ["DaskANFISRegressor"]
 
@@ -29,8 +29,8 @@ class DaskANFISRegressor(ANFISRegressor):
 
     Parameters, attributes and results are those of :class:`skanfis.ANFISRegressor` on the same
     rows, up to rounding errors. X, y, weights and groups may be dask arrays or frames cut at the
-    same rows, or whatever it takes. Of dask collections ``predict``, ``coverage``, ``in_bounds``
-    and ``strengths`` are lazy, and ``score`` is a reduction.
+    same rows, or whatever it takes. Of dask collections ``predict`` is lazy, and ``score`` is a
+    reduction.
 
     The scheduler is that which dask uses: the ``dask.distributed`` client that was made last, or
     else the threads of this process. Partitions are loaded anew for every pass, some eight
@@ -66,26 +66,9 @@ class DaskANFISRegressor(ANFISRegressor):
         if not is_collection(X):
             return super().predict(X, return_std)
         check_is_fitted(self)
-        columns = None if self._single_output else self.model_.output_names
-        name = self.model_.output_names[0]
-        y = self._lazily("predict", X, columns, name)
-        return (y, self._lazily("std", X, columns, name)) if return_std else y
-
-    def coverage(self, X: Any) -> Any:
-        """Tell how well the training data cover each row, lazily where X is a dask collection."""
-        return self._lazily("coverage", X) if is_collection(X) else super().coverage(X)
-
-    def in_bounds(self, X: Any) -> Any:
-        """Tell which rows lie in the range of training, lazily where X is a dask collection."""
-        return (
-            self._lazily("in_bounds", X, dtype=bool) if is_collection(X) else super().in_bounds(X)
-        )
-
-    def strengths(self, X: Any) -> Any:
-        """Tell how strongly each rule fires on each row, lazily where X is a dask collection."""
-        if not is_collection(X):
-            return super().strengths(X)
-        return self._lazily("strengths", X, tuple(range(self.n_rules_)))
+        self._check_columns(X)
+        y = self._lazily(X)
+        return (y, self._lazily(X, is_deviation=True)) if return_std else y
 
     def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
         """Coefficient of determination, a reduction where X and y are dask collections."""
@@ -111,21 +94,19 @@ class DaskANFISRegressor(ANFISRegressor):
                 setattr(local, name, getattr(self, name))
         return local
 
-    def _lazily(self, method, X, columns=None, name=None, dtype=float):
-        """A method on every block; ``columns`` names those of a result of two dimensions."""
-        check_is_fitted(self)
-        self._check_columns(X)
-        is_frame = hasattr(X, "columns")
+    def _lazily(self, X, is_deviation=False):
+        """Predictions, or their standard deviations, block by block."""
+        is_frame, names = hasattr(X, "columns"), self.model_.output_names
         local = self._local(has_names=is_frame)
-        of_block = partial(_apply, model=local, method=method, columns=columns, name=name)
-        nothing = np.empty((0, len(columns)) if columns else 0, dtype)
+        of_block = partial(_predicted, model=local, names=names, is_deviation=is_deviation)
+        nothing = np.empty(0 if self._single_output else (0, len(names)))
         if is_frame:
-            return X.map_partitions(of_block, meta=_as_frame(nothing, columns, name))
+            return X.map_partitions(of_block, meta=_as_frame(nothing, names))
         X = X.rechunk({1: -1})
-        if columns is None:
-            return X.map_blocks(of_block, drop_axis=1, dtype=dtype, meta=nothing)
-        chunks = (X.chunks[0], (len(columns),))
-        return X.map_blocks(of_block, chunks=chunks, dtype=dtype, meta=nothing)
+        if self._single_output:
+            return X.map_blocks(of_block, drop_axis=1, dtype=float, meta=nothing)
+        chunks = (X.chunks[0], (len(names),))
+        return X.map_blocks(of_block, chunks=chunks, dtype=float, meta=nothing)
 
     def _check_columns(self, X, reset=False):
         """scikit-learn's checks of the columns: here, where a worker would warn of each block."""
@@ -149,7 +130,8 @@ class DaskANFISRegressor(ANFISRegressor):
             self.monotonic_cst, self.constraints, layout.input_names, len(layout.output_names)
         )
         if not is_many(data.rows()):
-            return super()._check_training_data(*_named(layout, *data.gathered()))
+            here = computed(X, y, sample_weight, groups)
+            return super()._check_training_data(*here)
         is_given = self.max_iter == 0 and not isinstance(self.partition, str)
         for name, is_asked in (
             ("Huber's loss", self.loss != "squared_error"),
@@ -179,41 +161,27 @@ class DaskANFISRegressor(ANFISRegressor):
         return Readability(model, sums.measures())
 
 
-def _named(layout, X, y, sample_weight, groups):
-    """Rows that were fetched, with the names that their collections had."""
-    import pandas as pd
-
-    if layout.given_input_names is not None:
-        X = pd.DataFrame(X, columns=list(layout.given_input_names))
-    if layout.is_single_output:
-        y = y[:, 0]
-    if layout.given_output_names is not None:
-        names = list(layout.given_output_names)
-        y = pd.Series(y, name=names[0]) if y.ndim == 1 else pd.DataFrame(y, columns=names)
-    return X, y, sample_weight, groups
-
-
 def _joined(one, other):
     return one.joined(other)
 
 
-def _apply(block, model, method, columns, name):
-    """A method of the model on a block, as a frame where the block is one."""
+def _predicted(block, model, names, is_deviation):
+    """Predictions of a block, or their standard deviations; a frame where the block is one."""
     if not len(block):
-        values = np.empty((0, len(columns)) if columns else 0)
-    elif method == "std":
+        values = np.empty(0 if model._single_output else (0, len(names)))
+    elif is_deviation:
         values = model.predict(block, return_std=True)[1]
     else:
-        values = getattr(model, method)(block)
-    return _as_frame(values, columns, name, block.index) if hasattr(block, "index") else values
+        values = model.predict(block)
+    return _as_frame(values, names, block.index) if hasattr(block, "index") else values
 
 
-def _as_frame(values, columns, name, index=None):
+def _as_frame(values, names, index=None):
     import pandas as pd
 
-    if columns is None:
-        return pd.Series(values, index=index, name=name)
-    return pd.DataFrame(values, index=index, columns=list(columns))
+    if values.ndim == 1:
+        return pd.Series(values, index=index, name=names[0])
+    return pd.DataFrame(values, index=index, columns=list(names))
 
 
 def _error_sums(rows, model, origin):

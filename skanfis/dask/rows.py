@@ -15,7 +15,14 @@ from ..learning.data import Scale, StandardisedData, check_scales, column_statis
 from ..naming import default_output_names
 from ..training.chunks import joined_scales
 
-__all__ = ["ClusterData", "Layout", "Partitions", "add_each", "is_collection", "reduce_partitions"]
+__all__ = [
+    "ClusterData",
+    "Partitions",
+    "add_each",
+    "computed",
+    "is_collection",
+    "reduce_partitions",
+]
 
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
@@ -136,8 +143,7 @@ def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable
     """What ``of_rows`` makes of every partition, merged two by two, in their order.
 
     One task per partition, and a tree of merges; nothing but the result comes to the client.
-    ``of_rows`` takes the rows with weight, not standardised. RuntimeError where the cluster is
-    gone, or kills its workers.
+    ``of_rows`` takes the rows with weight, not standardised.
     """
     from dask.delayed import delayed
 
@@ -148,14 +154,17 @@ def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable
     while len(level) > 1:
         groups = [level[start : start + _FAN_IN] for start in range(0, len(level), _FAN_IN)]
         level = [add(merge, group) for group in groups]
-    return _computed(level[0])
+    return computed(level[0])[0]
 
 
-def _computed(lazy):
+def computed(*collections):
+    """What ``dask.compute`` gives; RuntimeError where the cluster is gone, or kills its workers."""
     from concurrent.futures import CancelledError
 
+    import dask
+
     try:
-        return lazy.compute()
+        return dask.compute(*collections)
     except Exception as error:
         # Futures of a client that is closed are no part of the graph any more.
         is_missing = isinstance(error, ValueError) and str(error).startswith("Missing dependency")
@@ -270,16 +279,18 @@ def _on_scales(rows, inputs, targets, of_rows):
 
 @dataclass(frozen=True, eq=False)
 class _Described:
-    """What is known of some rows after one pass; the scales are None of no rows."""
+    """What is known of some rows after one pass."""
 
     n_rows: int
     weight: float
-    inputs: Scale | None = None
-    targets: Scale | None = None
+    inputs: Scale
+    targets: Scale
 
 
 def _describe(rows, layout):
-    """Count and measure a partition; ValueError where it is not finite."""
+    """Count and measure a partition, None of no rows; ValueError where it is not finite."""
+    if rows.n_rows == 0:
+        return None
     check_finite(rows.X, "X", layout.input_names)
     check_finite(rows.y, "y", layout.output_names)
     if rows.sample_weight is not None:
@@ -287,16 +298,14 @@ def _describe(rows, layout):
         largest, total = rows.sample_weight.max(initial=0.0), rows.total_weight
         if largest > _LARGEST_WEIGHT or 0.0 < total < 1.0 / _LARGEST_WEIGHT:
             raise ValueError(f"sample_weight is as large as {largest:g}: give weights near to one.")
-    if rows.n_rows == 0:
-        return _Described(0, 0.0)
     inputs, targets = (column_statistics(part, rows.sample_weight) for part in (rows.X, rows.y))
     return _Described(rows.n_rows, rows.total_weight, inputs, targets)
 
 
 def _joined(one, other):
     """Describe the rows of both."""
-    if one.n_rows == 0 or other.n_rows == 0:
-        return other if one.n_rows == 0 else one
+    if one is None or other is None:
+        return other if one is None else one
     weights = one.weight, other.weight
     inputs = joined_scales(one.inputs, other.inputs, *weights)
     targets = joined_scales(one.targets, other.targets, *weights)
@@ -316,10 +325,9 @@ class ClusterData:
         """Validate and measure the partitions, in one pass."""
         describe = partial(_describe, layout=partitions.layout)
         described = reduce_partitions(partitions, describe, _joined)
-        if described.n_rows < 2:
-            raise ValueError(
-                f"Found {described.n_rows} rows with a positive weight; at least 2 are needed."
-            )
+        n_rows = 0 if described is None else described.n_rows
+        if n_rows < 2:
+            raise ValueError(f"Found {n_rows} rows with a positive weight; at least 2 are needed.")
         return cls(partitions, described)
 
     @property
@@ -335,23 +343,5 @@ class ClusterData:
     def rows(self):
         """The rows on their scales."""
         found = self.described
-        assert found.inputs is not None
-        assert found.targets is not None
         check_scales(found.inputs, found.targets, self.input_names, self.output_names)
         return ClusterRows(self.partitions, found.n_rows, found.weight, found.inputs, found.targets)
-
-    def gathered(self):
-        """All rows, here: X, y, weights or None, groups or None."""
-        rows = reduce_partitions(self.partitions, _as_they_are, _concatenated)
-        return rows.X, rows.y, rows.sample_weight, rows.groups
-
-
-def _as_they_are(rows):
-    return rows
-
-
-def _concatenated(one, other):
-    names = ("X", "y", "sample_weight", "groups")
-    pairs = {name: (getattr(one, name), getattr(other, name)) for name in names}
-    arrays = {k: None if a is None else np.concatenate([a, b]) for k, (a, b) in pairs.items()}
-    return replace(one, **arrays)
