@@ -8,7 +8,7 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..bounds.constraints import Constraints
-from ..inspection.measures import TargetScale, rule_sums
+from ..inspection.measures import RuleSums
 from ..inspection.readability import Readability
 from ..learning.sampling import is_many
 from ..options import policy_of
@@ -150,19 +150,15 @@ class DaskANFISRegressor(ANFISRegressor):
     def _readability(self, data):
         if not isinstance(data, ClusterData):
             return super()._readability(data)
-        rows, model = data.rows(), self.model_
-        scale = rows.targets
-        target = TargetScale(
-            rows.total_weight, scale.offset, scale.scale, scale.minimum, scale.maximum
-        )
+        rows = data.rows()
         # Nothing is asked of the posterior, which is most of a model's bytes.
-        sent = replace(model, posterior=None)
-        sums = rows.reduce(partial(rule_sums, model=sent, target=target), _joined)
-        return Readability(model, sums.measures())
+        sent = replace(self.model_, posterior=None)
+        sums = rows.reduce(partial(_rule_sums, model=sent, target=rows.targets), RuleSums.joined)
+        return Readability(self.model_, sums.measures())
 
 
-def _joined(one, other):
-    return one.joined(other)
+def _rule_sums(rows, model, target):
+    return RuleSums(model, target).add(rows.X, rows.sample_weight)
 
 
 def _predicted(block, model, names, is_deviation):

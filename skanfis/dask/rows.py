@@ -15,14 +15,7 @@ from ..learning.data import Scale, StandardisedData, check_scales, column_statis
 from ..naming import default_output_names
 from ..training.chunks import joined_scales
 
-__all__ = [
-    "ClusterData",
-    "Partitions",
-    "add_each",
-    "computed",
-    "is_collection",
-    "reduce_partitions",
-]
+__all__ = ["ClusterData", "Partitions", "computed", "is_collection", "reduce_partitions"]
 
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
@@ -58,9 +51,6 @@ class Layout:
             if one.ndim not in dimensions:
                 raise ValueError(f"{what} has {one.ndim} dimensions, and cannot be trained on.")
         n_inputs, n_outputs = X.shape[1], 1 if y.ndim == 1 else y.shape[1]
-        for what, count in (("X", n_inputs), ("y", n_outputs)):
-            if not (isinstance(count, int | np.integer) and count > 0):
-                raise ValueError(f"{what} has {count} columns: their number must be known, not 0.")
         names = getattr(y, "columns", None)
         if names is None and getattr(y, "name", None) is not None and hasattr(y, "divisions"):
             names = [y.name]
@@ -100,22 +90,21 @@ class Partitions:
     def of(cls, X, y, sample_weight=None, groups=None):
         """Of collections; TypeError or ValueError where they cannot be laid side by side."""
         layout = Layout.of(X, y)
-        first = _delayed(X, "X", None)
+        first = _delayed(X, "X")
         pieces = [first]
         for what, one in (("y", y), ("sample_weight", sample_weight), ("groups", groups)):
-            parts = [None] * len(first) if one is None else _delayed(one, what, X)
+            parts = [None] * len(first) if one is None else _delayed(one, what)
             if len(parts) != len(first):
                 raise ValueError(
                     f"{what} has {len(parts)} partitions, X has {len(first)}: they must be cut at "
-                    "the same rows. Take them from one frame, use repartition, or compute the "
-                    "sizes of unknown chunks (compute_chunk_sizes) so that they can be rechunked."
+                    "the same rows. Take them from one frame, or use repartition or rechunk."
                 )
             pieces.append(parts)
         return cls(list(zip(*pieces, strict=True)), layout)
 
 
-def _delayed(collection, what, like):
-    """The partitions of a collection; chunks of an array are cut as those of ``like``."""
+def _delayed(collection, what):
+    """The partitions of a collection."""
     if not is_collection(collection):
         raise TypeError(
             f"{what} is a {type(collection).__name__}, but X is a dask collection: give a dask "
@@ -127,15 +116,6 @@ def _delayed(collection, what, like):
         return list(collection.simplify().to_delayed(optimize_graph=False))
     if collection.ndim == 2:
         collection = collection.rechunk({1: -1})
-    chunks = None if like is None else getattr(like, "chunks", None)
-    if chunks is not None and chunks[0] != collection.chunks[0]:
-        sizes = (*chunks[0], *collection.chunks[0])
-        if all(size == size for size in sizes):  # none is unknown, which is NaN
-            if sum(chunks[0]) != sum(collection.chunks[0]):
-                raise ValueError(
-                    f"X has {sum(chunks[0]):,} rows and {what} {sum(collection.chunks[0]):,}."
-                )
-            collection = collection.rechunk({0: chunks[0]})
     return list(collection.to_delayed().ravel())
 
 
@@ -161,10 +141,10 @@ def computed(*collections):
     """What ``dask.compute`` gives; RuntimeError where the cluster is gone, or kills its workers."""
     from concurrent.futures import CancelledError
 
-    import dask
+    from dask.base import compute
 
     try:
-        return dask.compute(*collections)
+        return compute(*collections)
     except Exception as error:
         # Futures of a client that is closed are no part of the graph any more.
         is_missing = isinstance(error, ValueError) and str(error).startswith("Missing dependency")
