@@ -277,8 +277,7 @@ def _checked(model, box, tol, max_boxes):
     for group in model.antecedent.groups:
         if not is_known(group.family):
             raise ValueError(
-                f"The ranges of {group.family.name!r} memberships are not known: bounds can be "
-                "proven for the families of skanfis.membership alone."
+                f"The ranges of {group.family.name!r} memberships are not known: give another mf."
             )
     if not (np.ndim(tol) == 0 and tol >= 0.0):
         raise ValueError(f"tol={tol!r} must be zero or positive.")
@@ -313,8 +312,7 @@ def read_box(box, model: TSKModel):
     for name, (low, high) in zip(model.input_names, found, strict=True):
         if not low <= high:
             raise ValueError(
-                f"box has ({low:g}, {high:g}) for {name!r}: low must not be above high, and "
-                "neither may be NaN."
+                f"box has ({low:g}, {high:g}) for {name!r}: low must not be above high, or NaN."
             )
     return found
 

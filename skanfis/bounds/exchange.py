@@ -51,8 +51,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         why = "" if exchange.is_known else ": the ranges of its memberships are not known"
         warn_user(
             f"Not proven to hold everywhere{why}: {names}. It holds on the training data and a "
-            f"sample of {_SAMPLE} points. Use fewer rules, or Gaussian terms; see "
-            "skanfis.bounds.",
+            f"sample of {_SAMPLE} points. Use fewer rules, or Gaussian terms.",
             ConvergenceWarning,
         )
     normal, local = evaluation.normal, solved.local
@@ -68,7 +67,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     report = {
         "certified": is_proven,
         "margin": exchange.points.margin,
-        "rows": exchange.points.n_rows,
+        "rows": sum(map(len, exchange.points.after)),
         "boxes": exchange.n_boxes,
         "loss_before": float(evaluation.mean_squared_error),
         "loss_after": float(ended.mean_squared_error),
@@ -138,8 +137,7 @@ class _Exchange:
                 warn_user(
                     f"The data contradict {names}: kept, it raises the mean squared error of "
                     f"training from {before:.3g} to {after:.3g} of the variance of {name!r}, far "
-                    "more than noise would. Leave the constraint out, or look at the data; "
-                    "constraints_ has both losses.",
+                    "more than noise would. Leave the constraint out, or look at the data.",
                     ConstraintWarning,
                 )
 

@@ -83,14 +83,8 @@ class HeldPoints:
             raise ValueError(
                 f"constraints has a FixedPoint at {beyond[0]}, where a model with "
                 f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
-                f"{model.describe_out_of_bounds(beyond)} Fix a point in the range, add a row of "
-                "data there, or use out_of_bounds='linear' or 'clip'."
+                f"{model.describe_out_of_bounds(beyond)} Use out_of_bounds='linear' or 'clip'."
             )
-
-    @property
-    def n_rows(self):
-        """Number of points held."""
-        return sum(len(points) for points in self.after)
 
     def standardised(self, X):
         """Points in standardised inputs."""

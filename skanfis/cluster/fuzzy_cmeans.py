@@ -233,8 +233,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
             if centers.shape != (self.n_clusters, points.shape[1]):
                 raise ValueError(
                     f"init has shape {centers.shape}, but n_clusters={self.n_clusters} and X has "
-                    f"{points.shape[1]} columns: give an array of shape "
-                    f"{(self.n_clusters, points.shape[1])}."
+                    f"{points.shape[1]} columns."
                 )
             return [(centers - mean) / scale]
         random_state = check_random_state(self.random_state)

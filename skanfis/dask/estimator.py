@@ -22,19 +22,14 @@ class DaskANFISRegressor(ANFISRegressor):
     r"""ANFISRegressor for dask arrays and DataFrames, trained on the cluster where they live.
 
     Every pass over the rows is one reduction on the cluster: a task per partition, and a tree that
-    adds their sums. The rows stay where they are; what comes to the client are sums of a few
-    hundred kilobytes, and one sample of 20,000 rows, on which the structure is searched and the
-    memberships are trained before all rows are used. Up to 100,000 rows are fetched, and trained
-    on as :class:`skanfis.ANFISRegressor` does.
+    adds their sums. The rows stay where they are, but for one sample of 20,000, on which the
+    structure is searched and the memberships are trained first. Up to 100,000 rows are fetched.
 
     Parameters, attributes and results are those of :class:`skanfis.ANFISRegressor` on the same
     rows, up to rounding errors. X, y, weights and groups may be dask arrays or frames cut at the
     same rows, or whatever it takes. Of dask collections ``predict`` is lazy, and ``score`` is a
-    reduction.
-
-    The scheduler is that which dask uses: the ``dask.distributed`` client that was made last, or
-    else the threads of this process. Partitions are loaded anew for every pass, some eight
-    times, unless they have been persisted (``X.persist()``).
+    reduction. The scheduler is that which dask uses; partitions are loaded anew for every pass,
+    some eight times, unless they have been persisted (``X.persist()``).
 
     See Also
     --------
@@ -99,10 +94,9 @@ class DaskANFISRegressor(ANFISRegressor):
         is_frame, names = hasattr(X, "columns"), self.model_.output_names
         local = self._local(has_names=is_frame)
         of_block = partial(_predicted, model=local, names=names, is_deviation=is_deviation)
-        nothing = np.empty(0 if self._single_output else (0, len(names)))
         if is_frame:
-            return X.map_partitions(of_block, meta=_as_frame(nothing, names))
-        X = X.rechunk({1: -1})
+            return X.map_partitions(of_block, meta=of_block(X._meta))
+        X, nothing = X.rechunk({1: -1}), of_block(np.empty((0, X.shape[1])))
         if self._single_output:
             return X.map_blocks(of_block, drop_axis=1, dtype=float, meta=nothing)
         chunks = (X.chunks[0], (len(names),))
@@ -144,7 +138,7 @@ class DaskANFISRegressor(ANFISRegressor):
                     "out, or train an ANFISRegressor on a sample of the rows."
                 )
         self._check_columns(X, reset=True)
-        self._single_output = layout.is_single_output
+        self._single_output = y.ndim == 1
         return replace(data, wishes=wishes)
 
     def _readability(self, data):
@@ -169,15 +163,13 @@ def _predicted(block, model, names, is_deviation):
         values = model.predict(block, return_std=True)[1]
     else:
         values = model.predict(block)
-    return _as_frame(values, names, block.index) if hasattr(block, "index") else values
-
-
-def _as_frame(values, names, index=None):
+    if not hasattr(block, "index"):
+        return values
     import pandas as pd
 
     if values.ndim == 1:
-        return pd.Series(values, index=index, name=names[0])
-    return pd.DataFrame(values, index=index, columns=list(names))
+        return pd.Series(values, index=block.index, name=names[0])
+    return pd.DataFrame(values, index=block.index, columns=list(names))
 
 
 def _error_sums(rows, model, origin):

@@ -34,7 +34,6 @@ class Layout:
 
     n_inputs: int
     n_outputs: int
-    is_single_output: bool
     given_input_names: tuple | None
     given_output_names: tuple | None
 
@@ -45,20 +44,17 @@ class Layout:
             if not is_collection(one):
                 raise TypeError(
                     f"{what} is a {type(one).__name__}, but the other one is a dask collection: "
-                    "give both as dask arrays or DataFrames (dask.array.from_array, "
-                    "dask.dataframe.from_pandas)."
+                    "give both as dask arrays or DataFrames."
                 )
             if one.ndim not in dimensions:
                 raise ValueError(f"{what} has {one.ndim} dimensions, and cannot be trained on.")
         n_inputs, n_outputs = X.shape[1], 1 if y.ndim == 1 else y.shape[1]
-        names = getattr(y, "columns", None)
-        if names is None and getattr(y, "name", None) is not None and hasattr(y, "divisions"):
-            names = [y.name]
+        is_named = hasattr(y, "divisions") and getattr(y, "name", None) is not None
+        names = getattr(y, "columns", [y.name] if is_named else None)
         columns = getattr(X, "columns", None)
         return cls(
             int(n_inputs),
             int(n_outputs),
-            y.ndim == 1,
             None if columns is None else tuple(columns),
             None if names is None else tuple(names),
         )
@@ -150,13 +146,12 @@ def computed(*collections):
         is_missing = isinstance(error, ValueError) and str(error).startswith("Missing dependency")
         is_of_cluster = type(error).__module__.partition(".")[0] == "distributed"
         if is_missing or is_of_cluster or isinstance(error, CancelledError):
-            raise RuntimeError(_gone(error)) from error
+            raise RuntimeError(_gone(f"{type(error).__name__}: {error}".strip())) from error
         raise
 
 
-def _gone(error):
-    what = f"{type(error).__name__}: {error}".strip()
-    if type(error).__name__ == "KilledWorker":
+def _gone(what):
+    if what.startswith("KilledWorker"):
         return (
             "The same partition ended several workers, most likely for want of memory: use smaller "
             f"partitions (repartition, rechunk), or workers with more memory. ({what})"
@@ -206,10 +201,7 @@ def _numbers(table, what, names, n_columns):
     """A partition as floats, (n_rows, n_columns); ValueError where it is none of these columns."""
     if isinstance(table, str | tuple):
         # Where its future is gone, dask may hand over a chunk's key in its place.
-        raise RuntimeError(
-            f"{what} is a {type(table).__name__} and no rows: the cluster that they lived on was "
-            "closed. Load or persist them again with the client that is now open."
-        )
+        raise RuntimeError(_gone(f"{what} is a {type(table).__name__} and no rows"))
     found = None if names is None or not hasattr(table, "columns") else tuple(table.columns)
     if found is not None and found != names:
         raise ValueError(

@@ -239,15 +239,15 @@ def _on_truth(terms):
 
 
 def _on_crossings(terms):
-    pairs = [(a, b) for a, b in pairwise(terms.itertuples()) if a.input == b.input]
+    # The last term of an input crosses no other: its crossing is NaN.
     found = [
         f"{a.term!r} and {b.term!r} of {a.input!r} ({_figure(a.crossing)})"
-        for a, b in pairs
+        for a, b in pairwise(terms.itertuples())
         if a.crossing > GREATEST_CROSSING
     ]
     if not found:
         return []
-    many = f"{len(found)} of {len(pairs)} pairs of neighbouring terms"
+    many = f"{len(found)} of {terms['crossing'].count()} pairs of neighbouring terms"
     return [
         f"{many if len(found) > 1 else 'Two terms'} can hardly be told apart, for they cross "
         f"above {GREATEST_CROSSING}: {_named(found)}."

@@ -116,22 +116,21 @@ def writable(model):
 
 def rename(model, feature_names, output_names):
     """The model with other names of inputs and outputs, where given."""
-    if feature_names is not None:
-        names = _checked_names("feature_names", feature_names, model.n_inputs, "inputs")
-        model = replace(model, input_names=names)
-    if output_names is not None:
-        names = _checked_names("output_names", output_names, model.n_outputs, "outputs")
-        model = replace(model, output_names=names)
+    given = {"feature_names": feature_names, "output_names": output_names}
+    for kind, (parameter, names) in zip(
+        ("input_names", "output_names"), given.items(), strict=True
+    ):
+        if names is not None:
+            count = len(getattr(model, kind))
+            model = replace(model, **{kind: _checked_names(parameter, names, count)})
     return writable(model)
 
 
-def _checked_names(parameter, names, count, what):
+def _checked_names(parameter, names, count):
     if isinstance(names, str) or not all(isinstance(name, str) for name in names):
         raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
-    if len(names) != count:
-        raise ValueError(f"{parameter} has {len(names)} names; the model has {count} {what}.")
-    if len(set(names)) != len(names):
-        raise ValueError(f"{parameter} repeats a name: {list(names)!r}.")
+    if len(names) != count or len(set(names)) != count:
+        raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
     return tuple(names)
 
 

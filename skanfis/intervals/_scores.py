@@ -160,9 +160,8 @@ def held_out_scores(estimator, data, rows, least):
     is_frozen = isinstance(estimator, FrozenEstimator)
     if not is_frozen and getattr(last_step(estimator)[0], "out_of_bounds", None) == "raise":
         raise ValueError(
-            "out_of_bounds='raise' refuses rows held out that lie beyond the range of the others, "
-            "as some always do. Give the regressor out_of_bounds='clip' or 'linear', or a fitted "
-            "one as sklearn.frozen.FrozenEstimator(model), with method='split'."
+            "out_of_bounds='raise' refuses rows held out beyond the range of the others. Use "
+            "'clip' or 'linear', or a fitted FrozenEstimator(model) with method='split'."
         )
     with warnings.catch_warnings():
         # That a row held out lies beyond the others is what is to be measured.
@@ -178,8 +177,7 @@ def leave_one_out_scores(estimator, data, weight, least):
     if noise is None:
         raise ValueError(
             f"method='loo' needs a fitted ANFISRegressor, alone or at the end of a Pipeline; "
-            f"{type(final).__name__} tells nothing of its noise (noise_std_). Use "
-            "another method; with scaled=False where predict has no return_std."
+            f"{type(final).__name__} tells nothing of its noise (noise_std_). Use another method."
         )
     floor = least_deviations(data.targets)
     centers, deviations = predicted(estimator, data.X, floor)

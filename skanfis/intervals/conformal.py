@@ -157,10 +157,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             type(self).__name__, y, sample_weight, groups
         )
         if numbers is not None and self.method == "loo":
-            raise ValueError(
-                "method='loo' leaves out rows, not groups: a row's group would stay, and tell. Use "
-                "method='folds' or 'split', or leave groups at None."
-            )
+            raise ValueError("method='loo' leaves out rows, not groups: use 'folds' or 'split'.")
         regressor = self._regressor()
         data = _scores.TrainingSet(
             X, y, targets, _scores.fit_params(self, regressor, sample_weight, groups)
@@ -250,26 +247,6 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         width = deviations * self._quantiles(coverage, confidence)
         lower, upper = centers - width, centers + width
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
-
-    def half_width(
-        self, coverage: float = 0.9, confidence: float | str | None = "auto"
-    ) -> float | np.ndarray:
-        """How far intervals reach to either side of the prediction.
-
-        Parameters
-        ----------
-        coverage : float, default=0.9
-        confidence : float, "auto" or None, default="auto"
-            As of :meth:`predict_interval`.
-
-        Returns
-        -------
-        q : float or ndarray of shape (n_outputs,)
-            In standard deviations; with ``scaled=False`` in the target's units.
-        """
-        check_is_fitted(self)
-        found = self._quantiles(*self._checked_levels(coverage, confidence))
-        return float(found[0]) if self._single_output else found
 
     def _quantiles(self, coverage, confidence):
         found = []

@@ -55,17 +55,6 @@ def test_what_a_rule_does_not_look_at_is_missing():
     assert "if" not in rules_table(MODELS["one rule, order 1, 1 outputs"])
 
 
-@ALL
-def test_memberships_table_is_the_list_of_terms(model):
-    for trained in (True, False):
-        table = memberships_table(model, trained=trained)
-        assert table.index.name == "term"
-        terms = model.memberships(trained)
-        assert len(table) == len(terms)
-        for t, term in enumerate(terms):
-            assert table.loc[t].dropna().to_dict() == term
-
-
 def test_a_pipeline_is_told_in_raw_units():
     g = np.random.default_rng(0)
     X = pd.DataFrame(g.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"])
