@@ -11,7 +11,6 @@ from ..bounds.constraints import Constraints
 from ..inspection.measures import RuleSums
 from ..inspection.readability import Readability
 from ..learning.sampling import is_many
-from ..options import policy_of
 from ..regressor import ANFISRegressor
 from .rows import ClusterData, Partitions, add_each, computed, is_collection, reduce_partitions
 
@@ -30,10 +29,6 @@ class DaskANFISRegressor(ANFISRegressor):
     same rows, or whatever it takes. Of dask collections ``predict`` is lazy, and ``score`` is a
     reduction. The scheduler is that which dask uses; partitions are loaded anew for every pass,
     some eight times, unless they have been persisted (``X.persist()``).
-
-    See Also
-    --------
-    skanfis.ANFISRegressor : What the parameters and attributes mean.
 
     Notes
     -----
@@ -74,7 +69,7 @@ class DaskANFISRegressor(ANFISRegressor):
         self._check_columns(X)
         # About the training mean: the squares lose no digits.
         origin = self.readability_.measures.mean
-        of_rows = partial(_error_sums, model=self._local(), origin=origin)
+        of_rows = partial(_error_sums, model=self._local(has_names=False), origin=origin)
         weight, first, second, error = reduce_partitions(partitions, of_rows, add_each)
         spread = second - first**2 / weight
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -177,6 +172,6 @@ def _error_sums(rows, model, origin):
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     if not rows.n_rows:
         return [0.0, *np.zeros((3, len(origin)))]
-    predicted = model.model_.with_out_of_bounds(*policy_of(model.out_of_bounds)).predict(rows.X)
+    predicted = model.predict(rows.X).reshape(rows.y.shape)
     away, error = rows.y - origin, rows.y - predicted
     return [weight.sum(), weight @ away, weight @ away**2, weight @ error**2]

@@ -230,8 +230,6 @@ class ResponseSurfaceDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the surface on ``ax``, as of :meth:`from_estimator`."""
-        from matplotlib.ticker import MaxNLocator
-
         if ax is None:
             ax = _pyplot().subplots(figsize=(5.6, 4.2), layout="constrained")[1]
         self.ax_, self.figure_ = ax, ax.figure
@@ -241,7 +239,7 @@ class ResponseSurfaceDisplay:
         seen = self.response[self.coverage >= _COVERED]
         seen = seen if seen.size > 1 else self.response
         low, high = np.min(seen), np.max(seen)
-        levels = MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
+        levels = _pyplot().MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
         self.surface_ = ax.contourf(*grid, levels=levels, extend="both")
         self.figure_.colorbar(self.surface_, ax=ax, label=as_label(self.output_name))
         # White over the surface, the thicker the less data cover it; under the points.

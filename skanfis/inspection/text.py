@@ -40,8 +40,7 @@ def export_text(
 ) -> str:
     """Write the rules as IF-THEN sentences in the units of the data.
 
-    The sentences and the terms' parameters are the whole model: the output is the mean of the
-    rules' values, weighted by the products of the memberships of their terms.
+    Sentences and terms are the whole model: :doc:`/inspection`.
 
     Parameters
     ----------

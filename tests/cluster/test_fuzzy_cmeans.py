@@ -128,7 +128,6 @@ class TestErrors:
     @pytest.mark.parametrize(
         ("setting", "message"),
         [
-            ({"n_clusters": 0}, "'n_clusters' parameter"),
             ({"m": 1.0}, "'m' parameter"),
             ({"init": np.zeros((2, 2))}, r"init has shape \(2, 2\), but n_clusters=3"),
             ({"init": np.full((3, 2), np.nan)}, "init contains NaN"),

@@ -60,7 +60,6 @@ def cloud(rng, n_rows=150, n_columns=3):
 SETTINGS = [
     {},
     {"radius": 0.2},
-    {"radius": 0.9, "reject": 0.01},
     {"radius": 0.3, "squash": 0.6, "accept": 0.9, "reject": 1e-6},
     {"radius": 0.25, "squash": 2.0, "accept": 1.0, "reject": 0.05},
     {"radius": np.array([0.2, 0.4, 0.8])},

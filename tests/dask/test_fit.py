@@ -231,10 +231,9 @@ def test_bad_data_are_refused_by_name(make, error, message):
         DaskANFISRegressor(n_mfs=2).fit(*make())
 
 
-@pytest.mark.parametrize("settings", [{"loss": "huber"}, {"early_stopping": True}], ids=str)
-def test_what_needs_every_residual_is_refused(few_are_many, settings):
+def test_what_needs_every_residual_is_refused(few_are_many):
     with pytest.raises(ValueError, match="needs every row's own residual"):
-        DaskANFISRegressor(n_mfs=2, **settings).fit(*cut(1000, *data()))
+        DaskANFISRegressor(n_mfs=2, loss="huber").fit(*cut(1000, *data()))
 
 
 def test_prediction_wants_the_columns_of_training():
