@@ -75,7 +75,7 @@ class HeldPoints:
     def __init__(self, model: TSKModel, problem, constraints: Constraints, margin: float):
         self.model, self.problem, self.constraints = model, problem, constraints
         self.inequalities, self.margin = inequalities_of(constraints, model), margin
-        # Of each, points in standardised inputs: where a slope ends, and where it begins.
+        # Of each, points: where a slope ends, and where it begins.
         nothing = np.empty((0, model.n_inputs))
         self.after, self.before = ([nothing] * len(self.inequalities) for _ in range(2))
         beyond = constraints.points[~model.in_bounds(constraints.points)]
@@ -106,8 +106,8 @@ class HeldPoints:
         """Hold an inequality at these points too."""
         j = self.inequalities[place].input
         before, after = (X[:0], X) if j is None else self.steps(X, j)[:2]
-        self.after[place] = np.vstack([self.after[place], self.standardised(after)])
-        self.before[place] = np.vstack([self.before[place], self.standardised(before)])
+        self.after[place] = np.vstack([self.after[place], after])
+        self.before[place] = np.vstack([self.before[place], before])
 
     def solve(self, evaluation) -> Solved:
         """The nearest consequents."""
@@ -137,8 +137,7 @@ class HeldPoints:
 
     def _known(self, places, is_active, active):
         """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
-        inputs, found, start = self.problem.rows.inputs, [], 0
-        model, points = self.model, self.constraints.points
+        model, points, found, start = self.model, self.constraints.points, [], 0
         if model.out_of_bounds == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[model.in_bounds(points)]
@@ -149,10 +148,8 @@ class HeldPoints:
             start, active[p] = start + chosen.size, chosen.sum()
             if not chosen.any():
                 continue
-            after, before = inputs.offset + inputs.scale * self.after[p][chosen], None
-            if self.inequalities[p].input is not None:
-                before = inputs.offset + inputs.scale * self.before[p][chosen]
-            found.append((after, before))
+            before = None if self.inequalities[p].input is None else self.before[p][chosen]
+            found.append((self.after[p][chosen], before))
         return found
 
     def _rows(self, columns, places):
@@ -161,11 +158,11 @@ class HeldPoints:
         rows, least = [np.empty((0, n_columns))], [np.empty(0)]
         for p in places:
             one = self.inequalities[p]
-            found, size, limit = columns.predict(self.after[p]), 1.0, 0.0
+            found, size, limit = columns.predict(self.standardised(self.after[p])), 1.0, 0.0
             if one.input is None:
                 limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
             else:
-                found = (found - columns.predict(self.before[p])) / _STEP
+                found = (found - columns.predict(self.standardised(self.before[p]))) / _STEP
                 # Where no consequents have much of a slope, none is asked for.
                 size = np.minimum(np.abs(found).sum(axis=1), 1.0)
             rows.append(self._in_local(one.sign * found))
