@@ -8,6 +8,8 @@ pictures all speak of seconds and degrees. :doc:`/inspection` has the reference.
 """
 
 import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -16,8 +18,6 @@ from skanfis.datasets import make_ofog
 from skanfis.inspection import (
     MembershipDisplay,
     ResponseSurfaceDisplay,
-    RuleActivationDisplay,
-    RuleContributionDisplay,
     explain,
     export_text,
     readability,
@@ -67,7 +67,7 @@ rules_table(model, about="mean").round(3)
 # prediction.
 
 row = X.iloc[[2000]]
-explanation = explain(model, row, min_strength=0.02)
+explanation = explain(model, row)
 print(row.round(2).to_string(index=False))
 print(f"prediction {model.predict(row)[0]:.4f}, sum {explanation['contribution'].sum():.4f}")
 explanation.drop(columns=["row", "output"]).round(4)
@@ -86,14 +86,13 @@ MembershipDisplay.from_estimator(model, X)
 # ----------------------
 #
 # The gyro warms fast only for a while after power-on, so that a full grid over temperature and its
-# rate of change has rules with few rows. Those without any would be hatched: what they say is
-# extrapolation.
+# rate of change has rules with few rows. What those without any say is extrapolation.
 
 warming = make_pipeline(
     StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], solver=VariableProjection(stiffness=0.1))
 )
 warming.fit(data[["temperature", "temperature_rate", "rate"]], error)
-RuleActivationDisplay.from_estimator(warming)
+rules_table(warming)["data"].plot.bar(subplots=True, legend=False, figsize=(5.6, 4.2))
 
 # %%
 # Can the rules be read one by one?
@@ -116,10 +115,13 @@ ResponseSurfaceDisplay.from_estimator(model, X.iloc[::5])
 # Contributions
 # -------------
 #
-# Along one input, the others held: how the rules hand over to each other, and what each adds to or
-# takes from the mean of the curve.
+# Along one input, the other held: how the rules hand over to each other. Contributions add up to
+# the prediction.
 
-RuleContributionDisplay.from_estimator(model, "rate", held={"temperature": 40.0})
+rates = np.linspace(X["rate"].min(), X["rate"].max(), 201)
+told = explain(model, pd.DataFrame({"temperature": 40.0, "rate": rates}))
+parts = told.pivot(index="row", columns="rule", values="contribution").set_index(rates)
+parts.plot(xlabel="rate, °/s", ylabel="contribution, °/s")
 
 # %%
 # Training

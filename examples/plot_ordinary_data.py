@@ -97,10 +97,10 @@ print(model[-1].readability_)
 # For one row: the rules that fired, and what each contributed.
 
 row = X_test.iloc[[0]]
-explanation = explain(model, row, min_strength=0.05)
+explanation = explain(model, row)
 print(row.round(3).to_string(index=False))
 print(f"measured {y_test.iloc[0]:.0f}, predicted {model.predict(row)[0]:.0f}")
-explanation[["rule", "if", "strength", "value", "contribution"]].round(2)
+explanation[["rule", "if", "strength", "value", "contribution"]].head(8).round(2)
 
 # %%
 # The prediction over two inputs, pale where no data cover it:

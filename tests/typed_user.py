@@ -47,7 +47,6 @@ from skanfis.inspection import (
     MembershipDisplay,
     Readability,
     ResponseSurfaceDisplay,
-    RuleActivationDisplay,
     explain,
     export_text,
     readability,
@@ -133,9 +132,8 @@ write_json(model, Path("model.json"))
 restored: np.ndarray = read_json("model.json").predict(X)
 found: Readability = readability(model, frame, y, sample_weight=weights)
 ResponseSurfaceDisplay.from_estimator(model, frame, features=("x0", "x1"), held={"x1": 0.0})
-RuleActivationDisplay.from_estimator(model, frame)
 sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
-half: float | np.ndarray = sure.half_width(coverage=0.95)
+lower, upper = sure.predict_interval(frame, coverage=0.95)
 model.partial_fit(frame, y, forgetting=0.99)
 stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
 labels: np.ndarray = group_by_run(log["time"])

@@ -1,18 +1,20 @@
 """Bounds of predictions and of their slopes over a box: what a user calls."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import qmc
 
+from .._validation import check_count, position_of
 from ..model import TSKModel
-from .box import held_box, input_index, read_box, spread_points
-from .enclosure import Enclosure
+from .enclosure import Enclosure, reach_of
 from .search import largest
 from .terms import is_known
 
-__all__ = ["Bounds", "bounds", "cuts_of", "gradient_bounds", "monotonicity"]
+__all__ = ["Bounds", "bounds", "cuts_of", "gradient_bounds", "monotonicity", "spread_points"]
 
 # Rows that are looked at first: all corners, of so few inputs, and some between.
 _CORNERS = 6
@@ -275,11 +277,89 @@ def _checked(model, box, tol, max_boxes):
     for group in model.antecedent.groups:
         if not is_known(group.family):
             raise ValueError(
-                f"The ranges of {group.family.name!r} memberships are not known: bounds can be "
-                "proven for the families of skanfis.membership alone."
+                f"The ranges of {group.family.name!r} memberships are not known: give another mf."
             )
     if not (np.ndim(tol) == 0 and tol >= 0.0):
         raise ValueError(f"tol={tol!r} must be zero or positive.")
-    if not (np.ndim(max_boxes) == 0 and max_boxes >= 1):
-        raise ValueError(f"max_boxes={max_boxes!r} must be 1 or more.")
+    check_count("max_boxes", max_boxes, 1)
     return model, read_box(box, model)
+
+
+def read_box(box, model: TSKModel):
+    """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
+    found = np.stack([model.minimum, model.maximum], axis=1)
+    if box is None:
+        return found
+    names = ", ".join(map(repr, model.input_names))
+    if isinstance(box, Mapping):
+        for name, ends in box.items():
+            j = input_index(name, model, "box")
+            if np.shape(ends) != (2,):
+                raise ValueError(f"box[{name!r}]={ends!r} must be two numbers: (low, high).")
+            found[j] = ends
+    else:
+        try:
+            given = np.array(box, dtype=float)
+            what = f"an array of shape {given.shape}"
+        except (TypeError, ValueError):
+            given, what = np.empty(0), repr(box)
+        if given.shape != found.shape:
+            raise ValueError(
+                f"box must have one (low, high) for each of the {model.n_inputs} inputs ({names}), "
+                f"or be a dict by their names; got {what}."
+            )
+        found = given
+    for name, (low, high) in zip(model.input_names, found, strict=True):
+        if not low <= high:
+            raise ValueError(
+                f"box has ({low:g}, {high:g}) for {name!r}: low must not be above high, or NaN."
+            )
+    return found
+
+
+def held_box(box, model: TSKModel, beyond=0.0):
+    """Lows and highs of the part of a box in which predictions change, and a strip ``beyond``."""
+    low, high = box.T.copy()
+    if model.out_of_bounds in ("nan", "raise"):
+        low, high = np.maximum(low, model.minimum), np.minimum(high, model.maximum)
+        for name, start, stop, ends in zip(model.input_names, low, high, box, strict=True):
+            if start > stop:
+                raise ValueError(
+                    f"box has ({ends[0]:g}, {ends[1]:g}) for {name!r}, outside the range of the "
+                    f"training data: with out_of_bounds={model.out_of_bounds!r} the model predicts "
+                    "nothing there. Give a box that meets the range, or another policy."
+                )
+        return low, high
+    reach = reach_of(model)
+    if model.out_of_bounds == "linear" and np.isinf(model.max_extrapolation):
+        for name, ends in zip(model.input_names, box, strict=True):
+            if not np.isfinite(ends).all():
+                raise ValueError(
+                    f"box has ({ends[0]:g}, {ends[1]:g}) for {name!r}, and the model goes on along "
+                    "its tangent without end (max_extrapolation=inf): nothing bounds it. Give "
+                    "finite ends, or a finite max_extrapolation."
+                )
+    # The way beyond is computed, and held, in floats: a few units in the last place more reach it.
+    strip = 8.0 * np.finfo(float).eps * (np.abs(model.minimum) + np.abs(model.maximum) + reach)
+    strip = np.where(reach > 0.0, strip, 0.0) + beyond * (model.maximum - model.minimum)
+    edges = model.minimum - reach - strip, model.maximum + reach + strip
+    return np.clip(low, *edges), np.clip(high, *edges)
+
+
+def input_index(name, model: TSKModel, parameter):
+    """The position of an input, by its name or position."""
+    found = position_of(name, model.input_names)
+    if found is not None:
+        return found
+    raise ValueError(
+        f"{parameter} names {name!r}, which is no input of the model; they are "
+        f"{', '.join(map(repr, model.input_names))}, at positions 0 to {model.n_inputs - 1}."
+    )
+
+
+def spread_points(low, high, n_points, most_inputs):
+    """Rows of a box: ``n_points`` all over it, and of so few inputs all its corners."""
+    unit = qmc.Halton(low.size, scramble=False).random(n_points)
+    if low.size <= most_inputs:
+        unit = np.vstack([np.indices((2,) * low.size).reshape(low.size, -1).T, unit])
+    return np.clip(low + unit * (high - low), low, high)

@@ -102,8 +102,7 @@ class Constraints:
             if not low < high:
                 which = "the output" if len(self.lower) == 1 else f"output {k}"
                 raise ValueError(
-                    f"constraints limits {which} to [{low:g}, {high:g}], between which nothing "
-                    "lies: lower must be below upper."
+                    f"constraints limits {which} to [{low:g}, {high:g}]: lower must be below upper."
                 )
         for point, value in zip(self.points, self.values, strict=True):
             if not np.isfinite(point).all() or not np.isfinite(value).all():
@@ -158,8 +157,7 @@ def _per_output(given, nothing, what, n_outputs):
     values = _numbers(nothing if given is None else given, f"{what} in constraints")
     if values.ndim > 1 or values.size not in (1, n_outputs) or np.isnan(values).any():
         raise ValueError(
-            f"{what}={given!r} in constraints must be a number, or one for each of the "
-            f"{n_outputs} outputs."
+            f"{what}={given!r} must be a number, or one for each of the {n_outputs} outputs."
         )
     return np.broadcast_to(values, (n_outputs,))
 

@@ -19,8 +19,19 @@ import numpy as np
 
 from ..model import TSKModel
 from ..policies import FARTHEST_ROW
-from .arithmetic import EPS, ROUNDINGS, product, size, square
-from .shares import Shares, enclosed, factors, largest_mean, smallest_mean, term_ranges
+from .terms import (
+    EPS,
+    ROUNDINGS,
+    Shares,
+    enclosed,
+    factors,
+    largest_mean,
+    product,
+    size,
+    smallest_mean,
+    square,
+    term_ranges,
+)
 
 __all__ = ["Enclosure", "reach_of"]
 
@@ -151,7 +162,7 @@ class Enclosure:
         terms = term_ranges(model.antecedent, near, far)
         log_mu = model.antecedent.log_memberships(middle)
         log_mu = np.concatenate([log_mu, np.zeros((1, low.shape[1]))])
-        shares = [enclosed(factor, terms, log_mu, half) for factor in self.factors]
+        shares = [enclosed(factor, terms, log_mu) for factor in self.factors]
         centre = self.height + self.slopes @ (middle - model.reference[:, None])
         radius = np.abs(self.slopes) @ half
         value = self._shaped(centre - radius), self._shaped(centre + radius)

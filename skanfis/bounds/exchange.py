@@ -14,12 +14,10 @@ from sklearn.exceptions import ConvergenceWarning
 from .._validation import warn_user
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..model import TSKModel
-from .box import spread_points
-from .certified import cuts_of
+from .certified import cuts_of, spread_points
 from .constraints import Constraints
 from .enclosure import Enclosure
-from .inequalities import HeldPoints
-from .quadratic_program import InfeasibleError
+from .inequalities import HeldPoints, InfeasibleError
 from .search import largest
 from .terms import is_known
 
@@ -53,8 +51,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         why = "" if exchange.is_known else ": the ranges of its memberships are not known"
         warn_user(
             f"Not proven to hold everywhere{why}: {names}. It holds on the training data and a "
-            f"sample of {_SAMPLE} points. Use fewer rules, or Gaussian terms; see "
-            "skanfis.bounds.",
+            f"sample of {_SAMPLE} points. Use fewer rules, or Gaussian terms.",
             ConvergenceWarning,
         )
     normal, local = evaluation.normal, solved.local
@@ -70,7 +67,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     report = {
         "certified": is_proven,
         "margin": exchange.points.margin,
-        "rows": exchange.points.n_rows,
+        "rows": sum(map(len, exchange.points.after)),
         "boxes": exchange.n_boxes,
         "loss_before": float(evaluation.mean_squared_error),
         "loss_after": float(ended.mean_squared_error),
@@ -140,8 +137,7 @@ class _Exchange:
                 warn_user(
                     f"The data contradict {names}: kept, it raises the mean squared error of "
                     f"training from {before:.3g} to {after:.3g} of the variance of {name!r}, far "
-                    "more than noise would. Leave the constraint out, or look at the data; "
-                    "constraints_ has both losses.",
+                    "more than noise would. Leave the constraint out, or look at the data.",
                     ConstraintWarning,
                 )
 
@@ -164,14 +160,7 @@ class _Exchange:
                 f"points, which {self.model.n_rules} rules cannot all meet: two are the same, or "
                 "there are more than consequents. Give fewer points, or use more rules."
             )
-        own = [p for p, one in enumerate(self.inequalities) if one.output == failure.output]
-        guilty = []
-        for p in own:
-            try:
-                self.points.solve(evaluation, [p])
-            except InfeasibleError:
-                guilty.append(p)
-        return self._refuse([p in (guilty or own) for p in range(len(self.inequalities))])
+        return self._refuse([one.output == failure.output for one in self.inequalities])
 
     def _refuse(self, is_guilty):
         """Raise an error; ``is_guilty`` has, of every inequality, whether it is not kept."""

@@ -2,21 +2,32 @@
 
 Slopes are held as mean slopes over a small step, [y(x + d) - y(x)] / d, which a monotone output has
 of the right sign too: what is constrained is the prediction itself.
+
+The nearest consequents that keep them: (u - u0)' M (u - u0), with M = L L' the matrix of the normal
+equations, is to be least over E u = e, G u >= h. In v = L' (u - u0) equalities are eliminated by a
+QR factorisation; the rest is least-distance programming by non-negative least squares (Lawson and
+Hanson 1974, chapter 23).
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
 
+from ..consequent import NormalFactor
 from ..model import TSKModel
 from ..policies import SILENT
 from .constraints import Constraints
-from .quadratic_program import InfeasibleError, nearest
 
-__all__ = ["HeldPoints", "Inequality", "Solved", "inequalities_of"]
+__all__ = ["HeldPoints", "InfeasibleError", "nearest"]
 
 # The step of a slope, in standard deviations of the input.
 _STEP = 1e-5
+# A minimum below this is zero; rows are of length one.
+_ZERO = 1e-10
+# Equalities of which one follows from others.
+_DEPENDENT = 1e-10
 
 
 @dataclass(frozen=True)
@@ -64,7 +75,7 @@ class HeldPoints:
     def __init__(self, model: TSKModel, problem, constraints: Constraints, margin: float):
         self.model, self.problem, self.constraints = model, problem, constraints
         self.inequalities, self.margin = inequalities_of(constraints, model), margin
-        # Of each, points in standardised inputs: where a slope ends, and where it begins.
+        # Of each, points: where a slope ends, and where it begins.
         nothing = np.empty((0, model.n_inputs))
         self.after, self.before = ([nothing] * len(self.inequalities) for _ in range(2))
         beyond = constraints.points[~model.in_bounds(constraints.points)]
@@ -72,14 +83,8 @@ class HeldPoints:
             raise ValueError(
                 f"constraints has a FixedPoint at {beyond[0]}, where a model with "
                 f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
-                f"{model.describe_out_of_bounds(beyond)} Fix a point in the range, add a row of "
-                "data there, or use out_of_bounds='linear' or 'clip'."
+                f"{model.describe_out_of_bounds(beyond)} Use out_of_bounds='linear' or 'clip'."
             )
-
-    @property
-    def n_rows(self):
-        """Number of points held."""
-        return sum(len(points) for points in self.after)
 
     def standardised(self, X):
         """Points in standardised inputs."""
@@ -101,11 +106,11 @@ class HeldPoints:
         """Hold an inequality at these points too."""
         j = self.inequalities[place].input
         before, after = (X[:0], X) if j is None else self.steps(X, j)[:2]
-        self.after[place] = np.vstack([self.after[place], self.standardised(after)])
-        self.before[place] = np.vstack([self.before[place], self.standardised(before)])
+        self.after[place] = np.vstack([self.after[place], after])
+        self.before[place] = np.vstack([self.before[place], before])
 
-    def solve(self, evaluation, chosen=None) -> Solved:
-        """The nearest consequents; ``chosen`` inequalities alone, if given."""
+    def solve(self, evaluation) -> Solved:
+        """The nearest consequents."""
         columns, model = self._columns(evaluation.antecedent), self.model
         normal, problem = evaluation.normal, self.problem
         local, targets = normal.coefficients.copy(), problem.rows.targets
@@ -113,10 +118,9 @@ class HeldPoints:
         at_points = columns.with_out_of_bounds(model.out_of_bounds, model.max_extrapolation)
         equal = self._in_local(at_points.predict(self.standardised(self.constraints.points)))
         values = (self.constraints.values - targets.offset) / targets.scale
-        places = range(len(self.inequalities)) if chosen is None else chosen
         known, active = [], np.zeros(len(self.inequalities), dtype=int)
         for k in range(problem.n_outputs):
-            own = [p for p in places if self.inequalities[p].output == k]
+            own = [p for p, one in enumerate(self.inequalities) if one.output == k]
             rows, least = self._rows(columns, own)
             try:
                 local[:, k], is_active = nearest(
@@ -133,8 +137,7 @@ class HeldPoints:
 
     def _known(self, places, is_active, active):
         """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
-        inputs, found, start = self.problem.rows.inputs, [], 0
-        model, points = self.model, self.constraints.points
+        model, points, found, start = self.model, self.constraints.points, [], 0
         if model.out_of_bounds == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[model.in_bounds(points)]
@@ -145,10 +148,8 @@ class HeldPoints:
             start, active[p] = start + chosen.size, chosen.sum()
             if not chosen.any():
                 continue
-            after, before = inputs.offset + inputs.scale * self.after[p][chosen], None
-            if self.inequalities[p].input is not None:
-                before = inputs.offset + inputs.scale * self.before[p][chosen]
-            found.append((after, before))
+            before = None if self.inequalities[p].input is None else self.before[p][chosen]
+            found.append((self.after[p][chosen], before))
         return found
 
     def _rows(self, columns, places):
@@ -157,11 +158,11 @@ class HeldPoints:
         rows, least = [np.empty((0, n_columns))], [np.empty(0)]
         for p in places:
             one = self.inequalities[p]
-            found, size, limit = columns.predict(self.after[p]), 1.0, 0.0
+            found, size, limit = columns.predict(self.standardised(self.after[p])), 1.0, 0.0
             if one.input is None:
                 limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
             else:
-                found = (found - columns.predict(self.before[p])) / _STEP
+                found = (found - columns.predict(self.standardised(self.before[p]))) / _STEP
                 # Where no consequents have much of a slope, none is asked for.
                 size = np.minimum(np.abs(found).sum(axis=1), 1.0)
             rows.append(self._in_local(one.sign * found))
@@ -198,3 +199,50 @@ class HeldPoints:
         if not len(rows):
             return rows
         return self.problem.local.transform_rows(np.array(rows.T, order="C")).T
+
+
+class InfeasibleError(Exception):
+    """No consequents keep the constraints; ``by_equalities``: not even the equalities alone."""
+
+    def __init__(self, by_equalities):
+        super().__init__()
+        self.by_equalities, self.output = by_equalities, 0
+
+
+def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
+    """The u nearest to ``start`` with E u = e and G u >= h, and which of these hold it back."""
+    base, toward = np.empty((start.size, 0)), np.empty(0)
+    if equal.size:
+        base, triangle = np.linalg.qr(factor.half_solve(equal.T))
+        sizes = np.abs(np.diagonal(triangle))
+        if (sizes <= _DEPENDENT * sizes.max(initial=0.0)).any() or equal.shape[0] > start.size:
+            raise InfeasibleError(True)
+        toward = solve_triangular(triangle, equal_to - equal @ start, trans="T")
+    half = factor.half_solve(at_least.T)
+    short = least - at_least @ start - half.T @ (base @ toward)
+    free = half - base @ (base.T @ half)
+    length = np.sqrt(np.sum(free**2, axis=0))
+    # What equalities decide, or nothing can change: met, or not to be met.
+    fixed = length <= _DEPENDENT * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
+    if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
+        raise InfeasibleError(False)
+    multipliers = np.zeros(least.size)
+    kept = ~fixed
+    if (short[kept] > 0.0).any():
+        found = _least_distance(free[:, kept] / length[kept], short[kept] / length[kept])
+        multipliers[kept] = found / length[kept]
+    step = base @ toward + free @ multipliers
+    return start + factor.back_solve(step), multipliers > 0.0
+
+
+def _least_distance(columns, short):
+    """Multipliers of the shortest t with columns' t >= short."""
+    scale = short.max()
+    rows = np.vstack([columns, short / scale])
+    target = np.zeros(rows.shape[0])
+    target[-1] = 1.0
+    multipliers, distance = nnls(rows, target, maxiter=30 * max(rows.shape))
+    rest = 1.0 - (short / scale) @ multipliers
+    if distance <= _ZERO or rest <= _ZERO**2:
+        raise InfeasibleError(False)
+    return scale * multipliers / rest

@@ -1,16 +1,21 @@
-r"""What a term can be on an interval: the ranges of log mu and of its slope, for every family.
+r"""What terms can be on a box, for every family; shares of strengths, and means by them.
 
 log mu rises up to the term's place and falls from there on. Slopes of log-concave families
 (Gaussians, sigmoids) fall; those of bells and of flanks with a foot are looked at piece by piece.
 Ranges are taken over a box wider by what rounding x and the term's numbers may amount to, and are
 then widened by rounding themselves: they hold of log mu as it is, and as it is computed.
+
+Strengths are products of shares, one of each factor: a softmax of sums l_k of log mu, enclosed from
+the ranges of all l_k. A mean sum_k nu_k v_k is bounded by weak duality; docs/bounds.rst has the
+formulas.
 """
 
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ..antecedent import TermGroup
+from ..antecedent import Antecedent, TermGroup
 from ..membership import (
     Bell,
     Gaussian,
@@ -24,13 +29,20 @@ from ..membership import (
     ZShaped,
 )
 from ..membership.profiles import LinearProfile
-from .arithmetic import EPS, ROUNDINGS, size, widened
 
-__all__ = ["TermRanges", "is_known", "ranges"]
+__all__ = ["Shares", "TermRanges", "is_known", "ranges"]
 
+EPS = float(np.finfo(float).eps)
+# Roundings of a membership, a share, a rule's output or its slope, in EPS, with room to spare: of
+# a dozen operations one after another, beside those of sums, which are counted.
+ROUNDINGS = 32.0
 _LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, SigmoidProduct)
 _ONE_SIDED = (SShaped, ZShaped)
 _BY_SIDES = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
+# Where the logarithm of a floored flank is steepest: of the straight one as the foot is reached;
+# of two parabolas where 2 s^2 is as large as the floor, s = 1 - t = 5.5e-6, to a thousandth.
+_STEEPEST_LINEAR = (np.nextafter(1.0, 0.0),)
+_STEEPEST_SPLINE = tuple(1.0 - 5.507e-6 * np.array([1.5, 1.0, 0.5]))
 
 
 def is_known(family):
@@ -203,7 +215,127 @@ def _bell_curve(theta, lo, hi):
     return np.minimum.reduce(corners), np.maximum.reduce(corners)
 
 
-# Where the logarithm of a floored flank is steepest: of the straight one as the foot is reached;
-# of two parabolas where 2 s^2 is as large as the floor, s = 1 - t = 5.5e-6, to a thousandth.
-_STEEPEST_LINEAR = (np.nextafter(1.0, 0.0),)
-_STEEPEST_SPLINE = tuple(1.0 - 5.507e-6 * np.array([1.5, 1.0, 0.5]))
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """Shares that sum to one: by input, positions of the terms (n_shares, n) whose log mu add up.
+
+    The number of all terms stands for none.
+    """
+
+    terms: dict[int, np.ndarray]
+
+    def total(self, by_term):
+        """Sums over each share's terms, (n_shares, n_boxes); ``by_term`` ends in a row of zeros."""
+        return sum(by_term[places].sum(axis=1) for places in self.terms.values())
+
+    def along(self, by_term):
+        """The same along each input: dict of (n_shares, n_boxes)."""
+        return {j: by_term[places].sum(axis=1) for j, places in self.terms.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """The shares of one factor in every box, (n_shares, n_boxes) each."""
+
+    middle: np.ndarray  # at the middle of the box
+    low: np.ndarray
+    high: np.ndarray
+    error: np.ndarray  # of the logarithm of a share as it is computed, at most
+    departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
+    curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
+
+
+def factors(antecedent: Antecedent):
+    """The factors of a rule base, in the order of its rules."""
+    return [Factor(terms) for terms in antecedent.factor_terms()]
+
+
+def term_ranges(antecedent: Antecedent, low, high):
+    """Ranges of all terms over boxes (n_inputs, n_boxes), with a row of zeros at the end."""
+    parts = [ranges(group, low, high) for group in antecedent.groups]
+    parts.append(TermRanges(*[np.zeros((1, low.shape[1]))] * len(TermRanges._fields)))
+    return TermRanges(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def enclosed(factor: Factor, terms: TermRanges, log_mu):
+    """The :class:`Shares` of a factor, from the ranges of its terms; ``log_mu`` at the middles."""
+    middle = factor.total(log_mu)
+    middle = np.exp(middle - middle.max(axis=0))
+    middle /= middle.sum(axis=0)
+    least, most = _by_range(factor.total(terms.low), factor.total(terms.high))
+    error = factor.total(terms.error)
+    # The mean error of all counts for each: the sum of the softmax.
+    common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
+    error = error + common + EPS * (ROUNDINGS + least.shape[0])
+    curve_low, curve_high = factor.along(terms.curve_low), factor.along(terms.curve_high)
+    curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
+    shares = Shares(middle, least, most, error, {}, curvature)
+    slopes = factor.along(terms.slope_low), factor.along(terms.slope_high)
+    return replace(shares, departure=_departures(shares, *slopes))
+
+
+def _by_range(low, high):
+    """Shares from the ranges of their logarithms alone."""
+    top = high.max(axis=0)
+    down, up = np.exp(low - top), np.exp(high - top)
+    n = down.shape[0]
+    slack = (n + ROUNDINGS) * EPS
+    others_up, others_down = up.sum(axis=0) - up, down.sum(axis=0) - down
+    # What the subtraction has lost counts as being there.
+    least = down / (down + np.maximum(others_up, 0.0) + 2.0 * slack * up.sum(axis=0))
+    spare = np.maximum(others_down - 2.0 * slack * down.sum(axis=0), 0.0)
+    most = np.minimum(up / (up + spare) * (1.0 + slack), 1.0)
+    # Of a share that no box can give a strength to, nothing is left: 0 / 0.
+    return np.nan_to_num(least * (1.0 - slack), nan=0.0), np.nan_to_num(most, nan=1.0)
+
+
+def _departures(shares, slopes_low, slopes_high):
+    found = {}
+    for j, high in slopes_high.items():
+        low = slopes_low[j]
+        mean_low, mean_high = smallest_mean(low, [shares]), largest_mean(high, [shares])
+        slack = 4.0 * ROUNDINGS * EPS * size((low, high))
+        common = slack.max(axis=0, initial=0.0, where=shares.high > EPS)
+        total = (shares.high * size((low, high))).sum(axis=0)
+        common = common + EPS * (ROUNDINGS + low.shape[0]) * total
+        found[j] = low - mean_high - slack - common, high - mean_low + slack + common
+    return found
+
+
+def largest_mean(values, every):
+    """Upper bound of the mean of ``values`` (n_shares, ..., n_boxes) under all factors' shares."""
+    for shares in reversed(every):
+        middle = (shares.middle * values).sum(axis=-2)
+        off = values - middle[..., None, :]
+        values = middle + np.where(off > 0.0, shares.high * off, shares.low * off).sum(axis=-2)
+    return values if every else values[0]
+
+
+def smallest_mean(values, every):
+    """Lower bound of the same."""
+    return -largest_mean(-values, every)
+
+
+def product(one, other):
+    """Range of a product from the ranges of both; NaN, for unknown, of zero times infinity."""
+    corners = [a * b for a in one for b in other]
+    low = np.minimum(np.minimum(corners[0], corners[1]), np.minimum(corners[2], corners[3]))
+    high = np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3]))
+    return low, high
+
+
+def square(ends):
+    """Range of a square from that of its root."""
+    low, high = np.minimum(*np.abs(ends)), np.maximum(*np.abs(ends))
+    return np.where((ends[0] <= 0.0) & (ends[1] >= 0.0), 0.0, low**2), high**2
+
+
+def size(ends):
+    """The largest absolute value in an interval."""
+    return np.maximum(np.abs(ends[0]), np.abs(ends[1]))
+
+
+def widened(low, high):
+    """The interval, wider by rounding errors of its ends."""
+    slack = ROUNDINGS * EPS * size((low, high))
+    return low - slack, high + slack

@@ -2,8 +2,8 @@ r"""Fuzzy c-means by alternating optimisation.
 
 With squared distances D_ik, memberships u_ik of row sum one and weights w_i, the objective (Bezdek
 1981) is J = Σ_i w_i Σ_k u_ik^m D_ik. At fixed centres u_ik ~ D_ik^(-1/(m-1)) is best, at fixed
-memberships c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m. Powers are logarithms, relative to the
-nearest centre and to a cluster's largest weight: as m → 1 they would overflow, or vanish.
+memberships c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m. Distances are taken relative to the nearest
+centre's, for as m → 1 their powers would overflow.
 
 All centres at the mean of the data are a fixed point, which attracts if m > 1 / (1 - 2 λ), λ the
 largest eigenvalue of Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i w_i with z = x - mean (Yu et al. 2004).
@@ -29,40 +29,34 @@ __all__ = ["FuzzyCMeans"]
 
 # Centres that differ by less than this part of their cluster's own spread are one.
 _SAME = 0.01
-# Stands for log 0 where differences are taken, for -inf - -inf is not a number.
-_LOG_ZERO = -1e300
 
 
-def log_memberships(distances, m):
-    """Logarithms of the memberships, from squared distances (n_clusters, n_rows)."""
+def memberships(distances, m):
+    """Memberships, from squared distances (n_clusters, n_rows)."""
     closest = distances.min(axis=0)
-    relative = np.ones_like(distances)
-    with np.errstate(divide="ignore", over="ignore"):
-        np.divide(distances, closest, out=relative, where=distances > closest)
-    log_u = np.log(relative, out=relative)
-    log_u /= 1.0 - m
-    log_u -= np.log(np.exp(log_u).sum(axis=0))
-    return log_u
+    nearness = np.ones_like(distances)
+    np.divide(closest, distances, out=nearness, where=distances > closest)
+    # "auto" is m = 1 where all rows are the same.
+    nearness **= 1.0 / max(m - 1.0, np.finfo(float).tiny)
+    nearness /= nearness.sum(axis=0)
+    return nearness
 
 
 def alternate(points, weight, centers, m):
     """New centres, the root mean square distances from the old ones, and J at the old ones."""
-    top = np.full((centers.shape[0], 1), _LOG_ZERO)
-    mass, scatter = np.zeros_like(top), np.zeros_like(top)
+    mass, scatter = np.zeros((2, centers.shape[0], 1))
     moment = np.zeros_like(centers)
     for part, distances in distance_blocks(points, centers):
-        log_pull = log_memberships(distances, m)
-        log_pull *= m
-        new_top = np.maximum(top, log_pull.max(axis=1, keepdims=True))
-        fade = np.exp(top - new_top)
-        pull = np.exp(log_pull - new_top)
+        pull = memberships(distances, m) ** m
         pull *= weight[part]
-        mass = fade * mass + pull.sum(axis=1, keepdims=True)
-        scatter = fade * scatter + np.einsum("kn,kn->k", pull, distances)[:, np.newaxis]
-        moment = fade * moment + pull @ points[part]
-        top = new_top
-    spread = np.sqrt(scatter / mass)[:, 0]
-    return moment / mass, spread, float((np.exp(top) * scatter).sum())
+        mass += pull.sum(axis=1, keepdims=True)
+        scatter += np.einsum("kn,kn->k", pull, distances)[:, np.newaxis]
+        moment += pull @ points[part]
+    # A centre far from all rows has none where m is near to one: it stays where it is.
+    has_rows = mass > 0.0
+    mass = np.where(has_rows, mass, 1.0)
+    new = np.where(has_rows, moment / mass, centers)
+    return new, np.sqrt(scatter / mass)[:, 0], float(scatter.sum())
 
 
 def descend(points, weight, centers, m, tol, max_iter):
@@ -227,10 +221,10 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
         """
         check_is_fitted(self)
         X = check_rows(self, X)
-        memberships = np.empty((X.shape[0], self.n_clusters))
+        found = np.empty((X.shape[0], self.n_clusters))
         for part, distances in distance_blocks(X, self.cluster_centers_):
-            np.exp(log_memberships(distances, self.m_).T, out=memberships[part])
-        return memberships
+            found[part] = memberships(distances, self.m_).T
+        return found
 
     def _starts(self, points, weight, mean, scale):
         """Centres to start from, on the scale of ``points``."""
@@ -239,8 +233,7 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
             if centers.shape != (self.n_clusters, points.shape[1]):
                 raise ValueError(
                     f"init has shape {centers.shape}, but n_clusters={self.n_clusters} and X has "
-                    f"{points.shape[1]} columns: give an array of shape "
-                    f"{(self.n_clusters, points.shape[1])}."
+                    f"{points.shape[1]} columns."
                 )
             return [(centers - mean) / scale]
         random_state = check_random_state(self.random_state)

@@ -8,33 +8,19 @@ from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 
 from .._sklearn import Interval
-from ..blocks import row_blocks
-from ._rows import Clusterer, nearest
+from ._rows import Clusterer, distance_blocks, nearest
 
 __all__ = ["SubtractiveClustering"]
 
-# Rows and columns of a block of the kernel matrix: 512 kB.
-_BLOCK_ROWS = 256
 # Potentials this near, relative to the first centre's, differ by rounding: the first of them wins.
 _TIE = 1e-9
 
 
 def potentials(points, weight):
-    """Potentials of points in units of the radius, by blocks above the diagonal."""
-    # -4 |x - y|² = 8 x·y - 4 |x|² - 4 |y|² is one product of points with two more columns.
-    squares = -4.0 * np.einsum("ij,ij->i", points, points)[:, np.newaxis]
-    ones = np.ones_like(squares)
-    left = np.hstack([8.0 * points, squares, ones])
-    right = np.hstack([points, ones, squares])
-    blocks = row_blocks(points.shape[0], _BLOCK_ROWS)
-    total = np.zeros(points.shape[0])
-    for place, rows in enumerate(blocks):
-        for columns in blocks[place:]:
-            kernel = left[rows] @ right[columns].T
-            np.exp(kernel, out=kernel)
-            total[rows] += kernel @ weight[columns]
-            if columns != rows:
-                total[columns] += weight[rows] @ kernel
+    """Potentials of points in units of the radius."""
+    total = np.empty(points.shape[0])
+    for part, squared in distance_blocks(points, points):
+        total[part] = weight @ np.exp(-4.0 * squared)
     return total
 
 
@@ -137,10 +123,8 @@ class SubtractiveClustering(Clusterer):
         self.widths_ = radius * (high - low) / np.sqrt(8.0)
         points = self._in_radii(rows, low + 0.5 * (high - low))
         most = rows.shape[0] if self.max_clusters is None else self.max_clusters
-        potential = potentials(points, weight)
-        centers, self.potentials_ = find_centers(
-            points, potential, self.squash, self.accept, self.reject, most
-        )
+        limits = self.squash, self.accept, self.reject, most
+        centers, self.potentials_ = find_centers(points, potentials(points, weight), *limits)
         self.cluster_centers_ = rows[centers]
 
     def _checked_radius(self):
@@ -149,8 +133,7 @@ class SubtractiveClustering(Clusterer):
         radius = np.asarray(self.radius, dtype=np.float64)
         if radius.ndim and radius.shape != (self.n_features_in_,):
             raise ValueError(
-                f"radius has shape {radius.shape}, but X has {self.n_features_in_} columns: give "
-                "one number, or one per column."
+                f"radius has shape {radius.shape}, but X has {self.n_features_in_} columns."
             )
         if not (np.isfinite(radius) & (radius > 0)).all():
             raise ValueError(f"radius={self.radius!r} must be positive and finite everywhere.")

@@ -8,12 +8,11 @@ import numpy as np
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ..bounds.constraints import Constraints
-from ..inspection.measures import TargetScale, rule_sums
+from ..inspection.measures import RuleSums
 from ..inspection.readability import Readability
 from ..learning.sampling import is_many
-from ..options import policy_of
 from ..regressor import ANFISRegressor
-from .rows import ClusterData, Partitions, add_each, is_collection, reduce_partitions
+from .rows import ClusterData, Partitions, add_each, computed, is_collection, reduce_partitions
 
 __all__ = ["DaskANFISRegressor"]
 
@@ -22,23 +21,14 @@ class DaskANFISRegressor(ANFISRegressor):
     r"""ANFISRegressor for dask arrays and DataFrames, trained on the cluster where they live.
 
     Every pass over the rows is one reduction on the cluster: a task per partition, and a tree that
-    adds their sums. The rows stay where they are; what comes to the client are sums of a few
-    hundred kilobytes, and one sample of 20,000 rows, on which the structure is searched and the
-    memberships are trained before all rows are used. Up to 100,000 rows are fetched, and trained
-    on as :class:`skanfis.ANFISRegressor` does.
+    adds their sums. The rows stay where they are, but for one sample of 20,000, on which the
+    structure is searched and the memberships are trained first. Up to 100,000 rows are fetched.
 
     Parameters, attributes and results are those of :class:`skanfis.ANFISRegressor` on the same
     rows, up to rounding errors. X, y, weights and groups may be dask arrays or frames cut at the
-    same rows, or whatever it takes. Of dask collections ``predict``, ``coverage``, ``in_bounds``
-    and ``strengths`` are lazy, and ``score`` is a reduction.
-
-    The scheduler is that which dask uses: the ``dask.distributed`` client that was made last, or
-    else the threads of this process. Partitions are loaded anew for every pass, some eight
-    times, unless they have been persisted (``X.persist()``).
-
-    See Also
-    --------
-    skanfis.ANFISRegressor : What the parameters and attributes mean.
+    same rows, or whatever it takes. Of dask collections ``predict`` is lazy, and ``score`` is a
+    reduction. The scheduler is that which dask uses; partitions are loaded anew for every pass,
+    some eight times, unless they have been persisted (``X.persist()``).
 
     Notes
     -----
@@ -66,26 +56,9 @@ class DaskANFISRegressor(ANFISRegressor):
         if not is_collection(X):
             return super().predict(X, return_std)
         check_is_fitted(self)
-        columns = None if self._single_output else self.model_.output_names
-        name = self.model_.output_names[0]
-        y = self._lazily("predict", X, columns, name)
-        return (y, self._lazily("std", X, columns, name)) if return_std else y
-
-    def coverage(self, X: Any) -> Any:
-        """Tell how well the training data cover each row, lazily where X is a dask collection."""
-        return self._lazily("coverage", X) if is_collection(X) else super().coverage(X)
-
-    def in_bounds(self, X: Any) -> Any:
-        """Tell which rows lie in the range of training, lazily where X is a dask collection."""
-        return (
-            self._lazily("in_bounds", X, dtype=bool) if is_collection(X) else super().in_bounds(X)
-        )
-
-    def strengths(self, X: Any) -> Any:
-        """Tell how strongly each rule fires on each row, lazily where X is a dask collection."""
-        if not is_collection(X):
-            return super().strengths(X)
-        return self._lazily("strengths", X, tuple(range(self.n_rules_)))
+        self._check_columns(X)
+        y = self._lazily(X)
+        return (y, self._lazily(X, is_deviation=True)) if return_std else y
 
     def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
         """Coefficient of determination, a reduction where X and y are dask collections."""
@@ -96,7 +69,7 @@ class DaskANFISRegressor(ANFISRegressor):
         self._check_columns(X)
         # About the training mean: the squares lose no digits.
         origin = self.readability_.measures.mean
-        of_rows = partial(_error_sums, model=self._local(), origin=origin)
+        of_rows = partial(_error_sums, model=self._local(has_names=False), origin=origin)
         weight, first, second, error = reduce_partitions(partitions, of_rows, add_each)
         spread = second - first**2 / weight
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -111,21 +84,18 @@ class DaskANFISRegressor(ANFISRegressor):
                 setattr(local, name, getattr(self, name))
         return local
 
-    def _lazily(self, method, X, columns=None, name=None, dtype=float):
-        """A method on every block; ``columns`` names those of a result of two dimensions."""
-        check_is_fitted(self)
-        self._check_columns(X)
-        is_frame = hasattr(X, "columns")
+    def _lazily(self, X, is_deviation=False):
+        """Predictions, or their standard deviations, block by block."""
+        is_frame, names = hasattr(X, "columns"), self.model_.output_names
         local = self._local(has_names=is_frame)
-        of_block = partial(_apply, model=local, method=method, columns=columns, name=name)
-        nothing = np.empty((0, len(columns)) if columns else 0, dtype)
+        of_block = partial(_predicted, model=local, names=names, is_deviation=is_deviation)
         if is_frame:
-            return X.map_partitions(of_block, meta=_as_frame(nothing, columns, name))
-        X = X.rechunk({1: -1})
-        if columns is None:
-            return X.map_blocks(of_block, drop_axis=1, dtype=dtype, meta=nothing)
-        chunks = (X.chunks[0], (len(columns),))
-        return X.map_blocks(of_block, chunks=chunks, dtype=dtype, meta=nothing)
+            return X.map_partitions(of_block, meta=of_block(X._meta))
+        X, nothing = X.rechunk({1: -1}), of_block(np.empty((0, X.shape[1])))
+        if self._single_output:
+            return X.map_blocks(of_block, drop_axis=1, dtype=float, meta=nothing)
+        chunks = (X.chunks[0], (len(names),))
+        return X.map_blocks(of_block, chunks=chunks, dtype=float, meta=nothing)
 
     def _check_columns(self, X, reset=False):
         """scikit-learn's checks of the columns: here, where a worker would warn of each block."""
@@ -149,7 +119,8 @@ class DaskANFISRegressor(ANFISRegressor):
             self.monotonic_cst, self.constraints, layout.input_names, len(layout.output_names)
         )
         if not is_many(data.rows()):
-            return super()._check_training_data(*_named(layout, *data.gathered()))
+            here = computed(X, y, sample_weight, groups)
+            return super()._check_training_data(*here)
         is_given = self.max_iter == 0 and not isinstance(self.partition, str)
         for name, is_asked in (
             ("Huber's loss", self.loss != "squared_error"),
@@ -162,58 +133,38 @@ class DaskANFISRegressor(ANFISRegressor):
                     "out, or train an ANFISRegressor on a sample of the rows."
                 )
         self._check_columns(X, reset=True)
-        self._single_output = layout.is_single_output
+        self._single_output = y.ndim == 1
         return replace(data, wishes=wishes)
 
     def _readability(self, data):
         if not isinstance(data, ClusterData):
             return super()._readability(data)
-        rows, model = data.rows(), self.model_
-        scale = rows.targets
-        target = TargetScale(
-            rows.total_weight, scale.offset, scale.scale, scale.minimum, scale.maximum
-        )
+        rows = data.rows()
         # Nothing is asked of the posterior, which is most of a model's bytes.
-        sent = replace(model, posterior=None)
-        sums = rows.reduce(partial(rule_sums, model=sent, target=target), _joined)
-        return Readability(model, sums.measures())
+        sent = replace(self.model_, posterior=None)
+        sums = rows.reduce(partial(_rule_sums, model=sent, target=rows.targets), RuleSums.joined)
+        return Readability(self.model_, sums.measures())
 
 
-def _named(layout, X, y, sample_weight, groups):
-    """Rows that were fetched, with the names that their collections had."""
-    import pandas as pd
-
-    if layout.given_input_names is not None:
-        X = pd.DataFrame(X, columns=list(layout.given_input_names))
-    if layout.is_single_output:
-        y = y[:, 0]
-    if layout.given_output_names is not None:
-        names = list(layout.given_output_names)
-        y = pd.Series(y, name=names[0]) if y.ndim == 1 else pd.DataFrame(y, columns=names)
-    return X, y, sample_weight, groups
+def _rule_sums(rows, model, target):
+    return RuleSums(model, target).add(rows.X, rows.sample_weight)
 
 
-def _joined(one, other):
-    return one.joined(other)
-
-
-def _apply(block, model, method, columns, name):
-    """A method of the model on a block, as a frame where the block is one."""
+def _predicted(block, model, names, is_deviation):
+    """Predictions of a block, or their standard deviations; a frame where the block is one."""
     if not len(block):
-        values = np.empty((0, len(columns)) if columns else 0)
-    elif method == "std":
+        values = np.empty(0 if model._single_output else (0, len(names)))
+    elif is_deviation:
         values = model.predict(block, return_std=True)[1]
     else:
-        values = getattr(model, method)(block)
-    return _as_frame(values, columns, name, block.index) if hasattr(block, "index") else values
-
-
-def _as_frame(values, columns, name, index=None):
+        values = model.predict(block)
+    if not hasattr(block, "index"):
+        return values
     import pandas as pd
 
-    if columns is None:
-        return pd.Series(values, index=index, name=name)
-    return pd.DataFrame(values, index=index, columns=list(columns))
+    if values.ndim == 1:
+        return pd.Series(values, index=block.index, name=names[0])
+    return pd.DataFrame(values, index=block.index, columns=list(names))
 
 
 def _error_sums(rows, model, origin):
@@ -221,6 +172,6 @@ def _error_sums(rows, model, origin):
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     if not rows.n_rows:
         return [0.0, *np.zeros((3, len(origin)))]
-    predicted = model.model_.with_out_of_bounds(*policy_of(model.out_of_bounds)).predict(rows.X)
+    predicted = model.predict(rows.X).reshape(rows.y.shape)
     away, error = rows.y - origin, rows.y - predicted
     return [weight.sum(), weight @ away, weight @ away**2, weight @ error**2]

@@ -15,7 +15,7 @@ from ..learning.data import Scale, StandardisedData, check_scales, column_statis
 from ..naming import default_output_names
 from ..training.chunks import joined_scales
 
-__all__ = ["ClusterData", "Layout", "Partitions", "add_each", "is_collection", "reduce_partitions"]
+__all__ = ["ClusterData", "Partitions", "computed", "is_collection", "reduce_partitions"]
 
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
@@ -34,7 +34,6 @@ class Layout:
 
     n_inputs: int
     n_outputs: int
-    is_single_output: bool
     given_input_names: tuple | None
     given_output_names: tuple | None
 
@@ -45,23 +44,17 @@ class Layout:
             if not is_collection(one):
                 raise TypeError(
                     f"{what} is a {type(one).__name__}, but the other one is a dask collection: "
-                    "give both as dask arrays or DataFrames (dask.array.from_array, "
-                    "dask.dataframe.from_pandas)."
+                    "give both as dask arrays or DataFrames."
                 )
             if one.ndim not in dimensions:
                 raise ValueError(f"{what} has {one.ndim} dimensions, and cannot be trained on.")
         n_inputs, n_outputs = X.shape[1], 1 if y.ndim == 1 else y.shape[1]
-        for what, count in (("X", n_inputs), ("y", n_outputs)):
-            if not (isinstance(count, int | np.integer) and count > 0):
-                raise ValueError(f"{what} has {count} columns: their number must be known, not 0.")
-        names = getattr(y, "columns", None)
-        if names is None and getattr(y, "name", None) is not None and hasattr(y, "divisions"):
-            names = [y.name]
+        is_named = hasattr(y, "divisions") and getattr(y, "name", None) is not None
+        names = getattr(y, "columns", [y.name] if is_named else None)
         columns = getattr(X, "columns", None)
         return cls(
             int(n_inputs),
             int(n_outputs),
-            y.ndim == 1,
             None if columns is None else tuple(columns),
             None if names is None else tuple(names),
         )
@@ -93,22 +86,21 @@ class Partitions:
     def of(cls, X, y, sample_weight=None, groups=None):
         """Of collections; TypeError or ValueError where they cannot be laid side by side."""
         layout = Layout.of(X, y)
-        first = _delayed(X, "X", None)
+        first = _delayed(X, "X")
         pieces = [first]
         for what, one in (("y", y), ("sample_weight", sample_weight), ("groups", groups)):
-            parts = [None] * len(first) if one is None else _delayed(one, what, X)
+            parts = [None] * len(first) if one is None else _delayed(one, what)
             if len(parts) != len(first):
                 raise ValueError(
                     f"{what} has {len(parts)} partitions, X has {len(first)}: they must be cut at "
-                    "the same rows. Take them from one frame, use repartition, or compute the "
-                    "sizes of unknown chunks (compute_chunk_sizes) so that they can be rechunked."
+                    "the same rows. Take them from one frame, or use repartition or rechunk."
                 )
             pieces.append(parts)
         return cls(list(zip(*pieces, strict=True)), layout)
 
 
-def _delayed(collection, what, like):
-    """The partitions of a collection; chunks of an array are cut as those of ``like``."""
+def _delayed(collection, what):
+    """The partitions of a collection."""
     if not is_collection(collection):
         raise TypeError(
             f"{what} is a {type(collection).__name__}, but X is a dask collection: give a dask "
@@ -120,15 +112,6 @@ def _delayed(collection, what, like):
         return list(collection.simplify().to_delayed(optimize_graph=False))
     if collection.ndim == 2:
         collection = collection.rechunk({1: -1})
-    chunks = None if like is None else getattr(like, "chunks", None)
-    if chunks is not None and chunks[0] != collection.chunks[0]:
-        sizes = (*chunks[0], *collection.chunks[0])
-        if all(size == size for size in sizes):  # none is unknown, which is NaN
-            if sum(chunks[0]) != sum(collection.chunks[0]):
-                raise ValueError(
-                    f"X has {sum(chunks[0]):,} rows and {what} {sum(collection.chunks[0]):,}."
-                )
-            collection = collection.rechunk({0: chunks[0]})
     return list(collection.to_delayed().ravel())
 
 
@@ -136,8 +119,7 @@ def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable
     """What ``of_rows`` makes of every partition, merged two by two, in their order.
 
     One task per partition, and a tree of merges; nothing but the result comes to the client.
-    ``of_rows`` takes the rows with weight, not standardised. RuntimeError where the cluster is
-    gone, or kills its workers.
+    ``of_rows`` takes the rows with weight, not standardised.
     """
     from dask.delayed import delayed
 
@@ -148,26 +130,28 @@ def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable
     while len(level) > 1:
         groups = [level[start : start + _FAN_IN] for start in range(0, len(level), _FAN_IN)]
         level = [add(merge, group) for group in groups]
-    return _computed(level[0])
+    return computed(level[0])[0]
 
 
-def _computed(lazy):
+def computed(*collections):
+    """What ``dask.compute`` gives; RuntimeError where the cluster is gone, or kills its workers."""
     from concurrent.futures import CancelledError
 
+    from dask.base import compute
+
     try:
-        return lazy.compute()
+        return compute(*collections)
     except Exception as error:
         # Futures of a client that is closed are no part of the graph any more.
         is_missing = isinstance(error, ValueError) and str(error).startswith("Missing dependency")
         is_of_cluster = type(error).__module__.partition(".")[0] == "distributed"
         if is_missing or is_of_cluster or isinstance(error, CancelledError):
-            raise RuntimeError(_gone(error)) from error
+            raise RuntimeError(_gone(f"{type(error).__name__}: {error}".strip())) from error
         raise
 
 
-def _gone(error):
-    what = f"{type(error).__name__}: {error}".strip()
-    if type(error).__name__ == "KilledWorker":
+def _gone(what):
+    if what.startswith("KilledWorker"):
         return (
             "The same partition ended several workers, most likely for want of memory: use smaller "
             f"partitions (repartition, rechunk), or workers with more memory. ({what})"
@@ -217,10 +201,7 @@ def _numbers(table, what, names, n_columns):
     """A partition as floats, (n_rows, n_columns); ValueError where it is none of these columns."""
     if isinstance(table, str | tuple):
         # Where its future is gone, dask may hand over a chunk's key in its place.
-        raise RuntimeError(
-            f"{what} is a {type(table).__name__} and no rows: the cluster that they lived on was "
-            "closed. Load or persist them again with the client that is now open."
-        )
+        raise RuntimeError(_gone(f"{what} is a {type(table).__name__} and no rows"))
     found = None if names is None or not hasattr(table, "columns") else tuple(table.columns)
     if found is not None and found != names:
         raise ValueError(
@@ -270,16 +251,18 @@ def _on_scales(rows, inputs, targets, of_rows):
 
 @dataclass(frozen=True, eq=False)
 class _Described:
-    """What is known of some rows after one pass; the scales are None of no rows."""
+    """What is known of some rows after one pass."""
 
     n_rows: int
     weight: float
-    inputs: Scale | None = None
-    targets: Scale | None = None
+    inputs: Scale
+    targets: Scale
 
 
 def _describe(rows, layout):
-    """Count and measure a partition; ValueError where it is not finite."""
+    """Count and measure a partition, None of no rows; ValueError where it is not finite."""
+    if rows.n_rows == 0:
+        return None
     check_finite(rows.X, "X", layout.input_names)
     check_finite(rows.y, "y", layout.output_names)
     if rows.sample_weight is not None:
@@ -287,16 +270,14 @@ def _describe(rows, layout):
         largest, total = rows.sample_weight.max(initial=0.0), rows.total_weight
         if largest > _LARGEST_WEIGHT or 0.0 < total < 1.0 / _LARGEST_WEIGHT:
             raise ValueError(f"sample_weight is as large as {largest:g}: give weights near to one.")
-    if rows.n_rows == 0:
-        return _Described(0, 0.0)
     inputs, targets = (column_statistics(part, rows.sample_weight) for part in (rows.X, rows.y))
     return _Described(rows.n_rows, rows.total_weight, inputs, targets)
 
 
 def _joined(one, other):
     """Describe the rows of both."""
-    if one.n_rows == 0 or other.n_rows == 0:
-        return other if one.n_rows == 0 else one
+    if one is None or other is None:
+        return other if one is None else one
     weights = one.weight, other.weight
     inputs = joined_scales(one.inputs, other.inputs, *weights)
     targets = joined_scales(one.targets, other.targets, *weights)
@@ -316,10 +297,9 @@ class ClusterData:
         """Validate and measure the partitions, in one pass."""
         describe = partial(_describe, layout=partitions.layout)
         described = reduce_partitions(partitions, describe, _joined)
-        if described.n_rows < 2:
-            raise ValueError(
-                f"Found {described.n_rows} rows with a positive weight; at least 2 are needed."
-            )
+        n_rows = 0 if described is None else described.n_rows
+        if n_rows < 2:
+            raise ValueError(f"Found {n_rows} rows with a positive weight; at least 2 are needed.")
         return cls(partitions, described)
 
     @property
@@ -335,23 +315,5 @@ class ClusterData:
     def rows(self):
         """The rows on their scales."""
         found = self.described
-        assert found.inputs is not None
-        assert found.targets is not None
         check_scales(found.inputs, found.targets, self.input_names, self.output_names)
         return ClusterRows(self.partitions, found.n_rows, found.weight, found.inputs, found.targets)
-
-    def gathered(self):
-        """All rows, here: X, y, weights or None, groups or None."""
-        rows = reduce_partitions(self.partitions, _as_they_are, _concatenated)
-        return rows.X, rows.y, rows.sample_weight, rows.groups
-
-
-def _as_they_are(rows):
-    return rows
-
-
-def _concatenated(one, other):
-    names = ("X", "y", "sample_weight", "groups")
-    pairs = {name: (getattr(one, name), getattr(other, name)) for name in names}
-    arrays = {k: None if a is None else np.concatenate([a, b]) for k, (a, b) in pairs.items()}
-    return replace(one, **arrays)

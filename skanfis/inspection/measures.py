@@ -8,14 +8,15 @@ of training, and sd the target's standard deviation, the *strongest rule alone* 
 Rules that are equally strong count in equal parts. Means are by the rows' weights.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from ..blocks import LARGE_BLOCK_ROWS, fitting_rows, row_blocks
+from ..learning.data import column_statistics
 
-__all__ = ["Measures", "TargetScale", "crossings", "distinct_terms", "measure", "rule_sums"]
+__all__ = ["Measures", "RuleSums", "crossings", "distinct_terms", "measure"]
 
 # Strengths that differ by rounding errors only are equal.
 _EQUALLY_STRONG = 1.0 - 1e-9
@@ -28,35 +29,12 @@ _POINTS, _LOOKS = 33, 14
 
 
 @dataclass(frozen=True, eq=False)
-class TargetScale:
-    """Of the target: total weight of its rows, and by output mean, deviation and range."""
-
-    weight: float
-    mean: np.ndarray
-    deviation: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-    @classmethod
-    def of(cls, y, weight):
-        """Of rows y (n_rows, n_outputs); a constant output has a deviation of one."""
-        has_weight = (weight > 0.0)[:, None]
-        low = np.min(y, axis=0, where=has_weight, initial=np.inf)
-        high = np.max(y, axis=0, where=has_weight, initial=-np.inf)
-        is_constant = high - low <= _CONSTANT * np.maximum(np.abs(low), np.abs(high))
-        # In parts of the range about its end: no digit is lost, and no square overflows.
-        unit = np.where(is_constant, 1.0, high - low)
-        blocks, total = row_blocks(len(y), LARGE_BLOCK_ROWS), float(np.sum(weight))
-        mean = sum(weight[part] @ ((y[part] - low) / unit) for part in blocks) / total
-        square = sum(weight[part] @ ((y[part] - low) / unit - mean) ** 2 for part in blocks) / total
-        deviation = np.where(is_constant | (square == 0.0), 1.0, unit * np.sqrt(square))
-        return cls(total, low + unit * mean, deviation, low, high)
-
-
-@dataclass(frozen=True, eq=False)
-class Measures(TargetScale):
+class Measures:
     """What was found on rows; errors are in standard deviations of the target."""
 
+    weight: float  # of all rows
+    mean: np.ndarray  # of the target, (n_outputs,)
+    deviation: np.ndarray  # its standard deviation; one of a constant
     truth: np.ndarray  # greatest membership of each term on a row, (n_terms,)
     rule_weights: np.ndarray  # part of the rows' weight on which each rule fires, (n_rules,)
     rule_rows: np.ndarray  # weight of the rows on which it is the strongest, (n_rules,)
@@ -70,43 +48,45 @@ def measure(model, read, n_rows, y=None, sample_weight=None):
     blocks = row_blocks(n_rows, LARGE_BLOCK_ROWS) or [slice(0, 0)]
     if y is None:
         y = np.concatenate([model.predict(read(part)) for part in blocks])
+    y = np.asarray(y, dtype=float)
     if sample_weight is None:
-        sample_weight = np.broadcast_to(1.0, n_rows)
-    weight = np.asarray(sample_weight, dtype=float)
-    sums = _Sums(model, TargetScale.of(np.asarray(y, dtype=float), weight))
+        sums = RuleSums(model, column_statistics(y))
+    else:
+        has_weight = sample_weight > 0.0
+        sums = RuleSums(model, column_statistics(y[has_weight], sample_weight[has_weight]))
     for part in blocks:
-        sums.add(read(part), weight[part])
+        sums.add(read(part), None if sample_weight is None else sample_weight[part])
     return sums.measures()
 
 
-def rule_sums(rows, model, target):
-    """The sums of :func:`measure` over some rows; ``joined`` adds those of others."""
-    sums = _Sums(model.with_out_of_bounds("clip"), target)
-    sums.add(rows.X, np.ones(len(rows.X)) if rows.sample_weight is None else rows.sample_weight)
-    return sums
-
-
-class _Sums:
-    """The pass over the rows."""
+class RuleSums:
+    """The pass over the rows, by parts; ``target`` is the scale of all of them."""
 
     def __init__(self, model, target):
-        self.model, self.target = model, target
+        largest = np.maximum(np.abs(target.minimum), np.abs(target.maximum))
+        is_constant = target.maximum - target.minimum <= _CONSTANT * largest
+        target = replace(target, scale=np.where(is_constant, 1.0, target.scale))
+        self.model, self.target, self.weight = model.with_out_of_bounds("clip"), target, 0.0
         # Consequents in standard deviations of the target about its mean, on the inputs' distances
         # from the reference in standard deviations of their own.
-        by_rule = model.coefficients / target.deviation
-        by_rule[:, 0] -= target.mean / target.deviation
+        by_rule = model.coefficients / target.scale
+        by_rule[:, 0] -= target.offset / target.scale
         by_rule[:, 1:] *= model.spread[: by_rule.shape[1] - 1, None]
         self.by_rule = np.ascontiguousarray(by_rule.transpose(2, 0, 1))
         self.truth = np.full(model.antecedent.n_terms, -np.inf)
         self.mass, self.rows = np.zeros((2, model.n_rules))
         self.alone = np.zeros((model.n_rules, model.n_outputs))
 
-    def add(self, rows, weight):
+    def add(self, rows, weight=None):
+        """Add rows; returns itself."""
+        weight = np.ones(len(rows)) if weight is None else np.asarray(weight, dtype=float)
         if not np.all(weight > 0.0):
             rows, weight = rows[weight > 0.0], weight[weight > 0.0]
+        self.weight += float(weight.sum())
         step = fitting_rows(6 * self.model.n_rules + self.truth.size)
         for part in row_blocks(len(rows), step):
             self._add(np.array(rows[part].T, dtype=float, order="C"), weight[part])
+        return self
 
     def _add(self, Z, weight):
         model = self.model
@@ -126,22 +106,25 @@ class _Sums:
             self.alone[:, k] += np.einsum("rn,rn->r", strongest, distance)
 
     def joined(self, other):
-        for name in ("mass", "rows", "alone"):
+        """The sums over the rows of both."""
+        for name in ("weight", "mass", "rows", "alone"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         self.truth = np.maximum(self.truth, other.truth)
         return self
 
     def measures(self):
-        target = self.target
+        """What the sums amount to."""
         with np.errstate(divide="ignore", invalid="ignore"):
             rule_alone = np.sqrt(self.alone / self.rows[:, None])
         return Measures(
-            **vars(target),
+            weight=self.weight,
+            mean=self.target.offset,
+            deviation=self.target.scale,
             truth=np.exp(self.truth),
-            rule_weights=self.mass / target.weight,
+            rule_weights=self.mass / self.weight,
             rule_rows=self.rows,
             rule_alone=rule_alone,
-            alone=np.sqrt(self.alone.sum(axis=0) / target.weight),
+            alone=np.sqrt(self.alone.sum(axis=0) / self.weight),
         )
 
 

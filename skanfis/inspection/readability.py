@@ -1,7 +1,6 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
 from dataclasses import dataclass
-from html import escape
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -20,8 +19,6 @@ from .rules import premise_texts, rules_frame, writable
 
 __all__ = ["Readability", "readability", "readability_of_rows"]
 
-# Rules of the notebook's table.
-_MOST_LINES = 10
 # A sentence names so many terms or pairs, and counts the others.
 _MOST_NAMED = 5
 
@@ -30,7 +27,7 @@ _MOST_NAMED = 5
 class Readability:
     """Whether the rules of a model can be read one by one, and what speaks against it.
 
-    :func:`skanfis.inspection.readability` makes it; in a notebook it shows itself.
+    :func:`skanfis.inspection.readability` makes it; ``print`` says what was found.
 
     Parameters
     ----------
@@ -146,25 +143,9 @@ class Readability:
         return f"<Readability of {self.model!r}: {self.line}>"
 
     def __str__(self):
-        return "\n".join(self._lines())
-
-    def _lines(self):
         nothing = "Nothing measured here speaks against reading the rules one by one."
-        return [f"{self.line[0].upper()}{self.line[1:]}.", *(self.findings or [nothing])]
-
-    def _repr_html_(self):
-        rules = self.rules.sort_values("weight", ascending=False, kind="stable")
-        parts = [self.html()]
-        for table in (self.terms, rules.head(_MOST_LINES)):
-            parts.append(f"<div>{table.to_html(float_format=_figure, na_rep='', border=0)}</div>")
-        if len(rules) > _MOST_LINES:
-            parts.append(f"<div>and {len(rules) - _MOST_LINES} more lines</div>")
-        style = "font-family:sans-serif;font-size:90%;margin:0.5em 0"
-        return f'<div style="{style}">{"".join(parts)}</div>'
-
-    def html(self) -> str:
-        """Write the summary and the findings as HTML, a ``<div>`` for each."""
-        return "".join(f"<div>{escape(line)}</div>" for line in self._lines())
+        summary = f"{self.line[0].upper()}{self.line[1:]}."
+        return "\n".join([summary, *(self.findings or [nothing])])
 
 
 def readability(
@@ -258,15 +239,15 @@ def _on_truth(terms):
 
 
 def _on_crossings(terms):
-    pairs = [(a, b) for a, b in pairwise(terms.itertuples()) if a.input == b.input]
+    # The last term of an input crosses no other: its crossing is NaN.
     found = [
         f"{a.term!r} and {b.term!r} of {a.input!r} ({_figure(a.crossing)})"
-        for a, b in pairs
+        for a, b in pairwise(terms.itertuples())
         if a.crossing > GREATEST_CROSSING
     ]
     if not found:
         return []
-    many = f"{len(found)} of {len(pairs)} pairs of neighbouring terms"
+    many = f"{len(found)} of {terms['crossing'].count()} pairs of neighbouring terms"
     return [
         f"{many if len(found) > 1 else 'Two terms'} can hardly be told apart, for they cross "
         f"above {GREATEST_CROSSING}: {_named(found)}."

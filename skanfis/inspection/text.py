@@ -1,6 +1,7 @@
 """Rules as text, and as HTML for notebooks."""
 
 from collections.abc import Sequence
+from html import escape
 from math import floor, log10
 from typing import Any
 
@@ -8,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_choice, check_count
-from ..export.folding import fold
+from ..export import fold
 from .rules import (
-    choose_rules,
     has_training_data,
     premise_texts,
     readability_in_training,
@@ -18,6 +18,7 @@ from .rules import (
     rounded_reference,
     rules_frame,
     warn_of_findings,
+    weightiest,
     writable,
 )
 
@@ -32,17 +33,14 @@ def export_text(
     *,
     precision: int = 4,
     about: str = "mean",
-    sort_by: str = "weight",
     max_rules: int | None = None,
-    min_weight: float = 0.0,
     show_terms: bool = True,
     feature_names: Sequence[str] | None = None,
     output_names: Sequence[str] | None = None,
 ) -> str:
     """Write the rules as IF-THEN sentences in the units of the data.
 
-    The sentences and the terms' parameters are the whole model: the output is the mean of the
-    rules' values, weighted by the products of the memberships of their terms.
+    Sentences and terms are the whole model: :doc:`/inspection`.
 
     Parameters
     ----------
@@ -53,10 +51,8 @@ def export_text(
     about : {"mean", "origin"}, default="mean"
         Consequents by the inputs' distances from a round number near their mean, ``1.2 + 0.3 *
         (temperature - 290)``, or in the textbook form, ``-85.8 + 0.3 * temperature``.
-    sort_by : {"weight", "rows", "rule"}, default="weight"
-        By the part of the training data, or the rows, that each rule has, or by number.
-    max_rules, min_weight : int or None, float
-        Most rules to write, and the least part of the training data that a rule fires on.
+    max_rules : int, default=None
+        Most rules to write, the weightiest first; None for all.
     show_terms : bool, default=True
         Whether to write the terms' parameters, the ranges, the policy outside them, and the noise.
     feature_names, output_names : sequence of str, default=None
@@ -103,7 +99,7 @@ def export_text(
     warn_of_findings(estimator, model)
     reference = rounded_reference(model) if about == "mean" else 0.0 * model.reference
     frame = rules_frame(model, reference)
-    chosen = choose_rules(frame, sort_by, max_rules, min_weight)
+    chosen = weightiest(frame, max_rules)
     consequents = _consequent_texts(model, frame, reference, precision)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
     for r, premise in zip(chosen.index, premise_texts(chosen), strict=True):
@@ -155,7 +151,7 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     model = writable(fold(estimator))
     reference = rounded_reference(model)
     frame = rules_frame(model, reference)
-    chosen = choose_rules(frame, "weight", max_rules, 0.0)
+    chosen = weightiest(frame, max_rules)
     consequents = _consequent_texts(model, frame, reference, precision)
     cells: dict = {}
     if has_training_data(model):
@@ -175,7 +171,7 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     if len(chosen) < model.n_rules:
         parts.append(f"<div>and {_left_out(model, chosen)}</div>")
     found = readability_in_training(estimator, model)
-    parts.append("" if found is None else found.html())
+    parts += [f"<div>{escape(line)}</div>" for line in str(found or "").splitlines()]
     style = "font-family:sans-serif;font-size:90%;margin:0.5em 0"
     return f'<div style="{style}">{"".join(parts)}</div>'
 
@@ -220,15 +216,15 @@ def _legend(model, precision):
             f"    {term['name'] + ':':<{width + 1}} {_term_text(term, precision)}" for term in terms
         ]
     lines.append(f"Outside these ranges: {model.policy}.")
-    for k, name in enumerate(model.output_names):
-        low, high = model.output_limits[:, k]
-        if np.isfinite([low, high]).all():
-            ends = " to ".join(place(end, precision, high - low) for end in (low, high))
-            lines.append(f"Held within the limits of its training: {name}, {ends}.")
-        elif np.isfinite([low, high]).any():
-            side, end = ("above", low) if np.isfinite(low) else ("below", high)
-            end = number(end, precision)
-            lines.append(f"Held {side} the limit of its training: {name}, {end}.")
+    for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
+        ends = [low, high]
+        if np.isfinite(ends).all():
+            written = [place(end, precision, high - low) for end in ends]
+        else:
+            written = [number(end, precision) for end in ends]
+        if np.isfinite(ends).any():
+            limits = " to ".join(written)
+            lines.append(f"Held within the limits of its training: {name}, {limits}.")
     if model.posterior is not None:
         noise = zip(model.output_names, model.posterior.noise, strict=True)
         values = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)

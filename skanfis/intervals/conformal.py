@@ -14,25 +14,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
-from ._quantiles import (
-    group_scores,
-    is_enough,
-    n_needed,
-    one_row_per_group,
-    row_masses,
-    score_quantile,
-)
-from ._scores import (
-    TrainingSet,
-    checked_targets,
-    fit_params,
-    folds,
-    held_out_scores,
-    least_deviations,
-    leave_one_out_scores,
-    one_part,
-    predicted,
-)
+from . import _scores
 
 __all__ = ["ConformalRegressor"]
 
@@ -171,37 +153,38 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             or groups with "loo"; if the regressor has no standard deviation.
         """
         X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
-        targets, weight, numbers = checked_targets(type(self).__name__, y, sample_weight, groups)
+        targets, weight, numbers = _scores.checked_targets(
+            type(self).__name__, y, sample_weight, groups
+        )
         if numbers is not None and self.method == "loo":
-            raise ValueError(
-                "method='loo' leaves out rows, not groups: a row's group would stay, and tell. Use "
-                "method='folds' or 'split', or leave groups at None."
-            )
+            raise ValueError("method='loo' leaves out rows, not groups: use 'folds' or 'split'.")
         regressor = self._regressor()
-        data = TrainingSet(X, y, targets, fit_params(self, regressor, sample_weight, groups))
-        least = least_deviations(targets) if self.scaled else None
+        data = _scores.TrainingSet(
+            X, y, targets, _scores.fit_params(self, regressor, sample_weight, groups)
+        )
+        least = _scores.least_deviations(targets) if self.scaled else None
         held_out, estimators = np.arange(len(targets)), []
         seed = 0 if self.random_state is None else self.random_state
         if self.method == "split":
             fraction = float(self.calibration_fraction)
-            training, held_out = one_part(regressor, len(targets), numbers, fraction, seed)
+            training, held_out = _scores.one_part(regressor, len(targets), numbers, fraction, seed)
             estimator = data.fitted(regressor, training)
-            scores = held_out_scores(estimator, data, held_out, least)
+            scores = _scores.held_out_scores(estimator, data, held_out, least)
         elif self.method == "loo":
             estimator = data.fitted(regressor)
-            scores = leave_one_out_scores(estimator, data, weight, least)
+            scores = _scores.leave_one_out_scores(estimator, data, weight, least)
         else:
             estimator = data.fitted(regressor)
-            parts = folds(self.cv, targets, numbers, seed)
+            parts = _scores.folds(self.cv, targets, numbers, seed)
             estimators = Parallel(n_jobs=self.n_jobs)(
                 delayed(data.fitted)(regressor, training) for training, _ in parts
             )
             scores = np.empty(targets.reshape(len(targets), -1).shape)
             for one, (_, rows) in zip(estimators, parts, strict=True):
-                scores[rows] = held_out_scores(one, data, rows, least)
+                scores[rows] = _scores.held_out_scores(one, data, rows, least)
         own_groups = None if numbers is None else numbers[held_out]
         own_weight = None if weight is None else weight[held_out]
-        masses, n_units = row_masses(held_out.size, own_weight, own_groups)
+        masses, n_units = _scores.row_masses(held_out.size, own_weight, own_groups)
         # All at once: a fit that is interrupted leaves what was there.
         for name in ("n_features_in_", "feature_names_in_"):
             self.__dict__.pop(name, None)
@@ -260,41 +243,23 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         """
         check_is_fitted(self)
         coverage, confidence = self._checked_levels(coverage, confidence)
-        centers, deviations = predicted(self.estimator_, X, self._least)
+        centers, deviations = _scores.predicted(self.estimator_, X, self._least)
         width = deviations * self._quantiles(coverage, confidence)
         lower, upper = centers - width, centers + width
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
-
-    def half_width(
-        self, coverage: float = 0.9, confidence: float | str | None = "auto"
-    ) -> float | np.ndarray:
-        """How far intervals reach to either side of the prediction.
-
-        Parameters
-        ----------
-        coverage : float, default=0.9
-        confidence : float, "auto" or None, default="auto"
-            As of :meth:`predict_interval`.
-
-        Returns
-        -------
-        q : float or ndarray of shape (n_outputs,)
-            In standard deviations; with ``scaled=False`` in the target's units.
-        """
-        check_is_fitted(self)
-        found = self._quantiles(*self._checked_levels(coverage, confidence))
-        return float(found[0]) if self._single_output else found
 
     def _quantiles(self, coverage, confidence):
         found = []
         for scores in self._scores_by_row.T:
             if self._groups is None:
-                found.append(score_quantile(scores, self._masses, coverage))
+                found.append(_scores.score_quantile(scores, self._masses, coverage))
             elif confidence is None:
-                found.append(one_row_per_group(scores, self._masses, self._groups, coverage))
+                found.append(
+                    _scores.one_row_per_group(scores, self._masses, self._groups, coverage)
+                )
             else:
-                own, masses = group_scores(scores, self._masses, self._groups, coverage)
-                found.append(score_quantile(own, masses, confidence))
+                own, masses = _scores.group_scores(scores, self._masses, self._groups, coverage)
+                found.append(_scores.score_quantile(own, masses, confidence))
         return np.array(found)
 
     def _regressor(self):
@@ -302,27 +267,25 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
 
     def _checked_levels(self, coverage, confidence):
         """Both levels, as far as the rows or groups at hand allow them; None of no groups."""
-        if isinstance(confidence, str) and confidence != "auto":
-            raise ValueError(f"confidence={confidence!r} must be a number, 'auto' or None.")
-        name, level = "coverage", coverage
         if self._groups is None and confidence not in (None, "auto"):
             raise ValueError(
                 "confidence is of whole groups, and fit was given none: give it groups, or None."
             )
+        for name, level in (("confidence", confidence), ("coverage", coverage)):
+            is_number = isinstance(level, Real) and 0.0 < float(level) < 1.0
+            if not is_number and (name == "coverage" or level not in (None, "auto")):
+                raise ValueError(f"{name}={level!r} must be a number between 0 and 1.")
         by_group = self._groups is not None and confidence is not None
         if by_group and confidence != "auto":
             name, level = "confidence", confidence
-        for what, given in (("coverage", coverage), (name, level)):
-            if not (isinstance(given, Real) and 0.0 < float(given) < 1.0):
-                raise ValueError(f"{what}={given!r} must be a number between 0 and 1.")
         total = self.n_units_ / (self.n_units_ + 1.0)
-        if not is_enough(total, level):
+        if not _scores.is_enough(total, level):
             what = "rows" if self._groups is None else "groups"
             held_out = " held out" if self.method == "split" else ""
             more = ", or a larger calibration_fraction" if self.method == "split" else ""
             raise ValueError(
-                f"{name}={level:g} needs {n_needed(level)} {what}{held_out} or more; there are "
-                f"{self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
+                f"{name}={level:g} needs {_scores.n_needed(level)} {what}{held_out} or more; there "
+                f"are {self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
                 f"for less, or give more {what}{more}."
             )
         return float(coverage), float(level) if by_group else None

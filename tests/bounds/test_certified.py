@@ -5,9 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import MinMaxScaler, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TermGroup
@@ -47,6 +44,7 @@ def test_one_rule_is_bounded_by_its_corners():
     slope = gradient_bounds(ONE_RULE, "rate", box)
     assert_allclose([slope.lower, slope.upper], [slopes[2], slopes[2]], rtol=1e-9)
     assert_allclose(monotonicity(ONE_RULE, 2, box), np.sign(slopes[2]))
+    assert repr(found).startswith("Bounds(y0 in [")
 
 
 def test_two_rules_of_order_zero_are_a_sigmoid():
@@ -70,19 +68,6 @@ def test_two_rules_of_order_zero_are_a_sigmoid():
     assert_allclose(slope.upper, 3.0 * 0.25 * 2.0 / SCALE[0], rtol=2e-4)
     assert monotonicity(model, "time") == 1
     assert monotonicity(replace(model, coefficients=-model.coefficients), "time") == -1
-
-
-@pytest.mark.parametrize("n_mfs", [[1, 6, 6], [4, 3, 3]])
-def test_a_gyro_like_model_takes_few_boxes(n_mfs):
-    rng = np.random.default_rng(0)
-    X = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (150, 3))
-    y = 0.05 * np.exp(-X[:, 0] / 600.0) - 4e-4 * X[:, 2] * (X[:, 1] - 20.0)
-    model = ANFISRegressor(
-        n_mfs=n_mfs, max_iter=3, solver=VariableProjection(tol=1.0), agreement=0.01, alpha=0.01
-    ).fit(X, y)
-    found = bounds(model)
-    assert found.converged
-    assert found.n_boxes < 3000
 
 
 def test_the_box_is_held_where_the_policy_holds(rng):
@@ -111,36 +96,6 @@ def test_the_box_is_held_where_the_policy_holds(rng):
     assert 1e90 < ends.max() <= far.upper[0] < np.inf
 
 
-@pytest.mark.theory
-def test_slopes_beyond_the_range_are_those_of_the_policy(rng):
-    X, y, estimator = a_fit(rng, monotonic_cst=[0, 1])
-    estimator.fit(X, y)
-    top = X[:, 1].max()
-    assert gradient_bounds(estimator, "x1", {"x1": (top + 1.0, top + 2.0)}).lower[0] > 0.0
-    away = gradient_bounds(estimator, "x1", {"x1": (top + 1e3, top + 2e3)})
-    assert_allclose([away.lower, away.upper], 0.0, atol=1e-15)
-    # Held at the edge the output never falls with the rate, whatever comes after.
-    estimator.set_params(out_of_bounds="clip")
-    everywhere = {"x1": (-np.inf, np.inf)}
-    slope = gradient_bounds(estimator, "x1", everywhere)
-    assert -0.011 * slope.magnitude[0] <= slope.lower[0] <= slope.lowest[0] == 0.0
-    assert monotonicity(estimator, "x1", everywhere) == 1
-
-
-def test_scalers_are_folded_in(rng):
-    X, y, estimator = a_fit(rng)
-    whole = TransformedTargetRegressor(
-        make_pipeline(StandardScaler(), MinMaxScaler(), estimator), transformer=StandardScaler()
-    ).fit(X, 1e3 * y + 7e4)
-    found = bounds(whole, tol=1e-3)
-    rows = rng.uniform(X.min(axis=0), X.max(axis=0), (20_000, 2))
-    predicted = whole.predict(rows)
-    assert found.lower[0] <= predicted.min()
-    assert predicted.max() <= found.upper[0]
-    assert_allclose([found.lower[0], found.upper[0]], [predicted.min(), predicted.max()], rtol=3e-3)
-    assert repr(found).startswith("Bounds(y in [")
-
-
 @pytest.mark.parametrize(
     ("box", "message"),
     [
@@ -148,7 +103,7 @@ def test_scalers_are_folded_in(rng):
         ("all", r"one \(low, high\) for each of the 3 inputs .*got 'all'"),
         ({"speed": (0.0, 1.0)}, r"box names 'speed', which is no input .*'rate', at positions 0"),
         ({"rate": (1.0, 0.0)}, r"box has \(1, 0\) for 'rate': low must not be above high"),
-        ({"rate": (np.nan, 0.0)}, "neither may be NaN"),
+        ({"rate": (np.nan, 0.0)}, "above high, or NaN"),
         ({"rate": 1.0}, "must be two numbers"),
     ],
 )
@@ -162,7 +117,7 @@ def test_what_cannot_be_bounded_is_refused():
         bounds(ONE_RULE.with_out_of_bounds("nan"), {"rate": (5.0, 6.0)})
     with pytest.raises(ValueError, match="tol=-1 must be zero or positive"):
         bounds(ONE_RULE, tol=-1)
-    with pytest.raises(ValueError, match="max_boxes=0 must be 1 or more"):
+    with pytest.raises(ValueError, match="max_boxes=0 must be a whole number of 1 or more"):
         bounds(ONE_RULE, max_boxes=0)
 
     class Own(Gaussian):

@@ -58,19 +58,3 @@ def test_nothing_is_beyond_the_bounds(number):
         slack = 1e-9 * np.abs(mean) + 1e-12 * scale
         assert (least[far] <= mean + slack).all()
         assert (mean - slack <= steepest[far]).all()
-
-
-@pytest.mark.parametrize("number", range(0, len(CASES), 11))
-def test_a_point_is_enclosed_to_rounding(number):
-    model = CASES[number].model.with_out_of_bounds("linear", 0.5)
-    width = model.maximum - model.minimum
-    X = np.random.default_rng(0).uniform(model.minimum - width, model.maximum + width, (40, 3))
-    y = model.predict(X)[:, 0]
-    upper, lower = (s * Enclosure(model, 0, s).values(X.T, X.T)[0] for s in (1.0, -1.0))
-    assert (lower <= y).all()
-    assert (y <= upper).all()
-    inside = model.in_bounds(X)
-    # A million units from the origin in one input, 600 wide: 1e-13 of it are 1e-10 of the width.
-    sizes = np.abs(model.coefficients[:, 1:, 0]).max(axis=0) @ width if model.order else 0.0
-    scale = np.abs(model.coefficients[:, 0, 0]).max() + sizes
-    assert (upper - lower)[inside].max() < 1e-6 * scale

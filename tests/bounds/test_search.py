@@ -51,9 +51,3 @@ def test_it_ends_as_soon_as_it_is_known_whether_a_value_is_passed():
     passed = largest(loose(seen, 0.0), low, high, 0.0, 100_000, np.full((3, 2), np.nan), until=-0.5)
     assert passed.attained > -0.5
     assert len(seen) == 1
-    # On a box without the top.
-    never = largest(
-        loose(seen, 0.0), low, TOP - 0.8 * WIDTH, 0.0, 100_000, low[:, None], until=-1.0
-    )
-    assert never.bound <= -1.0
-    assert never.converged

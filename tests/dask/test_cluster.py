@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("distributed")
 
+import dask
 import dask.array as da
 from distributed import Client, LocalCluster
 from distributed.scheduler import KilledWorker
@@ -71,9 +72,11 @@ def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkey
 
 
 def test_a_partition_that_ends_its_workers_is_said_to_be_too_large():
-    class Lazy:
-        def compute(self):
-            raise KilledWorker("sum-3", SimpleNamespace(address="tcp://w"), 3)
+    def ended():
+        raise KilledWorker("sum-3", SimpleNamespace(address="tcp://w"), 3)
 
-    with pytest.raises(RuntimeError, match=r"same partition ended several workers.*KilledWorker"):
-        rows._computed(Lazy())
+    with (
+        dask.config.set(scheduler="synchronous"),
+        pytest.raises(RuntimeError, match=r"same partition ended several workers.*KilledWorker"),
+    ):
+        rows.computed(dask.delayed(ended)())

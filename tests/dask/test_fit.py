@@ -16,10 +16,7 @@ import dask.dataframe as dd
 
 from skanfis import ANFISRegressor
 from skanfis.dask import DaskANFISRegressor, rows
-from skanfis.export import export_json
 from skanfis.learning import sampling
-from skanfis.learning.data import column_statistics
-from skanfis.training.chunks import joined_scales
 
 N_ROWS = 6000
 NAMES = ["temperature", "rate"]
@@ -103,14 +100,14 @@ def test_few_rows_are_fetched_and_trained_on_as_ever():
 def test_nothing_but_sums_and_one_sample_comes_to_the_client(few_are_many, monkeypatch):
     X, y = data()
     sizes = []
-    real = rows._computed
+    real = rows.computed
 
-    def computed(lazy):
-        result = real(lazy)
+    def computed(*lazy):
+        result = real(*lazy)
         sizes.append(len(pickle.dumps(result)))
         return result
 
-    monkeypatch.setattr(rows, "_computed", computed)
+    monkeypatch.setattr(rows, "computed", computed)
     DaskANFISRegressor(n_mfs=2).fit(*cut(500, X, y))
     sample = sizes.pop(1)
     assert sample < 1.3 * 1500 * 6 * 8
@@ -136,52 +133,24 @@ def test_parquet_of_small_files_is_read_partition_by_partition(few_are_many, tmp
     assert_array_equal(deviations.compute().to_numpy(), expected)
 
 
-@pytest.mark.parametrize("method", ["predict", "coverage", "in_bounds", "strengths"])
 @pytest.mark.parametrize("n_outputs", [1, 2])
-def test_what_is_lazy_is_what_is_eager(method, n_outputs):
+def test_what_is_lazy_is_what_is_eager(n_outputs):
     X, y = data(600)
-    y = y if n_outputs == 1 else np.column_stack([y, X])
+    y = y if n_outputs == 1 else np.column_stack([y, X[:, 0]])
     model = DaskANFISRegressor(n_mfs=2).fit(X, y)
-    eager = getattr(model, method)(X)
-    lazy = getattr(model, method)(da.from_array(X, chunks=((250, 0, 350), (1, 1))))
+    eager = model.predict(X)
+    lazy = model.predict(da.from_array(X, chunks=((250, 0, 350), (1, 1))))
     assert isinstance(lazy, da.Array)
-    assert lazy.shape == eager.shape
-    assert lazy.dtype == eager.dtype
+    assert (lazy.shape, lazy.dtype) == (eager.shape, eager.dtype)
     assert_array_equal(lazy.compute(), eager)
     weight = np.linspace(0.0, 1.0, 600)
     score = model.score(*cut(170, X, y, weight))
-    assert_allclose(score, r2_score(y, model.predict(X), sample_weight=weight), rtol=1e-12)
+    assert_allclose(score, r2_score(y, eager, sample_weight=weight), rtol=1e-12)
     table = dd.from_pandas(pd.DataFrame(X), npartitions=3)
-    in_frame = getattr(model, method)(table)
-    assert_array_equal(in_frame.compute().to_numpy(), eager)
-    assert in_frame.compute().dtypes.tolist() if lazy.ndim == 2 else in_frame.dtype == eager.dtype
-
-
-def test_fitted_model_is_small_and_travels():
-    X, y = data(600)
-    model = DaskANFISRegressor(n_mfs=2).fit(*cut(200, X, y))
-    assert len(pickle.dumps(model)) < 20_000
-    assert_array_equal(pickle.loads(pickle.dumps(model)).predict(X), model.predict(X))
-    plain = ANFISRegressor(n_mfs=2).fit(X, y)
-    assert export_json(model) == export_json(plain)
-
-
-@pytest.mark.parametrize("offset", [0.0, 1e9])
-def test_scales_of_parts_join_to_those_of_the_whole(offset):
-    g = np.random.default_rng(3)
-    values = g.normal(size=(900, 3)) * [1.0, 1e-5, 0.0] + offset * np.array([1.0, 0.0, 1.0])
-    weight = g.uniform(0.1, 3.0, 900)
-    found, total = column_statistics(values[:1], weight[:1]), weight[0]
-    for part in (slice(1, 500), slice(500, 503), slice(503, 900)):
-        other = column_statistics(values[part], weight[part])
-        found = joined_scales(found, other, total, weight[part].sum())
-        total += weight[part].sum()
-    whole = column_statistics(values, weight)
-    for name in ("offset", "scale", "minimum", "maximum"):
-        # Means of parts are floats: what they round is a part of the offset.
-        rounding = 4.0 * np.finfo(float).eps * np.abs(whole.offset)
-        error = np.abs(getattr(found, name) - getattr(whole, name))
-        assert (error <= 1e-13 * whole.scale + rounding).all()
+    assert_array_equal(model.predict(table).compute().to_numpy(), eager)
+    assert_array_equal(table.map_partitions(model.coverage).compute(), model.coverage(X))
+    with pytest.raises(TypeError, match=r"X\.compute"):
+        model.coverage(table)
 
 
 def parts_of(*tables):
@@ -203,16 +172,12 @@ def with_other_columns():
     return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
 
 
-def with_whole_numbers_in_one():
+def test_whole_numbers_in_one_partition_are_read_as_floats():
     table = frame(300).round()
     lazy = parts_of(table[:100].astype({"rate": int}), table[100:])
-    return lazy[NAMES], lazy["error"], table
-
-
-def test_whole_numbers_in_one_partition_are_read_as_floats():
-    X, y, table = with_whole_numbers_in_one()
     single = ANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
-    assert_array_equal(DaskANFISRegressor(n_mfs=2).fit(X, y).consequents_, single.consequents_)
+    found = DaskANFISRegressor(n_mfs=2).fit(lazy[NAMES], lazy["error"])
+    assert_array_equal(found.consequents_, single.consequents_)
 
 
 def with_text():
@@ -221,14 +186,9 @@ def with_text():
     return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
 
 
-def with_unknown_chunks(keep):
+def with_unknown_chunks():
     X, y = cut(100, *data(300))
-    return X[X[:, 0] > -1e9], y[(y > keep)]
-
-
-def of_other_lengths():
-    X, y = data(300)
-    return cut(100, X, y[:-1])
+    return X[X[:, 0] > -1e9], y[(y > 0.0)]
 
 
 def of_other_partitions():
@@ -236,19 +196,8 @@ def of_other_partitions():
     return lazy[NAMES], lazy["error"].repartition(npartitions=2)
 
 
-def half_lazy():
-    X, y = data(300)
-    return da.from_array(X), y
-
-
-def with_negative_weights():
-    X, y = data(300)
-    return cut(100, X, y, np.where(np.arange(300) == 107, -2.0, 1.0))
-
-
-def without_weight():
-    X, y = data(300)
-    return cut(100, X, y, np.zeros(300))
+def weighted(weight):
+    return cut(100, *data(300), weight)
 
 
 @pytest.mark.parametrize(
@@ -257,12 +206,24 @@ def without_weight():
         (with_nan, ValueError, r"Partition 2: .*NaN in column 'rate', first at row 12"),
         (with_other_columns, ValueError, r"Partition 1: .*has the columns temperature, Rate"),
         (with_text, ValueError, r"Partition 1: .*holds text in column 'rate'"),
-        (lambda: with_unknown_chunks(0.0), ValueError, r"Partition \d: X has 100 rows and y \d+"),
-        (of_other_lengths, ValueError, "X has 300 rows and y 299"),
+        (with_unknown_chunks, ValueError, r"Partition \d: X has 100 rows and y \d+"),
+        (
+            lambda: cut(100, data(300)[0], data(299)[1]),
+            ValueError,
+            "Partition 2: X has 100 rows and y 99",
+        ),
         (of_other_partitions, ValueError, "y has 2 partitions, X has 3"),
-        (half_lazy, TypeError, "y is a ndarray, but the other one is a dask collection"),
-        (with_negative_weights, ValueError, "Partition 1: Negative values in sample_weight"),
-        (without_weight, ValueError, "Found 0 rows with a positive weight"),
+        (
+            lambda: (cut(100, data(300)[0])[0], data(300)[1]),
+            TypeError,
+            "y is a ndarray, but the other one is a dask collection",
+        ),
+        (
+            lambda: weighted(np.where(np.arange(300) == 107, -2.0, 1.0)),
+            ValueError,
+            "Partition 1: Negative values in sample_weight",
+        ),
+        (lambda: weighted(np.zeros(300)), ValueError, "Found 0 rows with a positive weight"),
     ],
 )
 def test_bad_data_are_refused_by_name(make, error, message):
@@ -270,10 +231,9 @@ def test_bad_data_are_refused_by_name(make, error, message):
         DaskANFISRegressor(n_mfs=2).fit(*make())
 
 
-@pytest.mark.parametrize("settings", [{"loss": "huber"}, {"early_stopping": True}], ids=str)
-def test_what_needs_every_residual_is_refused(few_are_many, settings):
+def test_what_needs_every_residual_is_refused(few_are_many):
     with pytest.raises(ValueError, match="needs every row's own residual"):
-        DaskANFISRegressor(n_mfs=2, **settings).fit(*cut(1000, *data()))
+        DaskANFISRegressor(n_mfs=2, loss="huber").fit(*cut(1000, *data()))
 
 
 def test_prediction_wants_the_columns_of_training():

@@ -52,8 +52,6 @@ def by_loops(model, X, y, weight):
             "weight": total,
             "mean": mean,
             "deviation": sd,
-            "low": y.min(axis=0),
-            "high": y.max(axis=0),
             "truth": np.exp(model.antecedent.log_memberships(X.T)).max(axis=1),
             "rule_weights": weight @ w / total,
             "rule_rows": rows,
@@ -73,14 +71,6 @@ def test_measures_are_what_loops_find(model):
     data = data_of(model)
     # The textbook form of the consequents, far from the origin, has lost digits: so the tolerance.
     assert_alike(found_of(model, *data), by_loops(model, *data), rtol=1e-6)
-
-
-@ALL
-def test_whole_weights_count_as_repeated_rows(model):
-    X, y, _ = data_of(model)
-    times = np.random.default_rng(0).integers(0, 4, len(X))
-    repeated = found_of(model, np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
-    assert_alike(found_of(model, X, y, times.astype(float)), repeated)
 
 
 @pytest.mark.parametrize("has_target", [True, False])
@@ -111,19 +101,10 @@ def test_units_do_not_matter(model, factor):
     moved = replace(model, antecedent=antecedent, coefficients=coefficients, **places)
     moved = replace(moved, spread=scale * model.spread)
     found = found_of(moved, offset + scale * X, (5.0 + y) * factor, weight)
-    for name in ("mean", "low", "high"):
-        assert_allclose(getattr(found, name) / factor - 5.0, getattr(expected, name), rtol=1e-6)
-    kept = {name: getattr(expected, name) for name in ("mean", "low", "high", "deviation")}
+    assert_allclose(found.mean / factor - 5.0, expected.mean, rtol=1e-6)
+    kept = {"mean": expected.mean, "deviation": expected.deviation}
     assert_alike(replace(found, **kept), expected, rtol=1e-6)
     assert_allclose(found.deviation / factor, expected.deviation, rtol=1e-9)
-
-
-@pytest.mark.parametrize("scale", [1e-300, 1e300])
-def test_squares_of_the_target_neither_overflow_nor_vanish(scale):
-    X, y, weight = data_of(ONE)
-    model = replace(ONE, coefficients=ONE.coefficients * scale)
-    found, expected = found_of(model, X, y * scale, weight), found_of(ONE, X, y, weight)
-    assert_allclose(found.deviation / scale, expected.deviation, rtol=1e-12)
 
 
 def test_a_single_rule_is_the_model():
@@ -152,11 +133,6 @@ def test_equally_strong_rules_count_in_equal_parts():
     found = found_of(model, np.zeros((1, 3)), np.array([[2.0]]))  # yhat is 2.5, both miss by 1.5
     assert_allclose(found.rule_rows, 0.5)
     assert_allclose(found.alone, 1.5)
-    X, y = np.zeros((3, 3)), np.array([[0.0], [1.0], [2.0]])
-    X[:, 1] = [-1.0, 0.0, 1.0]
-    w = 1.0 / (1.0 + np.exp(-2.0))  # of the nearer rule at its center
-    expected = np.sqrt((2 * (3.0 * (1.0 - w)) ** 2 + 1.5**2) / 3.0) / np.std(y)
-    assert_allclose(found_of(model, X, y).alone, expected, rtol=1e-12)
 
 
 def test_a_constant_target_has_a_deviation_of_one():

@@ -1,24 +1,17 @@
 """Readability: its tables and sentences, pipelines and tables of every kind, the warning."""
 
-import pickle
-import tracemalloc
-import warnings
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import MinMaxScaler, StandardScaler
+from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ReadabilityWarning
-from skanfis.export import fold
 from skanfis.inspection import (
-    Readability,
     export_text,
     measures,
     readability,
@@ -102,25 +95,6 @@ def test_neighbours_that_cannot_be_told_apart():
     ]
 
 
-def test_it_is_frozen_and_can_be_pickled():
-    found = found_of(A_GRID)
-    with pytest.raises(FrozenInstanceError):
-        found.model = None
-    again = pickle.loads(pickle.dumps(found))
-    assert isinstance(again, Readability)
-    assert str(again) == str(found)
-    assert repr(found).startswith("<Readability of TSKModel(12 rules")
-
-
-def test_names_are_escaped_in_html():
-    model = replace(A_GRID, input_names=("<b>&", "x", "y"), term_names=("<i>",) * 7)
-    html = found_of(model, truth=np.zeros(7))._repr_html_()
-    assert "<b>" not in html
-    assert "<i>" not in html
-    assert "&lt;b&gt;&amp;" in html
-    assert "and 2 more lines" in html  # of twelve rules
-
-
 def target_of(X):
     return 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
 
@@ -139,42 +113,6 @@ def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
     assert_same(found, readability(pipe[-1], pipe[:-1].transform(X), y))
     assert list(found.terms["input"]) == ["kelvin"] * 3 + ["rate"] * 2
     assert_same(readability(pipe, X), readability(pipe, X, pipe.predict(X)))
-    anfis = ANFISRegressor(n_mfs=2, solver="lse")
-    search = GridSearchCV(make_pipeline(StandardScaler(), anfis), {})
-    scaled = TransformedTargetRegressor(search, transformer=MinMaxScaler()).fit(X, y)
-    inner = scaled.regressor_.best_estimator_
-    inside = readability(inner, X, scaled.transformer_.transform(y.to_numpy()[:, None]))
-    assert_allclose(readability(scaled, X, y).summary, inside.summary, rtol=1e-6)
-
-
-def test_tables_of_every_kind(fitted):
-    pipe, X = fitted
-    y = target_of(X)
-    expected = readability(pipe, X, y)
-    polars = pytest.importorskip("polars")
-    shuffled = X.set_index(np.random.default_rng(0).permutation(len(X)).astype(float))
-    for found in (
-        readability(pipe, polars.DataFrame({name: X[name].to_numpy() for name in X}), y),
-        readability(pipe, shuffled, y),
-        readability(pipe[-1], pipe[:-1].transform(X).tolist(), list(y)),
-    ):
-        assert_same(found, expected)
-    times = np.random.default_rng(0).integers(0, 3, len(X))
-    repeated = readability(pipe, X.loc[X.index.repeat(times)], np.repeat(y, times))
-    assert_same(readability(pipe, X, y, sample_weight=times), repeated)
-
-
-def test_rows_are_read_block_by_block(tmp_path):
-    n_rows = 500_000
-    X = np.memmap(tmp_path / "rows", dtype=np.float32, mode="w+", shape=(n_rows, 3))
-    X[:] = rows_of(A_GRID, 1.0, 1000).astype(np.float32)[np.arange(n_rows) % 1000]
-    readability(A_GRID, X[:10])  # what is made once
-    tracemalloc.start()
-    found = readability(A_GRID, X)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < X.size * 8
-    assert_allclose(found.summary, readability(A_GRID, X[:1000]).summary, rtol=1e-9)
 
 
 def test_errors_name_the_row_and_the_column(monkeypatch):
@@ -225,17 +163,6 @@ def test_reading_rules_that_cannot_be_read_warns_once(read):
     assert title == "The rules are not fit to be read one by one:"
     assert findings == [f"- {line}" for line in found.findings]
     assert "let them agree more (agreement=0.01, say" in what_helps
-
-
-def test_pages_and_models_that_carry_the_findings_or_know_of_none_do_not_warn():
-    pipeline, _ = unreadable()
-    model = fold(pipeline)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        assert "No rule can be read without the others" in rules_html(pipeline)
-        export_text(model)
-        rules_table(model)
-        assert "trongest" not in rules_html(model)
 
 
 def test_findings_of_the_fit_are_in_the_names_of_the_whole():

@@ -16,14 +16,14 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
 from skanfis.intervals import ConformalRegressor
-from skanfis.intervals._quantiles import (
+from skanfis.intervals._scores import (
     group_scores,
+    last_step,
     n_needed,
     one_row_per_group,
     row_masses,
     score_quantile,
 )
-from skanfis.intervals._scores import last_step
 from skanfis.learning import VariableProjection
 
 QUICK = {
@@ -64,14 +64,13 @@ def test_split_is_that_of_crepes():
         assert_allclose(np.column_stack(ours.predict_interval(new, coverage)), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("n_splits", [5, 40])
-def test_folds_are_those_of_mapie(n_splits):
+def test_folds_are_those_of_mapie():
     from mapie.regression import CrossConformalRegressor
 
     rng = np.random.default_rng(1)
     X, y = bent(rng, 40)
     new = rng.uniform(-3, 3, size=(30, 1))
-    cv = KFold(n_splits, shuffle=True, random_state=3)
+    cv = KFold(5, shuffle=True, random_state=3)
     settings = {"confidence_level": 0.8, "method": "base", "cv": cv}
     mapie = CrossConformalRegressor(LinearRegression(), **settings).fit_conformalize(X, y)
     expected = mapie.predict_interval(new)[1][:, :, 0]
@@ -85,11 +84,9 @@ def test_units_count_and_not_the_size_of_weights():
     masses, n_units = row_masses(30, weight)
     assert_allclose(n_units, weight.sum() ** 2 / (weight**2).sum())
     assert_allclose(masses, weight / weight.sum() * n_units / (n_units + 1))
-    assert_allclose(row_masses(30, 1e-200 * weight)[0], masses)
     masses, n_units = row_masses(30, weight, groups)
     assert n_units == 4
     assert_allclose(np.bincount(groups, masses), 0.2)
-    assert_allclose(row_masses(30, weight * 5.0**groups, groups)[0], masses)
     assert [n_needed(c) for c in (0.5, 0.8, 0.9, 0.95, 0.99)] == [1, 4, 9, 19, 99]
     # The ninth of nine scores, and of eight none.
     assert score_quantile(np.arange(9.0), row_masses(9)[0], 0.9) == 8.0
@@ -232,23 +229,15 @@ class NearestRun(DummyRegressor):
 def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method):
     rng = np.random.default_rng(7)
     X, y = bent(rng, 300)
+    y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=300)])
     regressor = make_pipeline(StandardScaler(), ANFISRegressor(**QUICK))
     model = ConformalRegressor(regressor, method=method, cv=4).fit(X, y)
     new, truth = bent(rng, 3000)
-    assert abs(covered(model.predict_interval(new, 0.8), truth) - 0.8) < 0.06
+    lower, upper = model.predict_interval(new, 0.8)
+    assert lower.shape == (3000, 2)
+    assert abs(covered((lower[:, 0], upper[:, 0]), truth) - 0.8) < 0.06
     lower, upper = model.predict_interval([[0.0], [1.5], [3.0]])
-    assert (np.diff(upper - lower) > 0.0).all()
-
-
-def test_several_outputs_are_each_covered():
-    rng = np.random.default_rng(8)
-    X, y = bent(rng, 160)
-    y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=160)])
-    for method in ("folds", "split"):
-        model = ConformalRegressor(ANFISRegressor(**QUICK), method=method, cv=3).fit(X[:80], y[:80])
-        lower, upper = model.predict_interval(X[80:], 0.8)
-        assert lower.shape == (80, 2)
-        assert (np.abs(np.mean((lower <= y[80:]) & (y[80:] <= upper), axis=0) - 0.8) < 0.13).all()
+    assert (np.diff(upper - lower, axis=0) > 0.0).all()
 
 
 def test_groups_and_weights_reach_a_regressor_in_a_pipeline(metadata_routing):
@@ -287,7 +276,7 @@ RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
         ("single group", {}, {"groups": np.zeros(24)}),
         ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
         (
-            r"tells nothing of its noise.* another method; with scaled",
+            r"tells nothing of its noise.* another method",
             {"method": "loo", "estimator": BayesianRidge()},
             {},
         ),
@@ -299,7 +288,6 @@ RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
             {"estimator": make_pipeline(StandardScaler(), ANFISRegressor(out_of_bounds="raise"))},
             {},
         ),
-        ("leaves no row to train on", {"method": "split", "calibration_fraction": 1.0}, {}),
         (
             "enable_metadata_routing=True",
             {"estimator": make_pipeline(StandardScaler(), RULES)},
@@ -322,17 +310,15 @@ def test_levels_and_missing_numbers_are_refused_by_name():
     model = ConformalRegressor(RULES, cv=4).fit(X, y)
     with pytest.raises(ValueError, match=r"coverage=90 must be a number between 0 and 1"):
         model.predict_interval(X, 90)
-    with pytest.raises(ValueError, match="Input X contains NaN"):
-        model.predict_interval([[np.nan]])
     with pytest.raises(ValueError, match="confidence is of whole groups, and fit was given none"):
         model.predict_interval(X, confidence=0.9)
-    with pytest.raises(ValueError, match="confidence='all' must be a number, 'auto' or None"):
-        model.predict_interval(X, confidence="all")
     model.fit(X, y, groups=np.arange(24) // 2)
+    with pytest.raises(ValueError, match="confidence='all' must be a number between 0 and 1"):
+        model.predict_interval(X, confidence="all")
     with pytest.raises(ValueError, match=r"confidence=0\.95 needs 19 groups or more; there are 12"):
         model.predict_interval(X, 0.99, confidence=0.95)
     with pytest.raises(ValueError, match=r"confidence=2 must be a number between 0 and 1"):
-        model.half_width(0.9, confidence=2)
+        model.predict_interval(X, 0.9, confidence=2)
 
 
 def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch):
@@ -349,7 +335,7 @@ def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("skanfis.intervals.conformal.held_out_scores", interrupted)
+    monkeypatch.setattr("skanfis.intervals._scores.held_out_scores", interrupted)
     with pytest.raises(KeyboardInterrupt):
         model.fit(np.hstack([X, X**2]), y)
     assert vars(model) == before | {"cv": 4}

@@ -1,25 +1,32 @@
 """Pictures of a model: its terms, and its prediction over two inputs."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._validation import check_choice, check_count
+from .._validation import check_count, position_of
 from ..export import fold, fold_with_rows
-from ._display import COVERED, Display, colors, panels, position, section
 from .labels import as_label
+from .rules import has_training_data
 
 __all__ = ["MembershipDisplay", "ResponseSurfaceDisplay"]
 
+# Points of a membership along its input, and bins of the data behind it.
+_N_POINTS, _BINS = 201, 30
+# The brightest end of a colour map is hard to see on white.
+_BRIGHTEST = 0.85
 # Beyond so many terms, a legend is longer than the picture is high.
 _MOST_NAMED = 7
 # Characters of a legend that a panel has room for.
 _LEGEND_WIDTH = 42
 # Contours that can still be told apart by colour.
 _LEVELS = 15
+# Below this coverage the prediction counts as extrapolated.
+_COVERED = 0.5
 
 
 class InputTerms(NamedTuple):
@@ -35,7 +42,7 @@ class InputTerms(NamedTuple):
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class MembershipDisplay(Display):
+class MembershipDisplay:
     """Membership functions before and after training, over a histogram of the data.
 
     ``axes_`` (n_inputs,) and ``figure_`` are matplotlib's, once drawn.
@@ -65,11 +72,6 @@ class MembershipDisplay(Display):
         estimator: Any,
         X: ArrayLike | None = None,
         *,
-        features: Sequence[int] | str | None = None,
-        n_points: int = 201,
-        bins: int = 30,
-        show_before: bool = True,
-        colormap: str = "viridis",
         ax: Any = None,
     ) -> Self:
         """Draw the memberships of a fitted estimator.
@@ -80,67 +82,50 @@ class MembershipDisplay(Display):
             As :func:`skanfis.export.fold` takes it; the units are those of a pipeline's input.
         X : array-like of shape (n_samples, n_features), default=None
             Data whose histogram lies behind the memberships.
-        features : sequence of int or str, default=None
-            Inputs to draw, by position or name; None is all that have terms.
-        n_points, bins : int, default=201 and 30
-            Points of each curve, 2 or more, and bins of the histogram.
-        show_before : bool, default=True
-            Whether to draw the memberships before training, dashed.
-        colormap : str, default="viridis"
-            Colours of the terms, from the lowest to the highest.
         ax : matplotlib Axes or sequence of Axes, default=None
-            One for each input; None makes a figure.
+            One for each input that has terms; None makes a figure.
         """
-        check_count("n_points", n_points, 2)
-        check_count("bins", bins, 1)
         model, rows = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
         with_terms = np.unique(model.antecedent.term_inputs).tolist()
         if not with_terms:
             raise ValueError("The model has no terms: nothing to draw.")
-        names = model.input_names
-        chosen = with_terms if features is None else [position(j, names) for j in features]
-        for j in chosen:
-            if j not in with_terms:
-                raise ValueError(f"Input {names[j]!r} has no terms.")
-        display = cls(inputs=[_terms_on(model, j, n_points, rows, bins) for j in chosen])
-        return display.plot(ax=ax, show_before=show_before, colormap=colormap)
+        return cls(inputs=[_terms_on(model, j, rows) for j in with_terms]).plot(ax=ax)
 
-    def plot(self, *, show_before: bool = True, colormap: str = "viridis", ax: Any = None) -> Self:
-        """Draw the memberships; parameters are those of :meth:`from_estimator`."""
-        self.axes_ = panels(ax, len(self.inputs))
+    def plot(self, *, ax: Any = None) -> Self:
+        """Draw the memberships on ``ax``, as of :meth:`from_estimator`."""
+        self.axes_ = _panels(ax, len(self.inputs))
         self.figure_ = self.axes_[0].figure
         for terms, axes in zip(self.inputs, self.axes_, strict=True):
-            _draw_terms(axes, terms, show_before, colormap)
+            _draw_terms(axes, terms)
         if ax is None:
-            notes = ["dashed: before training"] if show_before else []
-            notes += ["grey: data"] if self.inputs[0].counts is not None else []
-            self.figure_.supxlabel("; ".join(notes), fontsize="small", color="0.4")
+            data = "" if self.inputs[0].counts is None else "; grey: data"
+            note = f"dashed: before training{data}"
+            self.figure_.supxlabel(note, fontsize="small", color="0.4")
         return self
 
 
-def _terms_on(model, j, n_points, rows, bins):
-    grid = np.linspace(model.minimum[j], model.maximum[j], n_points)
+def _terms_on(model, j, rows):
+    grid = np.linspace(model.minimum[j], model.maximum[j], _N_POINTS)
     own = np.flatnonzero(model.antecedent.term_inputs == j)
-    Z = np.zeros((model.n_inputs, n_points))
+    Z = np.zeros((model.n_inputs, _N_POINTS))
     Z[j] = grid
     names = tuple(model.term_names[t] for t in own)
     before = np.exp(model.initial_antecedent.log_memberships(Z)[own])
     after = np.exp(model.antecedent.log_memberships(Z)[own])
-    counts, edges = (None, None) if rows is None else np.histogram(rows[:, j], bins)
+    counts, edges = (None, None) if rows is None else np.histogram(rows[:, j], _BINS)
     return InputTerms(model.input_names[j], names, grid, before, after, edges, counts)
 
 
-def _draw_terms(axes, terms, show_before, colormap):
+def _draw_terms(axes, terms):
     names = [as_label(name) for name in terms.term_names]
     if terms.counts is not None:
         heights = terms.counts / max(terms.counts.max(), 1)
         axes.stairs(heights, terms.edges, fill=True, color="0.9", zorder=0)
     # Colours in the order of places: scattered terms come in the order of their rules.
     rank = np.argsort(np.argsort(terms.after.argmax(axis=1), kind="stable"))
-    shades = colors(len(names), colormap)[rank]
+    shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(names)))[rank]
     for name, before, after, shade in zip(names, terms.before, terms.after, shades, strict=True):
-        if show_before:
-            axes.plot(terms.grid, before, "--", color=shade, linewidth=1.0, alpha=0.7)
+        axes.plot(terms.grid, before, "--", color=shade, linewidth=1.0, alpha=0.7)
         axes.plot(terms.grid, after, color=shade, linewidth=1.8, label=name)
     axes.set(xlabel=as_label(terms.input_name), ylabel="membership", ylim=(0.0, 1.05))
     axes.set_xlim(terms.grid[0], terms.grid[-1])
@@ -151,7 +136,7 @@ def _draw_terms(axes, terms, show_before, colormap):
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class ResponseSurfaceDisplay(Display):
+class ResponseSurfaceDisplay:
     """Prediction over two inputs with the rest held; it fades where no data cover it.
 
     ``ax_``, ``figure_`` and ``surface_`` are matplotlib's, once drawn.
@@ -198,8 +183,6 @@ class ResponseSurfaceDisplay(Display):
         held: dict[str, Any] | None = None,
         output: int | str = 0,
         grid_resolution: int = 60,
-        plot_method: str = "contourf",
-        colormap: str = "viridis",
         ax: Any = None,
     ) -> Self:
         """Draw the prediction of a fitted estimator over the range of two inputs.
@@ -214,10 +197,6 @@ class ResponseSurfaceDisplay(Display):
             Inputs across and up; values of others, by default their mean; which output.
         grid_resolution : int, default=60
             Points on each axis, 2 or more.
-        plot_method : {"contourf", "pcolormesh"}, default="contourf"
-            Bands with lines between them, or a colour per point.
-        colormap : str, default="viridis"
-            Colours of the prediction.
         ax : matplotlib Axes, default=None
             None makes a figure.
         """
@@ -227,17 +206,16 @@ class ResponseSurfaceDisplay(Display):
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:
             raise ValueError(
-                "The model has one input, and a surface takes two: RuleContributionDisplay draws "
-                "the prediction along one."
+                "The model has one input, and a surface takes two: plot what it predicts along it."
             )
-        both = [position(feature, model.input_names) for feature in features]
+        both = [_position(feature, model.input_names) for feature in features]
         if both[0] == both[1]:
             raise ValueError(f"features={features!r} is the same input twice.")
-        k = position(output, model.output_names, "output")
+        k = _position(output, model.output_names, "output")
         ends = model.minimum[both], model.maximum[both]
         xx0, xx1 = np.meshgrid(*np.linspace(*ends, grid_resolution).T)
         values = np.column_stack([xx0.ravel(), xx1.ravel()])
-        rows, others, coverage = section(model, both, values, held)
+        rows, others, coverage = _section(model, both, values, held)
         display = cls(
             xx0=xx0,
             xx1=xx1,
@@ -248,36 +226,95 @@ class ResponseSurfaceDisplay(Display):
             held=others,
             points=None if points is None else points[:, both],
         )
-        return display.plot(plot_method=plot_method, colormap=colormap, ax=ax)
+        return display.plot(ax=ax)
 
-    def plot(
-        self, *, plot_method: str = "contourf", colormap: str = "viridis", ax: Any = None
-    ) -> Self:
-        """Draw the surface; parameters are those of :meth:`from_estimator`."""
-        check_choice("plot_method", plot_method, ("contourf", "pcolormesh"))
-        axes = self._begin(ax)
+    def plot(self, *, ax: Any = None) -> Self:
+        """Draw the surface on ``ax``, as of :meth:`from_estimator`."""
+        if ax is None:
+            ax = _pyplot().subplots(figsize=(5.6, 4.2), layout="constrained")[1]
+        self.ax_, self.figure_ = ax, ax.figure
         x, y = self.xx0[0], self.xx1[:, 0]
         grid = (x, y, self.response)
         # Extrapolation shall not set the colours.
-        seen = self.response[self.coverage >= COVERED]
+        seen = self.response[self.coverage >= _COVERED]
         seen = seen if seen.size > 1 else self.response
         low, high = np.min(seen), np.max(seen)
-        if plot_method == "contourf":
-            from matplotlib.ticker import MaxNLocator
-
-            levels = MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
-            self.surface_ = axes.contourf(*grid, levels=levels, cmap=colormap, extend="both")
-        else:
-            self.surface_ = axes.pcolormesh(*grid, vmin=low, vmax=high, cmap=colormap)
-        self.figure_.colorbar(self.surface_, ax=axes, label=as_label(self.output_name))
+        levels = _pyplot().MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
+        self.surface_ = ax.contourf(*grid, levels=levels, extend="both")
+        self.figure_.colorbar(self.surface_, ax=ax, label=as_label(self.output_name))
         # White over the surface, the thicker the less data cover it; under the points.
         white = np.ones((*self.coverage.shape, 4))
         white[..., 3] = 0.85 * np.clip(1.0 - self.coverage, 0.0, 1.0)
-        axes.pcolormesh(x, y, white, zorder=1.5)
+        ax.pcolormesh(x, y, white, zorder=1.5)
         if self.points is not None:
-            axes.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
+            ax.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
         first, second = map(as_label, self.input_names)
-        axes.set(xlabel=first, ylabel=second, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-        is_pale = np.any(self.coverage < COVERED)
-        self._note(self.held, *(["pale: few training data"] if is_pale else []))
+        ax.set(xlabel=first, ylabel=second, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+        notes = [f"{as_label(name)} = {value:.4g}" for name, value in self.held.items()]
+        if np.any(self.coverage < _COVERED):
+            notes.append("pale: few training data")
+        ax.set_title("; ".join(notes), fontsize="small", loc="left")
         return self
+
+
+def _panels(ax, count, columns=3):
+    """So many axes as an array: those given, or of a new figure."""
+    if ax is not None:
+        axes = np.ravel(ax)
+        if axes.size != count:
+            raise ValueError(f"ax has {axes.size} axes; {count} are needed, one per panel.")
+        return axes
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    figure = _pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
+    return np.array([figure.add_subplot(rows, columns, i + 1) for i in range(count)])
+
+
+def _pyplot():
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise ImportError(
+            "Displays are drawn with matplotlib: pip install matplotlib (the extra 'plot'; in a "
+            "clone pip install '.[plot]')."
+        ) from error
+    return plt
+
+
+def _position(feature, names, what="input"):
+    """Position of an input or output given by its name or position."""
+    found = position_of(feature, names)
+    if found is not None:
+        return found
+    raise ValueError(
+        f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
+        f"{', '.join(map(repr, names))}."
+    )
+
+
+def _section(model, inputs, values, held):
+    """Rows that have ``values`` (n_rows, n_inputs_varied) on some inputs, with the others held.
+
+    The others take their value in ``held``, or their mean in training; without training data, the
+    middle of their range. Returns the rows, the others' values by name, and the rows' coverage.
+    """
+    middle = 0.5 * (model.minimum + model.maximum)
+    mean = model.reference if has_training_data(model) else middle
+    row = np.clip(mean, model.minimum, model.maximum)
+    held = {} if held is None else held
+    if not isinstance(held, Mapping):
+        raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
+    for feature, value in held.items():
+        j = _position(feature, model.input_names)
+        low, high = model.minimum[j], model.maximum[j]
+        if not isinstance(value, Real) or not low <= value <= high:
+            raise ValueError(
+                f"held[{feature!r}]={value!r} must be a number in the range of training, from "
+                f"{low:.6g} to {high:.6g}."
+            )
+        row[j] = value
+    rows = np.tile(row, (len(values), 1))
+    rows[:, inputs] = values
+    others = [j for j in range(model.n_inputs) if j not in inputs]
+    coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
+    return rows, {model.input_names[j]: float(row[j]) for j in others}, coverage
