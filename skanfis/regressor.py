@@ -85,8 +85,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, for all inputs or one each: "gaussian", "bell",
         "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
-        "sigmoid_difference", "sigmoid_product", or a class of one's own. "auto" tries the first
-        six. Not used where ``partition`` is a model.
+        "sigmoid_difference", "sigmoid_product", or a class of one's own. Not used where
+        ``partition`` is a model.
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
         None is all.

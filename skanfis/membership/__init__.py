@@ -11,7 +11,6 @@ __all__ = [
     "LEAST_TRUTH",
     "MEMBERSHIPS",
     "NAMES_IN_MATLAB",
-    "TRIED_FAMILIES",
     "Bell",
     "Gaussian",
     "Membership",
@@ -59,24 +58,8 @@ NAMES_IN_MATLAB = {
 }
 
 
-# Tried by mf="auto", the default first: those that may peak anywhere, without and with kinks.
-TRIED_FAMILIES: tuple[type[Membership], ...] = (
-    Gaussian,
-    Bell,
-    Triangular,
-    Trapezoidal,
-    TwoSidedGaussian,
-    PiShaped,
-)
-
-
 def membership_families(mf, input_names) -> list[type[Membership]]:
-    """One family per input, from a name, a class, or a sequence of these.
-
-    "auto" is the first of ``TRIED_FAMILIES``, which the others are compared with.
-    """
-    if isinstance(mf, str) and mf == "auto":
-        return [TRIED_FAMILIES[0]] * len(input_names)
+    """One family per input, from a name, a class, or a sequence of these."""
     given = [mf] * len(input_names) if isinstance(mf, str | type) else list(mf)
     if len(given) != len(input_names):
         raise ValueError(

@@ -31,14 +31,12 @@ class Candidate:
     counts: tuple[int, ...] | None
     size: float | None = None  # number of clusters, or the radius that they have
     clustering: str = ""  # "k-means", "subtractive" or "fcm"
-    family: type[Membership] | None = None  # where it is another one than that of the search
 
     def describe(self):
         """In words."""
-        family = "" if self.family is None else f", {self.family.name}"
         if self.counts is not None:
-            return f"grid {list(self.counts)}{family}"
-        return _IN_WORDS[self.clustering].format(self.size) + family
+            return f"grid {list(self.counts)}"
+        return _IN_WORDS[self.clustering].format(self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +62,11 @@ class RuleBases:
 
     def of(self, candidate: Candidate, rows: StandardisedData):
         """The antecedent of a candidate; clusters are sought in the rows."""
-        families = self.families
-        if candidate.family is not None:
-            families = [candidate.family] * len(families)
         if candidate.counts is not None:
-            return grid_antecedent(families, candidate.counts, self.spacing)
+            return grid_antecedent(self.families, candidate.counts, self.spacing)
         clusterer = self._clusterer(candidate, rows.y.shape[1])
         return clustered_antecedent(
-            families,
+            self.families,
             rows,
             lambda table, weight: clusterer.fit(table, sample_weight=weight).labels_,
             self.inputs,

@@ -49,8 +49,6 @@ class StructureRequest:
         Of clusterings that have none of their own.
     names : sequence of str
         Of the inputs.
-    other_families : sequence of type of Membership
-        For all inputs in place of ``families``, where they promise a smaller error.
     """
 
     n_mfs: Any
@@ -63,7 +61,6 @@ class StructureRequest:
     premises_move: bool
     seed: int
     names: Sequence[str]
-    other_families: Sequence[type[Membership]] = ()
 
     @property
     def is_searched(self):
@@ -86,31 +83,24 @@ class StructureRequest:
                 self.consequent_inputs,
                 self.seed,
                 self.weights,
-                self.other_families,
             ).run(self.partition)
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
             self._warn_if_underdetermined(antecedent.n_rules, rows)
-            return replace(self._tuned(antecedent, rows, is_compared=False), term_names=names)
-        antecedent = self._antecedent(self.families, rows)
+            return replace(self._tuned(antecedent, rows), term_names=names)
+        antecedent = self._antecedent(rows)
         self._warn_if_underdetermined(antecedent.n_rules, rows)
-        is_compared = bool(self.other_families)
-        best = self._tuned(antecedent, rows, is_compared)
-        for family in self.other_families:
-            antecedent = self._antecedent([family] * len(self.families), rows)
-            other = self._tuned(antecedent, rows, is_compared)
-            best = other if other.expected_error < best.expected_error else best
-        return best
+        return self._tuned(antecedent, rows)
 
-    def _antecedent(self, families, rows):
+    def _antecedent(self, rows):
         """The rules that were asked for."""
         if not isinstance(self.n_mfs, str):
-            return self._grid(families, rows)
+            return self._grid(rows)
         label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
-        return clustered_antecedent(families, rows, label, self.premise_inputs)
+        return clustered_antecedent(self.families, rows, label, self.premise_inputs)
 
-    def _tuned(self, antecedent, rows, is_compared):
+    def _tuned(self, antecedent, rows):
         return tuned_start(
             antecedent,
             rows,
@@ -118,7 +108,6 @@ class StructureRequest:
             self.consequent_inputs,
             self.weights,
             self.premises_move,
-            is_compared,
         )
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
@@ -156,11 +145,11 @@ class StructureRequest:
 
         return checked
 
-    def _grid(self, families, rows):
+    def _grid(self, rows):
         counts = self._grid_counts(rows)
         n_basis, n_outputs = 1 + self.consequent_inputs.size, rows.y.shape[1]
         check_grid_fits(self.n_mfs, counts, n_basis, n_outputs, _memory_limit(), self.names)
-        return grid_antecedent(families, counts, Spacing(rows))
+        return grid_antecedent(self.families, counts, Spacing(rows))
 
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""

@@ -58,8 +58,6 @@ class StructureSearch:
         As ``trials.Trials`` takes them.
     premise_inputs : ndarray of int
         The inputs that may have terms, where they vary.
-    other_families : sequence of type of Membership
-        For all inputs in place of ``families``, tried on the structure that is found.
     """
 
     def __init__(
@@ -71,13 +69,11 @@ class StructureSearch:
         consequent_inputs: np.ndarray,
         seed,
         fixed: dict,
-        other_families: Sequence[type[Membership]] = (),
     ):
         is_constant = rows.inputs.is_constant
         self.inputs = premise_inputs[~is_constant[premise_inputs]]
         self.n_inputs = rows.X.shape[1]
         self.n_basis = 1 + np.count_nonzero(~is_constant[consequent_inputs])
-        self.other_families = other_families
         self.trials = Trials(rows, families, order, self.inputs, consequent_inputs, seed, fixed)
 
     def run(self, partition) -> Start:
@@ -105,10 +101,6 @@ class StructureSearch:
             clustering = "k-means" if partition == "auto" else partition
             clusters = self._best_clusters(clustering)
             best = best if clusters is None else self._better(best, clusters)
-        if best.counts is None or max(best.counts) > 1:
-            for family in self.other_families:
-                self.trials.beat(best)
-                best = self._better(best, replace(best, family=family))
         return best
 
     def _grow_grid(self, best):

@@ -51,7 +51,6 @@ class Start:
     is_held: bool = False
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
-    expected_error: float = np.nan  # mean square on new rows, as far as it was sought
 
 
 def tuned_start(
@@ -61,19 +60,17 @@ def tuned_start(
     consequent_inputs,
     weights,
     premises_move,
-    is_compared=False,
 ) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows.
 
-    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``;
-    ``is_compared`` says that the error to be expected is wanted even where all of them are given.
+    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``.
     """
     free = [key for key in FREE if key not in weights]
     penalty = replace(FIRST_PENALTY, **weights)
     if not premises_move:
         free = [key for key in free if key != "stiffness"]
         penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
-    if not free and not is_compared:
+    if not free:
         return Start(antecedent, penalty)
     sample = search_sample(rows, _MOST_ROWS)
     problem = SeparableProblem(
@@ -98,7 +95,6 @@ def tuned_start(
         settled(best.displacement),
         is_free,
         best.is_held,
-        expected_error=best.expected_error,
     )
 
 

@@ -4,7 +4,7 @@ from sklearn.utils import check_random_state
 
 from .._validation import feature_indices
 from ..learning import SOLVERS, Solver
-from ..membership import TRIED_FAMILIES, membership_families
+from ..membership import membership_families
 from ..model import TSKModel
 from ..search import StructureRequest, check_inputs
 
@@ -37,7 +37,6 @@ def structure_request(estimator, names):
     consequent = feature_indices(estimator.consequent_features, names, "consequent_features")
     # random_state=None stands for one fixed seed: the same data give the same model.
     state = estimator.random_state
-    tries_families = isinstance(estimator.mf, str) and estimator.mf == "auto"
     return StructureRequest(
         n_mfs=estimator.n_mfs,
         partition=start,
@@ -49,7 +48,6 @@ def structure_request(estimator, names):
         premises_move=solver_of(estimator).moves_premises and estimator.max_iter > 0,
         seed=0 if state is None else check_random_state(state).randint(2**31 - 1),
         names=names,
-        other_families=TRIED_FAMILIES[1:] if tries_families else (),
     )
 
 

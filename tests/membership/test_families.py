@@ -249,7 +249,6 @@ def test_bell_of_any_slope(rng, slope):
 
 def test_families_are_given_by_name_or_class_for_all_inputs_or_for_each():
     names = ["time", "rate"]
-    assert membership_families("auto", names) == [Gaussian, Gaussian]
     assert membership_families("bell", names) == [Bell, Bell]
     assert membership_families(Bell, names) == [Bell, Bell]
     assert membership_families(("bell", Gaussian), names) == [Bell, Gaussian]

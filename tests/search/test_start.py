@@ -30,4 +30,3 @@ def test_terms_have_no_bounds_where_data_are_next_to_exact(rng):
 def test_terms_have_bounds_where_there_is_noise(rng):
     _, found = of_grid(3, lambda x: np.sin(3.0 * x), rng, 0.1)
     assert not found.is_free
-    assert found.expected_error < 0.05
