@@ -7,6 +7,7 @@ no larger than it must be.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,12 +85,8 @@ _BY_NAME = {
 # By the class, since another class may go by the same name.
 _CONSTANTS_OF = {MEMBERSHIPS[name]: constants for name, constants in _BY_NAME.items()}
 
-# Which constants are places where the slope jumps.
-_KINKS_OF = {MEMBERSHIPS["triangular"]: (0, 1, 4), MEMBERSHIPS["trapezoidal"]: (0, 1)}
 
-
-@dataclass(frozen=True, eq=False)
-class TermTable:
+class TermTable(NamedTuple):
     """Consecutive terms of one family: where they start, and their constants (n_terms, k)."""
 
     family: type[Membership]
@@ -132,11 +129,17 @@ class Numbers:
         low = _rounded(model.minimum, dtype, "the minimum of an input")
         high = _rounded(model.maximum, dtype, "the maximum of an input")
         reference = _rounded(model.reference, dtype, "the mean of an input")
-        model, antecedent = _in_rounded_box(model, low, high), model.antecedent
+        model = replace(model, minimum=low.astype(float), maximum=high.astype(float))
+        antecedent = model.antecedent
         rule_terms = antecedent.rule_terms
         if isinstance(antecedent, RuleTableAntecedent):
             rule_terms = np.where(rule_terms < 0, antecedent.n_terms, rule_terms)
         offset, coefficients, slope_inputs = _consequents(model, reference)
+        limits = None
+        if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
+            # Where nothing else holds outputs, the largest numbers do.
+            end = float(np.finfo(dtype).max)
+            limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
         return cls(
             model=model,
             dtype=dtype,
@@ -144,7 +147,7 @@ class Numbers:
             high=high,
             reference=reference,
             inverse_spread=_rounded(1.0 / model.spread, dtype, "the inverse spread of an input"),
-            terms=tuple(_term_tables(model, low, high, reference)),
+            terms=tuple(_term_tables(model, reference)),
             term_inputs=antecedent.term_inputs,
             counts=antecedent.grid_counts,
             rule_terms=rule_terms,
@@ -152,25 +155,9 @@ class Numbers:
             coefficients=_rounded(coefficients, dtype, "a consequent"),
             slope_inputs=slope_inputs,
             reach=_reach(model, dtype),
-            output_limits=_output_limits(model, dtype),
+            output_limits=limits,
             support=None if model.support is None else _support(model, reference),
         )
-
-    @property
-    def n_inputs(self):
-        return self.low.size
-
-    @property
-    def n_outputs(self):
-        return self.offset.size
-
-    @property
-    def n_rules(self):
-        return self.coefficients.shape[0]
-
-    @property
-    def n_terms(self):
-        return self.term_inputs.size
 
     @property
     def block_starts(self):
@@ -191,42 +178,17 @@ def _rounded(values, dtype, what):
     """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero."""
     values = np.asarray(values, dtype=float)
     limits = np.finfo(dtype)
-    largest = np.abs(values).max(initial=0.0)
-    name = "Single precision" if dtype == np.float32 else "Double precision"
-    if not largest <= float(limits.max):
+    largest, ends = np.abs(values).max(initial=0.0), (float(limits.tiny), float(limits.max))
+    if largest != 0.0 and not ends[0] <= largest <= ends[1]:
+        name = "Single precision" if dtype == np.float32 else "Double precision"
         raise ValueError(
-            f"{name} cannot hold {what}, {largest:g}: it goes to {float(limits.max):.2g}. Scale "
-            "the data, or export in double precision."
-        )
-    if 0.0 < largest < float(limits.tiny):
-        raise ValueError(
-            f"{name} cannot hold {what}, {largest:g}, with all its digits: they end below "
-            f"{float(limits.tiny):.2g}. Scale the data, or export in double precision."
+            f"{name} cannot hold {what}, {largest:g}, with all its digits: it goes from "
+            f"{ends[0]:.2g} to {ends[1]:.2g}. Scale the data, or export in double precision."
         )
     return np.where(np.abs(values) < float(limits.tiny), 0.0, values).astype(dtype)
 
 
-def _in_rounded_box(model, low, high):
-    """The model with its box as it is rounded, and with the terms that lie on its edges.
-
-    A triangle that training has not moved has its corner on the edge, to a bit, and an input is
-    held at the edge as it is rounded.
-    """
-    groups = []
-    for group in model.antecedent.groups:
-        theta = group.theta.copy()
-        for edge, rounded in ((model.minimum, low), (model.maximum, high)):
-            beyond = theta[0] - edge[group.inputs]
-            reach = np.maximum(np.abs(edge), model.maximum - model.minimum)[group.inputs]
-            moved = rounded[group.inputs].astype(float) + beyond
-            theta[0] = np.where(np.abs(beyond) <= 16.0 * np.spacing(reach), moved, theta[0])
-        groups.append(replace(group, theta=theta))
-    antecedent = replace(model.antecedent, groups=tuple(groups))
-    edges = {"minimum": low.astype(float), "maximum": high.astype(float)}
-    return replace(model, antecedent=antecedent, **edges)
-
-
-def _term_tables(model, low, high, reference):
+def _term_tables(model, reference):
     start = 0
     for group in model.antecedent.groups:
         family, inputs = group.family, group.inputs
@@ -235,24 +197,12 @@ def _term_tables(model, low, high, reference):
                 f"Memberships {family.name!r} cannot be exported; "
                 f"{', '.join(one.name for one in _CONSTANTS_OF)} can."
             )
-        exact = _constants_about(reference, group)
-        constants = _rounded(exact, low.dtype, f"a constant of a {family.name} membership")
-        # An input that is held at an edge of the box is on the same side of a kink as in the model.
-        for edge in (low, high):
-            sides = np.sign(_constants_about(edge, group)).astype(low.dtype)
-            held = (edge - reference)[inputs]
-            for k in _KINKS_OF.get(family, ()):
-                moved = np.where(sides[:, k], np.nextafter(held, held + sides[:, k]), held)
-                is_right = np.sign(constants[:, k] - held) == sides[:, k]
-                constants[:, k] = np.where(is_right, constants[:, k], moved)
-        yield TermTable(family, start, constants)
+        theta = group.theta.copy()
+        theta[0] -= reference[inputs]
+        constants = np.column_stack(_CONSTANTS_OF[family](theta))
+        what = f"a constant of a {family.name} membership"
+        yield TermTable(family, start, _rounded(constants, reference.dtype, what))
         start += group.n_terms
-
-
-def _constants_about(place, group):
-    theta = group.theta.copy()
-    theta[0] -= place[group.inputs]
-    return np.column_stack(_CONSTANTS_OF[group.family](theta))
 
 
 def _consequents(model, reference):
@@ -273,13 +223,6 @@ def _reach(model, dtype):
         reach = min(model.max_extrapolation, 0.25 * largest / model.n_inputs) * model.spread
     reach = np.minimum(reach, largest)
     return np.where(reach < float(limits.tiny), 0.0, reach).astype(dtype)
-
-
-def _output_limits(model, dtype):
-    if model.out_of_bounds != "linear" and not np.isfinite(model.output_limits).any():
-        return None
-    end = float(np.finfo(dtype).max)
-    return rounded_within(np.clip(model.output_limits, -end, end), dtype)
 
 
 def _support(model, reference):

@@ -183,7 +183,7 @@ class _Formula:
         if way_out is not None:
             ahead = self._slopes(way_out)
             if strengths is not None:
-                of_strengths = changes.reshape(numbers.n_rules, 1) * by_rule
+                of_strengths = changes.reshape(numbers.model.n_rules, 1) * by_rule
                 ahead = of_strengths if ahead is None else ahead + of_strengths
             if ahead is not None:
                 y = y + far * self._weigh(strengths, ahead)
@@ -199,7 +199,7 @@ class _Formula:
     def _strengths(self, z, way_out):
         """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
-        if not numbers.n_terms:
+        if not numbers.model.antecedent.n_terms:
             return None, None
         for terms in numbers.terms:
             positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
@@ -208,8 +208,8 @@ class _Formula:
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
         # 1 where rule r has term t.
-        has_term = np.zeros((numbers.n_terms + 1, numbers.n_rules))
-        has_term[numbers.rule_terms.T, np.arange(numbers.n_rules)] = 1.0
+        has_term = np.zeros((numbers.model.antecedent.n_terms + 1, numbers.model.n_rules))
+        has_term[numbers.rule_terms.T, np.arange(numbers.model.n_rules)] = 1.0
         shares = (self.graph.node("Concat", *logs, axis=1) @ has_term[:-1]).softmax()
         if way_out is None:
             return shares, None
@@ -228,7 +228,7 @@ class _Formula:
     def _weigh(self, strengths, by_rule):
         """Sum over rules (n_rows, n_outputs)."""
         if strengths is not None:
-            return (strengths.reshape(self.numbers.n_rules, 1) * by_rule).sum(keep=False)
+            return (strengths.reshape(self.numbers.model.n_rules, 1) * by_rule).sum(keep=False)
         # One rule: its strength is one.
         if isinstance(by_rule, np.ndarray):
             return self.graph.node("Identity", by_rule[:, 0])

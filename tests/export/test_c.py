@@ -1,13 +1,11 @@
 """Exported C, compiled and run, answers what ``predict`` answers."""
 
 import re
-import runpy
 import shutil
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -19,7 +17,6 @@ from sklearn.preprocessing import RobustScaler
 from skanfis.antecedent import GridAntecedent, TermGroup
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
-from skanfis.export._numbers import Numbers
 from skanfis.export.c.builder import size_of_sum
 from skanfis.export.c.status import STATUS
 from skanfis.learning import VariableProjection
@@ -201,10 +198,8 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.parametrize("dtype", TOLERANCE)
-def test_corner_and_feet_on_an_edge_of_the_box_stay_there(dtype, tmp_path):
-    # Neither 0.1 nor 0.7 is a float, and the slope jumps there: answers are those on the box as it
-    # is rounded.
+def test_corner_and_feet_on_an_edge_of_the_box_stay_there(tmp_path):
+    # The slope jumps there.
     corners = np.array([[0.1, 0.4, 0.7], *np.log([[0.3] * 3] * 2)])
     antecedent = GridAntecedent((TermGroup(Triangular, np.zeros(3, dtype=int), corners),), (3,))
     model = quick(n_mfs=3).fit(np.linspace(0.1, 0.7, 50)[:, None], np.arange(50.0)).model_
@@ -215,11 +210,10 @@ def test_corner_and_feet_on_an_edge_of_the_box_stay_there(dtype, tmp_path):
         minimum=np.array([0.1]),
         maximum=np.array([0.7]),
     ).with_out_of_bounds("linear", 3.0)
-    X = np.linspace(-0.5, 1.5, 500)[:, None].astype(NUMPY[dtype])
-    code = export_c(model, name="m", dtype=dtype, min_coverage=None)
-    found, _ = answers_of(code, X, tmp_path)
-    wanted = Numbers.of(model, NUMPY[dtype]).model.predict(X.astype(float))
-    assert np.abs(found - wanted).max() < TOLERANCE[dtype] * np.abs(wanted).max()
+    X = np.linspace(-0.5, 1.5, 500)[:, None]
+    found, _ = answers_of(export_c(model, name="m", min_coverage=None), X, tmp_path)
+    wanted = model.predict(X)
+    assert np.abs(found - wanted).max() < 1e-12 * np.abs(wanted).max()
 
 
 @pytest.mark.theory
@@ -359,26 +353,15 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     assert run(["./test"], tmp_path).returncode == 1
 
 
-def far_off(mf, seed, offset=1e4):
-    """A model of inputs that lie so many standard deviations from zero, and its rows."""
-    g = np.random.default_rng(seed)
-    X = g.normal(size=(300, 2))
-    y = np.sin(2.0 * X[:, 0]) + X[:, 1] ** 2
-    model = quick(3, mf=mf, out_of_bounds="linear", max_iter=5)
-    return model.fit(X + offset, y), X + offset
-
-
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 def test_header_says_what_float_makes_of_the_inputs():
-    model, X = far_off("gaussian", 0)
+    X, y = surface()
+    X[:, 0] += 1e6
+    model = quick(n_mfs=2).fit(X, y)
     text = export_c(model, name="m", dtype="float").header.replace("\n *", "")
-    found = re.search(r"steps of (\S+) at the far end of .*?, (\S+) of .* by up to (\S+)\. ", text)
-    step, share, moved = map(float, found.groups())
-    assert step == pytest.approx(2.0**-10, rel=0.01)
-    assert share == pytest.approx(2.0**-10 / X.std(), rel=0.3)
-    # One digit is told.
-    rounded = model.model_.predict(X.astype(np.float32).astype(float))[:, 0]
-    assert 0.3 * moved < np.abs(model.predict(X) - rounded).max() < 1.5 * moved
+    found = re.search(r"steps of (\S+) at the far end of \[0\], (\S+) of its standard dev", text)
+    step, share = map(float, found.groups())
+    assert step == pytest.approx(2.0**-4, rel=0.01)
+    assert share == pytest.approx(step / X[:, 0].std(), rel=0.3)
     assert "steps of" not in export_c(model, name="m").header
 
 
@@ -387,13 +370,9 @@ HOSTILE = [
     "??/",
     'quote " and \\',
     "line\nbreak\r\n#error",
-    "°C · 陀螺 \U0001f600",
-    "int",
     "x" * 5000,
     "//\\",
-    "/*",
-    "%s%n",
-    "\x00\x1b[31m",
+    "\x00\x1b[31m °C 陀螺",
 ]
 
 
@@ -427,19 +406,15 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
     ("arguments", "message"),
     [
         ({}, "name=None takes the name from path"),
-        ({"name": "2x"}, "name='2x' must be a C identifier"),
-        ({"name": "grün"}, "must be a C identifier"),
-        ({"name": "x\n"}, "must be a C identifier"),
-        ({"name": 3}, "must be a C identifier"),
-        ({"name": "a__b"}, "two underscores"),
-        ({"name": "double"}, "is a keyword of C"),
-        ({"name": "x" * 17}, "has 17 characters; with 16 or fewer"),
+        ({"name": "2x"}, "name='2x' must be a letter, then letters"),
+        ({"name": "x\n"}, "must be a letter"),
+        ({"name": 3}, "must be a letter"),
+        ({"name": "a__b"}, "single underscores"),
+        ({"name": "x" * 17}, "with 16 or fewer"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
-        ({"path": 'a"b', "name": "m"}, "path ends in 'a\"b'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
         ({"name": "m", "std": "c11"}, "std='c11' must be one of 'c99', 'c89'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
-        ({"name": "m", "min_coverage": np.nan}, "min_coverage=nan must be"),
         ({"name": "m", "min_coverage": "0.5"}, "min_coverage='0.5' must be"),
         ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, r"each of the 1 outputs, .* shape \(2, 2\)"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must be finite, each low below its high"),
@@ -462,33 +437,13 @@ def test_family_of_ones_own_is_refused():
 
 def test_grid_too_deep_for_c89():
     antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 13, [2] * 13)
-    model = TSKModel(
-        antecedent=antecedent,
-        initial_antecedent=antecedent,
-        coefficients=np.ones((2**13, 1, 1)),
-        reference=np.zeros(13),
-        spread=np.ones(13),
-        minimum=-np.ones(13),
-        maximum=np.ones(13),
-        rule_weights=np.full(2**13, 2.0**-13),
-        rule_rows=np.ones(2**13),
-        input_names=tuple(f"x{j}" for j in range(13)),
-    )
+    n_rules, ones = antecedent.n_rules, np.ones(13)
+    names = tuple(f"x{j}" for j in range(13))
+    parts = (np.ones((n_rules, 1, 1)), 0.0 * ones, ones, -ones, ones)
+    model = TSKModel(antecedent, antecedent, *parts, *np.ones((2, n_rules)), names)
     with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
         export_c(model, name="m", std="c89")
     assert export_c(model, name="m").cost.exponentials == 26
-
-
-EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_c_export.py"
-
-
-@needs_compiler
-@pytest.mark.page
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
-def test_example_runs(capsys):
-    pytest.importorskip("matplotlib")
-    runpy.run_path(str(EXAMPLE))
-    assert "self-test: passed" in capsys.readouterr().out
 
 
 def test_limit_of_zero_is_clip_and_the_header_says_the_limit():

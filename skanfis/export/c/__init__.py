@@ -6,15 +6,10 @@ from typing import Any
 
 from .._numbers import Numbers
 from ..folding import fold
-from ._dialect import (
-    Dialect,
-    check_arguments,
-    read_limits,
-    write_files,
-)
-from ._header import header
+from ._dialect import Dialect, check_arguments, read_limits, write_files
 from ._self_test import known_answers, self_test
 from ._source import CCost, Source
+from .builder import header
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -118,7 +113,7 @@ def export_c(
     test = self_test(known_answers(numbers, min_coverage, limits), dialect)
     code = CCode(
         name,
-        header(model, numbers, dialect, source.cost(), min_coverage, limits),
+        header(numbers, dialect, source.cost(), min_coverage, limits),
         source.text(f"{stem}.h") + test,
         source.cost(),
     )
