@@ -2,7 +2,7 @@
 
 from .c import CCode, CCost, export_c
 from .fis import export_fis, read_fis, write_fis
-from .folding import fold, fold_with_reader, fold_with_rows, found_by_search, last_step
+from .folding import fold, fold_with_rows, found_by_search, last_step
 from .model_json import export_json, read_json, write_json
 from .onnx import register_onnx_converter
 
@@ -14,7 +14,6 @@ __all__ = [
     "export_fis",
     "export_json",
     "fold",
-    "fold_with_reader",
     "fold_with_rows",
     "found_by_search",
     "last_step",

@@ -106,28 +106,7 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
 
 
 def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray]]:
-    """Return what :func:`fold` does, and a function from tables to the model's inputs.
-
-    Parameters
-    ----------
-    estimator : fitted estimator or TSKModel
-
-    Returns
-    -------
-    model : TSKModel
-    read : callable
-        ``read(X)`` gives the rows that :func:`fold_with_rows` gives, and raises what it raises.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.export import fold_with_reader
-    >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
-    >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
-    >>> read(X[:5]).shape
-    (5, 1)
-    """
+    """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
     if isinstance(estimator, TSKModel):
         inputs = [_Column(j, name) for j, name in enumerate(estimator.input_names)]
         return estimator, _reader(inputs, estimator.input_names, True)

@@ -5,7 +5,6 @@ import shutil
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
-from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -108,48 +107,30 @@ def answers_of(code, X, folder):
     return evaluate_all([code], X, folder, "c99", [1])[0]
 
 
+# Those whose text has least in common with that of the list above, and a pipeline.
 TRAINED = {
-    "pipeline": lambda: make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
-    "one cluster": lambda: quick(partition=KMeans(1), out_of_bounds="linear"),
-    "plane": lambda: quick(n_mfs=1, out_of_bounds="linear"),
-    "constant": lambda: quick(n_mfs=1, order=0, out_of_bounds="linear"),
-    "scheduled": lambda: quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
+    "pipeline": make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
+    "one cluster": quick(partition=KMeans(1), out_of_bounds="linear"),
+    "constant": quick(n_mfs=1, order=0, out_of_bounds="linear"),
+    "scheduled": quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
 }
-
-
-@cache
-def trained():
-    """By kind; one output and two by turns, which are written the same way for every kind."""
-    X, y = surface(n_outputs=2)
-    return {
-        kind: make().fit(X, y[:, 0] if place % 2 else y)
-        for place, (kind, make) in enumerate(TRAINED.items())
-    }
 
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.parametrize(
-    ("dtype", "flags", "kinds"),
-    [
-        ("double", [], list(TRAINED)),
-        ("float", [], list(TRAINED)),
-        # Those whose text has least in common with that of the list above.
-        ("double", SANITIZE, ["one cluster", "constant", "scheduled"]),
-    ],
-    ids=["double", "float", "double sane"],
-)
-def test_trained_models_answer_as_predict(dtype, flags, kinds, tmp_path):
-    estimators = {kind: trained()[kind] for kind in kinds}
-    Z = around(surface()[0], dtype)
+@pytest.mark.parametrize(("dtype", "flags"), [("double", SANITIZE), ("float", [])])
+def test_trained_models_answer_as_predict(dtype, flags, tmp_path):
+    X, y = surface(n_outputs=2)
+    for estimator in TRAINED.values():
+        estimator.fit(X, y)
+    Z = around(X, dtype)
     codes = [
         export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
-        for place, estimator in enumerate(estimators.values())
+        for place, estimator in enumerate(TRAINED.values())
     ]
-    n_outputs = [fold(estimator).n_outputs for estimator in estimators.values()]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", n_outputs, flags)
-    for (kind, estimator), (found, status) in zip(estimators.items(), answers, strict=True):
-        wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
+    answers = evaluate_all(codes, Z, tmp_path, "c99", [2] * len(codes), flags)
+    for (kind, estimator), (found, status) in zip(TRAINED.items(), answers, strict=True):
+        wanted = estimator.predict(Z.astype(float))
         # Rules that cancel each other take digits with them, in Python too.
         scale = size_of_sum(fold(estimator), Z, wanted)
         assert (np.abs(found - wanted) / scale).max() < TOLERANCE[dtype], kind
@@ -260,12 +241,7 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("scale_x", "scale_y", "what"),
-    [
-        (1e45, 1.0, "an input"),
-        (1e-45, 1.0, "an input"),
-        (1.0, 1e42, "output"),
-    ],
+    ("scale_x", "scale_y", "what"), [(1e45, 1.0, "an input"), (1.0, 1e42, "output")]
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
     X, y = surface()
@@ -407,15 +383,12 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
     [
         ({}, "name=None takes the name from path"),
         ({"name": "2x"}, "name='2x' must be a letter, then letters"),
-        ({"name": "x\n"}, "must be a letter"),
         ({"name": 3}, "must be a letter"),
         ({"name": "a__b"}, "single underscores"),
         ({"name": "x" * 17}, "with 16 or fewer"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
-        ({"name": "m", "std": "c11"}, "std='c11' must be one of 'c99', 'c89'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
-        ({"name": "m", "min_coverage": "0.5"}, "min_coverage='0.5' must be"),
         ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, r"each of the 1 outputs, .* shape \(2, 2\)"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must be finite, each low below its high"),
     ],
@@ -444,18 +417,6 @@ def test_grid_too_deep_for_c89():
     with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
         export_c(model, name="m", std="c89")
     assert export_c(model, name="m").cost.exponentials == 26
-
-
-def test_limit_of_zero_is_clip_and_the_header_says_the_limit():
-    model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
-    for limit, words in [
-        (0.0, "Outside this range the value at the edge is held."),
-        (0.25, "up to 0.25 of its standard deviations, and holds the"),
-        (np.inf, "Outside this range the model goes on along its tangent."),
-    ]:
-        code = export_c(model.with_out_of_bounds("linear", limit), name="m")
-        assert words in " ".join(code.header.replace("*", "").split())
-        assert ("m_tangent" in code.source) is (limit > 0.0)
 
 
 def test_rules_that_have_seen_no_data_are_not_called_uncovered():

@@ -1,5 +1,7 @@
 """Membership functions of the format against the definitions in MATLAB's documentation."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -73,22 +75,15 @@ def mu(name, parameters):
 
 
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-def test_what_is_written_is_the_family(family, rng):
+def test_what_is_written_is_the_family_and_is_read(family, rng):
     for _ in range(20):
         theta = rng.normal(scale=0.7, size=(len(family.parameters), 1))
         name, parameters = function_of(family, family.natural(theta)[:, 0])
         expected = BY_DEFINITION[name](X, *parameters)
         assert_allclose(family.value(X[None], theta)[0], expected, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-def test_what_is_written_is_read(family, rng):
-    for _ in range(20):
-        theta = rng.normal(scale=0.7, size=len(family.parameters))
-        written = function_of(family, family.natural(theta[:, None])[:, 0])
-        read, theta_read = theta_of(*written, LOW, HIGH)
+        read, theta_read = theta_of(name, parameters, LOW, HIGH)
         assert read is family
-        assert_allclose(theta_read, theta, rtol=1e-12, atol=1e-13)
+        assert_allclose(theta_read, theta[:, 0], rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -132,9 +127,6 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
         ("gbellmf", [1.0, 0.0, 0.0], "slope 0, which must be between"),
         ("trimf", [0.0, -1.0, 1.0], "ascending order"),
         ("trimf", [0.0, 0.0, 1.0], r"vertical flank within its input's Range \[-4 4\]"),
-        ("trimf", [-4.0, -4.0, -4.0], "vertical flank"),
-        ("trapmf", [0.0, 2.0, 1.0, 3.0], "ascending order"),
-        ("pimf", [0.0, 0.0, 1.0, 2.0], "vertical flank"),
         ("gauss2mf", [1.0, 1.0, 1.0, -1.0], "plateau -2, which must be"),
         ("gauss2mf", [1.0, 1.0, 0.0, 2.0], "right 0"),
         ("smf", [1.0, 1.0], "width 0, which must be"),
@@ -154,3 +146,14 @@ def test_refuses_to_write_a_function_that_the_format_has_not():
 
     with pytest.raises(ValueError, match="'own' has no function in the"):
         function_of(Own, [0.0, 1.0])
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "files.rst"
+
+
+@pytest.mark.skipif(not PAGE.is_file(), reason="the documentation is not here")
+def test_every_family_is_on_the_page_with_its_function():
+    page = PAGE.read_text(encoding="utf-8")
+    for family in MEMBERSHIPS.values():
+        name, _ = function_of(family, [1.0] * len(family.parameters))
+        assert f'``"{family.name}"``\n     - ``{name}``' in page

@@ -95,7 +95,6 @@ def test_terms_of_a_grid_stay_in_order_else_rules_are_listed():
 REFUSED = [
     # the system
     ("Type=", "Type='mamdani'", "'mamdani': only Sugeno systems are supported"),
-    ("Type=", "Type=sugeno", "a name in single quotes"),
     ("DefuzzMethod=", "DefuzzMethod='wtsum'", "only the weighted average"),
     ("AndMethod=", "AndMethod='min'", "only the product"),
     ("NumInputs=", "NumInputs=two", "a whole number, found 'two'"),
@@ -104,7 +103,6 @@ REFUSED = [
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
     ("Version=", "Version 2.0", "key=value"),
     # names
-    ("Name='by hand'", "Name='by \N{BELL}\x07'", "cannot be printed"),
     # sections
     ("[Input1]", "[Input01]", r"expected \[System\], .* found '\[Input01\]'"),
     ("[Input2]", "[Input1]", r"\[Input1\] stands here for the second time"),
@@ -118,7 +116,6 @@ REFUSED = [
     # membership functions
     ("MF1='low'", "MF1='low':'gaussmf',[1 2", "'name':'function'"),
     ("MF1='low'", "MF1='low':'gaussmf',[1 exp(2)]", "a number of size up to"),
-    ("MF1='low'", "MF3='low':'gaussmf',[1 2]", None),
     ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' with 1 parameters is not supported"),
     (
         "MF1='flat'",
@@ -127,11 +124,9 @@ REFUSED = [
     ),
     # rules
     ("1 1, 2 1", "1 1 1, 2 1 (1) : 1", "3 numbers for 2 inputs"),
-    ("1 1, 2 1", "1 1, 2 (1) : 1", "1 numbers for 2 outputs"),
     ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight '0.5'; only weight 1"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 2", r"by OR \(2\)"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 3", "the connection is 1 or 2"),
-    ("1 1, 2 1", "1 1, 2 1", "expected a rule"),
     ("1 1, 2 1", "-1 1, 2 1 (1) : 1", "'-1' for input 'x y', .* NOT .a negative number"),
     ("1 1, 2 1", "1.2 1, 2 1 (1) : 1", "hedges"),
     ("1 1, 2 1", "3 1, 2 1 (1) : 1", "'3' for input 'x y', which has 2"),
@@ -153,7 +148,6 @@ def test_refuses_with_the_line(old, new, message):
         ("[System]", "[Rules]", "has no Type|second time|no .System"),
         ("Type=", "", r"line 2: \[System\] has no Type"),
         ("NumInputs=", "NumInputs=3", r"line 2: \[System\] counts \[Input3\]"),
-        ("NumOutputs=", "NumOutputs=1", r"line \d+: "),
         ("NumRules=", "NumRules=4", r"counts 4 rules, \[Rules\] has 3"),
         ("2 0, 2 3", "", r"counts 3 rules, \[Rules\] has 2"),
         ("NumMFs=1", "NumMFs=2", r"\[Input2\] has no MF2"),
@@ -162,13 +156,6 @@ def test_refuses_with_the_line(old, new, message):
 def test_refuses_counts_that_do_not_agree(old, new, message):
     with pytest.raises(ValueError, match=message):
         parse_fis(with_line(old, new)[0])
-
-
-def test_says_which_file(tmp_path):
-    path = tmp_path / "spoilt.fis"
-    path.write_text(BY_HAND.replace("'sugeno'", "'mamdani'"), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"spoilt\.fis: line 4: Type='mamdani'"):
-        read_fis(path)
 
 
 def test_reads_utf_8_with_and_without_mark_and_no_other_encoding(tmp_path):
@@ -224,7 +211,6 @@ def test_refuses_many_rules_over_wide_consequents_before_memory_is_asked_for():
     [
         "MF1='" + "a" * 1_000_000,
         "MF1='a':'gaussmf',[" + "1 " * 500_000,
-        "MF1='a':'gaussmf',[" + " " * 1_000_000 + "]",
         "Range=[" + "1" * 1_000_000 + " 2]",
         "[" * 1_000_000,
     ],
@@ -245,12 +231,9 @@ def test_what_an_error_shows_of_the_file_is_short_and_ascii():
     for old, new in [
         ("Type=", "Type='{}'"),
         ("Name='x y'", "Name='{}'"),
-        ("AndMethod=", "AndMethod='{}'"),
         ("MF1='low'", "MF1='low':'{}',[1 2]"),
-        ("MF1='flat'", "MF1='flat':'{}',[1 2]"),
         ("MF1='low'", "{}=1"),
         ("1 1, 2 1", "{} 1, 2 1 (1) : 1"),
-        ("1 1, 2 1", "{}"),
     ]:
         text, _ = with_line(old, new.format("é" * 10_000))
         with pytest.raises(ValueError, match="line") as caught:

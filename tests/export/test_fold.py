@@ -19,9 +19,7 @@ from sklearn.preprocessing import (
     FunctionTransformer,
     MaxAbsScaler,
     MinMaxScaler,
-    Normalizer,
     OneHotEncoder,
-    PolynomialFeatures,
     PowerTransformer,
     RobustScaler,
     StandardScaler,
@@ -31,7 +29,6 @@ from skanfis import ANFISRegressor
 from skanfis.export import fold, fold_with_rows
 
 NAMES = ["hours", "kelvin", "rate"]
-POLICIES = ("clip", "linear", "nan")
 KINDS = {
     "grid": {"n_mfs": [2, 3, 1]},
     "bells": {"n_mfs": 2, "mf": "bell"},
@@ -56,17 +53,17 @@ SCALERS = {
     ),
 }
 
-# Every kind of rules behind every scaler; policies and numbers of outputs take turns, so that they
-# meet every kind and every scaler too.
+# Every kind of rules behind every scaler; policies and numbers of outputs take turns. A triangle
+# that training has not moved has its corner on the edge of the box, where the last bit decides on
+# which side of it the tangent is taken.
 CASES = [
-    (kind, scaler, POLICIES[place % 3], 1 + place % 2)
+    (
+        kind,
+        scaler,
+        ("clip", "nan" if kind == "triangles" else "linear", "nan")[place % 3],
+        1 + place % 2,
+    )
     for place, (kind, scaler) in enumerate(product(KINDS, SCALERS))
-]
-# A triangle that training has not moved has its corner on the edge of the box, where the last bit
-# decides on which side of it the tangent is taken.
-CASES = [
-    (kind, scaler, "clip" if (kind, policy) == ("triangles", "linear") else policy, n_outputs)
-    for kind, scaler, policy, n_outputs in CASES
 ]
 
 
@@ -106,6 +103,7 @@ def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_ou
     last = regressor(**KINDS[kind], out_of_bounds=policy)
     pipe = make_pipeline(fresh(scaler), last).fit(X, y)
     assert_same_predictions(pipe, around(X), np.ptp(y, axis=0).max() * 20)
+    assert fold(pipe).in_bounds(X).all()
     assert_array_equal(fold(pipe).predict(X).shape, (len(X), n_outputs))
 
 
@@ -118,25 +116,10 @@ def test_scale_of_the_target_is_folded(kind):
     target = make_pipeline(MinMaxScaler((-1, 3)), StandardScaler())
     both = TransformedTargetRegressor(inner, transformer=target).fit(X, y)
     assert_same_predictions(both, around(X), 1e4)
-    only_target = make_pipeline(
-        MaxAbsScaler(),
-        TransformedTargetRegressor(
-            regressor(**KINDS[kind], out_of_bounds=policy), transformer=RobustScaler()
-        ),
-    ).fit(X, y[:, 0])
+    last = regressor(**KINDS[kind], out_of_bounds=policy)
+    only_target = TransformedTargetRegressor(last, transformer=RobustScaler())
+    only_target = make_pipeline(MaxAbsScaler(), only_target).fit(X, y[:, 0])
     assert_same_predictions(only_target, around(X), 10.0)
-    neither = TransformedTargetRegressor(inner).fit(X, y)
-    assert_same_predictions(neither, around(X), 1e4)
-
-
-@pytest.mark.parametrize("scaler", SCALERS)
-def test_no_training_row_leaves_the_box(scaler):
-    X, y = data()
-    model = fold(make_pipeline(fresh(scaler), regressor(n_mfs=2)).fit(X, y))
-    assert model.in_bounds(X).all()
-    span = np.ptp(X, axis=0)
-    assert_allclose((model.minimum - X.min(axis=0)) / span, 0.0, atol=1e-10)
-    assert_allclose((model.maximum - X.max(axis=0)) / span, 0.0, atol=1e-10)
 
 
 def test_folded_model_is_the_model_of_the_raw_data():
@@ -184,12 +167,8 @@ def test_moved_and_dropped_columns_go_back_to_their_place():
     [
         slice("kelvin", "rate"),
         slice(None, "kelvin"),
-        slice("kelvin", None),
-        slice(1, 3),
         slice(-2, None),
         "kelvin",
-        1,
-        -1,
         [2, 0],
         ["rate", "hours"],
         np.array([True, False, True]),
@@ -203,15 +182,6 @@ def test_columns_are_chosen_as_scikit_learn_does(columns):
     chosen = ColumnTransformer([("some", StandardScaler(), [columns] if one else columns)])
     pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, y)
     assert_same_predictions(pipe, frame, 10.0)
-
-
-def test_names_are_those_of_the_table_that_the_user_gives():
-    X, y = data()
-    frame = pd.DataFrame(X, columns=NAMES)
-    for first in (StandardScaler(), "passthrough"):
-        pipe = make_pipeline(first, regressor(n_mfs=2)).fit(frame, y)
-        assert fold(pipe).input_names == tuple(NAMES)
-        assert fold(pipe.fit(X, y)).input_names == ("x0", "x1", "x2")
 
 
 def test_a_model_is_its_own_folding():
@@ -271,8 +241,6 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
     ("step", "message"),
     [
         (PCA(2), r"step 'pca' \(PCA\) cannot be folded into the rules: .* every column alone"),
-        (PolynomialFeatures(2), "'polynomialfeatures'"),
-        (Normalizer(), "Normalizer"),
         (SimpleImputer(), "SimpleImputer"),
         (FunctionTransformer(np.negative), "FunctionTransformer"),
         (FeatureUnion([("a", StandardScaler())]), "FeatureUnion"),
@@ -283,12 +251,7 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
 )
 def test_what_does_not_fold_is_named(step, message):
     X, y = data()
-    pipe = make_pipeline(
-        step, regressor(n_mfs=2 if not isinstance(step, PolynomialFeatures) else 1)
-    )
-    if isinstance(step, PolynomialFeatures):
-        step.set_params(include_bias=False)
-    pipe.fit(X, y)
+    pipe = make_pipeline(step, regressor(n_mfs=2)).fit(X, y)
     with pytest.raises(ValueError, match=message):
         fold(pipe)
 
@@ -298,7 +261,6 @@ def test_what_does_not_fold_is_named(step, message):
     [
         {"func": np.log, "inverse_func": np.exp},
         {"transformer": PowerTransformer()},
-        {"transformer": MinMaxScaler(clip=True)},
     ],
 )
 def test_a_bent_target_is_refused(settings):
@@ -317,9 +279,7 @@ def test_what_has_no_rules_is_refused():
     with pytest.raises(TypeError, match="fitted ANFIS estimator"):
         fold(ANFISRegressor)
     for unfitted in (
-        ANFISRegressor(),
         make_pipeline(StandardScaler(), ANFISRegressor()),
-        TransformedTargetRegressor(ANFISRegressor()),
         GridSearchCV(ANFISRegressor(), {}),
     ):
         with pytest.raises(NotFittedError):

@@ -13,10 +13,8 @@ from numpy.testing import assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.export import export_json, read_json, write_json
 from skanfis.export.json_reader import parse_json
-from skanfis.inspection import export_text
 from skanfis.model import TSKModel
 
-from .json_mutations import mutated_numbers, with_number
 from .rule_bases import EVERY_PAIR, MODELS, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
@@ -218,27 +216,6 @@ def test_refuses_a_rule_base_too_large_before_memory_is_asked_for():
 
     with pytest.raises(ValueError, match=r"5000 rules over 5000 terms.*at most 20,000,000"):
         parse_json(changed(grow))
-
-
-@pytest.mark.theory
-@pytest.mark.parametrize(("part", "kind"), [(0, "grid"), (1, "scattered"), (2, "rule table")])
-def test_no_number_that_is_read_makes_one_that_is_not_finite(part, kind):
-    model = MODELS[f"{kind}, order 1, 2 outputs"]
-    document, rows = json.loads(export_json(model)), rows_of(model, 2.0, 6)
-    n_read = 0
-    for path, value in mutated_numbers(document, part, 7):
-        try:
-            read = parse_json(json.dumps(with_number(document, path, value)))
-        except ValueError:
-            continue
-        n_read += 1
-        for policy in ("clip", "linear"):
-            assert np.isfinite(read.with_out_of_bounds(policy).predict(rows)).all(), (path, value)
-        coverage = read.coverage(rows)
-        assert ((coverage >= 0.0) & (coverage <= 1.0 + 1e-9)).all(), (path, value)
-        export_text(read)
-        assert_same(parse_json(export_json(read)), read)
-    assert n_read > 20
 
 
 def test_what_could_not_be_read_is_not_written():

@@ -14,9 +14,6 @@ ROWS = 32
 # As part of the size of what is summed: what the algorithm loses, and no more.
 TOLERANCE = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}
 
-# Logarithms of memberships that this takes in, and the share from which on a term counts.
-_USUAL, _FIRES = 32.0, 1e-6
-
 _CODE = """
 #ifdef $NAME_SELF_TEST
 
@@ -105,21 +102,12 @@ def known_answers(numbers, min_coverage, limits=None):
         sure = np.abs(coverage - min_coverage) > 1e-3 * min_coverage
     y = outputs(Z)
     tolerance = TOLERANCE[numbers.dtype] * size_of_sum(model, Z, y)
-    tolerance *= max(_largest_logarithm(model, Z) / _USUAL, 1.0)
     step = 4.0 * np.finfo(numbers.dtype).eps * (np.abs(Z - numbers.reference) + model.spread)
     steady = (np.abs(outputs(Z + step) - y) <= 0.25 * tolerance).all(axis=1)
     chosen = np.flatnonzero(sure & steady if (sure & steady).any() else sure)[:ROWS]
     y[silent] = 0.0
     y, tolerance = y[chosen].astype(numbers.dtype), tolerance.astype(numbers.dtype)
     return X[chosen], y, status[chosen], tolerance
-
-
-def _largest_logarithm(model, X):
-    """Of a membership by which some rule fires; what it is rounded by a share is off by."""
-    inside = np.ascontiguousarray(np.clip(X, model.minimum, model.maximum).T)
-    log_mu = model.antecedent.log_memberships(inside)
-    shares = model.antecedent.sum_over_rules(model.antecedent.strengths(inside))
-    return np.abs(log_mu[shares > _FIRES]).max(initial=0.0)
 
 
 def size_of_sum(model, X, y):
