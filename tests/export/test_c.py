@@ -3,7 +3,6 @@
 import re
 import shutil
 import subprocess
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -13,13 +12,12 @@ from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import RobustScaler
 
-from skanfis.antecedent import GridAntecedent, TermGroup
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
 from skanfis.export.c.builder import size_of_sum
 from skanfis.export.c.status import STATUS
 from skanfis.learning import VariableProjection
-from skanfis.membership import MEMBERSHIPS, Gaussian, Triangular
+from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import OUT_OF_BOUNDS
@@ -47,13 +45,10 @@ def expected_status(model, X):
 
 
 def expected_outputs(model, X, status, std):
-    if model.out_of_bounds != "raise":
-        y = model.predict(X)
-        if model.out_of_bounds == "nan" and std == "c89":
-            y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
-        return y
-    y = model.with_out_of_bounds("clip").predict(X)
-    y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
+    is_left = model.out_of_bounds == "raise" or (model.out_of_bounds, std) == ("nan", "c89")
+    y = model.with_out_of_bounds("clip" if is_left else model.out_of_bounds).predict(X)
+    if is_left:
+        y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
     return y
 
 
@@ -63,13 +58,8 @@ def expected_outputs(model, X, status, std):
     [
         pytest.param("double", "c99", slice(None), [], id="double"),
         pytest.param("float", "c99", slice(None), [], id="float", marks=pytest.mark.theory),
-        # C89 differs by its exp and log alone: half of the models are met by the sanitizers.
-        pytest.param(
-            "double", "c89", slice(1, None, 4), SANITIZE, id="double c89", marks=pytest.mark.theory
-        ),
-        pytest.param(
-            "float", "c89", slice(2, None, 4), SANITIZE, id="float c89", marks=pytest.mark.theory
-        ),
+        # C89 differs by its exp and log alone: a part of the models is met by the sanitizers.
+        pytest.param("double", "c89", slice(1, None, 3), SANITIZE, marks=pytest.mark.theory),
     ],
 )
 def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):
@@ -175,26 +165,6 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
     found, status = answers_of(code, X.astype(np.float32), tmp_path)
     assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-6 * np.abs(y / scale).max()
     assert (status == STATUS["IN_RANGE"]).all()
-
-
-@pytest.mark.theory
-@needs_compiler
-def test_corner_and_feet_on_an_edge_of_the_box_stay_there(tmp_path):
-    # The slope jumps there.
-    corners = np.array([[0.1, 0.4, 0.7], *np.log([[0.3] * 3] * 2)])
-    antecedent = GridAntecedent((TermGroup(Triangular, np.zeros(3, dtype=int), corners),), (3,))
-    model = quick(n_mfs=3).fit(np.linspace(0.1, 0.7, 50)[:, None], np.arange(50.0)).model_
-    model = replace(
-        model,
-        antecedent=antecedent,
-        coefficients=np.array([[[1.0], [2.0]], [[5.0], [-3.0]], [[2.0], [7.0]]]),
-        minimum=np.array([0.1]),
-        maximum=np.array([0.7]),
-    ).with_out_of_bounds("linear", 3.0)
-    X = np.linspace(-0.5, 1.5, 500)[:, None]
-    found, _ = answers_of(export_c(model, name="m", min_coverage=None), X, tmp_path)
-    wanted = model.predict(X)
-    assert np.abs(found - wanted).max() < 1e-12 * np.abs(wanted).max()
 
 
 @pytest.mark.theory
@@ -329,18 +299,6 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     assert run(["./test"], tmp_path).returncode == 1
 
 
-def test_header_says_what_float_makes_of_the_inputs():
-    X, y = surface()
-    X[:, 0] += 1e6
-    model = quick(n_mfs=2).fit(X, y)
-    text = export_c(model, name="m", dtype="float").header.replace("\n *", "")
-    found = re.search(r"steps of (\S+) at the far end of \[0\], (\S+) of its standard dev", text)
-    step, share = map(float, found.groups())
-    assert step == pytest.approx(2.0**-4, rel=0.01)
-    assert share == pytest.approx(step / X[:, 0].std(), rel=0.3)
-    assert "steps of" not in export_c(model, name="m").header
-
-
 HOSTILE = [
     "*/ int x; /*",
     "??/",
@@ -417,11 +375,3 @@ def test_grid_too_deep_for_c89():
     with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
         export_c(model, name="m", std="c89")
     assert export_c(model, name="m").cost.exponentials == 26
-
-
-def test_rules_that_have_seen_no_data_are_not_called_uncovered():
-    model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
-    unseen = replace(model, support=None)
-    assert "support" not in export_c(unseen, name="m").source
-    assert "|= M_UNCOVERED" not in export_c(unseen, name="m").source
-    assert "|= M_UNCOVERED" in export_c(model, name="m").source

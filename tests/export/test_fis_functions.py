@@ -103,19 +103,9 @@ def test_other_ways_to_write_a_function_are_read(name, parameters):
     assert_allclose(mu(name, parameters), BY_DEFINITION[name](X, *parameters), atol=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("name", "parameters", "like"),
-    [
-        ("trimf", [-4.0, -4.0, 1.0], lambda x: np.maximum((1 - x) / 5, 0)),
-        ("trimf", [-1.0, 4.0, 4.0], lambda x: np.maximum((x + 1) / 5, 0)),
-        ("trapmf", [-9.0, -9.0, 0.0, 2.0], lambda x: np.clip((2 - x) / 2, 0, 1)),
-        ("pimf", [0.0, 2.0, 5.0, 5.0], lambda x: smf(x, 0, 2)),
-    ],
-)
-def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
-    name, parameters, like
-):
-    assert_allclose(mu(name, parameters), like(X), atol=1e-14)
+def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any():
+    assert_allclose(mu("trimf", [-4.0, -4.0, 1.0]), np.maximum((1 - X) / 5, 0), atol=1e-14)
+    assert_allclose(mu("pimf", [0.0, 2.0, 5.0, 5.0]), smf(X, 0, 2), atol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ fuzzylite is Debian's libfuzzylite; where it is not installed, its package is do
 and unpacked, for which nobody needs to be root.
 """
 
-import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -64,25 +64,15 @@ def _installed():
 
 def _downloaded(folder):
     for package in ("libfuzzylite6.0", "libfuzzylite6.0t64"):
-        if _run(["apt-get", "download", package], folder):
-            _run(["dpkg-deb", "-x", *folder.glob("*.deb"), folder], folder)
-    library = next(folder.glob("usr/lib/*/libfuzzylite.so.6*"), None)
-    if library is None:
-        pytest.skip(
-            "NO INDEPENDENT READER HAS CHECKED THE .fis FILES: libfuzzylite is not installed and "
-            "could not be downloaded. On Debian or Ubuntu: apt-get install fuzzylite."
-        )
-    return library
-
-
-def _run(command, folder):
-    if shutil.which(command[0]) is None:
-        return False
-    try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, timeout=60, check=False)
-    except subprocess.TimeoutExpired:
-        return False
-    return done.returncode == 0
+        with suppress(OSError, subprocess.SubprocessError):
+            settings = {"cwd": folder, "capture_output": True, "timeout": 60, "check": True}
+            subprocess.run(["apt-get", "download", package], **settings)
+            subprocess.run(["dpkg-deb", "-x", *folder.glob("*.deb"), folder], **settings)
+            return next(folder.glob("usr/lib/*/libfuzzylite.so.6*"))
+    pytest.skip(
+        "NO INDEPENDENT READER HAS CHECKED THE .fis FILES: libfuzzylite is not installed and "
+        "could not be downloaded. On Debian or Ubuntu: apt-get install fuzzylite."
+    )
 
 
 def difference(outputs, model, rows):

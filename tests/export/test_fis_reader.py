@@ -62,13 +62,10 @@ def test_means_what_was_written_by_hand():
         ([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)], GridAntecedent),
         ([2, 2], [(2, 1), (1, 1), (1, 2), (2, 2)], GridAntecedent),  # in another order
         ([2, 0, 2], [(1, 0, 1), (1, 0, 2), (2, 0, 1), (2, 0, 2)], GridAntecedent),
-        ([3], [(1,), (3,)], GridAntecedent),  # one term unused
         ([2, 2], [(1, 1), (2, 2)], ScatteredAntecedent),
-        ([2, 1, 2], [(1, 0, 2), (2, 0, 1)], ScatteredAntecedent),
         ([1, 1], [(0, 0)], GridAntecedent),  # one rule without conditions
         ([2, 2], [(1, 1), (1, 2), (2, 1)], RuleTableAntecedent),
         ([2, 2], [(1, 1), (1, 1), (2, 1), (2, 2)], RuleTableAntecedent),  # one twice
-        ([1], [(0,), (0,)], RuleTableAntecedent),
     ],
 )
 def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, kind, rng):
@@ -83,15 +80,6 @@ def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, 
         assert_allclose(outputs, average(np.exp(log_mu), np.arange(len(rules)) + 1.0))
 
 
-def test_terms_of_a_grid_stay_in_order_else_rules_are_listed():
-    text = system([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)])
-    # Training moves terms of a grid by their distances, which must be positive.
-    swapped = text.replace("[1 2]", "[1 0.5]", 1)
-    assert type(parse_fis(swapped).antecedent) is RuleTableAntecedent
-    mixed = text.replace("'gaussmf',[1 2]", "'zmf',[1 2]", 1)
-    assert type(parse_fis(mixed).antecedent) is RuleTableAntecedent
-
-
 REFUSED = [
     # the system
     ("Type=", "Type='mamdani'", "'mamdani': only Sugeno systems are supported"),
@@ -101,7 +89,6 @@ REFUSED = [
     ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
     ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
-    ("Version=", "Version 2.0", "key=value"),
     # names
     # sections
     ("[Input1]", "[Input01]", r"expected \[System\], .* found '\[Input01\]'"),
@@ -110,7 +97,6 @@ REFUSED = [
     # variables
     ("Range=[0 10]", "Range=[10 0]", "low < high"),
     ("Range=[0 10]", "Range=[0 inf]", "a number of size up to 1e.50, found 'inf'"),
-    ("Range=[0 10]", "Range=[0 1e999]", "a number of size up to"),
     ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a number of size up to"),
     ("Range=[0 10]", "Range=0 10", r"expected \[low high\]"),
     # membership functions
@@ -148,7 +134,6 @@ def test_refuses_with_the_line(old, new, message):
         ("[System]", "[Rules]", "has no Type|second time|no .System"),
         ("Type=", "", r"line 2: \[System\] has no Type"),
         ("NumInputs=", "NumInputs=3", r"line 2: \[System\] counts \[Input3\]"),
-        ("NumRules=", "NumRules=4", r"counts 4 rules, \[Rules\] has 3"),
         ("2 0, 2 3", "", r"counts 3 rules, \[Rules\] has 2"),
         ("NumMFs=1", "NumMFs=2", r"\[Input2\] has no MF2"),
     ],
@@ -177,16 +162,6 @@ def test_takes_names_of_columns(tmp_path):
     for names in (["time"], ["time", "time"], ["a", "b", "c"]):
         with pytest.raises(ValueError, match="must be 2 different names"):
             read_fis(path, input_names=names)
-
-
-def test_refuses_a_large_file_without_reading_it(tmp_path):
-    path = tmp_path / "large.fis"
-    with open(path, "wb") as file:
-        file.truncate(2**40)
-    start = time.process_time()
-    with pytest.raises(ValueError, match="larger than 4,194,304 bytes"):
-        read_fis(path)
-    assert time.process_time() - start < 1.0
 
 
 def test_text_in_place_of_a_path_is_named():
@@ -221,22 +196,3 @@ def test_long_lines_take_no_long_time(line):
     with pytest.raises(ValueError, match=r"line \d+: "):
         parse_fis(with_line("MF1='low'", line)[0])
     assert time.process_time() - start < 1.0
-
-
-def test_what_an_error_shows_of_the_file_is_short_and_ascii():
-    text, _ = with_line("Type=", "Type='\N{RIGHT-TO-LEFT OVERRIDE}" + "x" * 10_000 + "'")
-    with pytest.raises(ValueError, match="cannot be printed") as caught:
-        parse_fis(text)
-    assert str(caught.value).isascii()
-    for old, new in [
-        ("Type=", "Type='{}'"),
-        ("Name='x y'", "Name='{}'"),
-        ("MF1='low'", "MF1='low':'{}',[1 2]"),
-        ("MF1='low'", "{}=1"),
-        ("1 1, 2 1", "{} 1, 2 1 (1) : 1"),
-    ]:
-        text, _ = with_line(old, new.format("é" * 10_000))
-        with pytest.raises(ValueError, match="line") as caught:
-            parse_fis(text.replace("2 0, 2 3", "9 9, 2 3"))
-        assert str(caught.value).isascii()
-        assert len(str(caught.value)) < 400

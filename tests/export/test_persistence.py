@@ -1,5 +1,6 @@
 """A model in a file comes back the same: joblib, and skops for files from strangers."""
 
+import sys
 from functools import cache
 from importlib import import_module
 from io import BytesIO
@@ -17,7 +18,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
-from skanfis.export import TRUSTED_TYPES
+from skanfis.export import TRUSTED_TYPES, register_onnx_converter
 from skanfis.export.fis.reader import parse_fis
 from skanfis.gyro import (
     OpenLoopArcsineRegressor,
@@ -68,16 +69,6 @@ def fitted(name):
         return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
 
 
-def learning():
-    """One that goes on learning, and keeps what it needs for that."""
-    return quick().partial_fit(X, Y)
-
-
-def sure():
-    """With intervals."""
-    return ConformalRegressor(quick()).fit(X, Y[:, 0])
-
-
 def compensator():
     """Of a gyro: what its log does not say, a law, and rules for what the law leaves."""
     g = np.random.default_rng(1)
@@ -91,10 +82,17 @@ def compensator():
     ).fit(log, log[:, 2] + 0.1 * log[:, 2] ** 3)
 
 
-@pytest.mark.parametrize("make", [learning, sure, compensator])
-def test_skops_of_what_is_more_than_rules(make):
+MORE_THAN_RULES = {
+    "learning": lambda: quick().partial_fit(X, Y),
+    "intervals": lambda: ConformalRegressor(quick()).fit(X, Y[:, 0]),
+    "compensator": compensator,
+}
+
+
+@pytest.mark.parametrize("kind", MORE_THAN_RULES)
+def test_skops_of_what_is_more_than_rules(kind):
     io = pytest.importorskip("skops.io")
-    data = io.dumps(make())
+    data = io.dumps(MORE_THAN_RULES[kind]())
     assert set(io.get_untrusted_types(data=data)) <= set(TRUSTED_TYPES)
     io.loads(data, trusted=TRUSTED_TYPES)
 
@@ -116,3 +114,9 @@ def test_trusted_types_are_all_there_and_no_more():
         assert isinstance(getattr(import_module(module), name), type)
     families = {f"{family.__module__}.{family.__name__}" for family in MEMBERSHIPS.values()}
     assert families == {name for name in TRUSTED_TYPES if ".membership." in name}
+
+
+def test_missing_onnx_packages_are_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "skl2onnx", None)
+    with pytest.raises(ImportError, match=r"pip install skl2onnx onnxruntime .*'\.\[onnx\]'"):
+        register_onnx_converter()
