@@ -6,14 +6,12 @@ per output as well: strengths sum to one, so that it may be added at the end, an
 no larger than it must be.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ..antecedent import RuleTableAntecedent
 from ..membership import MEMBERSHIPS, Membership
-from ..model import TSKModel
 
 __all__ = ["FLOOR", "SMALLEST_LOG_SQUARE", "Numbers", "TermTable", "rounded_within"]
 
@@ -94,75 +92,44 @@ class TermTable(NamedTuple):
     constants: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
 class Numbers:
-    """What is written: floating-point arrays of one type, and integers."""
+    """What is written of a TSKModel: floating-point arrays of one type, and integers.
 
-    # With its box as it is rounded: from a function on the numbers it differs by rounding alone.
-    model: TSKModel
-    dtype: np.dtype
-    low: np.ndarray
-    high: np.ndarray
-    reference: np.ndarray
-    inverse_spread: np.ndarray
-    terms: tuple[TermTable, ...]
-    term_inputs: np.ndarray
-    # Terms per input of a grid.
-    counts: tuple[int, ...] | None
-    # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
-    rule_terms: np.ndarray
-    # Coefficients (n_rules, n_outputs, 1 + n_slopes) about it.
-    offset: np.ndarray
-    coefficients: np.ndarray
-    slope_inputs: np.ndarray
-    # How far the tangent is followed in each input, so that the sum in deviations is finite.
-    reach: np.ndarray
-    # (2, n_outputs); None where outputs are not held.
-    output_limits: np.ndarray | None
-    # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
-    support: np.ndarray | None
+    ValueError where the type cannot hold them.
+    """
 
-    @classmethod
-    def of(cls, model, dtype):
-        """Numbers of a TSKModel in a floating-point type; ValueError where it cannot hold them."""
-        dtype = np.dtype(dtype)
-        low = _rounded(model.minimum, dtype, "the minimum of an input")
-        high = _rounded(model.maximum, dtype, "the maximum of an input")
-        reference = _rounded(model.reference, dtype, "the mean of an input")
-        model = replace(model, minimum=low.astype(float), maximum=high.astype(float))
-        antecedent = model.antecedent
-        rule_terms = antecedent.rule_terms
-        if isinstance(antecedent, RuleTableAntecedent):
-            rule_terms = np.where(rule_terms < 0, antecedent.n_terms, rule_terms)
-        offset, coefficients, slope_inputs = _consequents(model, reference)
-        limits = None
+    def __init__(self, model, dtype):
+        self.dtype = dtype = np.dtype(dtype)
+        self.low = _rounded(model.minimum, dtype, "the minimum of an input")
+        self.high = _rounded(model.maximum, dtype, "the maximum of an input")
+        self.reference = reference = _rounded(model.reference, dtype, "the mean of an input")
+        what = "the inverse spread of an input"
+        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what)
+        # With its box as it is rounded: a function on the numbers differs by rounding alone.
+        box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
+        self.model = model = replace(model, **box)
+        self.terms = tuple(_term_tables(model, reference))
+        self.term_inputs = model.antecedent.term_inputs
+        # Terms per input of a grid, and where those of each input start; None where there is none.
+        self.counts = model.antecedent.grid_counts
+        self.block_starts = np.cumsum([0, *(self.counts or ())])[:-1]
+        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
+        rule_terms, n_terms = model.antecedent.rule_terms, model.antecedent.n_terms
+        self.rule_terms = np.where(rule_terms < 0, n_terms, rule_terms)
+        # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
+        offset, coefficients, self.slope_inputs = _consequents(model, reference)
+        self.offset = _rounded(offset, dtype, "a typical output")
+        self.coefficients = _rounded(coefficients, dtype, "a consequent")
+        # How far the tangent is followed in each input, so that the sum in deviations is finite.
+        self.reach = _reach(model, dtype)
+        # (2, n_outputs); None where outputs are not held.
+        self.output_limits = None
         if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
             # Where nothing else holds outputs, the largest numbers do.
             end = float(np.finfo(dtype).max)
-            limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
-        return cls(
-            model=model,
-            dtype=dtype,
-            low=low,
-            high=high,
-            reference=reference,
-            inverse_spread=_rounded(1.0 / model.spread, dtype, "the inverse spread of an input"),
-            terms=tuple(_term_tables(model, reference)),
-            term_inputs=antecedent.term_inputs,
-            counts=antecedent.grid_counts,
-            rule_terms=rule_terms,
-            offset=_rounded(offset, dtype, "a typical output"),
-            coefficients=_rounded(coefficients, dtype, "a consequent"),
-            slope_inputs=slope_inputs,
-            reach=_reach(model, dtype),
-            output_limits=limits,
-            support=None if model.support is None else _support(model, reference),
-        )
-
-    @property
-    def block_starts(self):
-        """Where the terms of each input of a grid start."""
-        return np.cumsum([0, *(self.counts or ())])[:-1]
+            self.output_limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
+        # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
+        self.support = None if model.support is None else _support(model, reference)
 
 
 def rounded_within(limits, dtype):

@@ -83,7 +83,7 @@ def _convert(scope, node, container):
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = _Graph(scope, container, np.dtype(dtype))
     x = graph.node("Cast", _Value(graph, given.full_name), to=kind)
-    y = _Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
+    y = _Formula(Numbers(model, dtype), model.out_of_bounds, graph).outputs(x)
     graph.node("Identity", y, output=node.outputs[0].full_name)
 
 

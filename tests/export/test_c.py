@@ -356,16 +356,6 @@ def test_bad_argument(arguments, message):
         export_c(CASES[0].model, **arguments)
 
 
-def test_family_of_ones_own_is_refused():
-    class Own(Gaussian):
-        name = "own"
-
-    X, y = surface()
-    model = quick(n_mfs=2, mf=Own).fit(X, y)
-    with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
-        export_c(model, name="m")
-
-
 def test_grid_too_deep_for_c89():
     antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 13, [2] * 13)
     n_rules, ones = antecedent.n_rules, np.ones(13)

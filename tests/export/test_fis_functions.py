@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skanfis.export import export_c
 from skanfis.export.fis.functions import function_of, theta_of
 from skanfis.membership import MEMBERSHIPS
+
+from ..quick import quick
 
 LOW, HIGH = -4.0, 4.0
 X = np.linspace(LOW, HIGH, 801)
@@ -130,12 +133,15 @@ def test_refuses(name, parameters, message):
         theta_of(name, parameters, LOW, HIGH)
 
 
-def test_refuses_to_write_a_function_that_the_format_has_not():
+def test_a_family_of_ones_own_is_refused():
     class Own(MEMBERSHIPS["gaussian"]):
         name = "own"
 
     with pytest.raises(ValueError, match="'own' has no function in the"):
         function_of(Own, [0.0, 1.0])
+    X = np.linspace(0.0, 1.0, 30)[:, None]
+    with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
+        export_c(quick(n_mfs=2, mf=Own).fit(X, X[:, 0]), name="m")
 
 
 PAGE = Path(__file__).parents[2] / "docs" / "files.rst"

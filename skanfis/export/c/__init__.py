@@ -107,7 +107,7 @@ def export_c(
         # Rules that come from elsewhere: no data to be near to or far from.
         min_coverage = None
     dialect = Dialect(name, dtype, std)
-    numbers = Numbers.of(model, dialect.dtype)
+    numbers = Numbers(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
     source = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits)
     test = self_test(known_answers(numbers, min_coverage, limits), dialect)

@@ -174,29 +174,29 @@ class Source:
     def tables(self):
         """Constant tables by their names: an array, and the type where it is one of positions."""
         numbers, facts = self.numbers, self.facts
-        reals = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
+        found = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
         if "beyond" in facts:
-            reals["inverse_spread"] = numbers.inverse_spread
+            found["inverse_spread"] = numbers.inverse_spread
         if "linear" in facts:
-            reals["reach"] = numbers.reach
+            found["reach"] = numbers.reach
         if "held" in facts:
-            reals["output_low"], reals["output_high"] = numbers.output_limits
-        for k, terms in enumerate(numbers.terms):
-            reals[f"terms{k}"] = terms.constants
+            found["output_low"], found["output_high"] = numbers.output_limits
+        found |= {f"terms{k}": terms.constants for k, terms in enumerate(numbers.terms)}
         if "covers" in facts:
-            reals["support"] = numbers.support
+            found["support"] = numbers.support
         if "saturates" in facts:
-            reals["limits"] = self.limits
-        reals |= {"offset": numbers.offset, "consequents": numbers.coefficients}
-        positions = {}
+            found["limits"] = self.limits
+        found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
         if self.n_terms:
-            positions["term_input"] = numbers.term_inputs
+            found["term_input"] = numbers.term_inputs
         if not self.is_grid and not self.is_in_order:
-            positions["rule_terms"] = numbers.rule_terms
+            found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
-            positions["slope_input"] = numbers.slope_inputs
-        found = {name: (values, None) for name, values in reals.items()}
-        return found | {name: (values, index_type(values)) for name, values in positions.items()}
+            found["slope_input"] = numbers.slope_inputs
+        return {
+            name: (values, None if values.dtype.kind == "f" else index_type(values))
+            for name, values in found.items()
+        }
 
     def arrays(self):
         """Arrays on the stack and their lengths: of the main function, and of the tangent."""

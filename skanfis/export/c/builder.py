@@ -180,7 +180,7 @@ class RulesPart:
     """
 
     def __init__(self, model, dialect: Dialect, suffix: str, min_coverage, saturate=None) -> None:
-        numbers = Numbers.of(model, dialect.dtype)
+        numbers = Numbers(model, dialect.dtype)
         self.name = dialect.name + suffix
         self.min_coverage = None if model.support is None else min_coverage
         self.limits = read_limits(saturate, numbers)
