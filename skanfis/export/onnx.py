@@ -328,22 +328,11 @@ def _one_foot(x, p):
     return value, lambda: slope() * p[1]
 
 
-def _sigmoid_difference(x, p):
-    center, per_flank, v, log_gain = p
-    u = (x - center) * per_flank
-    rise, fall = u + v, -(u - v)
-    return (
-        lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
-        lambda: ((-rise).sigmoid() - (-fall).sigmoid()) * per_flank,
-    )
-
-
-def _sigmoid_product(x, p):
-    center, per_left, per_right, at_left, at_right = p
+def _sigmoids(x, center, per_left, per_right, at_left, at_right, log_gain=0.0):
     d = x - center
     rise, fall = d * per_left + at_left, -(d * per_right - at_right)
     return (
-        lambda: _log_sigmoid(rise) + _log_sigmoid(fall),
+        lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
         lambda: (-rise).sigmoid() * per_left - (-fall).sigmoid() * per_right,
     )
 
@@ -357,7 +346,7 @@ _BY_NAME = {
     "pi_shaped": _two_feet(_spline),
     "s_shaped": _one_foot,
     "z_shaped": _one_foot,
-    "sigmoid_difference": _sigmoid_difference,
-    "sigmoid_product": _sigmoid_product,
+    "sigmoid_difference": lambda x, p: _sigmoids(x, p[0], p[1], p[1], p[2], p[2], p[3]),
+    "sigmoid_product": lambda x, p: _sigmoids(x, *p),
 }
 _FORMULAS = {MEMBERSHIPS[name]: formula for name, formula in _BY_NAME.items()}

@@ -122,6 +122,22 @@ _ONE_FOOT = (
 """,
 )
 
+
+def _sigmoids(gain, left, right, at_left, at_right):
+    """A rise times a fall, whose constants are at these places."""
+    value = f"""
+    const $real d = x - p[0];
+    return {gain}$name_log_sigmoid(p[{at_left}] + d * p[{left}])
+        + $name_log_sigmoid(p[{at_right}] - d * p[{right}]);
+"""
+    slope = f"""
+    const $real d = x - p[0];
+    return p[{left}] * $name_sigmoid(-p[{at_left}] - d * p[{left}])
+        - p[{right}] * $name_sigmoid(d * p[{right}] - p[{at_right}]);
+"""
+    return value, slope
+
+
 # Bodies of functions of x and p: the value, and its derivative by x.
 _BY_NAME = {
     "gaussian": (
@@ -173,26 +189,8 @@ _BY_NAME = {
     "pi_shaped": _two_feet("spline"),
     "s_shaped": _ONE_FOOT,
     "z_shaped": _ONE_FOOT,
-    "sigmoid_difference": (
-        """
-    const $real u = (x - p[0]) * p[1];
-    return p[3] + $name_log_sigmoid(p[2] + u) + $name_log_sigmoid(p[2] - u);
-""",
-        """
-    const $real u = (x - p[0]) * p[1];
-    return p[1] * ($name_sigmoid(-p[2] - u) - $name_sigmoid(u - p[2]));
-""",
-    ),
-    "sigmoid_product": (
-        """
-    const $real d = x - p[0];
-    return $name_log_sigmoid(p[3] + d * p[1]) + $name_log_sigmoid(p[4] - d * p[2]);
-""",
-        """
-    const $real d = x - p[0];
-    return p[1] * $name_sigmoid(-p[3] - d * p[1]) - p[2] * $name_sigmoid(d * p[2] - p[4]);
-""",
-    ),
+    "sigmoid_difference": _sigmoids("p[3] + ", 1, 1, 2, 2),
+    "sigmoid_product": _sigmoids("", 1, 2, 3, 4),
 }
 
 # By the class, since another class may go by the same name.
@@ -208,6 +206,6 @@ COSTS = {
     "pi_shaped": (1, 1, 7),
     "s_shaped": (1, 1, 6),
     "z_shaped": (1, 1, 6),
-    "sigmoid_difference": (2, 2, 1),
+    "sigmoid_difference": (2, 2, 2),
     "sigmoid_product": (2, 2, 2),
 }
