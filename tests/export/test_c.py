@@ -341,7 +341,6 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
     [
         ({}, "name=None takes the name from path"),
         ({"name": "2x"}, "name='2x' must be a letter, then letters"),
-        ({"name": 3}, "must be a letter"),
         ({"name": "a__b"}, "single underscores"),
         ({"name": "x" * 17}, "with 16 or fewer"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),

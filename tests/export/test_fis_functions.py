@@ -95,7 +95,6 @@ def test_what_is_written_is_the_family_and_is_read(family, rng):
         ("gaussmf", [-1.5, 0.3]),  # a deviation counts by its size
         ("gbellmf", [-2.0, 1.5, 1.0]),
         ("gauss2mf", [-1.0, -0.5, 0.7, 0.5]),
-        ("gauss2mf", [1.0, 0.5, 0.7, 0.5]),  # no plateau
         ("trapmf", [-1.0, 0.5, 0.5, 2.0]),  # no plateau
         ("pimf", [-1.0, 0.5, 0.5, 2.0]),
         ("dsigmf", [-3.0, 1.0, -3.0, -1.0]),  # both sigmoids fall
@@ -121,11 +120,9 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any():
         ("trimf", [0.0, -1.0, 1.0], "ascending order"),
         ("trimf", [0.0, 0.0, 1.0], r"vertical flank within its input's Range \[-4 4\]"),
         ("gauss2mf", [1.0, 1.0, 1.0, -1.0], "plateau -2, which must be"),
-        ("gauss2mf", [1.0, 1.0, 0.0, 2.0], "right 0"),
         ("smf", [1.0, 1.0], "width 0, which must be"),
         ("dsigmf", [1.0, 0.0, 2.0, 1.0], "must be the same and not zero"),
         ("psigmf", [1.0, 0.0, 2.0, 1.0], "one must be positive and one negative"),
-        ("psigmf", [1.0, 1.0, -1.0, 1.0], "width 0, which must be"),
     ],
 )
 def test_refuses(name, parameters, message):
