@@ -248,9 +248,10 @@ def _terms(terms, n_inputs):
 
 def _rules(rules, n_terms, n_inputs, n_outputs):
     """Table of terms; coefficients, weights and rows as the model has them."""
+    position = _whole(-1, n_terms - 1)
 
     def terms(value, where):
-        return [_whole(-1, n_terms - 1)(term, where) for term in _list(value, where, 0)]
+        return [position(term, where) for term in _list(value, where, 0)]
 
     def consequents(value, where):
         is_constant = all(isinstance(one, list) and len(one) == 1 for one in _list(value, where))
