@@ -6,13 +6,12 @@ per output as well: strengths sum to one, so that it may be added at the end, an
 no larger than it must be.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..antecedent import RuleTableAntecedent
 from ..membership import MEMBERSHIPS, Membership
-from ..model import TSKModel
 
 __all__ = ["FLOOR", "SMALLEST_LOG_SQUARE", "Numbers", "TermTable", "rounded_within"]
 
@@ -84,12 +83,8 @@ _BY_NAME = {
 # By the class, since another class may go by the same name.
 _CONSTANTS_OF = {MEMBERSHIPS[name]: constants for name, constants in _BY_NAME.items()}
 
-# Which constants are places where the slope jumps.
-_KINKS_OF = {MEMBERSHIPS["triangular"]: (0, 1, 4), MEMBERSHIPS["trapezoidal"]: (0, 1)}
 
-
-@dataclass(frozen=True, eq=False)
-class TermTable:
+class TermTable(NamedTuple):
     """Consecutive terms of one family: where they start, and their constants (n_terms, k)."""
 
     family: type[Membership]
@@ -97,85 +92,44 @@ class TermTable:
     constants: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
 class Numbers:
-    """What is written: floating-point arrays of one type, and integers."""
+    """What is written of a TSKModel: floating-point arrays of one type, and integers.
 
-    # With its box as it is rounded: from a function on the numbers it differs by rounding alone.
-    model: TSKModel
-    dtype: np.dtype
-    low: np.ndarray
-    high: np.ndarray
-    reference: np.ndarray
-    inverse_spread: np.ndarray
-    terms: tuple[TermTable, ...]
-    term_inputs: np.ndarray
-    # Terms per input of a grid.
-    counts: tuple[int, ...] | None
-    # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
-    rule_terms: np.ndarray
-    # Coefficients (n_rules, n_outputs, 1 + n_slopes) about it.
-    offset: np.ndarray
-    coefficients: np.ndarray
-    slope_inputs: np.ndarray
-    # How far the tangent is followed in each input, so that the sum in deviations is finite.
-    reach: np.ndarray
-    # (2, n_outputs); None where outputs are not held.
-    output_limits: np.ndarray | None
-    # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
-    support: np.ndarray | None
+    ValueError where the type cannot hold them.
+    """
 
-    @classmethod
-    def of(cls, model, dtype):
-        """Numbers of a TSKModel in a floating-point type; ValueError where it cannot hold them."""
-        dtype = np.dtype(dtype)
-        low = _rounded(model.minimum, dtype, "the minimum of an input")
-        high = _rounded(model.maximum, dtype, "the maximum of an input")
-        reference = _rounded(model.reference, dtype, "the mean of an input")
-        model, antecedent = _in_rounded_box(model, low, high), model.antecedent
-        rule_terms = antecedent.rule_terms
-        if isinstance(antecedent, RuleTableAntecedent):
-            rule_terms = np.where(rule_terms < 0, antecedent.n_terms, rule_terms)
-        offset, coefficients, slope_inputs = _consequents(model, reference)
-        return cls(
-            model=model,
-            dtype=dtype,
-            low=low,
-            high=high,
-            reference=reference,
-            inverse_spread=_rounded(1.0 / model.spread, dtype, "the inverse spread of an input"),
-            terms=tuple(_term_tables(model, low, high, reference)),
-            term_inputs=antecedent.term_inputs,
-            counts=antecedent.grid_counts,
-            rule_terms=rule_terms,
-            offset=_rounded(offset, dtype, "a typical output"),
-            coefficients=_rounded(coefficients, dtype, "a consequent"),
-            slope_inputs=slope_inputs,
-            reach=_reach(model, dtype),
-            output_limits=_output_limits(model, dtype),
-            support=None if model.support is None else _support(model, reference),
-        )
-
-    @property
-    def n_inputs(self):
-        return self.low.size
-
-    @property
-    def n_outputs(self):
-        return self.offset.size
-
-    @property
-    def n_rules(self):
-        return self.coefficients.shape[0]
-
-    @property
-    def n_terms(self):
-        return self.term_inputs.size
-
-    @property
-    def block_starts(self):
-        """Where the terms of each input of a grid start."""
-        return np.cumsum([0, *(self.counts or ())])[:-1]
+    def __init__(self, model, dtype):
+        self.dtype = dtype = np.dtype(dtype)
+        self.low = _rounded(model.minimum, dtype, "the minimum of an input")
+        self.high = _rounded(model.maximum, dtype, "the maximum of an input")
+        self.reference = reference = _rounded(model.reference, dtype, "the mean of an input")
+        what = "the inverse spread of an input"
+        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what)
+        # With its box as it is rounded: a function on the numbers differs by rounding alone.
+        box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
+        self.model = model = replace(model, **box)
+        self.terms = tuple(_term_tables(model, reference))
+        self.term_inputs = model.antecedent.term_inputs
+        # Terms per input of a grid, and where those of each input start; None where there is none.
+        self.counts = model.antecedent.grid_counts
+        self.block_starts = np.cumsum([0, *(self.counts or ())])[:-1]
+        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
+        rule_terms, n_terms = model.antecedent.rule_terms, model.antecedent.n_terms
+        self.rule_terms = np.where(rule_terms < 0, n_terms, rule_terms)
+        # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
+        offset, coefficients, self.slope_inputs = _consequents(model, reference)
+        self.offset = _rounded(offset, dtype, "a typical output")
+        self.coefficients = _rounded(coefficients, dtype, "a consequent")
+        # How far the tangent is followed in each input, so that the sum in deviations is finite.
+        self.reach = _reach(model, dtype)
+        # (2, n_outputs); None where outputs are not held.
+        self.output_limits = None
+        if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
+            # Where nothing else holds outputs, the largest numbers do.
+            end = float(np.finfo(dtype).max)
+            self.output_limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
+        # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
+        self.support = None if model.support is None else _support(model, reference)
 
 
 def rounded_within(limits, dtype):
@@ -191,42 +145,17 @@ def _rounded(values, dtype, what):
     """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero."""
     values = np.asarray(values, dtype=float)
     limits = np.finfo(dtype)
-    largest = np.abs(values).max(initial=0.0)
-    name = "Single precision" if dtype == np.float32 else "Double precision"
-    if not largest <= float(limits.max):
+    largest, ends = np.abs(values).max(initial=0.0), (float(limits.tiny), float(limits.max))
+    if largest != 0.0 and not ends[0] <= largest <= ends[1]:
+        name = "Single precision" if dtype == np.float32 else "Double precision"
         raise ValueError(
-            f"{name} cannot hold {what}, {largest:g}: it goes to {float(limits.max):.2g}. Scale "
-            "the data, or export in double precision."
-        )
-    if 0.0 < largest < float(limits.tiny):
-        raise ValueError(
-            f"{name} cannot hold {what}, {largest:g}, with all its digits: they end below "
-            f"{float(limits.tiny):.2g}. Scale the data, or export in double precision."
+            f"{name} cannot hold {what}, {largest:g}, with all its digits: it goes from "
+            f"{ends[0]:.2g} to {ends[1]:.2g}. Scale the data, or export in double precision."
         )
     return np.where(np.abs(values) < float(limits.tiny), 0.0, values).astype(dtype)
 
 
-def _in_rounded_box(model, low, high):
-    """The model with its box as it is rounded, and with the terms that lie on its edges.
-
-    A triangle that training has not moved has its corner on the edge, to a bit, and an input is
-    held at the edge as it is rounded.
-    """
-    groups = []
-    for group in model.antecedent.groups:
-        theta = group.theta.copy()
-        for edge, rounded in ((model.minimum, low), (model.maximum, high)):
-            beyond = theta[0] - edge[group.inputs]
-            reach = np.maximum(np.abs(edge), model.maximum - model.minimum)[group.inputs]
-            moved = rounded[group.inputs].astype(float) + beyond
-            theta[0] = np.where(np.abs(beyond) <= 16.0 * np.spacing(reach), moved, theta[0])
-        groups.append(replace(group, theta=theta))
-    antecedent = replace(model.antecedent, groups=tuple(groups))
-    edges = {"minimum": low.astype(float), "maximum": high.astype(float)}
-    return replace(model, antecedent=antecedent, **edges)
-
-
-def _term_tables(model, low, high, reference):
+def _term_tables(model, reference):
     start = 0
     for group in model.antecedent.groups:
         family, inputs = group.family, group.inputs
@@ -235,24 +164,12 @@ def _term_tables(model, low, high, reference):
                 f"Memberships {family.name!r} cannot be exported; "
                 f"{', '.join(one.name for one in _CONSTANTS_OF)} can."
             )
-        exact = _constants_about(reference, group)
-        constants = _rounded(exact, low.dtype, f"a constant of a {family.name} membership")
-        # An input that is held at an edge of the box is on the same side of a kink as in the model.
-        for edge in (low, high):
-            sides = np.sign(_constants_about(edge, group)).astype(low.dtype)
-            held = (edge - reference)[inputs]
-            for k in _KINKS_OF.get(family, ()):
-                moved = np.where(sides[:, k], np.nextafter(held, held + sides[:, k]), held)
-                is_right = np.sign(constants[:, k] - held) == sides[:, k]
-                constants[:, k] = np.where(is_right, constants[:, k], moved)
-        yield TermTable(family, start, constants)
+        theta = group.theta.copy()
+        theta[0] -= reference[inputs]
+        constants = np.column_stack(_CONSTANTS_OF[family](theta))
+        what = f"a constant of a {family.name} membership"
+        yield TermTable(family, start, _rounded(constants, reference.dtype, what))
         start += group.n_terms
-
-
-def _constants_about(place, group):
-    theta = group.theta.copy()
-    theta[0] -= place[group.inputs]
-    return np.column_stack(_CONSTANTS_OF[group.family](theta))
 
 
 def _consequents(model, reference):
@@ -273,13 +190,6 @@ def _reach(model, dtype):
         reach = min(model.max_extrapolation, 0.25 * largest / model.n_inputs) * model.spread
     reach = np.minimum(reach, largest)
     return np.where(reach < float(limits.tiny), 0.0, reach).astype(dtype)
-
-
-def _output_limits(model, dtype):
-    if model.out_of_bounds != "linear" and not np.isfinite(model.output_limits).any():
-        return None
-    end = float(np.finfo(dtype).max)
-    return rounded_within(np.clip(model.output_limits, -end, end), dtype)
 
 
 def _support(model, reference):

@@ -1,23 +1,38 @@
 """Scalers in front of a model, and on its target, folded into it: one model of the raw columns.
 
-Rules about z are rules about x = offset + scale z: memberships, box and consequents change their
-units, nothing else does. The same holds for the target, y = offset + scale t.
+A scaler maps every column alone, x = offset + scale z with a positive scale. Rules about z are
+rules about x: memberships, box and consequents change their units, nothing else does. The same
+holds for the target, y = offset + scale t. A OneHotEncoder makes indicators of a column, which are
+inputs of the folded model in its place.
 """
 
+from collections import UserList
 from collections.abc import Callable
-from dataclasses import replace
+from copy import copy
+from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
-from sklearn.compose import TransformedTargetRegressor
+import pandas as pd
+from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
+from sklearn.feature_selection import SelectorMixin
 from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import (
+    FunctionTransformer,
+    MaxAbsScaler,
+    MinMaxScaler,
+    OneHotEncoder,
+    RobustScaler,
+    StandardScaler,
+)
+from sklearn.utils import check_array
 from sklearn.utils.validation import check_is_fitted
 
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
 from ..options import policy_of
-from ._columns import Column, as_numbers, columns_after, described, is_passthrough
 
 __all__ = ["fold", "fold_with_reader", "fold_with_rows", "found_by_search", "last_step"]
 
@@ -91,55 +106,30 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
 
 
 def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray]]:
-    """Return what :func:`fold` does, and a function from tables to the model's inputs.
-
-    Parameters
-    ----------
-    estimator : fitted estimator or TSKModel
-
-    Returns
-    -------
-    model : TSKModel
-    read : callable
-        ``read(X)`` gives the rows that :func:`fold_with_rows` gives, and raises what it raises.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.export import fold_with_reader
-    >>> X = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
-    >>> model, read = fold_with_reader(ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2))
-    >>> read(X[:5]).shape
-    (5, 1)
-    """
+    """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
     if isinstance(estimator, TSKModel):
-        inputs = [Column(j) for j in range(estimator.n_inputs)]
-        return estimator, _reader(inputs, estimator.input_names, True, estimator.input_names)
-    *steps, (label, last) = _steps_of("", estimator)
+        inputs = [_Column(j, name) for j, name in enumerate(estimator.input_names)]
+        return estimator, _reader(inputs, estimator.input_names, True)
+    (*steps, (label, last)), target_steps = _steps_of("", estimator)
     model = _model_of(label, last)
-    first = next((step for _, step in steps if not is_passthrough(step)), last)
+    first = next((step for _, step in steps if not _is_passthrough(step)), last)
     given = getattr(first, "feature_names_in_", None)
-    n_raw = first.n_features_in_
-    names = tuple(f"x{j}" for j in range(n_raw)) if given is None else tuple(given)
-    columns = [Column(j) for j in range(n_raw)]
+    names = [f"x{j}" for j in range(first.n_features_in_)] if given is None else list(given)
+    columns = [_Column(j, name) for j, name in enumerate(names)]
     for label, step in steps:
-        columns = columns_after(label, step, columns, names)
-
-    named = [names[c.source] if c.indicator is None else c.indicator.name for c in columns]
+        columns = _columns_after(label, step, columns)
     keys = [column.key for column in columns]
-    for name, key in zip(named, keys, strict=True):
+    for column, key in zip(columns, keys, strict=True):
         if keys.count(key) > 1:
             raise ValueError(
-                f"Column {name!r} reaches the model {keys.count(key)} times: its rules cannot be "
-                "written with one membership per column. Let every column reach it once."
+                f"Column {column.name!r} reaches the model {keys.count(key)} times: its rules "
+                "cannot be written with one membership per column. Let every column reach it once."
             )
     order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
-    inputs = [columns[j] for j in order]
-    model = _with_raw_inputs(model, columns, order, [named[j] for j in order])
-    for label, transformer in reversed(_target_steps("", estimator)):
+    model = _with_raw_inputs(model, columns, order)
+    for label, transformer in reversed(target_steps):
         model = _with_raw_target(model, label, transformer)
-    return model, _reader(inputs, names, given is not None, model.input_names)
+    return model, _reader([columns[j] for j in order], names, given is not None)
 
 
 def last_step(estimator: Any) -> Any:
@@ -164,7 +154,7 @@ def last_step(estimator: Any) -> Any:
     >>> last_step(make_pipeline(ANFISRegressor(n_mfs=2)).fit(*make_jang_sinc())).model_.n_rules
     4
     """
-    label, last = _steps_of("", estimator)[-1]
+    label, last = _steps_of("", estimator)[0][-1]
     _model_of(label, last)
     return last
 
@@ -193,25 +183,163 @@ def found_by_search(estimator: Any) -> Any:
     return estimator
 
 
+@dataclass(frozen=True)
+class _Column:
+    """Raw column ``source`` as x = offset + scale z, or output ``place`` of what encodes it."""
+
+    source: int
+    name: str
+    offset: float = 0.0
+    scale: float = 1.0
+    encode: Callable[..., np.ndarray] | None = None
+    place: int = -1
+
+    @property
+    def key(self):
+        """What orders the inputs, and no two of them share."""
+        return self.source, self.place
+
+    def values(self, X):
+        """The input on the rows of the user's table."""
+        if self.encode is not None:
+            return self.encode(X)[:, self.place].astype(np.float64)
+        return _as_numbers(_part_of(X, [self.source]))[:, 0]
+
+    def edge(self, z, side):
+        """The x of an edge of the box, to the lower (-1) or upper (1) side.
+
+        Two roundings farther out where it is computed: the rows that made it stay inside.
+        """
+        x = self.offset + self.scale * z
+        is_raw = self.offset == 0.0 and self.scale == 1.0
+        return x if is_raw else x + side * 4.0 * np.spacing(max(abs(x), abs(self.offset)))
+
+
+def _as_numbers(X):
+    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
+
+
+def _part_of(X, columns):
+    """Columns of a frame, or of anything that is an array, by their positions."""
+    if hasattr(X, "iloc"):
+        return X.iloc[:, columns]
+    if hasattr(X, "get_columns") or isinstance(X, np.ndarray):
+        return X[:, columns]
+    return np.asarray(X, dtype=object)[:, columns]
+
+
+def _is_passthrough(step):
+    return step is None or (isinstance(step, str) and step == "passthrough")
+
+
+def _described(label, step):
+    """A step for a message, by its name and class."""
+    return f"step {label!r} ({type(step).__name__})" if label else type(step).__name__
+
+
 def _steps_of(label, estimator):
-    """The steps of nested pipelines one after the other, the model's estimator last."""
+    """The steps of nested pipelines one after the other, the model's estimator last.
+
+    And the transformers of the target from the outermost to the innermost.
+    """
     estimator = found_by_search(estimator)
     if isinstance(estimator, TransformedTargetRegressor):
         check_is_fitted(estimator)
-        return _steps_of(label, estimator.regressor_)
+        steps, targets = _steps_of(label, estimator.regressor_)
+        return steps, [(label, estimator.transformer_), *targets]
     if isinstance(estimator, Pipeline):
-        return [part for name, step in estimator.steps for part in _steps_of(name, step)]
-    return [(label, estimator)]
+        parts = [_steps_of(name, step) for name, step in estimator.steps]
+        return [step for steps, _ in parts for step in steps], parts[-1][1]
+    return [(label, estimator)], []
 
 
-def _target_steps(label, estimator):
-    """The transformers of the target from the outermost to the innermost."""
-    estimator = found_by_search(estimator)
-    if isinstance(estimator, TransformedTargetRegressor):
-        return [(label, estimator.transformer_), *_target_steps(label, estimator.regressor_)]
-    if isinstance(estimator, Pipeline):
-        return _target_steps(*estimator.steps[-1])
-    return []
+def _columns_after(label, step, columns):
+    """The columns after a step."""
+    if not columns or _is_passthrough(step):
+        return columns
+    if isinstance(step, Pipeline):
+        for name, part in step.steps:
+            columns = _columns_after(name, part, columns)
+        return columns
+    if type(step) is OneHotEncoder:
+        return _encoded(label, step, columns)
+    if isinstance(step, SelectorMixin):
+        return [columns[j] for j in step.get_support(indices=True)]
+    if type(step) is ColumnTransformer:
+        return [
+            column
+            for name, part, chosen in step.transformers_
+            if not (isinstance(part, str) and part == "drop")
+            for column in _columns_after(name, part, [columns[j] for j in _chosen(chosen, step)])
+        ]
+    return [
+        replace(column, offset=column.offset + column.scale * offset, scale=column.scale * scale)
+        for column, (offset, scale) in zip(columns, _offsets_and_scales(label, step), strict=False)
+    ]
+
+
+def _encoded(label, encoder, columns):
+    """Indicators in the place of the columns that an encoder is given."""
+    if any(column != _Column(column.source, column.name) for column in columns):
+        _refuse(label, encoder, "it must be given columns of the table as they are")
+    sources = {column.name: column.source for column in columns}
+    given = None if hasattr(encoder, "feature_names_in_") else list(sources)
+    by_column = copy(encoder).set_params(feature_name_combiner=lambda name, _: name)
+
+    def encode(X):
+        encoded = encoder.transform(_part_of(X, list(sources.values())))
+        return encoded.toarray() if hasattr(encoded, "toarray") else np.asarray(encoded)
+
+    names = zip(
+        by_column.get_feature_names_out(given), encoder.get_feature_names_out(given), strict=True
+    )
+    return [
+        _Column(sources[column], str(name), encode=encode, place=place)
+        for place, (column, name) in enumerate(names)
+    ]
+
+
+def _chosen(chosen, transformer):
+    """Positions of the columns that a ColumnTransformer's entry takes."""
+    places = pd.Series(range(transformer.n_features_in_))
+    if isinstance(chosen, UserList):
+        # The columns of a remainder, before scikit-learn 1.7: to look at one issues a warning.
+        chosen = chosen.data
+    ends = [chosen.start, chosen.stop] if isinstance(chosen, slice) else np.atleast_1d(chosen)
+    if not any(isinstance(one, str) for one in ends):
+        return places.iloc[chosen if isinstance(chosen, slice) else list(ends)]
+    places.index = transformer.feature_names_in_
+    return places.loc[chosen if isinstance(chosen, slice) else list(ends)]
+
+
+def _offsets_and_scales(label, scaler):
+    """Of x = offset + scale z, for every column of a fitted scaler."""
+    kind = type(scaler)
+    if getattr(scaler, "clip", False):
+        _refuse(label, scaler, "clip=True bends it at the edge; out_of_bounds='clip' does the same")
+    offset: Any = None
+    scale: Any = None
+    if kind is StandardScaler:
+        offset, scale = (scaler.mean_ if scaler.with_mean else None), scaler.scale_
+    elif kind is RobustScaler:
+        offset, scale = scaler.center_, scaler.scale_
+    elif kind is MaxAbsScaler:
+        scale = scaler.scale_
+    elif kind is MinMaxScaler:
+        offset, scale = -scaler.min_ / scaler.scale_, 1.0 / scaler.scale_
+    elif kind is not FunctionTransformer or scaler.func or scaler.inverse_func:
+        _refuse(label, scaler, "it does not map every column alone by a positive scale")
+    offsets = repeat(0.0) if offset is None else offset.tolist()
+    return zip(offsets, repeat(1.0) if scale is None else scale.tolist(), strict=False)
+
+
+def _refuse(label, step, reason):
+    raise ValueError(
+        f"{_described(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
+        "MinMaxScaler, MaxAbsScaler, RobustScaler, OneHotEncoder, column selections and "
+        "ColumnTransformers of these can. For rules in the units of that step's output, give the "
+        "ANFIS estimator alone."
+    )
 
 
 def _model_of(label, estimator):
@@ -225,15 +353,15 @@ def _model_of(label, estimator):
     if not isinstance(model, TSKModel):
         check_is_fitted(estimator)
         raise TypeError(
-            f"estimator must be or end in an ANFIS estimator; {described(label, estimator)} has no "
-            "rules."
+            f"estimator must be or end in an ANFIS estimator; {_described(label, estimator)} has "
+            "no rules."
         )
     if not hasattr(estimator, "out_of_bounds"):
         return model
     return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 
 
-def _reader(inputs, names, is_named, input_names):
+def _reader(inputs, names, is_named):
     """The function that takes the inputs out of tables with columns of these names."""
 
     def read(X):
@@ -243,25 +371,21 @@ def _reader(inputs, names, is_named, input_names):
                 f"X must have the columns {', '.join(map(repr, names))}, in this order; it "
                 f"has {', '.join(map(repr, given))}."
             )
-        is_encoded = any(one.indicator is not None for one in inputs)
-        table = X if is_encoded else as_numbers(X)
+        table = X if any(one.encode for one in inputs) else _as_numbers(X)
         n_columns = np.shape(table)[1]
         if n_columns != len(names):
             raise ValueError(
                 f"X has {n_columns} columns, the estimator takes {len(names)}: "
                 f"{', '.join(map(repr, names))}."
             )
-        if is_encoded:
-            rows = np.column_stack([one.values(X) for one in inputs])
-        else:
-            rows = table[:, [one.source for one in inputs]]
-        check_finite(rows, "X", input_names)
+        rows = np.column_stack([one.values(table) for one in inputs])
+        check_finite(rows, "X", [one.name for one in inputs])
         return rows
 
     return read
 
 
-def _with_raw_inputs(model, columns, order, names):
+def _with_raw_inputs(model, columns, order):
     """The model with its inputs in raw units and in the order of their raw columns."""
     offset, scale = np.array([(column.offset, column.scale) for column in columns]).T
     support, posterior = model.support, model.posterior
@@ -287,7 +411,7 @@ def _with_raw_inputs(model, columns, order, names):
         minimum=low[order],
         maximum=high[order],
         support=support and support.change_units(offset, scale).reordered(order),
-        input_names=tuple(map(str, names)),
+        input_names=tuple(str(columns[j].name) for j in order),
         posterior=posterior and posterior.change_units(model.antecedent, scale, order),
     )
     if model.term_names == default_term_names(model.antecedent):
@@ -299,10 +423,11 @@ def _with_raw_inputs(model, columns, order, names):
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
     label = f"{label}: transformer of the target" if label else "transformer of the target"
-    columns = columns_after(label, transformer, [Column(k) for k in range(model.n_outputs)])
+    outputs = [_Column(k, name) for k, name in enumerate(model.output_names)]
+    columns = _columns_after(label, transformer, outputs)
     if [column.source for column in columns] != list(range(model.n_outputs)):
         raise ValueError(
-            f"{described(label, transformer)} cannot be folded into the rules: it drops or moves "
+            f"{_described(label, transformer)} cannot be folded into the rules: it drops or moves "
             "columns of the target. A scaler such as StandardScaler can."
         )
     offset, scale = np.array([(column.offset, column.scale) for column in columns]).T

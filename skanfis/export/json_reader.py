@@ -1,26 +1,33 @@
-"""Reading a model from JSON, every entry checked."""
+"""Reading a model from JSON, every entry checked.
+
+What an object must hold is a table: under each key the function that checks its value, given the
+value and its place in the file.
+"""
 
 import json
+from functools import partial
 from itertools import groupby
 from math import inf, prod
 
 import numpy as np
 
-from ..antecedent import (
-    Antecedent,
-    GridAntecedent,
-    RuleTableAntecedent,
-    ScatteredAntecedent,
-    TermGroup,
-)
+from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from ..membership import MEMBERSHIPS
 from ..model import TSKModel
 from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..posterior import MOST_PARAMETERS, Posterior
 from ..support import RuleSupport
-from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
+from .limits import (
+    LARGEST_NUMBER,
+    SMALLEST_NUMBER,
+    check_size,
+    groups_of,
+    number,
+    numbers,
+    shown,
+)
 
-__all__ = ["FORMAT", "KINDS", "LIMITS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
+__all__ = ["FORMAT", "INPUT", "KINDS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
 
 FORMAT = "skanfis-model"
 VERSION = 1
@@ -29,17 +36,70 @@ KINDS: dict[type[Antecedent], str] = {
     ScatteredAntecedent: "scattered",
     RuleTableAntecedent: "table",
 }
-_FILE = (
-    "format version inputs outputs out_of_bounds max_extrapolation rule_base terms rules support"
-)
-_INPUT = ["name", "minimum", "maximum", "reference", "spread"]
-# Of an output; null where there is none.
-LIMITS = ["lower", "upper"]
-OUTPUT = ["name", "minimum", "maximum", "spread", *LIMITS]
-_POSTERIOR = ["noise", "inputs", "consequents", "premises", "cross"]
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 # Of weights, each of which is a part of the whole.
 _ROUNDING = 1e-6
+
+
+def _list(value, where, least=1):
+    if not isinstance(value, list) or len(value) < least:
+        raise ValueError(f"{where}: {shown(value)} is not a list of {least} or more.")
+    return value
+
+
+def _text(value, where):
+    if not isinstance(value, str):
+        raise ValueError(f"{where}: {shown(value)} is not a name in quotes.")
+    return value
+
+
+def _one_of(choices):
+    def read(value, where):
+        if value not in choices:
+            raise ValueError(f"{where} is {shown(value)}, not {', '.join(choices)}.")
+        return value
+
+    return read
+
+
+def _whole(lowest, highest):
+    return partial(number, lowest=lowest, highest=highest, kind=int)
+
+
+def _or_null(read, null=None):
+    return lambda value, where: null if value is None else read(value, where)
+
+
+def _as_it_is(value, where):
+    return value
+
+
+_list_or_empty = partial(_list, least=0)
+_positive = partial(number, lowest=SMALLEST_NUMBER)
+_not_negative = partial(number, lowest=0.0)
+_FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
+    "format": _as_it_is,
+    "version": _as_it_is,
+    "out_of_bounds": _one_of(OUT_OF_BOUNDS),
+    "max_extrapolation": _or_null(_not_negative, inf),
+    "rule_base": _one_of(tuple(KINDS.values())),
+    "terms": _list_or_empty,
+    "support": _or_null(_list),
+    "posterior": _as_it_is,
+}
+INPUT = {
+    "name": _text,
+    **dict.fromkeys(["minimum", "maximum", "reference"], number),
+    "spread": _positive,
+}
+OUTPUT = {
+    "name": _text,
+    **dict.fromkeys(["minimum", "maximum"], _or_null(number)),
+    "spread": _or_null(_positive),
+    "lower": _or_null(number, -inf),
+    "upper": _or_null(number, inf),
+}
+_POSTERIOR = ["noise", "inputs", "consequents", "premises", "cross", "pinned"]
 
 
 def parse_json(text):
@@ -59,40 +119,35 @@ def model_of(document):
             f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
             "upgrade skanfis to read it."
         )
-    posterior = document.get("posterior")
-    document = {key: value for key, value in document.items() if key != "posterior"}
-    _, _, inputs, outputs, policy, limit, kind, terms, rules, support = _members(
-        document, _FILE.split(), "the file"
-    )
-    input_names, box = _inputs(_list(inputs, "inputs"))
-    output_names, target = _outputs(_list(outputs, "outputs"))
-    if policy not in OUT_OF_BOUNDS:
-        raise ValueError(f"out_of_bounds is {shown(policy)}, not {', '.join(OUT_OF_BOUNDS)}.")
-    limit = inf if limit is None else number(limit, "max_extrapolation", 0.0)
-    n_rules = len(_list(rules, "rules"))
-    check_size(n_rules, len(_list(terms, "terms", 0)), len(inputs), len(outputs))
-    groups, initial_groups, term_names = _read_terms(terms, len(inputs))
-    table, weights, rows, coefficients = _rules(rules, len(terms), len(inputs), len(outputs))
-    antecedent = _rule_base(kind, groups, table)
+    file = _members({"posterior": None} | document, _FILE, "the file")
+    n_rules, n_terms = len(file["rules"]), len(file["terms"])
+    n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
+    inputs = _columns(file["inputs"], INPUT, "inputs")
+    minimum, maximum = np.array(inputs["minimum"]), np.array(inputs["maximum"])
+    _check_all(minimum <= maximum, "inputs[{}]: minimum is above maximum.")
+    output_names, target = _outputs(file["outputs"])
+    check_size(n_rules, n_terms, n_inputs, n_outputs)
+    groups, initial_groups, term_names = _terms(file["terms"], n_inputs)
+    table, rules = _rules(file["rules"], n_terms, n_inputs, n_outputs)
+    antecedent = _rule_base(file["rule_base"], groups, table)
+    support, posterior = file["support"], file["posterior"]
     if posterior is not None:
-        n_slopes = len(inputs) if coefficients.shape[1] > 1 else 0
-        posterior = _posterior(posterior, antecedent, len(inputs), n_slopes, len(outputs))
-    if not abs(weights.sum() - 1.0) <= _ROUNDING:
-        raise ValueError(f"rules[].weight: the sum over all rules is {weights.sum():g}, not 1.")
+        n_slopes = n_inputs if rules["consequents"].shape[1] > 1 else 0
+        posterior = _posterior(posterior, antecedent, n_inputs, n_slopes, n_outputs)
     return TSKModel(
         antecedent=antecedent,
-        initial_antecedent=_rule_base(kind, initial_groups, table),
-        coefficients=coefficients,
-        reference=box[2],
-        spread=box[3],
-        minimum=box[0],
-        maximum=box[1],
-        rule_weights=weights,
-        rule_rows=rows,
-        input_names=input_names,
-        out_of_bounds=policy,
-        max_extrapolation=limit,
-        support=None if support is None else _support(support, n_rules, len(inputs)),
+        initial_antecedent=_rule_base(file["rule_base"], initial_groups, table),
+        coefficients=rules["consequents"],
+        rule_weights=rules["weight"],
+        rule_rows=rules["rows"],
+        reference=np.array(inputs["reference"]),
+        spread=np.array(inputs["spread"]),
+        minimum=minimum,
+        maximum=maximum,
+        input_names=tuple(inputs["name"]),
+        out_of_bounds=file["out_of_bounds"],
+        max_extrapolation=file["max_extrapolation"],
+        support=None if support is None else _support(support, n_rules, n_inputs),
         term_names=term_names,
         output_names=output_names,
         target=target,
@@ -118,51 +173,50 @@ def _without_repetition(pairs):
     return members
 
 
-def _inputs(inputs):
-    """Names, and minimum, maximum, reference, spread as rows."""
-    names, box = [], []
-    for j, item in enumerate(inputs):
-        where = f"inputs[{j}]"
-        name, *_ = _members(item, _INPUT, where)
-        box.append(_range(item, _INPUT[1:], where))
-        names.append(_text(name, where))
-    return tuple(names), np.array(box).T.copy()
+def _members(item, readers, where):
+    """The values of exactly these keys, each as its reader gives it."""
+    if not isinstance(item, dict):
+        raise ValueError(f"{where} is {shown(item)}, not an object.")
+    if missing := [key for key in readers if key not in item]:
+        raise ValueError(f"{where} has no {shown(missing[0])}.")
+    if unknown := [key for key in item if key not in readers]:
+        raise ValueError(f"{where} has the unknown key {shown(unknown[0])}.")
+    inner = "" if where == "the file" else f"{where}."
+    return {key: read(item[key], f"{inner}{key}") for key, read in readers.items()}
+
+
+def _columns(items, readers, where):
+    """The values of all objects of a list, by their keys."""
+    rows = [_members(item, readers, f"{where}[{k}]") for k, item in enumerate(items)]
+    return {key: [row[key] for row in rows] for key in readers}
+
+
+def _check_all(holds, message):
+    """Raise ValueError with the place of the first for which a condition does not hold."""
+    if not np.all(holds):
+        raise ValueError(message.format(np.argmin(holds)))
 
 
 def _outputs(outputs):
     """Names, and the range of the target, which is known of every output or of none."""
-    names, known = [], []
-    for k, item in enumerate(outputs):
-        where = f"outputs[{k}]"
-        name, *values = _members(item, OUTPUT, where)
-        names.append(_text(name, where))
-        if all(value is None for value in values):
-            continue
-        seen = _range(item, ["minimum", "maximum", "spread"], where)
-        ends = [
-            end if item[key] is None else number(item[key], f"{where}.{key}")
-            for key, end in zip(LIMITS, (-inf, inf), strict=True)
-        ]
-        if not ends[0] < ends[1]:
-            raise ValueError(f"{where}: lower is not below upper.")
-        if ends[0] > seen[1] or ends[1] < seen[0]:
-            raise ValueError(f"{where}: nothing from minimum to maximum is within lower and upper.")
-        known.append([*seen, *ends])
-    if known and len(known) < len(names):
+    found = _columns(outputs, OUTPUT, "outputs")
+    names = tuple(found.pop("name"))
+    values = [value for column in found.values() for value in column]
+    if all(value in (None, -inf, inf) for value in values):
+        return names, None
+    if None in values:
         raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
-    return tuple(names), TargetRange(*np.array(known).T.copy()) if known else None
+    target = TargetRange(**{key: np.array(column) for key, column in found.items()})
+    _check_all(target.minimum <= target.maximum, "outputs[{}]: minimum is above maximum.")
+    _check_all(target.lower < target.upper, "outputs[{}]: lower is not below upper.")
+    _check_all(
+        (target.lower <= target.maximum) & (target.upper >= target.minimum),
+        "outputs[{}]: nothing from minimum to maximum is within lower and upper.",
+    )
+    return names, target
 
 
-def _range(item, keys, where):
-    """The numbers of these keys; minimum is at most maximum, and the spread is positive."""
-    lowest = {"spread": SMALLEST_NUMBER}
-    found = [number(item[key], f"{where}.{key}", lowest.get(key, -LARGEST_NUMBER)) for key in keys]
-    if item["minimum"] > item["maximum"]:
-        raise ValueError(f"{where}: minimum is above maximum.")
-    return found
-
-
-def _read_terms(terms, n_inputs):
+def _terms(terms, n_inputs):
     """Groups of terms after training, before it, and the terms' names."""
     names: list[str] = []
     after: list[tuple] = []
@@ -173,82 +227,73 @@ def _read_terms(terms, n_inputs):
         family = MEMBERSHIPS.get(function) if isinstance(function, str) else None
         if family is None:
             raise ValueError(f'{where} has no "function" among {", ".join(MEMBERSHIPS)}.')
-        limits = {
-            key_of(parameter): LARGEST_NUMBER if parameter.kind == "location" else _LARGEST_LOG
-            for parameter in family.parameters
+        theta = {
+            key_of(one): number
+            if one.kind == "location"
+            else partial(number, lowest=-_LARGEST_LOG, highest=_LARGEST_LOG)
+            for one in family.parameters
         }
-        name, j, _, start, *_ = _members(
-            item, ["name", "input", "function", "before_training", *limits], where
-        )
-        j = _whole(j, 0, n_inputs - 1, f'"input" of {where}')
-        names.append(_text(name, where))
-        _members(start, limits, f'"before_training" of {where}')
-        for found, place, terms_of in (
-            (item, where, after),
-            (start, f"{where}.before_training", before),
-        ):
-            theta = [
-                number(found[key], f"{place}.{key}", -largest, largest)
-                for key, largest in limits.items()
-            ]
-            terms_of.append((j, family, theta))
-    return _groups(after), _groups(before), tuple(names)
-
-
-def _groups(terms):
-    """Consecutive terms of one family together."""
-    groups = []
-    for family, members in groupby(terms, key=lambda term: term[1]):
-        inputs, _, theta = zip(*members, strict=True)
-        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
-    return tuple(groups)
+        readers = {
+            "name": _text,
+            "input": _whole(0, n_inputs - 1),
+            "function": _as_it_is,
+            "before_training": lambda start, where, theta=theta: _members(start, theta, where),
+        }
+        found = _members(item, readers | theta, where)
+        names.append(found["name"])
+        after.append((found["input"], family, [found[key] for key in theta]))
+        before.append((found["input"], family, list(found["before_training"].values())))
+    return groups_of(after), groups_of(before), tuple(names)
 
 
 def _rules(rules, n_terms, n_inputs, n_outputs):
-    """Table of terms, weights, rows and coefficients."""
-    table, weights, rows = [], [], []
-    consequents: list[np.ndarray] = []
-    for r, item in enumerate(rules):
-        where = f"rules[{r}]"
-        keys = ["terms", "weight", "rows", "consequents"]
-        own, weight, n_rows, by_output = _members(item, keys, where)
-        table.append([_whole(t, -1, n_terms - 1, where) for t in _list(own, where, 0)])
-        weights.append(number(weight, f"{where}.weight", 0.0, 1.0 + _ROUNDING))
-        rows.append(number(n_rows, f"{where}.rows", 0.0))
-        sizes = [len(_list(one, f"{where}.consequents")) for one in _list(by_output, where)]
-        if len(sizes) != n_outputs or sizes[0] not in (1, 1 + n_inputs):
-            raise ValueError(
-                f'"consequents" of {where} must be one list per output, of 1 or {1 + n_inputs} '
-                "numbers."
-            )
-        n_basis = consequents[0].shape[1] if consequents else sizes[0]
-        if sizes != [n_basis] * n_outputs or len(table[-1]) != len(table[0]):
-            raise ValueError(f"{where} has other numbers of terms or coefficients than rules[0].")
-        consequents.append(numbers(by_output, (n_outputs, n_basis), f"{where}.consequents"))
-    terms = np.array(table, dtype=int).reshape(len(rules), len(table[0]))
-    coefficients = np.array(consequents).transpose(0, 2, 1).copy()
-    return terms, np.array(weights), np.array(rows), coefficients
+    """Table of terms; coefficients, weights and rows as the model has them."""
+    position = _whole(-1, n_terms - 1)
+
+    def terms(value, where):
+        return [position(term, where) for term in _list(value, where, 0)]
+
+    def consequents(value, where):
+        is_constant = all(isinstance(one, list) and len(one) == 1 for one in _list(value, where))
+        return numbers(value, where, (n_outputs, 1 if is_constant else 1 + n_inputs))
+
+    readers = {
+        "terms": terms,
+        "weight": partial(number, lowest=0.0, highest=1.0 + _ROUNDING),
+        "rows": _not_negative,
+        "consequents": consequents,
+    }
+    found = _columns(rules, readers, "rules")
+    sizes = list(zip(map(len, found["terms"]), map(np.size, found["consequents"]), strict=True))
+    _check_all(
+        [size == sizes[0] for size in sizes],
+        "rules[{}] has other numbers of terms or coefficients than rules[0].",
+    )
+    weights = np.array(found["weight"])
+    if not abs(weights.sum() - 1.0) <= _ROUNDING:
+        raise ValueError(f"rules[].weight: the sum over all rules is {weights.sum():g}, not 1.")
+    table = np.array(found["terms"], dtype=int).reshape(len(rules), sizes[0][0])
+    found["consequents"] = np.array(found["consequents"]).transpose(0, 2, 1).copy()
+    return table, {key: np.array(found[key]) for key in ("consequents", "weight", "rows")}
 
 
 def _support(items, n_rules, n_inputs):
     """The support of the rules, out of an entry for each."""
-    n_factor = n_inputs * (n_inputs + 1) // 2
-    if len(_list(items, "support")) != n_rules:
+    if len(items) != n_rules:
         raise ValueError(f"support has {len(items)} entries; the model has {n_rules} rules.")
-    found = []
-    for r, item in enumerate(items):
-        where = f"support[{r}]"
-        keys = ["share", "center", "factor", "radius"]
-        share, center, factor, radius = _members(item, keys, where)
-        share = number(share, f"{where}.share", 0.0, 1.0)
-        center = numbers(center, (n_inputs,), f"{where}.center")
-        factor = numbers(factor, (n_factor,), f"{where}.factor")
-        found.append((share, center, factor, number(radius, f"{where}.radius", 0.0)))
-    shares, centers, factors, radii = map(np.array, zip(*found, strict=True))
+    readers = {
+        "share": partial(number, lowest=0.0, highest=1.0),
+        "center": partial(numbers, shape=(n_inputs,)),
+        "factor": partial(numbers, shape=(n_inputs * (n_inputs + 1) // 2,)),
+        "radius": _not_negative,
+    }
+    found = {
+        key: np.array(of_rules) for key, of_rules in _columns(items, readers, "support").items()
+    }
     # Asked for now that the file has shown to be as large.
     factor = np.zeros((n_rules, n_inputs, n_inputs))
-    factor[:, *np.tril_indices(n_inputs)] = factors
-    return RuleSupport(shares, centers, factor, radii)
+    factor[:, *np.tril_indices(n_inputs)] = found["factor"]
+    return RuleSupport(**found | {"factor": factor})
 
 
 def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
@@ -256,34 +301,36 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     if isinstance(item, dict):
         # Only where constraints are met with equality.
         item = {"pinned": [[]] * n_outputs} | item
-    _, inputs, triangle, rows, _, pinned = _members(item, [*_POSTERIOR, "pinned"], "posterior")
-    if not isinstance(inputs, list) or len(inputs) > n_slopes:
-        raise ValueError(f"posterior.inputs: {shown(inputs)} is not a list of up to {n_slopes}.")
+    found = _members(item, dict.fromkeys(_POSTERIOR, _list_or_empty), "posterior")
+    inputs, triangle = found["inputs"], found["consequents"]
     for value in inputs:
-        _whole(value, 0, n_inputs - 1, "posterior.inputs")
-    if len(set(inputs)) < len(inputs):
-        raise ValueError(f"posterior.inputs: {shown(inputs)} has an input twice.")
+        _whole(0, n_inputs - 1)(value, "posterior.inputs")
+    if len(set(inputs)) < len(inputs) or len(inputs) > n_slopes:
+        raise ValueError(
+            f"posterior.inputs: {shown(inputs)} has an input twice, or more than {n_slopes}."
+        )
     n_parameters = antecedent.parameters.size
     n_columns = antecedent.n_rules * (1 + len(inputs))
     if n_columns + n_parameters > MOST_PARAMETERS:
         raise ValueError(f"posterior: more than {MOST_PARAMETERS} parameters.")
-    n_rows = n_parameters if rows else 0
-    if len(_list(triangle, "posterior.consequents")) != n_columns:
+    if len(triangle) != n_columns:
         raise ValueError(f"posterior.consequents is not a triangle of {n_columns} rows.")
     consequents = np.zeros((n_columns, n_columns))
     for i, row in enumerate(triangle):
-        consequents[i, : i + 1] = numbers(row, (i + 1,), f"posterior.consequents[{i}]")
-    n_pinned = len(_list(_list(pinned, "posterior.pinned")[0], "posterior.pinned[0]", 0))
+        consequents[i, : i + 1] = numbers(row, f"posterior.consequents[{i}]", (i + 1,))
+    n_rows = n_parameters if found["premises"] else 0
+    n_pinned = len(_list(_list(found["pinned"], "posterior.pinned")[0], "posterior.pinned[0]", 0))
     if n_pinned > n_columns + n_rows:
         raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
-    return Posterior(
-        np.abs(numbers(item["noise"], (n_outputs,), "posterior.noise")),
-        np.array(inputs, dtype=int),
-        consequents,
-        numbers(rows, (n_rows, n_parameters), "posterior.premises"),
-        numbers(item["cross"], (n_outputs, n_rows, n_columns), "posterior.cross"),
-        numbers(pinned, (n_outputs, n_pinned, n_columns + n_rows), "posterior.pinned"),
-    )
+    shapes = {
+        "noise": (n_outputs,),
+        "premises": (n_rows, n_parameters),
+        "cross": (n_outputs, n_rows, n_columns),
+        "pinned": (n_outputs, n_pinned, n_columns + n_rows),
+    }
+    arrays = {key: numbers(found[key], f"posterior.{key}", shape) for key, shape in shapes.items()}
+    arrays |= {"noise": np.abs(arrays["noise"]), "inputs": np.array(inputs, dtype=int)}
+    return Posterior(consequents=consequents, **arrays)
 
 
 def _rule_base(kind, groups, table):
@@ -297,10 +344,8 @@ def _rule_base(kind, groups, table):
     elif kind == "scattered":
         antecedent = ScatteredAntecedent(groups, n_premise_inputs=table.shape[1])
         fits = 0 < table.size == inputs.size
-    elif kind == "table":
-        antecedent, fits = RuleTableAntecedent(groups, table), True
     else:
-        raise ValueError(f'"rule_base" is {shown(kind)}, not {", ".join(KINDS.values())}.')
+        antecedent, fits = RuleTableAntecedent(groups, table), True
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
     # Each place in a rule is one input's, and no input has two.
@@ -311,34 +356,3 @@ def _rule_base(kind, groups, table):
     if np.unique(seen).size < seen.size:
         raise ValueError("rules have two terms of one input.")
     return antecedent
-
-
-def _members(item, keys, where):
-    """The values of exactly these keys."""
-    if not isinstance(item, dict):
-        raise ValueError(f"{where} is {shown(item)}, not an object.")
-    if missing := [key for key in keys if key not in item]:
-        raise ValueError(f"{where} has no {shown(missing[0])}.")
-    if unknown := [key for key in item if key not in keys]:
-        raise ValueError(f"{where} has the unknown key {shown(unknown[0])}.")
-    return [item[key] for key in keys]
-
-
-def _list(value, where, least=1):
-    if not isinstance(value, list) or len(value) < least:
-        raise ValueError(f"{where}: {shown(value)} is not a list of {least} or more.")
-    return value
-
-
-def _text(value, where):
-    if not isinstance(value, str):
-        raise ValueError(f"{where}: {shown(value)} is not a name in quotes.")
-    return value
-
-
-def _whole(value, lowest, highest, where):
-    if type(value) is not int or not lowest <= value <= highest:
-        raise ValueError(
-            f"{where}: {shown(value)} is not a whole number from {lowest} to {highest}."
-        )
-    return value

@@ -1,12 +1,18 @@
 """What a file may describe: of what size, known before memory is asked for, by which numbers."""
 
+import os
+from itertools import groupby
+
 import numpy as np
+
+from ..antecedent import TermGroup
 
 __all__ = [
     "LARGEST_NUMBER",
     "MOST_NUMBERS",
     "SMALLEST_NUMBER",
     "check_size",
+    "groups_of",
     "number",
     "numbers",
     "read_bytes",
@@ -34,23 +40,33 @@ def check_size(n_rules, n_terms, n_inputs, n_outputs):
         )
 
 
-def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER):
-    """A number of a file as a float; ValueError, with its place, where it is out of its range."""
-    if type(value) not in (int, float) or not lowest <= value <= highest:
-        wanted = f"from {lowest:g} to {highest:g}"
+def groups_of(terms):
+    """Groups of terms (input, family, theta), consecutive ones of one family together."""
+    groups = []
+    for family, members in groupby(terms, key=lambda term: term[1]):
+        inputs, _, theta = zip(*members, strict=True)
+        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
+    return tuple(groups)
+
+
+def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER, kind=float):
+    """A number of a file; ValueError, with its place, where it is out of its range."""
+    if type(value) not in (int, kind) or not lowest <= value <= highest:
+        noun = "number" if kind is float else "whole number"
+        ends = f"from {lowest:g} to {highest:g}"
         if lowest == -highest:
-            wanted = f"of size up to {highest:g}"
-        raise ValueError(f"{where}: {shown(value)} is not a number {wanted}.")
-    return float(value)
+            ends = f"of size up to {highest:g}"
+        raise ValueError(f"{where}: {shown(value)} is not a {noun} {ends}.")
+    return kind(value)
 
 
-def numbers(values, shape, where):
+def numbers(values, where, shape):
     """Nested lists of numbers as an array of this shape."""
     if not shape:
         return number(values, where)
     if not isinstance(values, list) or len(values) != shape[0]:
         raise ValueError(f"{where}: {shown(values)} is not a list of {shape[0]}.")
-    found = [numbers(value, shape[1:], f"{where}[{k}]") for k, value in enumerate(values)]
+    found = [numbers(value, f"{where}[{k}]", shape[1:]) for k, value in enumerate(values)]
     return np.array(found, dtype=float).reshape(shape)
 
 
@@ -62,6 +78,11 @@ def shown(value):
 
 def read_bytes(path, most_bytes):
     """The file's bytes; ValueError, without reading on, where there are more than so many."""
+    text = os.fsdecode(path)
+    if "\n" in text or text.lstrip().startswith("{"):
+        raise ValueError(
+            "path is the text of a model, not the path of a file: write it to a file first."
+        )
     with open(path, "rb") as file:
         data = file.read(most_bytes + 1)
     if len(data) > most_bytes:

@@ -4,7 +4,7 @@ docs/files.rst has the format. Numbers are written so that the same double comes
 """
 
 import json
-from math import isinf
+from math import inf, isinf
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,8 @@ import numpy as np
 
 from ..membership import MEMBERSHIPS
 from ..model import TSKModel
-from ..posterior import Posterior
 from .folding import fold
-from .json_reader import FORMAT, KINDS, LIMITS, OUTPUT, VERSION, key_of, model_of, parse_json
+from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
 
 __all__ = ["export_json", "read_json", "write_json"]
@@ -54,28 +53,18 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
     '  "format": "skanfis-model",'
     """
     model = fold(estimator)
-    limit, before = model.max_extrapolation, _terms(model.initial_antecedent)
-    terms = [
-        {"name": name, **term, "before_training": {key: start[key] for key in list(start)[2:]}}
-        for name, term, start in zip(
-            model.term_names, _terms(model.antecedent), before, strict=True
-        )
-    ]
+    limit, support = model.max_extrapolation, model.support
     document = {
         "format": FORMAT,
         "version": VERSION,
         "inputs": _items(
-            name=model.input_names,
-            minimum=model.minimum,
-            maximum=model.maximum,
-            reference=model.reference,
-            spread=model.spread,
+            name=model.input_names, **{key: vars(model)[key] for key in list(INPUT)[1:]}
         ),
         "outputs": _output_items(model),
         "out_of_bounds": model.out_of_bounds,
         "max_extrapolation": None if isinf(limit) else limit,
         "rule_base": KINDS[type(model.antecedent)],
-        "terms": terms,
+        "terms": list(_terms(model)),
         "rules": _items(
             terms=model.antecedent.rule_terms,
             weight=model.rule_weights,
@@ -84,7 +73,7 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
         ),
         "support": None,
     }
-    if support := model.support:
+    if support:
         document["support"] = _items(
             share=support.share,
             radius=support.radius,
@@ -155,10 +144,6 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
     Traceback (most recent call last):
     ValueError: path is the text of a model, not the path of a file: write it to a file first.
     """
-    if isinstance(path, str) and path.lstrip().startswith("{"):
-        raise ValueError(
-            "path is the text of a model, not the path of a file: write it to a file first."
-        )
     data = read_bytes(path, _MOST_BYTES)
     try:
         return parse_json(data.decode("utf-8"))
@@ -168,17 +153,21 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _terms(antecedent):
-    """Every term's input, function and theta by name."""
-    terms = []
-    for group in antecedent.groups:
+def _terms(model):
+    """Every term's name, input, function and theta by name, after training and before it."""
+    names = iter(model.term_names)
+    before = model.initial_antecedent.groups
+    for group, initial in zip(model.antecedent.groups, before, strict=True):
         if group.family not in MEMBERSHIPS.values():
             raise ValueError(f"the membership {group.family.name!r} is not one of skanfis' own.")
         keys = [key_of(parameter) for parameter in group.family.parameters]
-        for j, theta in zip(group.inputs.tolist(), group.theta.T.tolist(), strict=True):
-            numbers = dict(zip(keys, theta, strict=True))
-            terms.append({"input": j, "function": group.family.name, **numbers})
-    return terms
+        thetas = zip(
+            group.inputs.tolist(), group.theta.T.tolist(), initial.theta.T.tolist(), strict=True
+        )
+        for j, theta, start in thetas:
+            term = {"name": next(names), "input": j, "function": group.family.name}
+            start = {"before_training": dict(zip(keys, start, strict=True))}
+            yield term | dict(zip(keys, theta, strict=True)) | start
 
 
 def _laid_out(document):
@@ -202,25 +191,21 @@ def _items(**columns):
 
 
 def _output_items(model):
-    """Every output's name, and what the target was in training."""
-    target = model.target
-    if target is None:
+    """Every output's name, and what the target was in training; null where there is none."""
+    if model.target is None:
         return [dict.fromkeys(OUTPUT) | {"name": name} for name in model.output_names]
-    ranges = {key: np.broadcast_to(getattr(target, key), target.spread.shape) for key in OUTPUT[1:]}
-    items = _items(name=model.output_names, **ranges)
-    for item in items:
-        item |= {key: None for key in LIMITS if isinf(item[key])}
-    return items
-
-
-def _posterior_item(posterior: Posterior):
-    item = {
-        "noise": posterior.noise.tolist(),
-        "inputs": posterior.inputs.tolist(),
-        "consequents": [row[: i + 1] for i, row in enumerate(posterior.consequents.tolist())],
-        "premises": posterior.premises.tolist(),
-        "cross": posterior.cross.tolist(),
+    ranges = {
+        key: np.broadcast_to(values, model.n_outputs) for key, values in vars(model.target).items()
     }
-    if posterior.pinned.size:
-        item["pinned"] = posterior.pinned.tolist()
+    return [
+        {key: None if value in (-inf, inf) else value for key, value in item.items()}
+        for item in _items(name=model.output_names, **ranges)
+    ]
+
+
+def _posterior_item(posterior):
+    item = {key: values.tolist() for key, values in vars(posterior).items()}
+    item["consequents"] = [row[: i + 1] for i, row in enumerate(item["consequents"])]
+    if not posterior.pinned.size:
+        del item["pinned"]
     return item

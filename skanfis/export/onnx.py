@@ -83,7 +83,7 @@ def _convert(scope, node, container):
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = _Graph(scope, container, np.dtype(dtype))
     x = graph.node("Cast", _Value(graph, given.full_name), to=kind)
-    y = _Formula(Numbers.of(model, dtype), model.out_of_bounds, graph).outputs(x)
+    y = _Formula(Numbers(model, dtype), model.out_of_bounds, graph).outputs(x)
     graph.node("Identity", y, output=node.outputs[0].full_name)
 
 
@@ -183,7 +183,7 @@ class _Formula:
         if way_out is not None:
             ahead = self._slopes(way_out)
             if strengths is not None:
-                of_strengths = changes.reshape(numbers.n_rules, 1) * by_rule
+                of_strengths = changes.reshape(numbers.model.n_rules, 1) * by_rule
                 ahead = of_strengths if ahead is None else ahead + of_strengths
             if ahead is not None:
                 y = y + far * self._weigh(strengths, ahead)
@@ -199,7 +199,7 @@ class _Formula:
     def _strengths(self, z, way_out):
         """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
-        if not numbers.n_terms:
+        if not numbers.model.antecedent.n_terms:
             return None, None
         for terms in numbers.terms:
             positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
@@ -208,8 +208,8 @@ class _Formula:
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
         # 1 where rule r has term t.
-        has_term = np.zeros((numbers.n_terms + 1, numbers.n_rules))
-        has_term[numbers.rule_terms.T, np.arange(numbers.n_rules)] = 1.0
+        has_term = np.zeros((numbers.model.antecedent.n_terms + 1, numbers.model.n_rules))
+        has_term[numbers.rule_terms.T, np.arange(numbers.model.n_rules)] = 1.0
         shares = (self.graph.node("Concat", *logs, axis=1) @ has_term[:-1]).softmax()
         if way_out is None:
             return shares, None
@@ -228,7 +228,7 @@ class _Formula:
     def _weigh(self, strengths, by_rule):
         """Sum over rules (n_rows, n_outputs)."""
         if strengths is not None:
-            return (strengths.reshape(self.numbers.n_rules, 1) * by_rule).sum(keep=False)
+            return (strengths.reshape(self.numbers.model.n_rules, 1) * by_rule).sum(keep=False)
         # One rule: its strength is one.
         if isinstance(by_rule, np.ndarray):
             return self.graph.node("Identity", by_rule[:, 0])
@@ -328,22 +328,11 @@ def _one_foot(x, p):
     return value, lambda: slope() * p[1]
 
 
-def _sigmoid_difference(x, p):
-    center, per_flank, v, log_gain = p
-    u = (x - center) * per_flank
-    rise, fall = u + v, -(u - v)
-    return (
-        lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
-        lambda: ((-rise).sigmoid() - (-fall).sigmoid()) * per_flank,
-    )
-
-
-def _sigmoid_product(x, p):
-    center, per_left, per_right, at_left, at_right = p
+def _sigmoids(x, center, per_left, per_right, at_left, at_right, log_gain=0.0):
     d = x - center
     rise, fall = d * per_left + at_left, -(d * per_right - at_right)
     return (
-        lambda: _log_sigmoid(rise) + _log_sigmoid(fall),
+        lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
         lambda: (-rise).sigmoid() * per_left - (-fall).sigmoid() * per_right,
     )
 
@@ -357,7 +346,7 @@ _BY_NAME = {
     "pi_shaped": _two_feet(_spline),
     "s_shaped": _one_foot,
     "z_shaped": _one_foot,
-    "sigmoid_difference": _sigmoid_difference,
-    "sigmoid_product": _sigmoid_product,
+    "sigmoid_difference": lambda x, p: _sigmoids(x, p[0], p[1], p[1], p[2], p[2], p[3]),
+    "sigmoid_product": lambda x, p: _sigmoids(x, *p),
 }
 _FORMULAS = {MEMBERSHIPS[name]: formula for name, formula in _BY_NAME.items()}

@@ -82,8 +82,7 @@ def evaluate_all(codes, X, folder, std, n_outputs, flags=SANITIZE):
     """What compiled models answer: per model outputs (n_rows, n_outputs) and status (n_rows,).
 
     Each comes after the model's self-test. All models are in one translation unit: nothing of one
-    may clash with another. The sanitizers make compiling six times as long; what they find is in
-    the text of the code, not in its numbers, so that of a long list of models a part may have them.
+    may clash with another. The sanitizers make compiling six times as long.
     """
     for code in codes:
         (folder / f"{code.name}.h").write_text(code.header, encoding="ascii")

@@ -54,11 +54,6 @@ MF3='c':'constant',[4]
 """
 
 
-def line_of(text, part):
-    """The number of the line that holds this part."""
-    return 1 + next(k for k, line in enumerate(text.splitlines()) if part in line)
-
-
 def with_line(old, new):
     """BY_HAND with the line that begins with ``old`` replaced by ``new``, and its number."""
     found = re.search(rf"^{re.escape(old)}.*$", BY_HAND, re.MULTILINE)

@@ -10,13 +10,24 @@ from .fis_files import BY_HAND
 from .rule_bases import MODELS, build
 
 HOSTILE = [
-    *(b"nan", b"inf", b"-Infinity", b"1e999", b"-1e-999", b"1e50", b"-9.9e49", b"0", b"-0", b"1_0"),
-    *(b"99999999999", b"9" * 5000, b"0x1F", b"1e", b".", b"--1", b"1,,2", b"\xd9\xa1", b"", b" "),
-    *(b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\r", b"\n", b"\n\n", b"\t", b"'", b"''", b"[", b"]"),
-    *(b"=", b":", b"(", b")", b"%", b"#", b"[System]", b"[Rules]", b"[Input1]", b"[Output99]"),
+    *(b"nan", b"-Infinity", b"1e999", b"1e50", b"-9.9e49", b"0", b"1_0", b"9" * 5000, b"1,,2"),
+    *(
+        b"",
+        b"\x00",
+        b"\xff\xfe",
+        b"\r",
+        b"\n\n",
+        b"\t",
+        b"'",
+        b"[",
+        b"]",
+        b"=",
+        b"(",
+        b"%",
+        b"[Rules]",
+    ),
     *(b"NumRules=100000", b"NumMFs=10000", b"NumInputs=1000", b"MF1='x':'trimf',[0 0 0]"),
-    *(b"__import__('os').system('true')", b"eval('1')", b"${IFS}", b"';!ls;'", b"../../etc/passwd"),
-    *(b"'sigmf'", b"'trimf'", b"'pimf'", b"'constant'", b"'mamdani'", b"'min'", b"1 1, 1 (1) : 1"),
+    *(b"__import__('os').system('true')", b"'sigmf'", b"'trimf'", b"'mamdani'", b"1 1, 1 (1) : 1"),
 ]
 
 
@@ -43,37 +54,14 @@ def _place(rng, data):
     return int(rng.integers(len(data) + 1))
 
 
-def _flip(rng, data):
-    place = _place(rng, data)
-    return data[:place] + bytes([rng.integers(256)]) + data[place + 1 :]
-
-
-def _digit(rng, data):
-    """Another digit in place of one: the file stays sound, the system does not."""
-    places = [k for k, byte in enumerate(data) if 48 <= byte <= 57]
-    if not places:
-        return data
-    place = places[rng.integers(len(places))]
-    return data[:place] + b"%d" % rng.integers(10) + data[place + 1 :]
-
-
 def _cut(rng, data):
     start = _place(rng, data)
     return data[:start] + data[start + int(rng.geometric(0.05)) :]
 
 
-def _end(rng, data):
-    return data[: _place(rng, data)]
-
-
 def _insert(rng, data):
     place = _place(rng, data)
     return data[:place] + HOSTILE[rng.integers(len(HOSTILE))] + data[place:]
-
-
-def _repeat(rng, data):
-    start, length = _place(rng, data), int(rng.geometric(0.02))
-    return data[:start] + data[start : start + length] * int(rng.integers(2, 50)) + data[start:]
 
 
 def _replace_token(rng, data):
@@ -87,34 +75,13 @@ def _replace_token(rng, data):
     return data[:start] + HOSTILE[rng.integers(len(HOSTILE))] + data[end:]
 
 
-def _of_lines(change):
-    def operation(rng, data):
-        lines = data.split(b"\n")
-        change(rng, lines, int(rng.integers(len(lines))), int(rng.integers(len(lines))))
-        return b"\n".join(lines)
-
-    return operation
-
-
-def _swap(rng, lines, one, other):
-    lines[one], lines[other] = lines[other], lines[one]
+def _lines(rng, data):
+    """A line less, another line in its place, or half of each."""
+    lines = data.split(b"\n")
+    one, other = rng.integers(len(lines), size=2)
+    half = lines[one][: len(lines[one]) // 2] + lines[other][len(lines[other]) // 2 :]
+    lines[one : one + 1] = [[], [lines[other]], [half], [lines[one], lines[other]]][rng.integers(4)]
+    return b"\n".join(lines)
 
 
-def _copy(rng, lines, one, other):
-    lines.insert(other, lines[one])
-
-
-def _drop(rng, lines, one, other):
-    del lines[one]
-
-
-def _mix(rng, lines, one, other):
-    """The first half of one line and the second of another."""
-    lines[one] = lines[one][: len(lines[one]) // 2] + lines[other][len(lines[other]) // 2 :]
-
-
-_OPERATIONS = [
-    *(_flip, _digit, _digit, _digit, _cut, _end, _insert, _repeat),
-    *(_replace_token, _replace_token, _replace_token),
-    *map(_of_lines, (_swap, _copy, _drop, _mix)),
-]
+_OPERATIONS = [_cut, _insert, _replace_token, _replace_token, _lines, _lines]

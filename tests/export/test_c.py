@@ -1,13 +1,9 @@
 """Exported C, compiled and run, answers what ``predict`` answers."""
 
 import re
-import runpy
 import shutil
 import subprocess
-from dataclasses import replace
 from fractions import Fraction
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,14 +12,12 @@ from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import RobustScaler
 
-from skanfis.antecedent import GridAntecedent, TermGroup
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
-from skanfis.export._numbers import Numbers
 from skanfis.export.c.builder import size_of_sum
 from skanfis.export.c.status import STATUS
 from skanfis.learning import VariableProjection
-from skanfis.membership import MEMBERSHIPS, Gaussian, Triangular
+from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import OUT_OF_BOUNDS
@@ -51,13 +45,10 @@ def expected_status(model, X):
 
 
 def expected_outputs(model, X, status, std):
-    if model.out_of_bounds != "raise":
-        y = model.predict(X)
-        if model.out_of_bounds == "nan" and std == "c89":
-            y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
-        return y
-    y = model.with_out_of_bounds("clip").predict(X)
-    y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
+    is_left = model.out_of_bounds == "raise" or (model.out_of_bounds, std) == ("nan", "c89")
+    y = model.with_out_of_bounds("clip" if is_left else model.out_of_bounds).predict(X)
+    if is_left:
+        y[status & STATUS["NO_OUTPUT"] > 0] = UNTOUCHED
     return y
 
 
@@ -67,13 +58,8 @@ def expected_outputs(model, X, status, std):
     [
         pytest.param("double", "c99", slice(None), [], id="double"),
         pytest.param("float", "c99", slice(None), [], id="float", marks=pytest.mark.theory),
-        # C89 differs by its exp and log alone: half of the models are met by the sanitizers.
-        pytest.param(
-            "double", "c89", slice(1, None, 4), SANITIZE, id="double c89", marks=pytest.mark.theory
-        ),
-        pytest.param(
-            "float", "c89", slice(2, None, 4), SANITIZE, id="float c89", marks=pytest.mark.theory
-        ),
+        # C89 differs by its exp and log alone: a part of the models is met by the sanitizers.
+        pytest.param("double", "c89", slice(1, None, 3), SANITIZE, marks=pytest.mark.theory),
     ],
 )
 def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):
@@ -111,48 +97,30 @@ def answers_of(code, X, folder):
     return evaluate_all([code], X, folder, "c99", [1])[0]
 
 
+# Those whose text has least in common with that of the list above, and a pipeline.
 TRAINED = {
-    "pipeline": lambda: make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
-    "one cluster": lambda: quick(partition=KMeans(1), out_of_bounds="linear"),
-    "plane": lambda: quick(n_mfs=1, out_of_bounds="linear"),
-    "constant": lambda: quick(n_mfs=1, order=0, out_of_bounds="linear"),
-    "scheduled": lambda: quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
+    "pipeline": make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
+    "one cluster": quick(partition=KMeans(1), out_of_bounds="linear"),
+    "constant": quick(n_mfs=1, order=0, out_of_bounds="linear"),
+    "scheduled": quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
 }
-
-
-@cache
-def trained():
-    """By kind; one output and two by turns, which are written the same way for every kind."""
-    X, y = surface(n_outputs=2)
-    return {
-        kind: make().fit(X, y[:, 0] if place % 2 else y)
-        for place, (kind, make) in enumerate(TRAINED.items())
-    }
 
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.parametrize(
-    ("dtype", "flags", "kinds"),
-    [
-        ("double", [], list(TRAINED)),
-        ("float", [], list(TRAINED)),
-        # Those whose text has least in common with that of the list above.
-        ("double", SANITIZE, ["one cluster", "constant", "scheduled"]),
-    ],
-    ids=["double", "float", "double sane"],
-)
-def test_trained_models_answer_as_predict(dtype, flags, kinds, tmp_path):
-    estimators = {kind: trained()[kind] for kind in kinds}
-    Z = around(surface()[0], dtype)
+@pytest.mark.parametrize(("dtype", "flags"), [("double", SANITIZE), ("float", [])])
+def test_trained_models_answer_as_predict(dtype, flags, tmp_path):
+    X, y = surface(n_outputs=2)
+    for estimator in TRAINED.values():
+        estimator.fit(X, y)
+    Z = around(X, dtype)
     codes = [
         export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
-        for place, estimator in enumerate(estimators.values())
+        for place, estimator in enumerate(TRAINED.values())
     ]
-    n_outputs = [fold(estimator).n_outputs for estimator in estimators.values()]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", n_outputs, flags)
-    for (kind, estimator), (found, status) in zip(estimators.items(), answers, strict=True):
-        wanted = estimator.predict(Z.astype(float)).reshape(len(Z), -1)
+    answers = evaluate_all(codes, Z, tmp_path, "c99", [2] * len(codes), flags)
+    for (kind, estimator), (found, status) in zip(TRAINED.items(), answers, strict=True):
+        wanted = estimator.predict(Z.astype(float))
         # Rules that cancel each other take digits with them, in Python too.
         scale = size_of_sum(fold(estimator), Z, wanted)
         assert (np.abs(found - wanted) / scale).max() < TOLERANCE[dtype], kind
@@ -201,29 +169,6 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.parametrize("dtype", TOLERANCE)
-def test_corner_and_feet_on_an_edge_of_the_box_stay_there(dtype, tmp_path):
-    # Neither 0.1 nor 0.7 is a float, and the slope jumps there: answers are those on the box as it
-    # is rounded.
-    corners = np.array([[0.1, 0.4, 0.7], *np.log([[0.3] * 3] * 2)])
-    antecedent = GridAntecedent((TermGroup(Triangular, np.zeros(3, dtype=int), corners),), (3,))
-    model = quick(n_mfs=3).fit(np.linspace(0.1, 0.7, 50)[:, None], np.arange(50.0)).model_
-    model = replace(
-        model,
-        antecedent=antecedent,
-        coefficients=np.array([[[1.0], [2.0]], [[5.0], [-3.0]], [[2.0], [7.0]]]),
-        minimum=np.array([0.1]),
-        maximum=np.array([0.7]),
-    ).with_out_of_bounds("linear", 3.0)
-    X = np.linspace(-0.5, 1.5, 500)[:, None].astype(NUMPY[dtype])
-    code = export_c(model, name="m", dtype=dtype, min_coverage=None)
-    found, _ = answers_of(code, X, tmp_path)
-    wanted = Numbers.of(model, NUMPY[dtype]).model.predict(X.astype(float))
-    assert np.abs(found - wanted).max() < TOLERANCE[dtype] * np.abs(wanted).max()
-
-
-@pytest.mark.theory
-@needs_compiler
 def test_row_that_is_not_finite_gets_no_answer(tmp_path):
     X, y = surface()
     model = quick(n_mfs=2, solver="lse").fit(X, y).model_
@@ -266,12 +211,7 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("scale_x", "scale_y", "what"),
-    [
-        (1e45, 1.0, "an input"),
-        (1e-45, 1.0, "an input"),
-        (1.0, 1e42, "output"),
-    ],
+    ("scale_x", "scale_y", "what"), [(1e45, 1.0, "an input"), (1.0, 1e42, "output")]
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
     X, y = surface()
@@ -359,41 +299,14 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     assert run(["./test"], tmp_path).returncode == 1
 
 
-def far_off(mf, seed, offset=1e4):
-    """A model of inputs that lie so many standard deviations from zero, and its rows."""
-    g = np.random.default_rng(seed)
-    X = g.normal(size=(300, 2))
-    y = np.sin(2.0 * X[:, 0]) + X[:, 1] ** 2
-    model = quick(3, mf=mf, out_of_bounds="linear", max_iter=5)
-    return model.fit(X + offset, y), X + offset
-
-
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-def test_header_says_what_float_makes_of_the_inputs():
-    model, X = far_off("gaussian", 0)
-    text = export_c(model, name="m", dtype="float").header.replace("\n *", "")
-    found = re.search(r"steps of (\S+) at the far end of .*?, (\S+) of .* by up to (\S+)\. ", text)
-    step, share, moved = map(float, found.groups())
-    assert step == pytest.approx(2.0**-10, rel=0.01)
-    assert share == pytest.approx(2.0**-10 / X.std(), rel=0.3)
-    # One digit is told.
-    rounded = model.model_.predict(X.astype(np.float32).astype(float))[:, 0]
-    assert 0.3 * moved < np.abs(model.predict(X) - rounded).max() < 1.5 * moved
-    assert "steps of" not in export_c(model, name="m").header
-
-
 HOSTILE = [
     "*/ int x; /*",
     "??/",
     'quote " and \\',
     "line\nbreak\r\n#error",
-    "°C · 陀螺 \U0001f600",
-    "int",
     "x" * 5000,
     "//\\",
-    "/*",
-    "%s%n",
-    "\x00\x1b[31m",
+    "\x00\x1b[31m °C 陀螺",
 ]
 
 
@@ -427,20 +340,12 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
     ("arguments", "message"),
     [
         ({}, "name=None takes the name from path"),
-        ({"name": "2x"}, "name='2x' must be a C identifier"),
-        ({"name": "grün"}, "must be a C identifier"),
-        ({"name": "x\n"}, "must be a C identifier"),
-        ({"name": 3}, "must be a C identifier"),
-        ({"name": "a__b"}, "two underscores"),
-        ({"name": "double"}, "is a keyword of C"),
-        ({"name": "x" * 17}, "has 17 characters; with 16 or fewer"),
+        ({"name": "2x"}, "name='2x' must be a letter, then letters"),
+        ({"name": "a__b"}, "single underscores"),
+        ({"name": "x" * 17}, "with 16 or fewer"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
-        ({"path": 'a"b', "name": "m"}, "path ends in 'a\"b'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
-        ({"name": "m", "std": "c11"}, "std='c11' must be one of 'c99', 'c89'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
-        ({"name": "m", "min_coverage": np.nan}, "min_coverage=nan must be"),
-        ({"name": "m", "min_coverage": "0.5"}, "min_coverage='0.5' must be"),
         ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, r"each of the 1 outputs, .* shape \(2, 2\)"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must be finite, each low below its high"),
     ],
@@ -450,62 +355,12 @@ def test_bad_argument(arguments, message):
         export_c(CASES[0].model, **arguments)
 
 
-def test_family_of_ones_own_is_refused():
-    class Own(Gaussian):
-        name = "own"
-
-    X, y = surface()
-    model = quick(n_mfs=2, mf=Own).fit(X, y)
-    with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
-        export_c(model, name="m")
-
-
 def test_grid_too_deep_for_c89():
     antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 13, [2] * 13)
-    model = TSKModel(
-        antecedent=antecedent,
-        initial_antecedent=antecedent,
-        coefficients=np.ones((2**13, 1, 1)),
-        reference=np.zeros(13),
-        spread=np.ones(13),
-        minimum=-np.ones(13),
-        maximum=np.ones(13),
-        rule_weights=np.full(2**13, 2.0**-13),
-        rule_rows=np.ones(2**13),
-        input_names=tuple(f"x{j}" for j in range(13)),
-    )
+    n_rules, ones = antecedent.n_rules, np.ones(13)
+    names = tuple(f"x{j}" for j in range(13))
+    parts = (np.ones((n_rules, 1, 1)), 0.0 * ones, ones, -ones, ones)
+    model = TSKModel(antecedent, antecedent, *parts, *np.ones((2, n_rules)), names)
     with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
         export_c(model, name="m", std="c89")
     assert export_c(model, name="m").cost.exponentials == 26
-
-
-EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_c_export.py"
-
-
-@needs_compiler
-@pytest.mark.page
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
-def test_example_runs(capsys):
-    pytest.importorskip("matplotlib")
-    runpy.run_path(str(EXAMPLE))
-    assert "self-test: passed" in capsys.readouterr().out
-
-
-def test_limit_of_zero_is_clip_and_the_header_says_the_limit():
-    model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
-    for limit, words in [
-        (0.0, "Outside this range the value at the edge is held."),
-        (0.25, "up to 0.25 of its standard deviations, and holds the"),
-        (np.inf, "Outside this range the model goes on along its tangent."),
-    ]:
-        code = export_c(model.with_out_of_bounds("linear", limit), name="m")
-        assert words in " ".join(code.header.replace("*", "").split())
-        assert ("m_tangent" in code.source) is (limit > 0.0)
-
-
-def test_rules_that_have_seen_no_data_are_not_called_uncovered():
-    model = next(case.model for case in CASES if case.model.out_of_bounds == "clip")
-    unseen = replace(model, support=None)
-    assert "support" not in export_c(unseen, name="m").source
-    assert "|= M_UNCOVERED" not in export_c(unseen, name="m").source
-    assert "|= M_UNCOVERED" in export_c(model, name="m").source

@@ -1,11 +1,16 @@
 """Membership functions of the format against the definitions in MATLAB's documentation."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skanfis.export import export_c
 from skanfis.export.fis.functions import function_of, theta_of
 from skanfis.membership import MEMBERSHIPS
+
+from ..quick import quick
 
 LOW, HIGH = -4.0, 4.0
 X = np.linspace(LOW, HIGH, 801)
@@ -73,22 +78,15 @@ def mu(name, parameters):
 
 
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-def test_what_is_written_is_the_family(family, rng):
+def test_what_is_written_is_the_family_and_is_read(family, rng):
     for _ in range(20):
         theta = rng.normal(scale=0.7, size=(len(family.parameters), 1))
         name, parameters = function_of(family, family.natural(theta)[:, 0])
         expected = BY_DEFINITION[name](X, *parameters)
         assert_allclose(family.value(X[None], theta)[0], expected, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-def test_what_is_written_is_read(family, rng):
-    for _ in range(20):
-        theta = rng.normal(scale=0.7, size=len(family.parameters))
-        written = function_of(family, family.natural(theta[:, None])[:, 0])
-        read, theta_read = theta_of(*written, LOW, HIGH)
+        read, theta_read = theta_of(name, parameters, LOW, HIGH)
         assert read is family
-        assert_allclose(theta_read, theta, rtol=1e-12, atol=1e-13)
+        assert_allclose(theta_read, theta[:, 0], rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +95,6 @@ def test_what_is_written_is_read(family, rng):
         ("gaussmf", [-1.5, 0.3]),  # a deviation counts by its size
         ("gbellmf", [-2.0, 1.5, 1.0]),
         ("gauss2mf", [-1.0, -0.5, 0.7, 0.5]),
-        ("gauss2mf", [1.0, 0.5, 0.7, 0.5]),  # no plateau
         ("trapmf", [-1.0, 0.5, 0.5, 2.0]),  # no plateau
         ("pimf", [-1.0, 0.5, 0.5, 2.0]),
         ("dsigmf", [-3.0, 1.0, -3.0, -1.0]),  # both sigmoids fall
@@ -108,19 +105,9 @@ def test_other_ways_to_write_a_function_are_read(name, parameters):
     assert_allclose(mu(name, parameters), BY_DEFINITION[name](X, *parameters), atol=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("name", "parameters", "like"),
-    [
-        ("trimf", [-4.0, -4.0, 1.0], lambda x: np.maximum((1 - x) / 5, 0)),
-        ("trimf", [-1.0, 4.0, 4.0], lambda x: np.maximum((x + 1) / 5, 0)),
-        ("trapmf", [-9.0, -9.0, 0.0, 2.0], lambda x: np.clip((2 - x) / 2, 0, 1)),
-        ("pimf", [0.0, 2.0, 5.0, 5.0], lambda x: smf(x, 0, 2)),
-    ],
-)
-def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
-    name, parameters, like
-):
-    assert_allclose(mu(name, parameters), like(X), atol=1e-14)
+def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any():
+    assert_allclose(mu("trimf", [-4.0, -4.0, 1.0]), np.maximum((1 - X) / 5, 0), atol=1e-14)
+    assert_allclose(mu("pimf", [0.0, 2.0, 5.0, 5.0]), smf(X, 0, 2), atol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -129,20 +116,13 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any(
         ("sigmf", [1.0, 2.0], "'sigmf' is not supported; gaussmf, gbellmf"),
         ("gaussmf", [1.0], "gaussmf takes 2 parameters, found 1"),
         ("gaussmf", [0.0, 1.0], "width 0, which must be between 1e-50 and 1e"),
-        ("gbellmf", [1.0, 0.0, 0.0], "b must be positive"),
+        ("gbellmf", [1.0, 0.0, 0.0], "slope 0, which must be between"),
         ("trimf", [0.0, -1.0, 1.0], "ascending order"),
         ("trimf", [0.0, 0.0, 1.0], r"vertical flank within its input's Range \[-4 4\]"),
-        ("trimf", [-4.0, -4.0, -4.0], "vertical flank"),
-        ("trapmf", [0.0, 2.0, 1.0, 3.0], "ascending order"),
-        ("pimf", [0.0, 0.0, 1.0, 2.0], "vertical flank"),
-        ("gauss2mf", [1.0, 1.0, 1.0, -1.0], "does not reach 1"),
-        ("gauss2mf", [1.0, 1.0, 0.0, 2.0], "right 0"),
-        ("smf", [1.0, 1.0], "ascending order"),
-        ("zmf", [2.0, 1.0], "ascending order"),
+        ("gauss2mf", [1.0, 1.0, 1.0, -1.0], "plateau -2, which must be"),
+        ("smf", [1.0, 1.0], "width 0, which must be"),
         ("dsigmf", [1.0, 0.0, 2.0, 1.0], "must be the same and not zero"),
-        ("dsigmf", [1.0, 1.0, 1.0, 0.0], "rises at 1, not before it falls at 0"),
         ("psigmf", [1.0, 0.0, 2.0, 1.0], "one must be positive and one negative"),
-        ("psigmf", [1.0, 1.0, -1.0, 1.0], "rises at 1, not before it falls at 1"),
     ],
 )
 def test_refuses(name, parameters, message):
@@ -150,9 +130,23 @@ def test_refuses(name, parameters, message):
         theta_of(name, parameters, LOW, HIGH)
 
 
-def test_refuses_to_write_a_function_that_the_format_has_not():
+def test_a_family_of_ones_own_is_refused():
     class Own(MEMBERSHIPS["gaussian"]):
         name = "own"
 
     with pytest.raises(ValueError, match="'own' has no function in the"):
         function_of(Own, [0.0, 1.0])
+    X = np.linspace(0.0, 1.0, 30)[:, None]
+    with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
+        export_c(quick(n_mfs=2, mf=Own).fit(X, X[:, 0]), name="m")
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "files.rst"
+
+
+@pytest.mark.skipif(not PAGE.is_file(), reason="the documentation is not here")
+def test_every_family_is_on_the_page_with_its_function():
+    page = PAGE.read_text(encoding="utf-8")
+    for family in MEMBERSHIPS.values():
+        name, _ = function_of(family, [1.0] * len(family.parameters))
+        assert f'``"{family.name}"``\n     - ``{name}``' in page

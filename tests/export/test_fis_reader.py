@@ -1,7 +1,6 @@
 """Reading .fis files: what they mean, and what is refused, with the line."""
 
 import time
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -12,9 +11,7 @@ from skanfis.export import read_fis
 from skanfis.export.fis.reader import parse_fis
 
 from .fis_files import BY_HAND, with_line
-from .mutations import mutated, seeds
 
-SERIES = [("[Input", "]"), ("key", "=1"), ("", " 1, 1 (1) : 1")]
 GAUSS = "MF{0}='t{0}':'gaussmf',[1 {0}]"
 
 
@@ -65,17 +62,8 @@ def test_means_what_was_written_by_hand():
         ([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)], GridAntecedent),
         ([2, 2], [(2, 1), (1, 1), (1, 2), (2, 2)], GridAntecedent),  # in another order
         ([2, 0, 2], [(1, 0, 1), (1, 0, 2), (2, 0, 1), (2, 0, 2)], GridAntecedent),
-        ([3], [(1,), (3,)], GridAntecedent),  # one term unused
         ([2, 2], [(1, 1), (2, 2)], ScatteredAntecedent),
-        ([3, 3], [(3, 1), (1, 2), (2, 3)], ScatteredAntecedent),
-        ([2, 1, 2], [(1, 0, 2), (2, 0, 1)], ScatteredAntecedent),
-        ([1, 1], [(1, 1)], ScatteredAntecedent),
-        ([1, 1], [(0, 0)], GridAntecedent),  # one rule without conditions
         ([2, 2], [(1, 1), (1, 2), (2, 1)], RuleTableAntecedent),
-        ([2, 2], [(1, 0), (0, 2)], RuleTableAntecedent),
-        ([2, 2], [(1, 1), (1, 1), (2, 1), (2, 2)], RuleTableAntecedent),  # one twice
-        ([1, 2], [(1, 1), (1, 2)], RuleTableAntecedent),
-        ([1], [(0,), (0,)], RuleTableAntecedent),
     ],
 )
 def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, kind, rng):
@@ -90,64 +78,39 @@ def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, 
         assert_allclose(outputs, average(np.exp(log_mu), np.arange(len(rules)) + 1.0))
 
 
-def test_terms_of_a_grid_stay_in_order_else_rules_are_listed():
-    text = system([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)])
-    # Training moves terms of a grid by their distances, which must be positive.
-    swapped = text.replace("[1 2]", "[1 0.5]", 1)
-    assert type(parse_fis(swapped).antecedent) is RuleTableAntecedent
-    mixed = text.replace("'gaussmf',[1 2]", "'zmf',[1 2]", 1)
-    assert type(parse_fis(mixed).antecedent) is RuleTableAntecedent
-
-
 REFUSED = [
     # the system
     ("Type=", "Type='mamdani'", "'mamdani': only Sugeno systems are supported"),
-    ("Type=", "Type=sugeno", "a name in single quotes"),
     ("DefuzzMethod=", "DefuzzMethod='wtsum'", "only the weighted average"),
     ("AndMethod=", "AndMethod='min'", "only the product"),
     ("NumInputs=", "NumInputs=two", "a whole number, found 'two'"),
     ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
-    ("NumInputs=", "NumInputs=0", "0 is not between 1 and 1000"),
-    ("NumRules=", "NumRules=999999999", "is not between 1 and 100000"),
     ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
-    ("Version=", "Version 2.0", "key=value"),
     # names
-    ("Name='by hand'", "Name='by \N{BELL}\x07'", "cannot be printed"),
-    ("Name='by hand'", "Name=__import__('os').abort()", "a name in single quotes"),
     # sections
-    ("[Input1]", "[Input01]", "is no section"),
+    ("[Input1]", "[Input01]", r"expected \[System\], .* found '\[Input01\]'"),
     ("[Input2]", "[Input1]", r"\[Input1\] stands here for the second time"),
-    ("[Output2]", "[Output2", "is no section"),
     ("% A comment", "stray", r"expected \[System\]"),
     # variables
     ("Range=[0 10]", "Range=[10 0]", "low < high"),
-    ("Range=[0 10]", "Range=[0 inf]", "a finite number, found 'inf'"),
-    ("Range=[0 10]", "Range=[0 1e999]", "beyond 1e"),
-    ("Range=[0 10]", "Range=[0 1_0]", "a finite number"),
-    ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a finite number"),
-    ("Range=[0 10]", "Range=0 10", r"expected \[low high\]"),
-    ("Range=[-1, +1.0]", "Range=[-1,, 1]", "a finite number, found ''"),
+    ("Range=[0 10]", "Range=[0 inf]", "a number of size up to 1e.50, found 'inf'"),
+    ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a number of size up to"),
     # membership functions
-    ("MF1='low'", "MF1='low':'trimf',[2 2 8]", r"vertical flank within its input's Range \[0 10\]"),
-    ("MF1='low'", "MF1='low':'sigmf',[1 2]", "'sigmf' is not supported"),
-    ("MF1='low'", "MF1='low':'gaussmf',[1 2", "'name':'function'"),
-    ("MF1='low'", "MF1='low':'gaussmf',[1 exp(2)]", "a finite number"),
-    ("MF1='low'", "MF1='low':'gaussmf',[1e-60 2]", "must be between"),
-    ("MF1='low'", "MF3='low':'gaussmf',[1 2]", None),
-    ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' is not supported; constant"),
-    ("MF1='flat'", "MF1='flat':'constant',[3 4]", "constant takes 1 parameters, found 2"),
+    ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' with 1 parameters is not supported"),
+    (
+        "MF1='flat'",
+        "MF1='flat':'constant',[3 4]",
+        "'constant' with 2 parameters is not .* linear with 3 are",
+    ),
     # rules
     ("1 1, 2 1", "1 1 1, 2 1 (1) : 1", "3 numbers for 2 inputs"),
-    ("1 1, 2 1", "1 1, 2 (1) : 1", "1 numbers for 2 outputs"),
-    ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight 0.5; only weight 1"),
+    ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight '0.5'; only weight 1"),
     ("1 1, 2 1", "1 1, 2 1 (1) : 2", r"by OR \(2\)"),
-    ("1 1, 2 1", "1 1, 2 1 (1) : 3", "the connection is 1 or 2"),
-    ("1 1, 2 1", "1 1, 2 1", "expected a rule"),
-    ("1 1, 2 1", "-1 1, 2 1 (1) : 1", "NOT, a negative number"),
+    ("1 1, 2 1", "-1 1, 2 1 (1) : 1", "'-1' for input 'x y', .* NOT .a negative number"),
     ("1 1, 2 1", "1.2 1, 2 1 (1) : 1", "hedges"),
-    ("1 1, 2 1", "3 1, 2 1 (1) : 1", "3 for input 'x y', which has 2"),
-    ("1 1, 2 1", "1 1, 0 1 (1) : 1", "0 for output 'u'"),
+    ("1 1, 2 1", "3 1, 2 1 (1) : 1", "'3' for input 'x y', which has 2"),
+    ("1 1, 2 1", "1 1, 0 1 (1) : 1", "'0' for output 'u'"),
 ]
 
 
@@ -165,12 +128,8 @@ def test_refuses_with_the_line(old, new, message):
         ("[System]", "[Rules]", "has no Type|second time|no .System"),
         ("Type=", "", r"line 2: \[System\] has no Type"),
         ("NumInputs=", "NumInputs=3", r"line 2: \[System\] counts \[Input3\]"),
-        ("NumInputs=", "NumInputs=1", r"line \d+: "),
-        ("NumOutputs=", "NumOutputs=1", r"line \d+: "),
-        ("NumRules=", "NumRules=4", r"counts 4 rules, \[Rules\] has 3"),
         ("2 0, 2 3", "", r"counts 3 rules, \[Rules\] has 2"),
         ("NumMFs=1", "NumMFs=2", r"\[Input2\] has no MF2"),
-        ("NumMFs=1", "NumMFs=0", r"\[Input2\] has the unknown key 'MF1'"),
     ],
 )
 def test_refuses_counts_that_do_not_agree(old, new, message):
@@ -178,28 +137,16 @@ def test_refuses_counts_that_do_not_agree(old, new, message):
         parse_fis(with_line(old, new)[0])
 
 
-def test_says_which_file(tmp_path):
-    path = tmp_path / "spoilt.fis"
-    path.write_text(BY_HAND.replace("'sugeno'", "'mamdani'"), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"spoilt\.fis: line 4: Type='mamdani'"):
-        read_fis(path)
-
-
-def test_reads_utf_8_with_and_without_mark(tmp_path):
+def test_reads_utf_8_with_and_without_mark_and_no_other_encoding(tmp_path):
     path = tmp_path / "named.fis"
+    text = BY_HAND.replace("'z'", "'température'")
     for encoding in ("utf-8", "utf-8-sig"):
-        path.write_text(BY_HAND.replace("'z'", "'température'"), encoding=encoding)
+        path.write_text(text, encoding=encoding)
         assert read_fis(str(path)).input_names == ("x y", "température")
-
-
-def test_refuses_other_encodings_with_the_line(tmp_path):
-    path = tmp_path / "latin.fis"
-    path.write_text(BY_HAND.replace("'z'", "'température'"), encoding="latin-1")
-    with pytest.raises(ValueError, match="line 23: byte 0xe9 is not UTF-8"):
-        read_fis(path)
-    path.write_text(BY_HAND, encoding="utf-16")
-    with pytest.raises(ValueError, match="line 1: byte 0xff is not UTF-8"):
-        read_fis(path)
+    for encoding in ("latin-1", "utf-16"):
+        path.write_text(text, encoding=encoding)
+        with pytest.raises(ValueError, match=r"named\.fis: 'utf-8' codec can't decode byte"):
+            read_fis(path)
 
 
 def test_takes_names_of_columns(tmp_path):
@@ -211,14 +158,9 @@ def test_takes_names_of_columns(tmp_path):
             read_fis(path, input_names=names)
 
 
-def test_refuses_a_large_file_without_reading_it(tmp_path):
-    path = tmp_path / "large.fis"
-    with open(path, "wb") as file:
-        file.truncate(2**40)
-    start = time.process_time()
-    with pytest.raises(ValueError, match="larger than 4,194,304 bytes"):
-        read_fis(path)
-    assert time.process_time() - start < 1.0
+def test_text_in_place_of_a_path_is_named():
+    with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
+        read_fis(BY_HAND)
 
 
 def test_refuses_many_rules_over_wide_consequents_before_memory_is_asked_for():
@@ -232,30 +174,14 @@ def test_refuses_many_rules_over_wide_consequents_before_memory_is_asked_for():
         parse_fis(text)
 
 
-@pytest.mark.parametrize(
-    "part",
-    ["".join(f"{before}{k}{after}\n" for k in range(1, 120_000)) for before, after in SERIES],
-    ids=["sections", "keys", "rules"],
-)
-def test_long_series_end_early(part):
-    with pytest.raises(ValueError, match=r"line 1000\d\d: 100,000 like this are the most"):
-        parse_fis(f"[System]\n[Rules]\n{part}" if part[0] == "1" else f"[System]\n{part}")
-
-
 @pytest.mark.theory
 @pytest.mark.parametrize(
     "line",
     [
         "MF1='" + "a" * 1_000_000,
-        "MF1=" + "'a':" * 250_000,
         "MF1='a':'gaussmf',[" + "1 " * 500_000,
-        "MF1='a':'gaussmf',[" + "1, " * 300_000 + "]",
-        "MF1='a':'gaussmf',[" + " " * 1_000_000 + "]",
-        "MF1='a'" + " " * 1_000_000 + ":",
         "Range=[" + "1" * 1_000_000 + " 2]",
-        "=" * 1_000_000,
         "[" * 1_000_000,
-        "\t" * 1_000_000 + "x",
     ],
     ids=lambda line: line[:20],
 )
@@ -264,59 +190,3 @@ def test_long_lines_take_no_long_time(line):
     with pytest.raises(ValueError, match=r"line \d+: "):
         parse_fis(with_line("MF1='low'", line)[0])
     assert time.process_time() - start < 1.0
-
-
-def test_what_an_error_shows_of_the_file_is_short_and_ascii():
-    text, _ = with_line("Type=", "Type='\N{RIGHT-TO-LEFT OVERRIDE}" + "x" * 10_000 + "'")
-    with pytest.raises(ValueError, match="cannot be printed") as caught:
-        parse_fis(text)
-    assert str(caught.value).isascii()
-    for old, new in [
-        ("Type=", "Type='{}'"),
-        ("Name='x y'", "Name='{}'"),
-        ("AndMethod=", "AndMethod='{}'"),
-        ("MF1='low'", "MF1='low':'{}',[1 2]"),
-        ("MF1='flat'", "MF1='flat':'{}',[1 2]"),
-        ("MF1='low'", "{}=1"),
-        ("1 1, 2 1", "{} 1, 2 1 (1) : 1"),
-        ("1 1, 2 1", "{}"),
-    ]:
-        text, _ = with_line(old, new.format("é" * 10_000))
-        with pytest.raises(ValueError, match="line") as caught:
-            parse_fis(text.replace("2 0, 2 3", "9 9, 2 3"))
-        assert str(caught.value).isascii()
-        assert len(str(caught.value)) < 400
-
-
-@pytest.mark.theory
-def test_many_constants_beside_many_inputs_take_little_memory():
-    # As slopes of zero they would be 160 MB.
-    constants = "\n".join(f"MF{k + 1}='r':'constant',[1]" for k in range(10_000))
-    head, _, rules = system([0] * 1000, [(0,) * 1000], 2).partition("[Output1]")
-    outputs, _, rules = rules.partition("[Rules]")
-    outputs = outputs.replace("NumMFs=1", "NumMFs=10000").replace(
-        "MF1='r':'constant',[1]", constants
-    )
-    tracemalloc.start()
-    model = parse_fis(f"{head}[Output1]{outputs}[Rules]{rules}")
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 5e7
-    assert_array_equal(model.predict(np.zeros((1, 1000))), 1.0)
-
-
-def test_spoilt_files_are_read_or_refused_with_the_line(tmp_path):
-    # benchmarks/fuzz_fis.py does this 100,000 times.
-    rng, sound, path = np.random.default_rng(1), seeds(), tmp_path / "spoilt.fis"
-    n_read, refusals = 0, []
-    for _ in range(1000):
-        path.write_bytes(mutated(rng, sound))
-        try:
-            model = read_fis(path)
-        except ValueError as error:
-            refusals.append(str(error))
-        else:
-            assert np.isfinite(model.predict(np.stack([model.minimum, model.maximum]))).all()
-            n_read += 1
-    assert 100 < n_read < 900
-    assert all("line " in refusal for refusal in refusals)

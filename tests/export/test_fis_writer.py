@@ -1,6 +1,5 @@
 """Writing .fis files: what is in them, and that they come back."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -19,11 +18,6 @@ ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR)
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 
 
-def of_family(family, rng):
-    """A grid whose terms of this family leave no gap."""
-    return build(oracles.random_grid(rng, [family] * 2, (3, 2), (0, 2)))
-
-
 def full_scale(model):
     return np.ptp(model.predict(rows_of(model, 1.0, 200)), axis=0).max()
 
@@ -38,28 +32,6 @@ def test_comes_back_as_it_was(model):
     assert_array_equal(read.maximum, model.maximum)
     assert read.antecedent.n_rules == model.n_rules
     assert read.order == model.order
-
-
-@pytest.mark.filterwarnings("ignore:At .* no rule of the .fis file fires")
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-def test_every_family_comes_back(family, rng):
-    model = of_family(family, rng)
-    read = parse_fis(export_fis(model))
-    assert {group.family for group in read.antecedent.groups} == {family}
-    rows = rows_of(model, 1.3, 200)
-    assert_allclose(read.predict(rows), model.predict(rows), atol=1e-9 * full_scale(model))
-
-
-@ALL
-def test_range_of_the_output_holds_it(model):
-    read = export_fis(model)
-    outputs = model.predict(rows_of(model, 3.0, 500))
-    for k in range(model.n_outputs):
-        found = re.search(rf"\[Output{k + 1}\]\nName='\w+'\nRange=\[(\S+) (\S+)\]", read)
-        low, high = map(float, found.groups())
-        assert low < high
-        assert low - 1e-9 <= outputs[:, k].min()
-        assert outputs[:, k].max() <= high + 1e-9
 
 
 @pytest.mark.parametrize("policy", OUT_OF_BOUNDS)
@@ -87,23 +59,6 @@ def test_names_become_identifiers_that_stay_apart():
     assert_allclose(read.predict(rows), model.predict(rows), atol=1e-11 * full_scale(model))
 
 
-@pytest.mark.parametrize("kind", ["one rule, order 1, 1 outputs", "rule table, order 1, 1 outputs"])
-def test_every_rule_has_a_condition(kind):
-    # Without one, fuzzylite gives NaN. The term is 1 on the whole Range.
-    model = MODELS[kind]
-    if kind.startswith("rule table"):
-        table = model.antecedent.table.copy()
-        table[0] = -1
-        model = replace(model, antecedent=replace(model.antecedent, table=table))
-    text = export_fis(model)
-    rules = text[text.index("[Rules]") :].splitlines()[1:]
-    assert not any(rule.startswith("0 0 0,") for rule in rules)
-    rows = rows_of(model, 1.3)
-    assert_allclose(
-        parse_fis(text).predict(rows), model.predict(rows), atol=1e-11 * full_scale(model)
-    )
-
-
 def test_warns_where_no_rule_of_the_file_fires(rng):
     family = MEMBERSHIPS["triangular"]
     centers = np.array([-1.5, 1.5])
@@ -119,7 +74,7 @@ def test_warns_where_no_rule_of_the_file_fires(rng):
 
 
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
-@pytest.mark.parametrize("scale", [1e-55, 1e-51, 1e-30, 1e30, 3e50, 1e51])
+@pytest.mark.parametrize("scale", [1e-51, 1e-30, 1e30, 1e51])
 @pytest.mark.filterwarnings("ignore:.*no rule")
 def test_what_is_written_can_be_read_or_is_refused(family, scale, rng):
     model = build(oracles.random_grid(rng, [family, family], [2, 3], [0, 2]))

@@ -19,9 +19,7 @@ from sklearn.preprocessing import (
     FunctionTransformer,
     MaxAbsScaler,
     MinMaxScaler,
-    Normalizer,
     OneHotEncoder,
-    PolynomialFeatures,
     PowerTransformer,
     RobustScaler,
     StandardScaler,
@@ -31,7 +29,6 @@ from skanfis import ANFISRegressor
 from skanfis.export import fold, fold_with_rows
 
 NAMES = ["hours", "kelvin", "rate"]
-POLICIES = ("clip", "linear", "nan")
 KINDS = {
     "grid": {"n_mfs": [2, 3, 1]},
     "bells": {"n_mfs": 2, "mf": "bell"},
@@ -42,11 +39,9 @@ KINDS = {
 SCALERS = {
     "standard": StandardScaler(),
     "uncentred": StandardScaler(with_mean=False),
-    "unscaled": StandardScaler(with_std=False),
     "min-max": MinMaxScaler((-3, 7)),
     "max-abs": MaxAbsScaler(),
     "robust": RobustScaler(),
-    "robust, centred only": RobustScaler(with_scaling=False),
     "identity": FunctionTransformer(),
     "passthrough": "passthrough",
     "two": make_pipeline(RobustScaler(), "passthrough", MinMaxScaler()),
@@ -56,17 +51,17 @@ SCALERS = {
     ),
 }
 
-# Every kind of rules behind every scaler; policies and numbers of outputs take turns, so that they
-# meet every kind and every scaler too.
+# Every kind of rules behind every scaler; policies and numbers of outputs take turns. A triangle
+# that training has not moved has its corner on the edge of the box, where the last bit decides on
+# which side of it the tangent is taken.
 CASES = [
-    (kind, scaler, POLICIES[place % 3], 1 + place % 2)
+    (
+        kind,
+        scaler,
+        ("clip", "nan" if kind == "triangles" else "linear", "nan")[place % 3],
+        1 + place % 2,
+    )
     for place, (kind, scaler) in enumerate(product(KINDS, SCALERS))
-]
-# A triangle that training has not moved has its corner on the edge of the box, where the last bit
-# decides on which side of it the tangent is taken.
-CASES = [
-    (kind, scaler, "clip" if (kind, policy) == ("triangles", "linear") else policy, n_outputs)
-    for kind, scaler, policy, n_outputs in CASES
 ]
 
 
@@ -106,6 +101,7 @@ def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_ou
     last = regressor(**KINDS[kind], out_of_bounds=policy)
     pipe = make_pipeline(fresh(scaler), last).fit(X, y)
     assert_same_predictions(pipe, around(X), np.ptp(y, axis=0).max() * 20)
+    assert fold(pipe).in_bounds(X).all()
     assert_array_equal(fold(pipe).predict(X).shape, (len(X), n_outputs))
 
 
@@ -118,42 +114,10 @@ def test_scale_of_the_target_is_folded(kind):
     target = make_pipeline(MinMaxScaler((-1, 3)), StandardScaler())
     both = TransformedTargetRegressor(inner, transformer=target).fit(X, y)
     assert_same_predictions(both, around(X), 1e4)
-    only_target = make_pipeline(
-        MaxAbsScaler(),
-        TransformedTargetRegressor(
-            regressor(**KINDS[kind], out_of_bounds=policy), transformer=RobustScaler()
-        ),
-    ).fit(X, y[:, 0])
+    last = regressor(**KINDS[kind], out_of_bounds=policy)
+    only_target = TransformedTargetRegressor(last, transformer=RobustScaler())
+    only_target = make_pipeline(MaxAbsScaler(), only_target).fit(X, y[:, 0])
     assert_same_predictions(only_target, around(X), 10.0)
-    neither = TransformedTargetRegressor(inner).fit(X, y)
-    assert_same_predictions(neither, around(X), 1e4)
-
-
-@pytest.mark.parametrize("scaler", SCALERS)
-def test_no_training_row_leaves_the_box(scaler):
-    X, y = data()
-    model = fold(make_pipeline(fresh(scaler), regressor(n_mfs=2)).fit(X, y))
-    assert model.in_bounds(X).all()
-    span = np.ptp(X, axis=0)
-    assert_allclose((model.minimum - X.min(axis=0)) / span, 0.0, atol=1e-10)
-    assert_allclose((model.maximum - X.max(axis=0)) / span, 0.0, atol=1e-10)
-
-
-def test_folded_model_is_the_model_of_the_raw_data():
-    # Least squares with memberships over the box of the data do not depend on units, so that a
-    # scaler in front changes nothing: the folded model is the one trained without it.
-    X, y = data(2)
-    bare = regressor(n_mfs=[2, 3, 1], alpha=1e-6).fit(X, y).model_
-    folded = fold(make_pipeline(MinMaxScaler(), regressor(n_mfs=[2, 3, 1], alpha=1e-6)).fit(X, y))
-    assert_allclose(folded.antecedent.parameters, bare.antecedent.parameters, rtol=1e-9)
-    assert folded.term_names == bare.term_names
-    for name in ("reference", "spread", "minimum", "maximum", "rule_weights", "rule_rows"):
-        assert_allclose(getattr(folded, name), getattr(bare, name), rtol=1e-9, atol=1e-12)
-    span = np.ptp(X, axis=0)[:, None]
-    assert_allclose(folded.coefficients[:, 0], bare.coefficients[:, 0], rtol=1e-6)
-    assert_allclose(
-        folded.coefficients[:, 1:] * span, bare.coefficients[:, 1:] * span, rtol=1e-5, atol=1e-6
-    )
 
 
 def test_moved_and_dropped_columns_go_back_to_their_place():
@@ -183,13 +147,8 @@ def test_moved_and_dropped_columns_go_back_to_their_place():
     "columns",
     [
         slice("kelvin", "rate"),
-        slice(None, "kelvin"),
-        slice("kelvin", None),
-        slice(1, 3),
         slice(-2, None),
         "kelvin",
-        1,
-        -1,
         [2, 0],
         ["rate", "hours"],
         np.array([True, False, True]),
@@ -203,25 +162,6 @@ def test_columns_are_chosen_as_scikit_learn_does(columns):
     chosen = ColumnTransformer([("some", StandardScaler(), [columns] if one else columns)])
     pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, y)
     assert_same_predictions(pipe, frame, 10.0)
-
-
-def test_names_are_those_of_the_table_that_the_user_gives():
-    X, y = data()
-    frame = pd.DataFrame(X, columns=NAMES)
-    for first in (StandardScaler(), "passthrough"):
-        pipe = make_pipeline(first, regressor(n_mfs=2)).fit(frame, y)
-        assert fold(pipe).input_names == tuple(NAMES)
-        assert fold(pipe.fit(X, y)).input_names == ("x0", "x1", "x2")
-
-
-def test_a_model_is_its_own_folding():
-    X, y = data()
-    bare = regressor(n_mfs=2).fit(X, y)
-    assert fold(bare.model_) is bare.model_
-    assert_array_equal(fold(bare).predict(X), bare.model_.predict(X))
-    model, rows = fold_with_rows(bare.model_, pd.DataFrame(X, columns=["x0", "x1", "x2"]))
-    assert model is bare.model_
-    assert_array_equal(rows, X)
 
 
 def mixed(n_rows=200):
@@ -243,7 +183,6 @@ def mixed(n_rows=200):
     [
         ({}, ["fibre_PM", "fibre_SM", "fibre_rare"]),
         ({"drop": "first"}, ["fibre_SM", "fibre_rare"]),
-        ({"drop": "if_binary"}, ["fibre_PM", "fibre_SM", "fibre_rare"]),
         ({"min_frequency": 0.2}, ["fibre_PM", "fibre_SM", "fibre_infrequent_sklearn"]),
         ({"handle_unknown": "ignore", "sparse_output": False}, None),
     ],
@@ -271,8 +210,6 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
     ("step", "message"),
     [
         (PCA(2), r"step 'pca' \(PCA\) cannot be folded into the rules: .* every column alone"),
-        (PolynomialFeatures(2), "'polynomialfeatures'"),
-        (Normalizer(), "Normalizer"),
         (SimpleImputer(), "SimpleImputer"),
         (FunctionTransformer(np.negative), "FunctionTransformer"),
         (FeatureUnion([("a", StandardScaler())]), "FeatureUnion"),
@@ -283,23 +220,14 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
 )
 def test_what_does_not_fold_is_named(step, message):
     X, y = data()
-    pipe = make_pipeline(
-        step, regressor(n_mfs=2 if not isinstance(step, PolynomialFeatures) else 1)
-    )
-    if isinstance(step, PolynomialFeatures):
-        step.set_params(include_bias=False)
-    pipe.fit(X, y)
+    pipe = make_pipeline(step, regressor(n_mfs=2)).fit(X, y)
     with pytest.raises(ValueError, match=message):
         fold(pipe)
 
 
 @pytest.mark.parametrize(
     "settings",
-    [
-        {"func": np.log, "inverse_func": np.exp},
-        {"transformer": PowerTransformer()},
-        {"transformer": MinMaxScaler(clip=True)},
-    ],
+    [{"func": np.log, "inverse_func": np.exp}, {"transformer": PowerTransformer()}],
 )
 def test_a_bent_target_is_refused(settings):
     X, y = data()
@@ -317,9 +245,7 @@ def test_what_has_no_rules_is_refused():
     with pytest.raises(TypeError, match="fitted ANFIS estimator"):
         fold(ANFISRegressor)
     for unfitted in (
-        ANFISRegressor(),
         make_pipeline(StandardScaler(), ANFISRegressor()),
-        TransformedTargetRegressor(ANFISRegressor()),
         GridSearchCV(ANFISRegressor(), {}),
     ):
         with pytest.raises(NotFittedError):

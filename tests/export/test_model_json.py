@@ -1,9 +1,9 @@
 """JSON of a model: exact, readable, and strict on the way in."""
 
 import json
-import re
 import time
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +12,8 @@ from numpy.testing import assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.export import export_json, read_json, write_json
 from skanfis.export.json_reader import parse_json
-from skanfis.inspection import export_text
 from skanfis.model import TSKModel
 
-from .json_mutations import mutated_numbers, with_number
 from .rule_bases import EVERY_PAIR, MODELS, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
@@ -71,18 +69,10 @@ def test_file_of_a_trained_model(tmp_path, rng):
 
 def test_a_person_can_read_it():
     text = export_json(A_GRID)
-    assert text.startswith('{\n  "format": "skanfis-model",\n  "version": 1,\n  "inputs": [\n')
-    assert re.search(
-        r'^    \{"name": "low", "input": 0, "function": "gaussian", "center": ', text, re.M
-    )
+    assert '\n    {"name": "low", "input": 0, "function": "gaussian", "center": ' in text
     # One line per input, output, term, rule and its support; ten keys, the ends of five lists, two
     # braces.
     assert text.count("\n") == 3 + 2 + 7 + 12 + 12 + 10 + 5 + 2
-
-
-def test_later_version_says_so():
-    with pytest.raises(ValueError, match="of version 2, this skanfis reads version 1: upgrade"):
-        parse_json(changed(lambda d: d.update(version=2, rules="of another kind")))
 
 
 def _set(*path):
@@ -98,17 +88,12 @@ def _set(*path):
 
 
 REFUSED = [
+    (_set("version", 2), "of version 2, this skanfis reads version 1: upgrade"),
     (_set("format", "pickle"), "not a model of skanfis"),
-    (_set("version", 0), '"version" is 0'),
-    (_set("version", True), '"version" is True'),
     (_set("more", 1), "the file has the unknown key 'more'"),
     (lambda d: d.pop("rules"), "the file has no 'rules'"),
     (_set("out_of_bounds", "wrap"), "out_of_bounds is 'wrap'"),
-    (_set("outputs", []), "outputs: .* is not a list of 1 or more"),
-    (_set("outputs", [1, 2]), r"outputs\[0\] is 1, not an object"),
-    (_set("outputs", 0, "name", 1), r"outputs\[0\]: 1 is not a name"),
-    (_set("outputs", 0, "spread", 0.0), r"outputs\[0\]\.spread: 0\.0 is not a number from"),
-    (_set("outputs", 0, "minimum", None), r"outputs\[0\]\.minimum: None is not a number"),
+    (_set("outputs", 0, "name", 1), r"outputs\[0\]\.name: 1 is not a name"),
     (
         lambda d: d["outputs"][0].update(dict.fromkeys(d["outputs"][0], None) | {"name": "y"}),
         "outputs: minimum, maximum and spread are null of some, but not of all",
@@ -116,48 +101,24 @@ REFUSED = [
     (_set("outputs", 0, "upper", "1"), r"outputs\[0\]\.upper: '1' is not a number of size up to"),
     (_set("outputs", 0, "upper", -0.9), r"outputs\[0\]: lower is not below upper"),
     (_set("outputs", 0, "lower", 1.6), r"outputs\[0\]: nothing from minimum to maximum is within"),
-    (_set("outputs", 1, "upper", -1.1), r"outputs\[1\]: nothing from minimum to maximum is within"),
-    (lambda d: d["outputs"].pop(), r'"consequents" of rules\[0\] must be one list per output'),
+    (lambda d: d["outputs"].pop(), r"rules\[0\]\.consequents: .* is not a list of 1"),
     (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),
-    (_set("max_extrapolation", -1), "max_extrapolation: -1 is not a number from 0"),
-    (_set("support", []), "support: .* is not a list of 1 or more"),
     (lambda d: d["support"].pop(), "support has 11 entries; the model has 12 rules"),
     (_set("support", 2, "share", 1.5), r"support\[2\]\.share: 1\.5 is not a number from 0 to 1"),
-    (_set("support", 2, "radius", -0.1), r"support\[2\]\.radius: -0\.1 is not a number from 0"),
     (_set("support", 0, "center", [0.0]), r"support\[0\]\.center: \[0\.0\] is not a list of 3"),
-    (_set("support", 0, "factor", [0.0] * 9), "is not a list of 6"),
-    (_set("inputs", 0, "spread", 0.0), r"inputs\[0\]\.spread: 0.0 is not a number from"),
-    (_set("inputs", 0, "name", None), "None is not a name"),
-    (_set("inputs", 0, "reference", 1e60), "not a number of size up to 1e"),
-    (_set("inputs", 0, "reference", True), "True is not a number"),
-    (_set("terms", 0, "function", ["bell"]), r'terms\[0\] has no "function" among gaussian'),
-    (_set("terms", 0, "function", "bell"), r"terms\[0\] has no 'log_width'|'log_slope'"),
     (_set("terms", 0, "input", 3), r"is not a whole number from 0 to 2"),
-    (_set("terms", 0, "input", 1), "rules are not those"),
     (_set("terms", 0, "log_width", 200.0), "not a number of size up to 115"),
-    (_set("terms", 0, "before_training", {}), r'"before_training" of terms\[0\] has no'),
-    (_set("terms", 0, "extra", 1), r"terms\[0\] has the unknown key 'extra'"),
-    (_set("rule_base", "tree"), "\"rule_base\" is 'tree'"),
-    (_set("rule_base", "scattered"), 'the rules are not those of "rule_base": "scattered"'),
-    (_set("rules", 0, "terms", [0, 2, 6]), 'the rules are not those of "rule_base": "grid"'),
+    (_set("terms", 0, "before_training", {}), r"terms\[0\]\.before_training has no"),
+    (_set("rule_base", "tree"), "rule_base is 'tree'"),
     (_set("rules", 0, "terms", [0, 2]), "other numbers of terms"),
     (_set("rules", 0, "terms", [0, 2, 99]), "99 is not a whole number from -1 to 6"),
-    (_set("rules", 0, "terms", [0, 2, 5.0]), "5.0 is not a whole number"),
-    (_set("rules", 0, "weight", -0.1), r"rules\[0\]\.weight: -0.1 is not a number from 0 to 1"),
     (_set("rules", 0, "weight", 0.9), r"rules\[\]\.weight: the sum over all rules is 1\.\d+"),
-    (_set("rules", 0, "rows", -1), r"rules\[0\]\.rows: -1 is not a number from 0 to 1e\+50"),
     (
         _set("rules", 0, "consequents", 1, 2, 1e51),
         r"rules\[0\]\.consequents\[1\]\[2\]: 1e\+51 is not a number of size up to 1e\+50",
     ),
-    (
-        _set("terms", 0, "before_training", "center", 10**60),
-        r"terms\[0\]\.before_training\.center: 10+\.\.\. is not a number of size up to",
-    ),
-    (_set("rules", 0, "consequents", 0, [1.0, 2.0]), "of 1 or 4 numbers"),
-    (_set("rules", 0, "consequents", 1, [1.0]), "other numbers of terms or coefficients"),
+    (_set("rules", 0, "consequents", 0, [1.0, 2.0]), r"\[0\]: \[1\.0, 2\.0\] is not a list of 4"),
     (_set("rules", 1, "consequents", [[1.0], [1.0]]), "other numbers of terms or coefficients"),
-    (lambda d: d["rules"].pop(), 'the rules are not those of "rule_base": "grid"'),
 ]
 
 
@@ -167,28 +128,18 @@ def test_refuses(change, message):
         parse_json(changed(change))
 
 
-def test_refuses_a_table_with_two_terms_of_one_input():
+def test_refuses_a_table_with_two_inputs_at_one_place():
     table = MODELS["rule table, order 1, 1 outputs"]
     with pytest.raises(ValueError, match="at one place of the rules are of different inputs"):
         parse_json(changed(_set("rules", 0, "terms", [3, 3, -1]), table))
-
-    def move(document):
-        for rule in document["rules"]:
-            rule["terms"] = [rule["terms"][0], rule["terms"][0], rule["terms"][2]]
-
-    with pytest.raises(ValueError, match="two terms of one input"):
-        parse_json(changed(move, table))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "Expecting value"),
-        ("[]", "not a model of skanfis"),
-        ('"skanfis-model"', "not a model of skanfis"),
         ("{", "line 1 column 2"),
         ('{"format": NaN}', "NaN is not a number of JSON"),
-        ('{"format": -Infinity}', "-Infinity is not a number of JSON"),
         ('{"format": 1, "format": 2}', "'format' stands twice"),
         (export_json(A_GRID) + "}", "Extra data"),
         (export_json(A_GRID).replace("0.015", "1e999"), "inf is not a number of size up to"),
@@ -199,6 +150,12 @@ def test_refuses_text_that_is_no_such_json(text, message):
         parse_json(text)
 
 
+@pytest.mark.parametrize("given", [export_json(A_GRID), '{"a": 1}', b"{}", Path('{"a": 1}')])
+def test_text_in_place_of_a_path_is_named(given):
+    with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
+        read_json(given)
+
+
 def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
     path = tmp_path / "model.json"
     path.write_text("[" * 1_000_000, encoding="utf-8")
@@ -207,47 +164,12 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
     path.write_text(export_json(A_GRID), encoding="utf-16")
     with pytest.raises(ValueError, match=r"model\.json: 'utf-8' codec"):
         read_json(path)
-    path.write_text('{"a": ' + "9" * 5000 + "}", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"model\.json: "):
-        read_json(path)
     with open(path, "wb") as file:
         file.truncate(2**40)
     start = time.perf_counter()
     with pytest.raises(ValueError, match="larger than 16,777,216 bytes"):
         read_json(path)
     assert time.perf_counter() - start < 1.0
-
-
-def test_refuses_a_rule_base_too_large_before_memory_is_asked_for():
-    # Rules without conditions over terms that none uses: a matrix of 5,000 x 5,000.
-    def grow(document):
-        document["rule_base"] = "table"
-        document["terms"] = document["terms"][:1] * 5000
-        document["rules"] = [dict(document["rules"][0], terms=[])] * 5000
-
-    with pytest.raises(ValueError, match=r"5000 rules over 5000 terms.*at most 20,000,000"):
-        parse_json(changed(grow))
-
-
-@pytest.mark.theory
-@pytest.mark.parametrize(("part", "kind"), [(0, "grid"), (1, "scattered"), (2, "rule table")])
-def test_no_number_that_is_read_makes_one_that_is_not_finite(part, kind):
-    model = MODELS[f"{kind}, order 1, 2 outputs"]
-    document, rows = json.loads(export_json(model)), rows_of(model, 2.0, 6)
-    n_read = 0
-    for path, value in mutated_numbers(document, part, 7):
-        try:
-            read = parse_json(json.dumps(with_number(document, path, value)))
-        except ValueError:
-            continue
-        n_read += 1
-        for policy in ("clip", "linear"):
-            assert np.isfinite(read.with_out_of_bounds(policy).predict(rows)).all(), (path, value)
-        coverage = read.coverage(rows)
-        assert ((coverage >= 0.0) & (coverage <= 1.0 + 1e-9)).all(), (path, value)
-        export_text(read)
-        assert_same(parse_json(export_json(read)), read)
-    assert n_read > 20
 
 
 def test_what_could_not_be_read_is_not_written():

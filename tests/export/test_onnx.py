@@ -1,9 +1,5 @@
 """The ONNX graph, run by onnxruntime, answers what ``predict`` answers."""
 
-import re
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 from sklearn.base import clone
@@ -78,11 +74,9 @@ COLUMNS = ColumnTransformer(
     [("first", StandardScaler(), [2]), ("second", MinMaxScaler(), [0])], remainder="passthrough"
 )
 PIPELINES = {
-    "min-max": (MinMaxScaler(), {"n_mfs": [3, 2, 2], "out_of_bounds": "linear"}),
     "robust": (RobustScaler(), {"n_mfs": 2, "mf": "bell", "out_of_bounds": "nan"}),
     "columns": (COLUMNS, {"partition": KMeans(4, n_init=1, random_state=0)}),
     "two": (make_pipeline(RobustScaler(), StandardScaler()), {"n_mfs": [1, 3, 1], "order": 0}),
-    "plane": (StandardScaler(), {"n_mfs": 1, "out_of_bounds": "linear"}),
     "constant": (StandardScaler(), {"n_mfs": 1, "order": 0, "out_of_bounds": "linear"}),
     "scheduled": (StandardScaler(), {"n_mfs": [1, 3, 1], "consequent_features": [2]}),
     "triangles": (
@@ -107,19 +101,6 @@ def test_pipeline_answers_as_predict(kind, dtype, tolerance):
     assert same.mean() > (0.99 if dtype == np.float32 else 0.9999)
     scale = size_of_sum(fold(pipeline), Z, np.nan_to_num(wanted))
     assert np.nanmax((np.abs(found - wanted) / scale)[same]) < tolerance
-
-
-@PRECISIONS
-def test_any_number_of_rows(dtype, tolerance):
-    X, y = surface()
-    for settings in ({"n_mfs": 2}, {"n_mfs": 1, "order": 0}):
-        estimator = quick(**settings).fit(X, y)
-        session = session_of(estimator, X.astype(dtype))
-        for n_rows in (0, 1, 7):
-            (found,) = session.run(None, {"X": X[:n_rows].astype(dtype)})
-            assert found.shape == (n_rows, 1)
-        wanted = estimator.predict(X[:n_rows])
-        np.testing.assert_allclose(found[:, 0], wanted, atol=tolerance * np.abs(y).max())
 
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
@@ -155,17 +136,3 @@ def test_what_a_graph_cannot_be_is_refused():
         np.testing.assert_allclose(answers(estimator, X, target_opset=opset)[:, 0], expected)
     with pytest.raises(ValueError, match="out_of_bounds='raise' has no counterpart in ONNX"):
         skl2onnx.to_onnx(estimator.set_params(out_of_bounds="raise"), X[:1])
-
-
-EXAMPLE = Path(__file__).parents[2] / "examples" / "plot_onnx.py"
-
-
-@pytest.mark.page
-@pytest.mark.skipif(not EXAMPLE.is_file(), reason="the examples are not here")
-def test_example_runs(capsys):
-    pytest.importorskip("matplotlib")
-    runpy.run_path(str(EXAMPLE))
-    found = re.findall(r"(float\d\d): largest difference (\S+)", capsys.readouterr().out)
-    differences = {dtype: float(value) for dtype, value in found}
-    assert differences["float64"] < 1e-9
-    assert differences["float32"] < 1e-5

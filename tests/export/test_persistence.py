@@ -1,5 +1,6 @@
 """A model in a file comes back the same: joblib, and skops for files from strangers."""
 
+import sys
 from functools import cache
 from importlib import import_module
 from io import BytesIO
@@ -17,7 +18,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
-from skanfis.export import TRUSTED_TYPES
+from skanfis.export import TRUSTED_TYPES, register_onnx_converter
 from skanfis.export.fis.reader import parse_fis
 from skanfis.gyro import (
     OpenLoopArcsineRegressor,
@@ -36,9 +37,6 @@ from .fis_files import BY_HAND
 
 ESTIMATORS = {
     "auto": ANFISRegressor(),
-    "grid": quick(),
-    "subtractive": ANFISRegressor(partition="subtractive"),
-    "fcm": ANFISRegressor(partition="fcm"),
     "own subtractive": quick(partition=SubtractiveClustering(radius=0.6)),
     "own fcm": quick(partition=FuzzyCMeans(3)),
     "clusterer": quick(partition=KMeans(3, random_state=0)),
@@ -56,7 +54,6 @@ ESTIMATORS = {
     ),
     **{mf: quick(mf=mf) for mf in MEMBERSHIPS},
 }
-EACH = pytest.mark.parametrize("name", ESTIMATORS)
 X = np.random.default_rng(0).uniform(0.0, [10.0, 1.0], (60, 2))
 Y = np.column_stack([np.sin(X[:, 0]) + X[:, 1], X[:, 0] * X[:, 1]])
 
@@ -72,16 +69,6 @@ def fitted(name):
         return clone(estimator).set_params(**(short or {"max_iter": 5})).fit(X, Y)
 
 
-def learning():
-    """One that goes on learning, and keeps what it needs for that."""
-    return quick().partial_fit(X, Y)
-
-
-def sure():
-    """With intervals."""
-    return ConformalRegressor(quick()).fit(X, Y[:, 0])
-
-
 def compensator():
     """Of a gyro: what its log does not say, a law, and rules for what the law leaves."""
     g = np.random.default_rng(1)
@@ -95,32 +82,30 @@ def compensator():
     ).fit(log, log[:, 2] + 0.1 * log[:, 2] ** 3)
 
 
-@pytest.mark.parametrize("make", [learning, sure, compensator])
-def test_skops_of_what_is_more_than_rules(make):
+MORE_THAN_RULES = {
+    "learning": lambda: quick().partial_fit(X, Y),
+    "intervals": lambda: ConformalRegressor(quick()).fit(X, Y[:, 0]),
+    "compensator": compensator,
+}
+
+
+@pytest.mark.parametrize("kind", MORE_THAN_RULES)
+def test_skops_of_what_is_more_than_rules(kind):
     io = pytest.importorskip("skops.io")
-    data = io.dumps(make())
+    data = io.dumps(MORE_THAN_RULES[kind]())
     assert set(io.get_untrusted_types(data=data)) <= set(TRUSTED_TYPES)
     io.loads(data, trusted=TRUSTED_TYPES)
 
 
-@EACH
-def test_joblib(name):
-    estimator = fitted(name)
-    file = BytesIO()
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_joblib_and_skops_give_the_same_predictions(name):
+    estimator, file = fitted(name), BytesIO()
     joblib.dump(estimator, file)
     assert_array_equal(joblib.load(file).predict(X), estimator.predict(X))
-
-
-@EACH
-def test_skops_with_the_listed_types(name):
-    io = pytest.importorskip(
-        "skops.io", reason="skops IS NOT INSTALLED: its files are not checked (pip install skops)"
-    )
-    estimator = fitted(name)
+    io = pytest.importorskip("skops.io", reason="skops IS NOT INSTALLED: its files are not checked")
     data = io.dumps(estimator)
     assert set(io.get_untrusted_types(data=data)) <= set(TRUSTED_TYPES)
-    loaded = io.loads(data, trusted=TRUSTED_TYPES)
-    assert_array_equal(loaded.predict(X), estimator.predict(X))
+    assert_array_equal(io.loads(data, trusted=TRUSTED_TYPES).predict(X), estimator.predict(X))
 
 
 def test_trusted_types_are_all_there_and_no_more():
@@ -129,3 +114,9 @@ def test_trusted_types_are_all_there_and_no_more():
         assert isinstance(getattr(import_module(module), name), type)
     families = {f"{family.__module__}.{family.__name__}" for family in MEMBERSHIPS.values()}
     assert families == {name for name in TRUSTED_TYPES if ".membership." in name}
+
+
+def test_missing_onnx_packages_are_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "skl2onnx", None)
+    with pytest.raises(ImportError, match=r"pip install skl2onnx onnxruntime .*'\.\[onnx\]'"):
+        register_onnx_converter()

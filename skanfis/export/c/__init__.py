@@ -6,15 +6,10 @@ from typing import Any
 
 from .._numbers import Numbers
 from ..folding import fold
-from ._dialect import (
-    Dialect,
-    check_arguments,
-    read_limits,
-    write_files,
-)
-from ._header import header
+from ._dialect import Dialect, check_arguments, read_limits, write_files
 from ._self_test import known_answers, self_test
 from ._source import CCost, Source
+from .builder import header
 
 __all__ = ["CCode", "CCost", "export_c"]
 
@@ -112,13 +107,13 @@ def export_c(
         # Rules that come from elsewhere: no data to be near to or far from.
         min_coverage = None
     dialect = Dialect(name, dtype, std)
-    numbers = Numbers.of(model, dialect.dtype)
+    numbers = Numbers(model, dialect.dtype)
     limits = read_limits(saturate, numbers)
     source = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits)
     test = self_test(known_answers(numbers, min_coverage, limits), dialect)
     code = CCode(
         name,
-        header(model, numbers, dialect, source.cost(), min_coverage, limits),
+        header(numbers, dialect, source.cost(), min_coverage, limits),
         source.text(f"{stem}.h") + test,
         source.cost(),
     )

@@ -26,17 +26,6 @@ _DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
 _STANDARDS = ("c99", "c89")
 # C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.
 LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
-# Of C89, C99, C11, C23 and C++: the files may be compiled as any of them.
-_KEYWORDS = """
-    alignas alignof and and_eq asm auto bitand bitor bool break case catch char class compl concept
-    const const_cast consteval constexpr constinit continue co_await co_return co_yield decltype
-    default delete do double dynamic_cast else enum explicit export extern false float for friend
-    goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq
-    private protected public register reinterpret_cast requires restrict return short signed sizeof
-    static static_assert static_cast struct switch template this thread_local throw true try typedef
-    typeof typeof_unqual typeid typename union unsigned using virtual void volatile wchar_t while
-    xor xor_eq
-"""
 _FUNCTIONS = ("exp", "log", "sqrt", "asin")
 _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
 # Decimal digits that give back the very same float or double.
@@ -167,36 +156,25 @@ def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_N
             f"path ends in {stem!r}; C can include files of letters, digits, '_', '.' and '-'."
         )
     name = stem if name is None else name
-    _check_name(name, longest_name)
-    return stem or name, name
-
-
-def _check_name(name, longest):
-    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        reason = "must be a C identifier: a letter, then letters, digits and underscores"
-    elif "__" in name:
-        reason = "must not have two underscores in a row, which C++ keeps for itself"
-    elif name.lower() in _KEYWORDS.split():
-        reason = "is a keyword of C or C++"
-    elif len(name) > longest:
-        reason = (
-            f"has {len(name)} characters; with {longest} or fewer, all identifiers differ "
-            f"in the 31 that a C compiler must look at"
+    # Two underscores in a row are C++'s own.
+    is_identifier = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
+    if not is_identifier or len(name) > longest_name:
+        raise ValueError(
+            f"name={name!r} must be a letter, then letters, digits and single underscores; with "
+            f"{longest_name} or fewer characters, all identifiers differ in the 31 that a C "
+            "compiler must look at."
         )
-    else:
-        return
-    raise ValueError(f"name={name!r} {reason}.")
+    return stem or name, name
 
 
 def read_limits(saturate, numbers):
     """Limits (n_outputs, 2) in the type of the code, none beyond what is given; or None."""
     if saturate is None:
         return None
-    if hasattr(saturate, "lower") and hasattr(saturate, "upper"):
-        given = np.stack([saturate.lower, saturate.upper], axis=-1).astype(float)
-    else:
-        given = np.array(saturate, dtype=float)
-    n_outputs = numbers.n_outputs
+    if hasattr(saturate, "lower"):
+        saturate = np.stack([saturate.lower, saturate.upper], axis=-1)
+    given = np.array(saturate, dtype=float)
+    n_outputs = numbers.model.n_outputs
     if given.shape != (n_outputs, 2):
         raise ValueError(
             f"saturate must have (low, high) for each of the {n_outputs} outputs, or be what "

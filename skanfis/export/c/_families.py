@@ -7,13 +7,60 @@ log(1 + exp(-|u|)) stands where Python has log1p, which C89 lacks: it is as exac
 since an absolute error of log mu is a relative one of the strengths.
 """
 
+from functools import reduce
+
 from ...membership import MEMBERSHIPS
 
 __all__ = ["BODIES", "COSTS", "HELPERS"]
 
 
-# Functions that bodies share. A flank with a foot is a function of s, which is zero at the foot and
-# one at the shoulder.
+# A flank with a foot: a function of s, which is zero at the foot and one at the shoulder, over a
+# floor. @ is its name, and it has a mu and a slope between the two.
+_FLANK = {
+    "@": """
+/* Logarithm of a flank over a floor; s is zero at its foot, one at its top. */
+static $real $name_@($real s)
+{
+    const $real t = 1.0R - s;
+    const $real below = -0.5R * t * t;
+    $real mu;
+    if (!(s < 1.0R)) {
+        return 0.0R;
+    }
+    if (!(s > 0.0R)) {
+        return $log_floor + below;
+    }
+    mu = $mu;
+    return $LOG(mu + $floor * ($EXP(below) - mu));
+}
+""",
+    "@_slope": """
+/* Its derivative by s. */
+static $real $name_@_slope($real s)
+{
+    const $real t = 1.0R - s;
+    $real low, mu;
+    if (!(s > 0.0R)) {
+        return t;
+    }
+    mu = $mu;
+    low = $floor * $EXP(-0.5R * t * t);
+    return ($steep + t * low) / (mu - $floor * mu + low);
+}
+""",
+}
+
+
+def _flank(profile, mu, steep):
+    """Helpers of a profile: mu between foot and shoulder, and (1 - floor) times its slope."""
+    words = {"@": profile, "$mu": mu, "$steep": steep}
+    return {
+        name.replace("@", profile): reduce(lambda t, w: t.replace(*w), words.items(), text)
+        for name, text in _FLANK.items()
+    }
+
+
+# Functions that bodies share.
 HELPERS = {
     "log_sigmoid": """
 /* Logarithm of 1 / (1 + exp(-u)). */
@@ -31,64 +78,12 @@ static $real $name_sigmoid($real u)
     return (u < 0.0R ? small : 1.0R) / (1.0R + small);
 }
 """,
-    "linear": """
-/* Logarithm of a straight flank over a floor; s is zero at its foot, one at its top. */
-static $real $name_linear($real s)
-{
-    const $real below = -0.5R * (1.0R - s) * (1.0R - s);
-    if (!(s < 1.0R)) {
-        return 0.0R;
-    }
-    if (!(s > 0.0R)) {
-        return $log_floor + below;
-    }
-    return $LOG(s + $floor * ($EXP(below) - s));
-}
-""",
-    "linear_slope": """
-/* Its derivative by s. */
-static $real $name_linear_slope($real s)
-{
-    const $real t = 1.0R - s;
-    $real low;
-    if (!(s > 0.0R)) {
-        return t;
-    }
-    low = $floor * $EXP(-0.5R * t * t);
-    return (1.0R - $floor + t * low) / (s - $floor * s + low);
-}
-""",
-    "spline": """
-/* Logarithm of a flank of two parabolas over a floor; s is zero at its foot, one at its top. */
-static $real $name_spline($real s)
-{
-    const $real t = 1.0R - s;
-    const $real below = -0.5R * t * t;
-    $real mu;
-    if (!(s < 1.0R)) {
-        return 0.0R;
-    }
-    if (!(s > 0.0R)) {
-        return $log_floor + below;
-    }
-    mu = s < 0.5R ? 2.0R * s * s : 1.0R - 2.0R * t * t;
-    return $LOG(mu + $floor * ($EXP(below) - mu));
-}
-""",
-    "spline_slope": """
-/* Its derivative by s. */
-static $real $name_spline_slope($real s)
-{
-    const $real t = 1.0R - s;
-    $real low, mu;
-    if (!(s > 0.0R)) {
-        return t;
-    }
-    mu = s < 0.5R ? 2.0R * s * s : 1.0R - 2.0R * t * t;
-    low = $floor * $EXP(-0.5R * t * t);
-    return (4.0R * (1.0R - $floor) * (s < 0.5R ? s : t) + t * low) / (mu - $floor * mu + low);
-}
-""",
+    **_flank("linear", "s", "1.0R - $floor"),
+    **_flank(
+        "spline",
+        "s < 0.5R ? 2.0R * s * s : 1.0R - 2.0R * t * t",
+        "4.0R * (1.0R - $floor) * (s < 0.5R ? s : t)",
+    ),
 }
 
 
@@ -126,6 +121,22 @@ _ONE_FOOT = (
     return s < 1.0R ? p[1] * $name_spline_slope(s) : 0.0R;
 """,
 )
+
+
+def _sigmoids(gain, left, right, at_left, at_right):
+    """A rise times a fall, whose constants are at these places."""
+    value = f"""
+    const $real d = x - p[0];
+    return {gain}$name_log_sigmoid(p[{at_left}] + d * p[{left}])
+        + $name_log_sigmoid(p[{at_right}] - d * p[{right}]);
+"""
+    slope = f"""
+    const $real d = x - p[0];
+    return p[{left}] * $name_sigmoid(-p[{at_left}] - d * p[{left}])
+        - p[{right}] * $name_sigmoid(d * p[{right}] - p[{at_right}]);
+"""
+    return value, slope
+
 
 # Bodies of functions of x and p: the value, and its derivative by x.
 _BY_NAME = {
@@ -178,26 +189,8 @@ _BY_NAME = {
     "pi_shaped": _two_feet("spline"),
     "s_shaped": _ONE_FOOT,
     "z_shaped": _ONE_FOOT,
-    "sigmoid_difference": (
-        """
-    const $real u = (x - p[0]) * p[1];
-    return p[3] + $name_log_sigmoid(p[2] + u) + $name_log_sigmoid(p[2] - u);
-""",
-        """
-    const $real u = (x - p[0]) * p[1];
-    return p[1] * ($name_sigmoid(-p[2] - u) - $name_sigmoid(u - p[2]));
-""",
-    ),
-    "sigmoid_product": (
-        """
-    const $real d = x - p[0];
-    return $name_log_sigmoid(p[3] + d * p[1]) + $name_log_sigmoid(p[4] - d * p[2]);
-""",
-        """
-    const $real d = x - p[0];
-    return p[1] * $name_sigmoid(-p[3] - d * p[1]) - p[2] * $name_sigmoid(d * p[2] - p[4]);
-""",
-    ),
+    "sigmoid_difference": _sigmoids("p[3] + ", 1, 1, 2, 2),
+    "sigmoid_product": _sigmoids("", 1, 2, 3, 4),
 }
 
 # By the class, since another class may go by the same name.
@@ -213,6 +206,6 @@ COSTS = {
     "pi_shaped": (1, 1, 7),
     "s_shaped": (1, 1, 6),
     "z_shaped": (1, 1, 6),
-    "sigmoid_difference": (2, 2, 1),
+    "sigmoid_difference": (2, 2, 2),
     "sigmoid_product": (2, 2, 2),
 }

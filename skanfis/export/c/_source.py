@@ -72,11 +72,12 @@ class Source:
                 f"std='c89' has {_MOST_LOOPS} loops in one another at most, and the grid has "
                 f"terms on {n_loops} inputs. Export as 'c99', or put terms on fewer inputs."
             )
+        self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
         # Whether the terms of a table of rules follow from the order of its rules.
-        self.is_in_order = np.array_equal(numbers.rule_terms.ravel(), np.arange(numbers.n_terms))
+        self.is_in_order = np.array_equal(numbers.rule_terms.ravel(), np.arange(self.n_terms))
         # Logarithms of terms, and the zero of "none".
-        self.n_logarithms = numbers.n_terms + int((numbers.rule_terms == numbers.n_terms).any())
+        self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
 
     def _facts(self):
@@ -84,10 +85,10 @@ class Source:
         numbers = self.numbers
         covers, answers = self.min_coverage is not None, self.policy not in SILENT
         # The tangent of a constant is the constant; one of no length is its start.
-        is_constant = not numbers.n_terms and not self.n_slopes
+        is_constant = not self.n_terms and not self.n_slopes
         linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
         facts = {
-            "shares": numbers.n_terms > 0 or not self.is_grid,
+            "shares": self.n_terms > 0 or not self.is_grid,
             "slopes": self.n_slopes > 0,
             "covers": covers,
             # Rows outside the box get no answer; are less covered; are followed along the tangent.
@@ -103,32 +104,32 @@ class Source:
     def cost(self):
         """CCost of a row in the box."""
         numbers, itemsize = self.numbers, self.numbers.dtype.itemsize
-        n_inputs = numbers.n_inputs
-        of_terms = np.array([0, 0, 0])
-        for terms in numbers.terms:
-            of_terms += len(terms.constants) * np.array(COSTS[terms.family.name])
-        exponentials, logarithms, multiply_adds = map(int, of_terms)
-        n_shares = numbers.n_terms if self.is_grid else numbers.n_rules
+        n_inputs = self.model.n_inputs
+        of_terms = [
+            len(terms.constants) * np.array(COSTS[terms.family.name]) for terms in numbers.terms
+        ]
+        exponentials, logarithms, multiply_adds = map(int, sum(of_terms, np.zeros(3)))
+        n_shares = self.n_terms if self.is_grid else self.model.n_rules
         # Of a grid, products of shares: after two inputs, after three, ...
-        products = np.cumprod(numbers.counts or (), dtype=int)[1:].sum()
+        products = int(np.cumprod(numbers.counts or (), dtype=int)[1:].sum())
         # The strongest rule is asked, then all that have data.
-        asked = 0 if "covers" not in self.facts else 1 + np.count_nonzero(numbers.support[:, 0])
+        asked = "covers" in self.facts and 1 + int(np.count_nonzero(numbers.support[:, 0]))
         main, tangent = self.arrays()
         n_values = sum(main.values()) + ("linear" in self.facts) * sum(tangent.values())
+        tables = self.tables().values()
         return CCost(
             exponentials=exponentials + n_shares,
             logarithms=logarithms,
-            multiply_adds=int(multiply_adds + products + n_shares + numbers.coefficients.size),
+            multiply_adds=multiply_adds + products + n_shares + numbers.coefficients.size,
             divisions=len(numbers.counts) if self.is_grid else 1,
             table_bytes=sum(
-                values.size * _INDEX_BYTES.get(kind, itemsize)
-                for values, kind in self.tables().values()
+                values.size * _INDEX_BYTES.get(kind, itemsize) for values, kind in tables
             ),
             stack_bytes=n_values * itemsize,
             coverage_exponentials=int(asked),
             coverage_square_roots=int(asked),
             # The factor's triangle, its square, share and strength.
-            coverage_multiply_adds=int(asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5)),
+            coverage_multiply_adds=asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5),
         )
 
     def text(self, include):
@@ -137,50 +138,77 @@ class Source:
 
     def body(self):
         """What follows the lines that include other files."""
-        dialect = self.dialect
+        dialect, indices = self.dialect, ["r", "o"]
+        main, tangent = self.arrays()
+        loops = [f"i{k}" for k in range(len(self.numbers.counts or ()))]
+        indices += ["j"] * (self.n_slopes > 0) + ["k"] * (not self.is_grid) + loops
+        # What the place of a row is told by: z, and what the strengths are made of.
+        taken = ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
+        words = {
+            "rejection": templates.rejection(self.policy, dialect.std).strip("\n"),
+            "finite_input": templates.FINITE_INPUT.strip("\n"),
+            "linkage": "static " if self.is_part else "",
+            "given": ", ".join(f"const $real *{name}" for name in taken),
+            "taken": ", ".join(taken),
+            "coverage_indices": ", ".join(["r", *loops]),
+            "tangent_indices": ", ".join(["i"] * (self.n_terms > 0) + indices),
+            "tangent_arrays": _declared(tangent),
+            "arrays": _declared(main),
+            "indices": ", ".join(["i", *indices]),
+            "limit": dialect.number(self.min_coverage or 0.0),
+            "strengths_inside": self._strengths("l", "w", ""),
+            "strengths_slope": self._strengths("t", "s", "_slope"),
+            "add_support": self._over_rules(templates.ADD_SUPPORT),
+            "add_rules": self._over_rules(templates.ADD_RULE),
+            "add_changes": self._over_rules(templates.ADD_CHANGE),
+        }
+        text = kept_lines(templates.FUNCTIONS, self.facts) + "\n"
+        for word, part in words.items():
+            text = text.replace(f"${word}", part)
+        # int has 16 bits at least.
+        is_long = max(self.model.n_rules, self.n_terms) > 32767
+        functions = dialect.write(text, int="long" if is_long else "int")
         tables = [dialect.table(name, *table) for name, table in self.tables().items()]
-        functions = dialect.write("".join([self._helpers(), self._predict()]), int=self._int)
         return "\n".join([dialect.functions() + "\n", *tables, *self._memberships(), functions])
 
     def tables(self):
         """Constant tables by their names: an array, and the type where it is one of positions."""
         numbers, facts = self.numbers, self.facts
-        reals = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
+        found = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
         if "beyond" in facts:
-            reals["inverse_spread"] = numbers.inverse_spread
+            found["inverse_spread"] = numbers.inverse_spread
         if "linear" in facts:
-            reals["reach"] = numbers.reach
+            found["reach"] = numbers.reach
         if "held" in facts:
-            reals["output_low"], reals["output_high"] = numbers.output_limits
-        for k, terms in enumerate(numbers.terms):
-            reals[f"terms{k}"] = terms.constants
+            found["output_low"], found["output_high"] = numbers.output_limits
+        found |= {f"terms{k}": terms.constants for k, terms in enumerate(numbers.terms)}
         if "covers" in facts:
-            reals["support"] = numbers.support
+            found["support"] = numbers.support
         if "saturates" in facts:
-            reals["limits"] = self.limits
-        reals |= {"offset": numbers.offset, "consequents": numbers.coefficients}
-        positions = {}
-        if numbers.n_terms:
-            positions["term_input"] = numbers.term_inputs
+            found["limits"] = self.limits
+        found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
+        if self.n_terms:
+            found["term_input"] = numbers.term_inputs
         if not self.is_grid and not self.is_in_order:
-            positions["rule_terms"] = numbers.rule_terms
-        if 0 < self.n_slopes < numbers.n_inputs:
-            positions["slope_input"] = numbers.slope_inputs
-        found = {name: (values, None) for name, values in reals.items()}
-        return found | {name: (values, index_type(values)) for name, values in positions.items()}
+            found["rule_terms"] = numbers.rule_terms
+        if 0 < self.n_slopes < self.model.n_inputs:
+            found["slope_input"] = numbers.slope_inputs
+        return {
+            name: (values, None if values.dtype.kind == "f" else index_type(values))
+            for name, values in found.items()
+        }
 
     def arrays(self):
         """Arrays on the stack and their lengths: of the main function, and of the tangent."""
-        numbers = self.numbers
-        main, tangent = {"z": numbers.n_inputs, "sum": numbers.n_outputs}, {}
+        main, tangent = {"z": self.model.n_inputs, "sum": self.model.n_outputs}, {}
         if "beyond" in self.facts:
-            main["e"] = numbers.n_inputs
+            main["e"] = self.model.n_inputs
         if "linear" in self.facts:
-            main["change"] = numbers.n_outputs
+            main["change"] = self.model.n_outputs
         if "shares" in self.facts:
             main["l"] = tangent["t"] = self.n_logarithms
         if not self.is_grid:
-            main["w"] = tangent["s"] = numbers.n_rules
+            main["w"] = tangent["s"] = self.model.n_rules
         return main, tangent
 
     def _memberships(self):
@@ -201,59 +229,6 @@ class Source:
         ]
         return helpers + functions
 
-    # The functions as templates, of which the parts are filled in.
-
-    @property
-    def _int(self):
-        # int has 16 bits at least.
-        return "long" if max(self.numbers.n_rules, self.numbers.n_terms) > 32767 else "int"
-
-    @property
-    def _taken(self):
-        """What the place of a row is told by: z, and what the strengths are made of."""
-        return ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
-
-    @property
-    def _loops(self):
-        return [f"i{k}" for k in range(len(self.numbers.counts or ()))]
-
-    @property
-    def _indices(self):
-        """Of loops over rules and what they are made of."""
-        return ["r", "o", *["j"] * (self.n_slopes > 0), *["k"] * (not self.is_grid), *self._loops]
-
-    def _helpers(self):
-        return self._filled(
-            templates.FUNCTIONS,
-            given=", ".join(f"const $real *{name}" for name in self._taken),
-            coverage_indices=", ".join(["r", *self._loops]),
-            tangent_indices=", ".join(["i"] * (self.numbers.n_terms > 0) + self._indices),
-            tangent_arrays=_declared(self.arrays()[1]),
-            strengths_slope=self._strengths("t", "s", "_slope"),
-            add_support=self._over_rules(templates.ADD_SUPPORT),
-            add_changes=self._over_rules(templates.ADD_CHANGE),
-        )
-
-    def _predict(self):
-        head = templates.rejection(self.policy, self.dialect.std).lstrip() + "\n"
-        return head + self._filled(
-            templates.PREDICT,
-            linkage="static " if self.is_part else "",
-            finite_input=templates.FINITE_INPUT.strip("\n"),
-            taken=", ".join(self._taken),
-            arrays=_declared(self.arrays()[0]),
-            indices=", ".join(["i", *self._indices]),
-            limit=self.dialect.number(self.min_coverage or 0.0),
-            strengths_inside=self._strengths("l", "w", ""),
-            add_rules=self._over_rules(templates.ADD_RULE),
-        )
-
-    def _filled(self, template, **parts):
-        text = kept_lines(template, self.facts) + "\n"
-        for word, part in parts.items():
-            text = text.replace(f"${word}", part)
-        return text
-
     def _strengths(self, logarithms, rules, slope):
         """Terms, then shares (of a grid, in place) or strengths; or their derivatives along e."""
         numbers, lines = self.numbers, []
@@ -272,13 +247,13 @@ class Source:
                 )
                 lines.append(finish.format(*of_input, count))
         else:
-            if self.n_logarithms > numbers.n_terms:
-                lines.append(f"{logarithms}[{numbers.n_terms}] = 0.0R;")
+            if self.n_logarithms > self.n_terms:
+                lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
             n_each = numbers.rule_terms.shape[1]
             term = f"r * {n_each} + k" if self.is_in_order else "$name_rule_terms[r][k]"
             total = _loop("k", n_each, [f"{rules}[r] += {logarithms}[{term}];"])
-            lines += _loop("r", numbers.n_rules, [f"{rules}[r] = 0.0R;", *total])
-            lines.append(finish.format(rules, "w", numbers.n_rules))
+            lines += _loop("r", self.model.n_rules, [f"{rules}[r] = 0.0R;", *total])
+            lines.append(finish.format(rules, "w", self.model.n_rules))
         return _indented(lines)
 
     def _over_rules(self, template):
@@ -286,11 +261,11 @@ class Source:
         numbers = self.numbers
         body = kept_lines(template, self.facts)
         body = body.replace("$n_slopes", str(self.n_slopes))
-        selects = 0 < self.n_slopes < numbers.n_inputs
+        selects = 0 < self.n_slopes < self.model.n_inputs
         body = body.replace("$input", "$name_slope_input[j]" if selects else "j")
         if not self.is_grid:
             body = body.replace("$w", "w[r]").replace("$s", "s[r]")
-            return _indented(_loop("r", numbers.n_rules, body.splitlines()))
+            return _indented(_loop("r", self.model.n_rules, body.splitlines()))
         if not numbers.counts:
             body = body.replace("$w", "1.0R").replace("$s", "0.0R")
             return _indented(["r = 0;", *body.splitlines()])

@@ -9,7 +9,6 @@ __all__ = [
     "ADD_SUPPORT",
     "FINITE_INPUT",
     "FUNCTIONS",
-    "PREDICT",
     "rejection",
 ]
 
@@ -128,6 +127,83 @@ linear        |    }
 linear        |$add_changes
 linear        |}
 linear        |
+              |$rejection
+              |
+              |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+              |{
+              |    /* z: the input, held in the box, about the reference. */
+              |    $real $arrays;
+ covers       |    $real top = 0.0R, enough = $limit;
+ covers       |    $int best = 0;
+              |    int status = $NAME_IN_RANGE;
+              |    $int $indices;
+              |
+              |$finite_input
+              |        z[i] = x[i];
+              |        if (z[i] < $name_low[i]) {
+              |            z[i] = $name_low[i];
+              |            status = $NAME_OUT_OF_RANGE;
+              |        } else if (z[i] > $name_high[i]) {
+              |            z[i] = $name_high[i];
+              |            status = $NAME_OUT_OF_RANGE;
+              |        }
+ beyond       |        e[i] = x[i] - z[i];
+              |        z[i] -= $name_reference[i];
+              |    }
+ silent       |    if (status != $NAME_IN_RANGE) {
+ silent       |        return $NAME_REJECT(y, status);
+ silent       |    }
+ shares       |$strengths_inside
+              |
+              |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+              |        sum[o] = 0.0R;
+              |    }
+              |$add_rules
+ beyond       |    if (status != $NAME_IN_RANGE) {
+ fades        |        $real distance = 0.0R;
+ linear       |        $real scale = 1.0R;
+ beyond       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+ fades        |            const $real d = e[i] * $name_inverse_spread[i];
+ fades        |            distance += d * d;
+ linear       |            if (e[i] > $name_reach[i]) {
+ linear       |                e[i] = $name_reach[i];
+ linear       |            } else if (e[i] < -$name_reach[i]) {
+ linear       |                e[i] = -$name_reach[i];
+ linear       |            }
+ linear       |            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
+ beyond       |        }
+ fades        |        /* The coverage falls with the distance: more of it is asked for. */
+ fades        |        enough = $limit * $EXP(0.5R * distance);
+ linear       |        /* First along a part of the way, since products could overflow. */
+ linear       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+ linear       |            e[i] /= scale;
+ linear       |        }
+ linear       |        $name_tangent($taken, e, change);
+ linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+ linear       |            sum[o] += scale * change[o];
+ linear       |        }
+ beyond       |    }
+ covers       |    if (top * $name_near(z, $name_support[best]) < enough
+ covers       |        && $name_coverage($taken, enough) < enough) {
+ covers       |        status |= $NAME_UNCOVERED;
+ covers       |    }
+              |    /* Last, so that y may be x. */
+              |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+              |        y[o] = $name_offset[o] + sum[o];
+ held         |        if (y[o] < $name_output_low[o]) {
+ held         |            y[o] = $name_output_low[o];
+ held         |        } else if (y[o] > $name_output_high[o]) {
+ held         |            y[o] = $name_output_high[o];
+ held         |        }
+ saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+ saturates    |        if (!(y[o] >= $name_limits[o][0])) {
+ saturates    |            y[o] = $name_limits[o][0];
+ saturates    |        } else if (y[o] > $name_limits[o][1]) {
+ saturates    |            y[o] = $name_limits[o][1];
+ saturates    |        }
+              |    }
+              |    return status;
+              |}
 """
 ADD_SUPPORT = """
  |if (covered < enough && $name_support[r][0] > 0.0R) {
@@ -156,83 +232,6 @@ slopes |        ahead += $name_consequents[r][o][1 + j] * e[$input];
 slopes |    }
        |    change[o] += $w * ($s * f + ahead);
        |}
-"""
-PREDICT = """
-             |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
-             |{
-             |    /* z: the input, held in the box, about the reference. */
-             |    $real $arrays;
-covers       |    $real top = 0.0R, enough = $limit;
-covers       |    $int best = 0;
-             |    int status = $NAME_IN_RANGE;
-             |    $int $indices;
-             |
-             |$finite_input
-             |        z[i] = x[i];
-             |        if (z[i] < $name_low[i]) {
-             |            z[i] = $name_low[i];
-             |            status = $NAME_OUT_OF_RANGE;
-             |        } else if (z[i] > $name_high[i]) {
-             |            z[i] = $name_high[i];
-             |            status = $NAME_OUT_OF_RANGE;
-             |        }
-beyond       |        e[i] = x[i] - z[i];
-             |        z[i] -= $name_reference[i];
-             |    }
-silent       |    if (status != $NAME_IN_RANGE) {
-silent       |        return $NAME_REJECT(y, status);
-silent       |    }
-shares       |$strengths_inside
-             |
-             |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-             |        sum[o] = 0.0R;
-             |    }
-             |$add_rules
-beyond       |    if (status != $NAME_IN_RANGE) {
-fades        |        $real distance = 0.0R;
-linear       |        $real scale = 1.0R;
-beyond       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
-fades        |            const $real d = e[i] * $name_inverse_spread[i];
-fades        |            distance += d * d;
-linear       |            if (e[i] > $name_reach[i]) {
-linear       |                e[i] = $name_reach[i];
-linear       |            } else if (e[i] < -$name_reach[i]) {
-linear       |                e[i] = -$name_reach[i];
-linear       |            }
-linear       |            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
-beyond       |        }
-fades        |        /* The coverage falls with the distance: more of it is asked for. */
-fades        |        enough = $limit * $EXP(0.5R * distance);
-linear       |        /* First along a part of the way, since products could overflow. */
-linear       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
-linear       |            e[i] /= scale;
-linear       |        }
-linear       |        $name_tangent($taken, e, change);
-linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-linear       |            sum[o] += scale * change[o];
-linear       |        }
-beyond       |    }
-covers       |    if (top * $name_near(z, $name_support[best]) < enough
-covers       |        && $name_coverage($taken, enough) < enough) {
-covers       |        status |= $NAME_UNCOVERED;
-covers       |    }
-             |    /* Last, so that y may be x. */
-             |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-             |        y[o] = $name_offset[o] + sum[o];
-held         |        if (y[o] < $name_output_low[o]) {
-held         |            y[o] = $name_output_low[o];
-held         |        } else if (y[o] > $name_output_high[o]) {
-held         |            y[o] = $name_output_high[o];
-held         |        }
-saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
-saturates    |        if (!(y[o] >= $name_limits[o][0])) {
-saturates    |            y[o] = $name_limits[o][0];
-saturates    |        } else if (y[o] > $name_limits[o][1]) {
-saturates    |            y[o] = $name_limits[o][1];
-saturates    |        }
-             |    }
-             |    return status;
-             |}
 """
 
 

@@ -1,6 +1,238 @@
-"""Sugeno systems in the .fis format of MATLAB and Octave, both ways."""
+"""Sugeno systems in the .fis format of MATLAB and Octave, both ways; writing them here."""
 
-from .reader import read_fis
-from .writer import export_fis, write_fis
+import re
+import unicodedata
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..._validation import warn_user
+from ..folding import fold
+from .functions import function_of
+from .reader import distinct, parse_fis, read_fis
 
 __all__ = ["export_fis", "read_fis", "write_fis"]
+
+_NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_]+")
+_MINUS = re.compile(r"(?<!\S)-(?=[0-9.])")
+# What fuzzylite takes for words of a rule.
+_WORDS = {"if", "is", "then", "with", "and", "or", "not"}
+_WORDS |= {"any", "very", "seldom", "somewhat", "extremely"}
+_HEAD = """[System]
+Name='skanfis'
+Type='sugeno'
+Version=2.0
+NumInputs={model.n_inputs}
+NumOutputs={model.n_outputs}
+NumRules={model.n_rules}
+AndMethod='prod'
+OrMethod='probor'
+ImpMethod='prod'
+AggMethod='sum'
+DefuzzMethod='wtaver'"""
+# Points of the box at which the rules of the file are tried.
+_N_POINTS = 1000
+
+
+def export_fis(estimator: Any) -> str:
+    """Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
+
+    The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
+    Outside the Range of the inputs, the box of the training data, other programs do as they like:
+    clamp the inputs.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+        As :func:`fold` takes it.
+
+    Returns
+    -------
+    text : str
+        ASCII. Names become letters, digits and underscores; a comment gives those that changed.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`fold`; ValueError if a membership has no function in the format, or if
+        :func:`read_fis` would refuse a number, such as a width beyond 1e50.
+
+    Warns
+    -----
+    UserWarning
+        If there are places in the box of the training data at which no rule of the file fires.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_fis
+    >>> export_fis(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc())).splitlines()[-1]
+    '2 2, 4 (1) : 1'
+    """
+    model = fold(estimator)
+    _warn_of_gaps(model)
+    inputs, names_of_terms, terms, rules = _premises(model)
+    comments, (input_names, output_names) = _comments_and_names(model)
+    lines = [*comments, _HEAD.format(model=model)]
+    for j, name in enumerate(input_names):
+        own = np.flatnonzero(inputs == j)
+        names = _identifiers([names_of_terms[t] for t in own], "term")
+        interval = _wide(model.minimum[j], model.maximum[j], 0.0)
+        lines += _variable(f"Input{j + 1}", name, interval, names, [terms[t] for t in own])
+    names = [f"rule{r + 1}" for r in range(model.n_rules)]
+    for k, name in enumerate(output_names):
+        interval, consequents = _consequents(model, k)
+        lines += _variable(f"Output{k + 1}", name, interval, names, consequents)
+    lines += ["", "[Rules]"]
+    for r, rule in enumerate(rules, start=1):
+        consequents = " ".join([str(r)] * model.n_outputs)
+        lines.append(f"{' '.join(map(str, rule))}, {consequents} (1) : 1")
+    text = "\n".join([*lines, ""])
+    try:
+        parse_fis(text)
+    except ValueError as error:
+        raise ValueError(
+            f"the model cannot be written such that it can be read: {error} Train on inputs and "
+            "targets in other units."
+        ) from None
+    return text
+
+
+def write_fis(estimator: Any, path: str | PathLike[str]) -> None:
+    """Write a trained model to a .fis file, as :func:`export_fis` gives it.
+
+    Parameters
+    ----------
+    estimator : fitted estimator or TSKModel
+    path : str or path-like
+        Octave wants it to end in ".fis".
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import write_fis
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_fis(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), Path(folder) / "sinc.fis")
+    """
+    Path(path).write_text(export_fis(estimator), encoding="ascii", newline="\n")
+
+
+def _premises(model):
+    """Per term its input, name, and function with parameters; the rules (n_rules, n_inputs).
+
+    A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
+    """
+    inputs, rule_terms = model.antecedent.term_inputs, model.antecedent.rule_terms
+    terms = [
+        function_of(group.family, natural)
+        for group in model.antecedent.groups
+        for natural in group.family.natural(group.theta).T
+    ]
+    number = [np.count_nonzero(inputs[: t + 1] == j) for t, j in enumerate(inputs)]
+    rules = np.zeros((model.n_rules, model.n_inputs), dtype=int)
+    for r, place in np.argwhere(rule_terms >= 0):
+        term = rule_terms[r, place]
+        rules[r, inputs[term]] = number[term]
+    names, always = list(model.term_names), ~rules.any(axis=1)
+    if always.any():
+        # Readers want every rule to have a condition: a term that is 1 on the whole Range.
+        rules[always, 0] = 1 + np.count_nonzero(inputs == 0)
+        inputs, names = np.append(inputs, 0), [*names, "any value"]
+        low, high = model.minimum[0], model.maximum[0]
+        margin = 1.0 + abs(low) + abs(high)
+        terms.append(("trapmf", [low - margin, low, high, high + margin]))
+    return inputs, names, terms, rules
+
+
+def _consequents(model, k):
+    """An interval that holds output k within the box, and its functions with parameters."""
+    constants, slopes = model.consequents[:, 0, k], model.consequents[:, 1:, k]
+    if model.order:
+        by_rule = [("linear", [*b, a]) for a, b in zip(constants, slopes, strict=True)]
+    else:
+        by_rule = [("constant", [a]) for a in constants]
+    # A linear function on a box: its value at the middle, and the half-widths times its slopes.
+    half = 0.5 * (model.maximum - model.minimum)
+    middle, reach = constants + slopes @ (model.minimum + half), np.abs(slopes) @ half
+    return _wide((middle - reach).min(), (middle + reach).max(), 1.0), by_rule
+
+
+def _wide(low, high, least):
+    """The interval, wider than nothing: MATLAB wants low < high."""
+    return [low, high if high > low else max(low + least, np.nextafter(low, np.inf))]
+
+
+def _variable(section, name, interval, names, functions):
+    """The lines of an input or output."""
+    lines = ["", f"[{section}]", f"Name='{name}'", f"Range={_numbers(interval)}"]
+    lines.append(f"NumMFs={len(functions)}")
+    for k, (term, (function, parameters)) in enumerate(zip(names, functions, strict=True)):
+        lines.append(f"MF{k + 1}='{term}':'{function}',{_numbers(parameters)}")
+    return lines
+
+
+def _numbers(values):
+    """As few digits as give the same double back, 17 at most."""
+    return f"[{' '.join(repr(float(value)) for value in values)}]"
+
+
+def _comments_and_names(model):
+    """The lines at the head; identifiers of the inputs and of the outputs."""
+    comments = [
+        f"% Sugeno system of {model.n_rules} rules, written by skanfis.",
+        "% It holds within the Range of its inputs: clamp them to it.",
+    ]
+    if model.out_of_bounds != "clip":
+        comments.append(f"% In skanfis, beyond it: {model.policy}.")
+    found = []
+    for kind, given in (("Input", model.input_names), ("Output", model.output_names)):
+        names = _identifiers(given, kind.lower())
+        for k, (name, original) in enumerate(zip(names, given, strict=True), start=1):
+            if name != original:
+                comments.append(f"% {kind}{k} is {original!a}.")
+        found.append(names)
+    return comments, found
+
+
+def _identifiers(names, fallback):
+    """Names of letters, digits and underscores, different from each other."""
+    identifiers = []
+    for k, name in enumerate(names, start=1):
+        plain = unicodedata.normalize("NFKD", _MINUS.sub("minus ", name))
+        base = _NOT_IN_A_NAME.sub("_", plain.encode("ascii", "ignore").decode()).strip("_")
+        if not base:
+            base = f"{fallback}{k}"
+        elif base[0].isdigit() or base in _WORDS:
+            base = f"{fallback}_{base}"
+        identifiers.append(base)
+    return distinct(identifiers, "{}_{}")
+
+
+def _warn_of_gaps(model):
+    """Warn where the textbook's strengths, which the file has, are zero for all rules.
+
+    In skanfis the nearest rule speaks there: its memberships have a floor.
+    """
+    rng = np.random.default_rng(0)
+    Z = rng.uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs)).T
+    groups = model.antecedent.groups
+    by_group = [group.family.value(Z[group.inputs], group.theta) for group in groups]
+    # One more, for the inputs that a rule does not look at (-1).
+    mu = np.concatenate([*by_group, np.ones((1, _N_POINTS))])
+    fires = np.zeros(_N_POINTS, dtype=bool)
+    for rule in model.antecedent.rule_terms:
+        fires |= np.prod(mu[rule], axis=0) > 0.0
+    if not fires.all():
+        warn_user(
+            f"At {np.mean(~fires):.1%} of {_N_POINTS} points within the training range no rule of "
+            "the .fis file fires: other programs give NaN, zero or the middle of the output's "
+            "Range there, skanfis what the nearest rule says. A membership without a foot (mf = "
+            "'gaussian', 'bell', 'two_sided_gaussian') or fewer, wider terms leave no such gaps.",
+            UserWarning,
+        )

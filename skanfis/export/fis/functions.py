@@ -11,7 +11,7 @@ from math import log
 import numpy as np
 
 from ...membership import MEMBERSHIPS
-from ..limits import LARGEST_NUMBER, shown
+from ..limits import LARGEST_NUMBER, SMALLEST_NUMBER, shown
 
 __all__ = ["function_of", "theta_of"]
 
@@ -49,12 +49,12 @@ def theta_of(name, parameters, low, high):
     for parameter, value in zip(MEMBERSHIPS[family].parameters, natural, strict=True):
         if parameter.kind == "location":
             theta.append(value)
-        elif 1.0 / LARGEST_NUMBER <= value <= LARGEST_NUMBER:
+        elif SMALLEST_NUMBER <= value <= LARGEST_NUMBER:
             theta.append(log(value))
         else:
             raise ValueError(
                 f"{name} {parameters} is a {family} membership of {parameter.name} {value:g}, "
-                f"which must be between {1.0 / LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}."
+                f"which must be between {SMALLEST_NUMBER:g} and {LARGEST_NUMBER:g}."
             )
     return MEMBERSHIPS[family], np.array(theta)
 
@@ -86,29 +86,17 @@ def _corners(center, left, right, plateau):
 
 
 def _from_corners(foot, shoulder, other_shoulder, other_foot):
-    return _about_middle(shoulder - foot, shoulder, other_shoulder, other_foot - other_shoulder)
+    return _about_middle(shoulder - foot, shoulder, other_foot - other_shoulder, other_shoulder)
 
 
-def _about_middle(left, shoulder, other_shoulder, right):
+def _about_middle(left, shoulder, right, other_shoulder):
+    left, right = abs(left), abs(right)
     plateau = other_shoulder - shoulder or _POINT * min(left, right)
     return [0.5 * (shoulder + other_shoulder), left, right, plateau]
 
 
-def _two_sided_to_file(center, left, right, plateau):
-    return [left, center - 0.5 * plateau, right, center + 0.5 * plateau]
-
-
-def _two_sided_from_file(left, shoulder, right, other_shoulder):
-    if shoulder > other_shoulder:
-        raise ValueError(
-            f"gauss2mf with its right shoulder {other_shoulder:g} left of the left one "
-            f"{shoulder:g} is not supported: it does not reach 1."
-        )
-    return _about_middle(abs(left), shoulder, other_shoulder, abs(right))
-
-
-def _difference_to_file(center, width, flank):
-    return [1.0 / flank, center - width, 1.0 / flank, center + width]
+def _from_sigmoids(rise, fall):
+    return [0.5 * (rise + fall), 0.5 * (fall - rise)]
 
 
 def _difference_from_file(slope, place, other_slope, other_place):
@@ -119,54 +107,31 @@ def _difference_from_file(slope, place, other_slope, other_place):
             "psigmf."
         )
     # s(-u) = 1 - s(u): with both slopes negative the rise is the second sigmoid.
-    rise, fall = (place, other_place) if slope > 0.0 else (other_place, place)
-    return [*_middle_and_half("dsigmf", rise, fall), 1.0 / abs(slope)]
-
-
-def _product_to_file(center, width, left, right):
-    return [1.0 / left, center - width, -1.0 / right, center + width]
+    ends = (place, other_place) if slope > 0.0 else (other_place, place)
+    return [*_from_sigmoids(*ends), 1.0 / abs(slope)]
 
 
 def _product_from_file(slope, place, other_slope, other_place):
-    if slope < 0.0 < other_slope:
-        slope, place, other_slope, other_place = other_slope, other_place, slope, place
-    if not slope > 0.0 > other_slope:
+    if not slope * other_slope < 0.0:
         raise ValueError(
             f"psigmf with slopes {slope:g} and {other_slope:g} is not supported: one must be "
             "positive and one negative."
         )
-    return [*_middle_and_half("psigmf", place, other_place), 1.0 / slope, -1.0 / other_slope]
-
-
-def _middle_and_half(name, rise, fall):
-    if rise >= fall:
-        raise ValueError(f"{name} that rises at {rise:g}, not before it falls at {fall:g}.")
-    return [0.5 * (rise + fall), 0.5 * (fall - rise)]
-
-
-def _bell_from_file(width, slope, center):
-    if slope <= 0.0:
-        raise ValueError(f"gbellmf with b = {slope:g} is not supported: b must be positive.")
-    return [center, abs(width), slope]
-
-
-def _s_from_file(foot, shoulder, name="smf"):
-    if foot >= shoulder:
-        raise ValueError(
-            f"the corners of {name} [{foot:g} {shoulder:g}] must be in ascending order."
-        )
-    return [shoulder, shoulder - foot]
-
-
-def _z_from_file(shoulder, foot):
-    return [shoulder, _s_from_file(shoulder, foot, "zmf")[1]]
+    if slope < 0.0:
+        slope, place, other_slope, other_place = other_slope, other_place, slope, place
+    return [*_from_sigmoids(place, other_place), 1.0 / slope, -1.0 / other_slope]
 
 
 # By family: the function's name, its number of parameters, and what turns those of the family into
 # them and back.
 _TABLE: dict[str, tuple[str, int, Callable, Callable]] = {
     "gaussian": ("gaussmf", 2, lambda c, width: [width, c], lambda width, c: [c, abs(width)]),
-    "bell": ("gbellmf", 3, lambda c, width, slope: [width, slope, c], _bell_from_file),
+    "bell": (
+        "gbellmf",
+        3,
+        lambda c, width, slope: [width, slope, c],
+        lambda width, slope, c: [c, abs(width), slope],
+    ),
     "triangular": (
         "trimf",
         3,
@@ -175,10 +140,35 @@ _TABLE: dict[str, tuple[str, int, Callable, Callable]] = {
     ),
     "trapezoidal": ("trapmf", 4, _corners, _from_corners),
     "pi_shaped": ("pimf", 4, _corners, _from_corners),
-    "two_sided_gaussian": ("gauss2mf", 4, _two_sided_to_file, _two_sided_from_file),
-    "s_shaped": ("smf", 2, lambda top, width: [top - width, top], _s_from_file),
-    "z_shaped": ("zmf", 2, lambda top, width: [top, top + width], _z_from_file),
-    "sigmoid_difference": ("dsigmf", 4, _difference_to_file, _difference_from_file),
-    "sigmoid_product": ("psigmf", 4, _product_to_file, _product_from_file),
+    "two_sided_gaussian": (
+        "gauss2mf",
+        4,
+        lambda c, left, right, plateau: [left, c - 0.5 * plateau, right, c + 0.5 * plateau],
+        _about_middle,
+    ),
+    "s_shaped": (
+        "smf",
+        2,
+        lambda top, width: [top - width, top],
+        lambda foot, top: [top, top - foot],
+    ),
+    "z_shaped": (
+        "zmf",
+        2,
+        lambda top, width: [top, top + width],
+        lambda top, foot: [top, foot - top],
+    ),
+    "sigmoid_difference": (
+        "dsigmf",
+        4,
+        lambda c, width, flank: [1.0 / flank, c - width, 1.0 / flank, c + width],
+        _difference_from_file,
+    ),
+    "sigmoid_product": (
+        "psigmf",
+        4,
+        lambda c, width, left, right: [1.0 / left, c - width, -1.0 / right, c + width],
+        _product_from_file,
+    ),
 }
 _FAMILIES = {name: family for family, (name, *_) in _TABLE.items()}

@@ -1,35 +1,45 @@
-"""From a .fis file to a frozen model: strictly, and nothing but data."""
+"""From a .fis file to a frozen model: strictly, and nothing but data.
 
+Every pattern is anchored and passes over its line once, whatever the line holds.
+"""
+
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import groupby
 from os import PathLike
 from typing import NamedTuple
 
 import numpy as np
 
-from ...antecedent import (
-    Antecedent,
-    GridAntecedent,
-    RuleTableAntecedent,
-    ScatteredAntecedent,
-    TermGroup,
-)
+from ...antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from ...model import TSKModel
-from ..limits import check_size, read_bytes, shown
+from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
-from .syntax import sections_of, text_of
 
-__all__ = ["parse_fis", "read_fis"]
+__all__ = ["distinct", "parse_fis", "read_fis"]
 
-# What is larger is refused before it is read, and so are counts that no rule base comes near:
-# each is a loop over sections.
+# What is larger is refused before it is read.
 _MOST_BYTES = 2**22
-_MOST_VARIABLES = 1000
-_MOST_TERMS = 10_000
-_MOST_RULES = 100_000
+
+_HEAD = re.compile(r"\[(System|Rules|(?:Input|Output)[1-9][0-9]{0,5})\]")
+_QUOTED = re.compile(r"'([^']*)'")
+_BRACKETS = re.compile(r"\[(.*)\]")
+_WHOLE = re.compile(r"[0-9]{1,9}")
+# fuzzylite writes them as 1.000.
+_WHOLE_OF_RULE = re.compile(r"([0-9]{1,9})(?:\.0*)?")
+# No number takes more than 100 characters, and a longer text takes long to parse.
+_NUMBER = re.compile(r"(?=.{1,100}$)[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_MEMBERSHIP = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^\]]*)\]")
+_RULE = re.compile(r"([^,]*),([^,(]*)\(([^()]*)\)\s*:\s*([12])")
+# Between numbers.
+_BLANK = re.compile(r"\s*,\s*|\s+")
+_SYSTEM = {
+    "Type": ("sugeno", "only Sugeno systems are supported"),
+    "AndMethod": ("prod", "only the product is supported"),
+    "DefuzzMethod": ("wtaver", "only the weighted average is supported"),
+}
 
 
 def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = None) -> TSKModel:
@@ -68,8 +78,9 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     ...     read_fis(Path(folder) / "sinc.fis").n_rules
     16
     """
+    data = read_bytes(path, _MOST_BYTES)
     try:
-        model = parse_fis(text_of(read_bytes(path, _MOST_BYTES)))
+        model = parse_fis(data.decode("utf-8-sig"))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
     if input_names is None:
@@ -85,18 +96,113 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
 
 def parse_fis(text):
     """The model that the text of a .fis file describes; ValueError with the line."""
-    sections = sections_of(text)
+    sections = _sections(text)
     if "System" not in sections:
         raise ValueError("line 1: the file has no [System].")
-    n_inputs, n_outputs, n_rules, and_method = _read_system(sections["System"])
-    inputs = [_variable(sections, "Input", j + 1, theta_of) for j in range(n_inputs)]
-    consequent = partial(_consequent, n_inputs)
-    outputs = [_variable(sections, "Output", k + 1, consequent) for k in range(n_outputs)]
-    rules = _rules(sections, inputs, outputs, n_rules, and_method)
+    counted = sections["System"][""]
+    n_inputs, n_outputs, n_rules = _read_system(sections.pop("System"))
+
+    def variables(kind, count, read_term):
+        for number in range(1, count + 1):
+            if f"{kind}{number}" not in sections:
+                raise counted.error(f"[System] counts [{kind}{number}], which is not there.")
+            yield _variable(sections.pop(f"{kind}{number}"), read_term)
+
+    inputs = list(variables("Input", n_inputs, theta_of))
+    outputs = list(variables("Output", n_outputs, partial(_consequent, n_inputs)))
+    head, *rules = sections.pop("Rules", {"": counted}).values()
+    if len(rules) != n_rules:
+        raise head.error(f"[System] counts {n_rules} rules, [Rules] has {len(rules)}.")
     for name, section in sections.items():
-        if name not in ("System", "Rules"):
-            raise ValueError(f"line {section.line}: [{name}] is not among those that are counted.")
-    return _model(inputs, outputs, *rules)
+        raise section[""].error(f"[{name}] is not among those that are counted.")
+    try:
+        check_size(n_rules, sum(len(one.terms) for one in inputs), n_inputs, n_outputs)
+    except ValueError as error:
+        raise head.error(error) from None
+    table = np.array([_rule(entry, inputs, outputs) for entry in rules])
+    return _model(inputs, outputs, table[:, :n_inputs], table[:, n_inputs:])
+
+
+class _Entry(NamedTuple):
+    """What stands to the right of a key, or a rule; ``line`` is its number in the file."""
+
+    line: int
+    text: str
+
+    def error(self, reason):
+        """A ValueError that says where."""
+        return ValueError(f"line {self.line}: {reason}")
+
+    def match(self, pattern, wanted):
+        match = pattern.fullmatch(self.text)
+        if match is None:
+            raise self.error(f"expected {wanted}, found {shown(self.text)}.")
+        return match
+
+    def name(self):
+        return self.match(_QUOTED, "a name in single quotes")[1]
+
+    def whole(self, lowest):
+        number = int(self.match(_WHOLE, "a whole number")[0])
+        if number < lowest:
+            raise self.error(f"{number} is below {lowest}.")
+        return number
+
+    def numbers(self, text):
+        """The numbers in a part of it, between blanks or commas."""
+        tokens = _BLANK.split(text.strip()) if text.strip() else []
+        for token in tokens:
+            if _NUMBER.fullmatch(token) is None or abs(float(token)) > LARGEST_NUMBER:
+                raise self.error(
+                    f"expected a number of size up to {LARGEST_NUMBER:g}, found {shown(token)}."
+                )
+        return [float(token) for token in tokens]
+
+
+def _sections(text):
+    """Entries by section and key, its head under "".
+
+    Comments, which begin with % or #, and empty lines are passed over.
+    """
+    sections: dict[str, dict[str, _Entry]] = {}
+    name = ""
+    for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
+        entry = _Entry(number, line.replace("\t", " ").strip())
+        if not entry.text or entry.text[0] in "%#":
+            continue
+        if not entry.text.isprintable():
+            raise entry.error(f"{shown(entry.text)} has characters that cannot be printed.")
+        key, separator, value = (part.strip() for part in entry.text.partition("="))
+        if entry.text[0] == "[":
+            name = entry.match(_HEAD, "[System], [Input1], [Output1] or [Rules]")[1]
+            if name in sections:
+                raise entry.error(f"[{name}] stands here for the second time.")
+            sections[name] = {"": entry}
+        elif not name:
+            raise entry.error(f"expected [System] before anything else, found {shown(line)}.")
+        elif name == "Rules":
+            sections[name][f"{number}"] = entry
+        elif not separator:
+            raise entry.error(f"expected key=value in [{name}], found {shown(line)}.")
+        elif key in sections[name]:
+            raise entry.error(f"[{name}] has {shown(key)} for the second time.")
+        else:
+            sections[name][key] = _Entry(number, value)
+    return sections
+
+
+def _take(section, key):
+    """Remove and return the entry of a key; ValueError where there is none."""
+    if key not in section:
+        raise section[""].error(f"{section[''].text} has no {key}.")
+    return section.pop(key)
+
+
+def _check_empty(section):
+    """Raise ValueError where a key is left that nothing has asked for."""
+    head, *others = section
+    for key in others:
+        raise section[key].error(f"{section[head].text} has the unknown key {shown(key)}.")
 
 
 class _Variable(NamedTuple):
@@ -110,112 +216,86 @@ class _Variable(NamedTuple):
 
 
 def _read_system(section):
-    """Numbers of inputs, outputs and rules, and the entry of the AND method."""
-    section.take("Name").name()
-    for key, wanted, reason in (
-        ("Type", "sugeno", "only Sugeno systems are supported"),
-        ("DefuzzMethod", "wtaver", "only the weighted average is supported"),
-    ):
-        entry = section.take(key)
+    """Numbers of inputs, outputs and rules."""
+    # The last three have no part in a Sugeno system of rules joined by AND.
+    for key in ("Name", *_SYSTEM, "OrMethod", "ImpMethod", "AggMethod"):
+        entry = _take(section, key)
+        wanted, reason = _SYSTEM.get(key, (entry.name(), ""))
         if entry.name() != wanted:
             raise entry.error(f"{key}={shown(entry.name())}: {reason} ({wanted!r}).")
-    section.entries.pop("Version", None)
-    n_inputs = section.take("NumInputs").whole(1, _MOST_VARIABLES)
-    n_outputs = section.take("NumOutputs").whole(1, _MOST_VARIABLES)
-    n_rules = section.take("NumRules").whole(1, _MOST_RULES)
-    and_method = section.take("AndMethod")
-    and_method.name()
-    # These three have no part in a Sugeno system of rules joined by AND.
-    for key in ("OrMethod", "ImpMethod", "AggMethod"):
-        section.take(key).name()
-    section.check_empty()
-    return n_inputs, n_outputs, n_rules, and_method
+    section.pop("Version", None)
+    counts = [_take(section, key).whole(1) for key in ("NumInputs", "NumOutputs", "NumRules")]
+    _check_empty(section)
+    return counts
 
 
-def _variable(sections, kind, number, read_term):
+def _variable(section, read_term):
     """An input or output with its membership functions, each as ``read_term`` takes it."""
-    section = sections.pop(f"{kind}{number}", None)
-    if section is None:
-        line = sections["System"].line
-        raise ValueError(f"line {line}: [System] counts [{kind}{number}], which is not there.")
-    name = section.take("Name").name()
-    low, high = section.take("Range").interval()
+    name, interval = _take(section, "Name").name(), _take(section, "Range")
+    ends = interval.numbers(interval.match(_BRACKETS, "[low high]")[1])
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise interval.error(f"expected [low high] with low < high, found {shown(interval.text)}.")
     # Written by some versions of fuzzylite.
-    section.entries.pop("Enabled", None)
+    section.pop("Enabled", None)
     names, terms = [], []
-    for k in range(section.take("NumMFs").whole(0, _MOST_TERMS)):
-        entry = section.take(f"MF{k + 1}")
-        term_name, function, parameters = entry.membership()
+    for k in range(_take(section, "NumMFs").whole(0)):
+        entry = _take(section, f"MF{k + 1}")
+        match = entry.match(_MEMBERSHIP, "'name':'function',[parameters]")
+        parameters = entry.numbers(match[3])
         try:
-            terms.append(read_term(function, parameters, low, high))
+            terms.append(read_term(match[2], parameters, *ends))
         except ValueError as error:
             raise entry.error(error) from None
-        names.append(term_name)
-    section.check_empty()
-    return _Variable(name, low, high, names, terms)
+        names.append(match[1])
+    _check_empty(section)
+    return _Variable(name, ends[0], ends[1], names, terms)
 
 
 def _consequent(n_inputs, function, parameters, low, high):
     """p0 of a constant; p0, p1 .. pd of a linear one."""
-    lengths = {"constant": 1, "linear": n_inputs + 1}
-    if function not in lengths:
+    if (function, len(parameters)) not in (("constant", 1), ("linear", n_inputs + 1)):
         raise ValueError(
-            f"the consequent {shown(function)} is not supported; constant, linear are."
-        )
-    if len(parameters) != lengths[function]:
-        raise ValueError(
-            f"{function} takes {lengths[function]} parameters, found {len(parameters)}."
+            f"the consequent {shown(function)} with {len(parameters)} parameters is not "
+            f"supported; constant with 1, linear with {n_inputs + 1} are."
         )
     return [parameters[-1], *parameters[:-1]]
 
 
-def _rules(sections, inputs, outputs, n_rules, and_method):
-    """Antecedents (n_rules, n_inputs) and consequents (n_rules, n_outputs), numbers from 1."""
-    section = sections.get("Rules")
-    if section is None or len(section.rules) != n_rules:
-        found = 0 if section is None else len(section.rules)
-        line = sections["System"].line if section is None else section.line
-        raise ValueError(f"line {line}: [System] counts {n_rules} rules, [Rules] has {found}.")
-    n_terms = sum(len(variable.terms) for variable in inputs)
-    try:
-        check_size(n_rules, n_terms, len(inputs), len(outputs))
-    except ValueError as error:
-        raise ValueError(f"line {section.line}: {error}") from None
-    antecedents = np.zeros((n_rules, len(inputs)), dtype=int)
-    consequents = np.zeros((n_rules, len(outputs)), dtype=int)
-    for r, entry in enumerate(section.rules):
-        antecedent, consequent, weight, connection = entry.rule()
-        _check_terms(entry, antecedent, inputs, "input", lowest=0)
-        _check_terms(entry, consequent, outputs, "output", lowest=1)
-        if weight != 1.0:
-            raise entry.error(f"the rule has weight {weight:g}; only weight 1 is supported.")
-        is_joined = np.count_nonzero(antecedent) > 1
-        if is_joined and connection == 2:
-            raise entry.error("the rule joins its terms by OR (2); only AND (1) is supported.")
-        if is_joined and and_method.name() != "prod":
-            raise and_method.error(
-                f"AndMethod={shown(and_method.name())}: only the product ('prod') is supported."
-            )
-        antecedents[r], consequents[r] = antecedent, consequent
-    return antecedents, consequents
+def _rule(entry, inputs, outputs):
+    """The numbers of a rule's terms, from 1 on, and of its consequents; 0 for none."""
+    match = entry.match(
+        _RULE,
+        "a rule such as '1 2, 3 (1) : 1' (terms of the inputs, consequents, weight, connection: "
+        "the connection is 1 or 2)",
+    )
+    antecedent = _numbers_of_terms(entry, match[1], inputs, "input", lowest=0)
+    consequent = _numbers_of_terms(entry, match[2], outputs, "output", lowest=1)
+    if entry.numbers(match[3]) != [1.0]:
+        raise entry.error(f"the rule has weight {shown(match[3])}; only weight 1 is supported.")
+    if match[4] == "2" and np.count_nonzero(antecedent) > 1:
+        raise entry.error("the rule joins its terms by OR (2); only AND (1) is supported.")
+    return antecedent + consequent
 
 
-def _check_terms(entry, numbers, variables, kind, lowest):
+def _numbers_of_terms(entry, text, variables, kind, lowest):
     """One number for every variable, each from ``lowest`` to the number of its terms."""
-    if len(numbers) != len(variables):
+    tokens = text.split()
+    if len(tokens) != len(variables):
         raise entry.error(
-            f"the rule has {len(numbers)} numbers for {len(variables)} {kind}s, it must have one "
+            f"the rule has {len(tokens)} numbers for {len(variables)} {kind}s, it must have one "
             "for each."
         )
-    for number, variable in zip(numbers, variables, strict=True):
-        what, n_terms = f"{number} for {kind} {shown(variable.name)}", len(variable.terms)
-        if number < 0:
-            raise entry.error(f"{what}: NOT, a negative number, is not supported.")
-        if not lowest <= number <= n_terms:
+    numbers = []
+    for token, variable in zip(tokens, variables, strict=True):
+        match, n_terms = _WHOLE_OF_RULE.fullmatch(token), len(variable.terms)
+        if match is None or not lowest <= int(match[1]) <= n_terms:
             raise entry.error(
-                f"{what}, which has {n_terms} membership functions; it must be from {lowest} to "
-                "that."
+                f"{shown(token)} for {kind} {shown(variable.name)}, which has {n_terms} membership "
+                f"functions: it must be a whole number from {lowest} to that. NOT (a negative "
+                "number) and hedges (fractions) are not supported."
             )
+        numbers.append(int(match[1]))
+    return numbers
 
 
 def _model(inputs, outputs, antecedents, consequents):
@@ -224,20 +304,23 @@ def _model(inputs, outputs, antecedents, consequents):
         antecedents, consequents = antecedents[rows], consequents[rows]
     # Input and number of each term that a rule looks at, input by input.
     places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
+    premises = np.flatnonzero(antecedents.any(axis=0))
+    is_scattered = rows is None and _is_scattered(inputs, antecedents)
+    if is_scattered:
+        places = [(j, rule[j]) for rule in antecedents for j in premises]
+    groups = groups_of((j, *inputs[j].terms[k - 1]) for j, k in places)
     antecedent: Antecedent
     if rows is not None:
         counts = tuple(Counter(j for j, _ in places).values())
-        antecedent = GridAntecedent(_groups(inputs, places), counts=counts)
-    elif _is_scattered(inputs, antecedents):
-        premises = np.flatnonzero(antecedents.any(axis=0))
-        places = [(j, rule[j]) for rule in antecedents for j in premises]
-        antecedent = ScatteredAntecedent(_groups(inputs, places), n_premise_inputs=premises.size)
+        antecedent = GridAntecedent(groups, counts=counts)
+    elif is_scattered:
+        antecedent = ScatteredAntecedent(groups, n_premise_inputs=premises.size)
     else:
         table = np.full(antecedents.shape, -1)
         for t, (j, k) in enumerate(places):
             table[antecedents[:, j] == k, j] = t
-        antecedent = RuleTableAntecedent(_groups(inputs, places), table)
-    names = [_distinct(variable.names) for variable in inputs]
+        antecedent = RuleTableAntecedent(groups, table)
+    names = [distinct(variable.names) for variable in inputs]
     # Constants beside linear consequents have no slopes.
     n_basis = max(len(term) for output in outputs for term in output.terms)
     coefficients = np.zeros((len(consequents), n_basis, len(outputs)))
@@ -258,10 +341,10 @@ def _model(inputs, outputs, antecedents, consequents):
         maximum=high,
         rule_weights=np.full(n_rules, 1.0 / n_rules),
         rule_rows=np.zeros(n_rules),
-        input_names=_distinct(variable.name for variable in inputs),
+        input_names=distinct(variable.name for variable in inputs),
         out_of_bounds="clip",
         term_names=tuple(names[j][k - 1] for j, k in places),
-        output_names=_distinct(variable.name for variable in outputs),
+        output_names=distinct(variable.name for variable in outputs),
     )
 
 
@@ -297,24 +380,14 @@ def _is_scattered(inputs, antecedents):
     )
 
 
-def _groups(inputs, places):
-    """The terms at these places, pairs of input and number, in runs of one family."""
-    terms = [(j, *inputs[j].terms[k - 1]) for j, k in places]
-    groups = []
-    for family, members in groupby(terms, key=lambda term: term[1]):
-        numbers, _, thetas = zip(*members, strict=True)
-        groups.append(TermGroup(family, np.array(numbers), np.stack(thetas, axis=1)))
-    return tuple(groups)
-
-
-def _distinct(names):
+def distinct(names, numbered="{} ({})"):
     """The names; one that was there before gets a number."""
     taken: dict[str, int] = {}
-    distinct = []
+    found = []
     for name in names:
         while name in taken:
             taken[name] += 1
-            name = f"{name} ({taken[name]})"
+            name = numbered.format(name, taken[name])
         taken[name] = 1
-        distinct.append(name)
-    return tuple(distinct)
+        found.append(name)
+    return tuple(found)
