@@ -33,7 +33,7 @@ def apply(options, tell):
         needed |= {"time", "temperature"}
     request = request_of(options, sorted(needed))
     check_different(paths)
-    tallies = []
+    tallies: list = []
     with staged(target.parent) as folder, usage_errors():
         with open(folder / target.name, "w", encoding="utf-8", newline="") as written:
             for number, path in enumerate(paths, start=1):

@@ -178,6 +178,8 @@ class _Column:
                 meant, words = found, words[:-length] or words
         axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
         self.words = set(words) - set(axes[-1:])
+        self.quantity: str | None
+        self.unit: str | None
         self.quantity, self.unit = meant or (None, None)
         numbers = as_numbers(values, decimal)
         self.numbers = numbers[np.isfinite(numbers)]

@@ -4,7 +4,6 @@ import warnings
 
 import numpy as np
 import pandas as pd
-from pandas.tseries.api import guess_datetime_format
 
 __all__ = ["NO_VALUE", "Clock", "as_numbers"]
 
@@ -12,7 +11,14 @@ __all__ = ["NO_VALUE", "Clock", "as_numbers"]
 NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 _CLOCK = r"\s*[0-9]{1,6}:[0-9]{1,2}:[0-9]{1,2}(?:[.,][0-9]*)?\s*$"
 _DATE = r"^\s*[0-9]{1,4}[./-][0-9]{1,2}[./-][0-9]{1,4}[T,\s]+[0-9]"
-_ISO = r"^\s*[0-9]{4}-"
+_FORMATS = [
+    "ISO8601",
+    *(
+        f"{date} {clock}"
+        for date in ("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%Y/%m/%d", "%d-%m-%Y")
+        for clock in ("%H:%M:%S", "%H:%M:%S.%f", "%I:%M:%S %p", "%H:%M")
+    ),
+]
 _DAY = 86_400.0
 
 
@@ -44,12 +50,9 @@ class Clock:
         if texts.str.match(_CLOCK).mean() > 0.5:
             self.form, self.note = "clock", "clock times, in s"
         elif texts.str.match(_DATE).mean() > 0.5:
-            first = texts[texts.str.match(_DATE)].iloc[0]
-            self._day_first = "." in first.split()[0]
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # the other order fits
-                self.form = guess_datetime_format(first, self._day_first) or "mixed"
-            self.form = "ISO8601" if texts.str.match(_ISO).mean() > 0.5 else self.form
+            dates = texts[texts.str.match(_DATE)]
+            self._day_first = "." in dates.iloc[0].split()[0]
+            self.form = next((form for form in _FORMATS if _fits(dates, form)), "mixed")
             self.note = f"dates and times ({self.form}), in s"
 
     def seconds(self, column):
@@ -72,6 +75,10 @@ class Clock:
             self._days, self._last = float(days[-1]), float(values[-1])
             seconds[known] += _DAY * days
         return seconds
+
+
+def _fits(texts, form):
+    return pd.to_datetime(texts, format=form, errors="coerce", utc=True).notna().all()
 
 
 def _texts(column):
