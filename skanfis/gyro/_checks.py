@@ -1,23 +1,24 @@
-"""Refusing a log that no compensator should learn from."""
+"""Refusing a log that no compensator should learn from, and naming rows that spoil one."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
 from ._columns import CANONICAL, SIGNALS, convert, declared_units, units_of
 from .errors import LogError
 
 __all__ = [
     "LABELS",
-    "LARGEST_AT_REST",
     "PARTS",
     "QUANTITIES",
     "RowChecks",
     "check_at_rest",
     "check_log",
     "check_values",
+    "find_glitches",
 ]
 
 QUANTITIES = ("time", "temperature", "output", "rate")
@@ -31,16 +32,29 @@ _PLAUSIBLE = {
 }
 _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _LONGEST_RUN = 31 * 86_400.0  # s
+_OF_A_RUN = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
 _NOISE = 5.0  # degC by which a few rows may differ
 # Fewer rows tell neither a line in every input nor what is left of it.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
-LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
+_LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
 _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
+
+# More than so many rows of a kind support one another.
+_MOST_GLITCHES = 3
+# Times the deviation of the next row: none of a bell-shaped noise comes near, nor of Student's with
+# three degrees of freedom in a thousand logs.
+_ALONE = 5.0
+# Their median is the row's surroundings, and stands one other glitch among them.
+_N_NEIGHBOURS = 8
+# The rows farthest off, and rows among which their neighbours are sought, at most.
+_MOST_CANDIDATES, _MOST_NEIGHBOURS = 2_000, 200_000
+# A temperature moves slowly: a part of its range is a lot from one row to the next.
+_SMOOTH = 0.2
 
 
 def check_log(
@@ -117,7 +131,7 @@ class RowChecks:
 
     def __init__(self, units):
         self._units = units
-        self._runs = pd.DataFrame()  # of each run: its first and last time, and its temperatures
+        self._runs = pd.DataFrame()
 
     def add(self, log):
         """LogError for the first bad row of the next piece."""
@@ -136,14 +150,14 @@ class RowChecks:
             self._check_time(log)
 
     def _check_time(self, log):
-        time = pd.Series(log["time"].to_numpy())
-        run = pd.Series(np.asarray(log["run"]) if "run" in log else np.zeros(len(log), dtype=int))
+        time = log["time"].reset_index(drop=True)
+        run = pd.Series(log["run"].to_numpy() if "run" in log else 0, time.index)
         before = time.groupby(run, sort=False).shift()
         if len(self._runs):
             before = before.fillna(run.map(self._runs["end"]).astype(float))
-        bad = (time <= before).to_numpy()
+        bad = time <= before
         if bad.any():
-            row = int(np.argmax(bad))
+            row = int(bad.idxmax())
             raise LogError(
                 f"time does not increase within a run: {time[row]:.10g} s after {before[row]:.10g} "
                 f"s ({bad.sum()} such rows). Rows must be in the order of time; if several runs "
@@ -151,14 +165,10 @@ class RowChecks:
                 "time",
                 row,
             )
-        columns = {"begin": time, "end": time}
-        if "temperature" in log:
-            temperature = pd.Series(log["temperature"].to_numpy())
-            columns |= {"coldest": temperature, "hottest": temperature}
-        kinds = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
-        kinds = {name: kinds[name] for name in columns}
-        found = pd.DataFrame(columns).groupby(run, sort=False).agg(kinds)
-        self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(kinds)
+        temperature = log["temperature"].to_numpy() if "temperature" in log else np.nan
+        columns = {"begin": time, "end": time, "coldest": temperature, "hottest": temperature}
+        found = pd.DataFrame(columns).groupby(run, sort=False).agg(_OF_A_RUN)
+        self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(_OF_A_RUN)
         _check_durations(self._runs.loc[found.index], self._units["time"])
 
 
@@ -170,8 +180,6 @@ def _check_durations(runs, unit):
             f"unit than {unit}?",
             "time",
         )
-    if "hottest" not in runs:
-        return
     heating = (runs["hottest"] - runs["coldest"]).to_numpy()
     fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
     if fast.any():
@@ -191,7 +199,7 @@ def check_at_rest(log, unit):
     if "rate" in log:
         rate = log["rate"].to_numpy()
         row = int(np.argmax(np.abs(rate)))
-        if abs(rate[row]) > LARGEST_AT_REST:
+        if abs(rate[row]) > _LARGEST_AT_REST:
             raise LogError(f"{rate[row]:.4g} deg/s: the gyro was not at rest.", "rate", row)
     output = log["output"].to_numpy()
     if unit not in SIGNALS:
@@ -302,3 +310,53 @@ def _diagnosis(slope, units):
             if 0.7 < slope * ratio**power < 1.4:
                 found.append(f"the {part} in {unit}")
     return f"is {' or '.join(found)}?" if found else "are the units right?"
+
+
+def find_glitches(log, error):
+    """Rows that no other row supports, and what is odd about each; ``error`` is of every row.
+
+    Two things are looked at: the error, beside that of the rows nearest in temperature, rate and
+    order, and the temperature, beside that of the rows before and after in the run. Least squares
+    bends the whole model towards one such row.
+    """
+    temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
+    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
+    by_run = pd.Series(temperature).groupby(runs)
+    around = pd.concat([by_run.shift(step) for step in (-2, -1, 1, 2)], axis=1)
+    around = around.T.fillna(log["temperature"].reset_index(drop=True)).T
+    found = {
+        row: f"the temperature of {temperature[row]:.4g} degC"
+        for row in _alone(temperature - np.median(around, axis=1), _SMOOTH * _spread(temperature))
+    }
+    # What is far from its neighbours by more than all errors spread is far from the middle too.
+    far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
+    places = np.column_stack([temperature, rate, np.arange(len(log))])
+    scale = _spread(places)
+    places /= np.where(scale > 0.0, scale, 1.0)
+    # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
+    step = -(-len(log) // _MOST_NEIGHBOURS)
+    tree = cKDTree(places[::step], balanced_tree=False)
+    nearest = step * tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
+    # Not itself, or else not the farthest.
+    own = nearest == far[:, None]
+    own[~own.any(axis=1), -1] = True
+    others = np.median(error[nearest[~own].reshape(len(far), -1)], axis=1)
+    for row in far[_alone(error[far] - others, _spread(error))].tolist():
+        output = log["output"].iloc[row]
+        found.setdefault(row, f"the output of {output:.4g} at a rate of {rate[row]:.4g} deg/s")
+    return sorted(found.items())
+
+
+def _alone(deviations, least):
+    """Rows, three at most, whose deviation is above the least and far beyond that of all others."""
+    sizes = np.abs(deviations)
+    order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]
+    for count in range(len(order) - 1, 0, -1):
+        if sizes[order[count - 1]] > max(_ALONE * sizes[order[count]], least):
+            return order[:count].tolist()
+    return []
+
+
+def _spread(values):
+    low, high = np.quantile(values, [0.05, 0.95], axis=0)
+    return high - low

@@ -9,7 +9,7 @@ import hashlib
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -17,22 +17,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._checks import LABELS, PARTS, RowChecks
-from ._columns import declared_units
-from ._guess import Request
-from ._log_file import LogFile
-from ._runs import RunFinder
-from .errors import LogError
+from ._checks import LABELS, RowChecks, check_values
+from ._columns import SIGNALS, convert
+from ._guess import Request, checked_request, settle
+from ._source import NO_VALUE, Clock, as_numbers, open_source
+from .errors import LogError, shortened
 
-__all__ = [
-    "Reading",
-    "check_different",
-    "checked_request",
-    "find_logs",
-    "pieces_of",
-    "read",
-    "read_log",
-]
+__all__ = ["LogFile", "Reading", "RunFinder", "check_different", "find_logs", "read", "read_log"]
+
+_ROWS = 200_000  # of a piece, which is all that is held beside the log itself
+_CLOCK_ROWS = 200  # by which the form of a clock is told
+# A rest without power is longer than what a logger drops, and than a few of its steps.
+_SHORTEST_GAP = 60.0  # s
+_STEPS = 50.0
+_FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
+_BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
 
 
 def read_log(
@@ -40,10 +39,7 @@ def read_log(
     *,
     columns: dict[str, Any] | None = None,
     units: dict[str, Any] | None = None,
-    require: Sequence[str] | None = None,
-    separator: str | None = None,
-    decimal: str | None = None,
-    encoding: str | None = None,
+    require: Sequence[str] = ("temperature", "output", "rate"),
 ) -> pd.DataFrame:
     r"""Read one log from one or several files.
 
@@ -53,17 +49,16 @@ def read_log(
     Parameters
     ----------
     paths : str, path, or sequence of these
-        Text files with a header line, or Parquet files (with pyarrow).
+        Text files with a header line, or Parquet files (with pyarrow). Encoding, separator and
+        decimal sign of a text are found out.
     columns : dict of str to str, default=None
         Names in the file by part ("time", "temperature", "output", "rate", "run", "device"), where
         they differ from it; blanks around names, and capitals, do not matter.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
         and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be in counts, V or mV.
-    require : sequence of str, default=None
-        Parts without which the log is refused; None stands for temperature, output and rate.
-    separator, decimal, encoding : str, default=None
-        Sign between columns, sign of the decimal fraction, encoding of the text; None finds out.
+    require : sequence of str, default=("temperature", "output", "rate")
+        Parts without which the log is refused.
 
     Returns
     -------
@@ -77,7 +72,7 @@ def read_log(
         If a file is no table or there twice, a required column or a value is missing, or a value
         is no number.
     ValueError
-        If an argument names an unknown part or unit, or is no single sign.
+        If an argument names an unknown part or unit.
     OSError
         If a file cannot be read.
 
@@ -95,8 +90,7 @@ def read_log(
     0   0.0         20.0  -190.0  10.0
     1   1.0         20.1  -380.0  20.0
     """
-    require = ("temperature", "output", "rate") if require is None else tuple(require)
-    request = Request(columns or {}, units or {}, require, separator, decimal, encoding)
+    request = Request(columns or {}, units or {}, tuple(require))
     return read([paths] if isinstance(paths, str | Path) else list(paths), request).log
 
 
@@ -128,67 +122,251 @@ class Reading:
     def located(self, error):
         """An error of a check of the log in the words of the files."""
         if error.row is not None:
-            file = self.files[self.file[error.row]]
-            return file.located(error, pd.Series(self.row))
+            return self.files[self.file[error.row]].located(error, self.row)
         where = None if len(self.files) == 1 else "the log"
         return self.files[0].located(error, where=where)
 
 
-def read(paths, request, *, by_clock=False, tell=None, most_rows=None, check=False):
+def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     """Read files as :func:`read_log` does; returns a :class:`Reading`.
 
-    With ``by_clock``, a file without labels is split where its clock tells new runs. ``tell`` is
-    called with a line of text now and then. With ``check``, every row is checked. Of more than
-    ``most_rows`` rows every k-th of each run is held, with k a power of two.
+    ``tell`` is called with a line of text for every file. Of more than ``most_rows`` rows every
+    k-th of each run is held, with k a power of two.
     """
     request = checked_request(request)
     if not paths:
         raise ValueError("paths: at least one file is needed.")
     check_different(paths)
     files: list[LogFile] = []
-    finder, checks, thinned = RunFinder(by_clock), None, _Thinned(most_rows)
+    finder, checks, thinned = RunFinder(request.guess), None, _Thinned(most_rows)
     for number, path in enumerate(paths):
         file = LogFile(path, request, files[0] if files else None)
         files.append(file)
-        if check and checks is None:
+        if request.guess and checks is None:
             checks = RowChecks(file.layout.units)
-        for piece in pieces_of(file, number, finder, checks, tell):
+        for piece in file.pieces(finder, checks, number):
             thinned.add(piece.drop(columns="device", errors="ignore"))
-        if tell is not None and len(paths) > 1:
+        if len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
     if not thinned.n_rows:
         raise LogError(f"{paths[0]}: has no rows with values.")
-    table, parts = pd.concat(thinned.pieces, ignore_index=True), files[0].layout.places
+    table, parts = pd.concat(thinned.pieces), files[0].layout.places
     code, runs = table["run"].to_numpy(), finder.runs
-    log = table[[part for part in parts if part not in LABELS]].copy()
-    names = finder.names(_short_names(paths), "run" in parts)
+    log = table[[part for part in parts if part not in LABELS]].reset_index(drop=True)
+    names = _names_of_runs(runs, paths, "run" in parts or finder.note)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
     if "device" in parts:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
     notes = [*_notes_of(files), *filter(None, [finder.note, thinned.note])]
-    file, row = runs["file"].to_numpy()[code], table["row"].to_numpy()
-    return Reading(log, file, row, files, notes, thinned.n_rows)
+    return Reading(
+        log, runs["file"].to_numpy()[code], table.index.to_numpy(), files, notes, thinned.n_rows
+    )
 
 
-def pieces_of(file, number, finder, checks=None, tell=None):
-    """Checked pieces of a file of a log, "run" in them being a position in ``finder.runs``."""
-    for piece in file.pieces(tell):
-        piece["run"] = finder.codes(piece, number)
-        try:
-            if checks is not None:
-                checks.add(piece)
-        except LogError as error:
-            raise file.located(error, piece["row"]) from error
-        yield piece
+class LogFile:
+    """A file of a log; ``first`` is the first file of the same log, whose columns hold.
+
+    LogError where it is no log, or not like the first.
+    """
+
+    def __init__(self, path, request, first=None):
+        self.path, self._allow_missing = path, request.guess
+        self.source = open_source(path)
+        self.layout = settle(self.source, request, None if first is None else first.layout)
+        self.notes = [*self.source.notes, *self.layout.notes]
+        self.n_rows = 0
+        if first is not None:
+            self._check_like(first)
+
+    def _check_like(self, first):
+        differ = sorted(set(self.layout.places) ^ set(first.layout.places))
+        if differ:
+            raise LogError(f"{self.path}: the files differ in having {', '.join(differ)}.")
+        own, other = self.layout.units["output"], first.layout.units["output"]
+        if own != other and {own, other} & set(SIGNALS):
+            raise LogError(
+                f"{self.path}: the output is in {own}, in {first.path} in {other}; say which it is "
+                "(units: output=UNIT)."
+            )
+
+    def pieces(self, finder, checks=None, number=0):
+        """Tables of the parts in the units of a log, "run" being a position in ``finder.runs``.
+
+        The index is the row's position in the file, of which ``number`` is that in the log. The
+        command leaves out rows that lack a value.
+        """
+        clock, places = self._clock(), self.layout.places
+        labels = [places[part] for part in LABELS if part in places]
+        lacking = pd.Series(0, index=list(places))
+        n_left_out, first = 0, None
+        for piece in self.source.pieces(list(places.values()), _ROWS, labels):
+            self.n_rows += len(piece)
+            try:
+                piece = self._converted(piece, clock)
+                missing = piece.isna()
+                bad = missing.any(axis=1)
+                if bad.any():
+                    lacking += missing.sum()
+                    n_left_out += int(bad.sum())
+                    first = bad.idxmax() if first is None else first
+                    piece = piece[~bad].copy()
+                if piece.empty:
+                    continue
+                piece["run"] = finder.codes(piece, number)
+                if checks is not None:
+                    checks.add(piece)
+            except LogError as error:
+                raise self.located(error, piece.index) from error
+            yield piece
+        if n_left_out:
+            self._report_missing(n_left_out, lacking[lacking > 0], first)
+
+    def _clock(self):
+        """What reads the time, where it is no number."""
+        if "time" not in self.layout.places:
+            return None
+        place = self.layout.places["time"]
+        table = next(self.source.pieces([place], _CLOCK_ROWS), None)
+        if table is None or np.isfinite(as_numbers(table[place], self.source.decimal)).any():
+            return None
+        clock = Clock(table[place])
+        if not clock.form:
+            return None
+        self.notes.append(clock.note)
+        return clock
+
+    def _converted(self, table, clock):
+        piece = pd.DataFrame(index=table.index)
+        for part, place in self.layout.places.items():
+            column = table[place]
+            if part in LABELS:
+                piece[part] = column.astype(object)
+            else:
+                piece[part] = self._numbers(column, part, clock if part == "time" else None)
+            check_values(piece[part], part, self._allow_missing)
+        return piece
+
+    def _numbers(self, column, part, clock):
+        numbers = clock.seconds(column) if clock else as_numbers(column, self.source.decimal)
+        bad = np.isnan(numbers) & (column.notna() & ~column.isin(NO_VALUE)).to_numpy()
+        if bad.any():
+            row = int(bad.argmax())
+            kind = "no time like those before" if clock else "not a number"
+            raise LogError(f"{shortened(column.iloc[row])} is {kind}.", part, row)
+        is_in_seconds = clock or column.dtype.kind in "mM"
+        return numbers if is_in_seconds else convert(numbers, part, self.layout.units[part])
+
+    def located(self, error, rows=None, where=None):
+        """An error of one part and row, in terms of this file; ``rows`` are positions in it."""
+        where = where or self.path
+        if error.row is not None:
+            where = f"{self.path}, {self.source.place_of(int(rows[error.row]))}"
+        if error.column is None:
+            return error
+        name = self.layout.name(error.column)
+        part = "" if name == error.column else f" ({error.column})"
+        return LogError(f"{where}, column {name!r}{part}: {error.reason}")
+
+    def _report_missing(self, n_rows, lacking, first):
+        parts = ", ".join(f"{self.layout.name(part)!r} in {n:,}" for part, n in lacking.items())
+        said = f"{n_rows:,} of {self.n_rows:,} rows lack a value ({parts})"
+        if 2 * n_rows > self.n_rows:
+            raise LogError(f"{self.path}: {said}: too many to go on without them.")
+        place = self.source.place_of(int(first))
+        self.notes.append(f"{said}; they are left out, the first of them {place}")
+
+
+class RunFinder:
+    """Finds the runs of a log that comes in pieces: by labels, else by files.
+
+    With ``by_clock``, a file without labels is split at long steps of its time, and where it begins
+    anew. ``runs`` are in the order in which they came.
+    """
+
+    def __init__(self, by_clock):
+        self._by_clock = by_clock
+        self._longest = None  # step of the time within a run [s]
+        self._codes: dict = {}
+        # By file and device: when its clock began, its last time, the number of its run.
+        self._open: dict = {}
+        self._n_gaps = self._n_restarts = 0
+
+    @property
+    def runs(self):
+        """Their files, devices and labels."""
+        return pd.DataFrame(list(self._codes), columns=["file", "device", "run"])
+
+    def codes(self, piece, file):
+        """Position of each row's run among ``runs``; ``file`` tells files apart."""
+        device = piece["device"] if "device" in piece else pd.Series("", piece.index)
+        if "run" in piece:
+            run = piece["run"]
+        elif "time" in piece and self._by_clock:
+            run = self._split(device, piece["time"], file).astype(str)
+        else:
+            run = pd.Series("", piece.index)
+        groups = pd.DataFrame({"device": device, "run": run}).groupby(["device", "run"], sort=False)
+        own = [
+            self._codes.setdefault((file, *key), len(self._codes))
+            for key in groups.head(1).itertuples(index=False, name=None)
+        ]
+        return np.array(own)[groups.ngroup().to_numpy()]
+
+    def _split(self, device, time, file):
+        if self._longest is None:
+            self._longest = _longest_step(time, device)
+        number = pd.Series(1, time.index)
+        for name, values in time.groupby(device, sort=False):
+            begin, last, before = self._open.get((file, name), (values.iloc[0],) * 2 + (1,))
+            steps = np.diff(values, prepend=last)
+            gaps = steps > self._longest
+            restarts = np.zeros(steps.size, dtype=bool)
+            for row in np.flatnonzero(steps < 0.0).tolist():
+                restart = values.iloc[row]
+                if restart <= begin + _BEGINNING * (restart - steps[row] - begin):
+                    restarts[row], begin = True, restart
+            number[values.index] = before + np.cumsum(gaps | restarts)
+            self._open[file, name] = begin, values.iloc[-1], int(number[values.index[-1]])
+            self._n_gaps += int(gaps.sum())
+            self._n_restarts += int(restarts.sum())
+        return number
+
+    @property
+    def note(self):
+        """What the clock has told, in words; empty where it tells one run."""
+        parts = []
+        if self._n_gaps:
+            gaps = _counted(self._n_gaps, "gap")
+            parts.append(f"at {gaps} of the time longer than {self._longest:.4g} s")
+        if self._n_restarts:
+            times = _counted(self._n_restarts, "time")
+            parts.append(f"where the time begins anew ({times})")
+        if not parts:
+            return ""
+        return f"the log is split into {_counted(len(self._codes), 'run')}, {' and '.join(parts)}"
+
+
+def _longest_step(time, device):
+    """The longest step of the time within a run, by the first piece of a log."""
+    steps = time.groupby(device, sort=False).diff()
+    forward = steps[steps > 0.0]
+    if forward.empty:
+        return np.inf
+    longest = max(_SHORTEST_GAP, _STEPS * forward.median())
+    number = (steps.isna() | (steps > longest)).groupby(device).cumsum()
+    return longest if number.groupby([device, number]).size().median() >= _FEWEST_ROWS else np.inf
+
+
+def _counted(n, noun):
+    return f"{n} {noun}{'s' if n > 1 else ''}"
 
 
 class _Thinned:
     """The rows of a log that comes in pieces; of too many, every k-th of each run."""
 
     def __init__(self, most_rows):
-        self._most = np.inf if most_rows is None else most_rows
-        self._every = 1
+        self._most, self._every = most_rows, 1
         self.pieces: list = []
         self._counts = pd.Series(dtype=int)  # rows so far, by run
         self.n_rows = 0
@@ -211,10 +389,21 @@ class _Thinned:
         return f"of {self.n_rows:,} rows {n_used:,} are used, one in {self._every} of each run"
 
 
-def _short_names(paths):
-    """Names of the files without folders and endings, where these tell them apart."""
+def _names_of_runs(runs, paths, has_labels):
+    """Labels of the runs that tell them apart, short ones if these do; None of a single run."""
     stems = [Path(path).stem for path in paths]
-    return stems if len(set(stems)) == len(stems) else [os.fspath(path) for path in paths]
+    files = stems if len(set(stems)) == len(stems) else list(map(os.fspath, paths))
+    owners = ["file"] if len(paths) > 1 else []
+    owners += ["device"] if runs["device"].any() else []
+    owners += ["run"] if has_labels else []
+    if not {"file", "run"} & set(owners):
+        return None
+    keys: dict = runs.to_dict("list") | {"file": [files[file] for file in runs["file"]]}
+    for parts in (["run"], ["file"], owners):
+        names = [" / ".join(row) for row in zip(*map(keys.get, parts), strict=True)]
+        if set(parts) <= set(owners) and len(set(names)) == len(names):
+            break
+    return names
 
 
 def _notes_of(files):
@@ -226,25 +415,6 @@ def _notes_of(files):
         for note in file.notes
     ]
     return list(dict.fromkeys(notes))
-
-
-def checked_request(request):
-    """The request with the usual names of units; ValueError where it names what is unknown."""
-    for name, parts in (("columns", request.columns), ("require", request.require)):
-        for part in parts:
-            if part not in PARTS:
-                known = ", ".join(PARTS)
-                raise ValueError(f"{name}: there is no {part!r}; it may be one of {known}.")
-    for name, sign in (("separator", request.separator), ("decimal", request.decimal)):
-        if sign is None:
-            continue
-        if not isinstance(sign, str) or len(sign) != 1 or sign.isalnum() or sign in '\r\n"':
-            raise ValueError(f"{name}={sign!r} must be one character, such as a comma.")
-    try:
-        "".encode(request.encoding or "utf-8")
-    except (LookupError, ValueError) as error:
-        raise ValueError(f"encoding: {error}.") from error
-    return replace(request, units=declared_units(request.units))
 
 
 def find_logs(arguments):

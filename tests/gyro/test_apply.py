@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator, _log_file
+from skanfis.gyro import GyroCompensator
 from skanfis.gyro.command import main
 from skanfis.gyro.log import read_log
 
@@ -61,7 +61,7 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
     kind(log).to_csv(path, index=False)
     tables, said = [], []
     for rows in (100_000, 197):
-        monkeypatch.setattr(_log_file, "_ROWS", rows)
+        monkeypatch.setattr("skanfis.gyro.log._ROWS", rows)
         target = tmp_path / f"rates{rows}.csv"
         assert main(["--apply", str(model), str(path), "--output", str(target)]) == 0
         tables.append(pd.read_csv(target))
@@ -107,7 +107,7 @@ BAD = {
 def test_bad_rows_are_named_by_their_place_in_the_file(
     log, model, case, tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr(_log_file, "_ROWS", 50)
+    monkeypatch.setattr("skanfis.gyro.log._ROWS", 50)
     spoil, said = BAD[case]
     # A run that heats by 20 degrees, of which no 50 rows do.
     table = one_run(log).reset_index(drop=True)

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis.gyro._budget import budget_of, noise_within, proven_bounds, scatter_between
 from skanfis.gyro._calibration import Recipe, calibrate
+from skanfis.gyro._headline import budget_of, noise_within, proven_bounds, scatter_between
 from skanfis.gyro._options import parse_box
 from skanfis.gyro._split import Split, choose_split
 from skanfis.gyro.command import main

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro._glitches import find_glitches
+from skanfis.gyro._checks import find_glitches
 
 
 def simulated(seed, **options):

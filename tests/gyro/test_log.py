@@ -167,12 +167,6 @@ def test_files_with_different_columns_are_refused(tmp_path, log):
         ({"units": {"time": "deg/s"}}, "time has no unit 'deg/s'.* s, ms"),
         ({"units": {"time": 1}}, "time has no unit 1: it may be in s, ms"),
         ({"require": ["speed"]}, "require: there is no 'speed'"),
-        ({"separator": ""}, "separator='' must be one character"),
-        ({"separator": "(("}, r"separator='\(\(' must be one character"),
-        ({"separator": "\n"}, "must be one character"),
-        ({"decimal": "5"}, "decimal='5' must be one character"),
-        ({"decimal": ","}, "separator and decimal are both ','"),
-        ({"encoding": "klingon"}, "klingon"),
     ],
 )
 def test_unknown_names_are_no_matter_of_the_log(tmp_path, log, options, message):

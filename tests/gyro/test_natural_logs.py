@@ -23,7 +23,7 @@ def truth():
 
 def found(path, **options):
     paths = path if isinstance(path, list) else [path]
-    return read(paths, Request(**(ASKED | options)), by_clock=True)
+    return read(paths, Request(**(ASKED | options)))
 
 
 def same(reading, truth, parts=PARTS[1:]):
@@ -213,11 +213,11 @@ def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
 
 
 def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, truth):
-    monkeypatch.setattr("skanfis.gyro._log_file._ROWS", 37)
+    monkeypatch.setattr("skanfis.gyro.log._ROWS", 37)
     table = truth[[*PARTS, "run"]].sort_values("time", kind="stable").reset_index(drop=True)
     table.to_csv(tmp_path / "log.csv", index=False)
     request = Request(**ASKED)
-    some = read([tmp_path / "log.csv"], request, most_rows=100, check=True)
+    some = read([tmp_path / "log.csv"], request, most_rows=100)
     place = table.groupby("run").cumcount()
     expected = table[place % 4 == 0]
     assert (some.n_rows, len(some.log)) == (300, 75)
@@ -229,7 +229,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     table.loc[290, "time"] = 0.0
     table.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(LogError, match=r"line 292, column 'time': time does not increase"):
-        read([tmp_path / "log.csv"], request, most_rows=100, check=True)
+        read([tmp_path / "log.csv"], request, most_rows=100)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +238,6 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
         (np.r_[0:100, 0:100, 0:50], [1] * 100 + [2] * 100 + [3] * 50),  # set anew
         (np.r_[0:100, 100 + 500 : 700], [1] * 100 + [2] * 100),  # a rest
         (np.r_[0:100, 130:230], None),  # half a minute lost
-        (np.r_[0:50, 49, 50:149], None),  # a row out of order, which is refused later
     ],
 )
 def test_runs_are_told_by_the_time(tmp_path, times, runs):
@@ -248,6 +247,11 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
     assert ("run" in log) == (runs is not None)
     if runs is not None:
         assert log["run"].astype(int).tolist() == runs
+    # A row out of order is no run.
+    table.loc[60, "time"] = table.loc[58, "time"]
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(LogError, match="line 62, column 'time': time does not increase"):
+        found(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize(

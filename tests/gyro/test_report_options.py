@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis.gyro._options import make_parser
-from skanfis.gyro._report_options import check_limit, parse_limit, report_options
+from skanfis.gyro._options import check_limit, make_parser, parse_limit, report_options
 
 
 @pytest.mark.parametrize(
@@ -78,10 +77,10 @@ def test_the_files_are_told_as_they_are(tmp_path):
     content = bytes(range(256)) * 5000
     (tmp_path / "a b.csv").write_bytes(content)
     path = tmp_path / "a b.csv"
-    typed = "--min-coverage 0 --serial 7 --operator Ö --limits bias=5deg/h --report-unit=deg/h"
+    typed = "--min-coverage 0 --serial 7 --operator Ö --limits bias=5deg/h"
     found = report_options(make_parser().parse_args([str(path), *typed.split()]), [path])
     assert found.files == (("a b.csv", len(content), hashlib.sha256(content).hexdigest()),)
-    assert (found.serial, found.operator, found.unit) == ("7", "Ö", "deg/h")
+    assert (found.serial, found.operator) == ("7", "Ö")
     assert found.limits == (parse_limit("bias=5deg/h"),)
     assert {("limits", "bias=5deg/h"), ("min-coverage", "0.0")} <= set(found.options)
 
