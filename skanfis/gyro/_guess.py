@@ -15,41 +15,37 @@ from .errors import LogError
 __all__ = ["Request", "checked_request", "settle"]
 
 _SAMPLE_ROWS = 5_000
-# How much a word in a column's name speaks for a part.
+_RATE = "rate omega angular velocity speed"
+_OUTPUT = (
+    "gyro gyroscope fog output out signal raw counts count adc measured meas indicated sensor imu "
+    "dut uut kreisel"
+)
+_TRUTH = "true truth table turntable drehtisch ref reference stage commanded command cmd encoder"
+# How much a word in a column's name speaks for a part. A chamber's thermometer is no gyro's.
 _WORDS = {
     "time": {
-        5: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime 时间",
-        4: "clock elapsed",
-        3: "t sec secs seconds epoch utc tow ms millis us",
+        5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime 时间",
+        4.0: "clock elapsed",
+        3.0: "t sec secs seconds epoch utc tow ms millis us",
     },
     "temperature": {
-        5: "temp temperature temperatur tmp therm thermometer thermistor ntc rtd celsius 温度",
-        3: "t",
+        5.0: "temp temperature temperatur tmp therm thermometer thermistor ntc rtd celsius 温度",
+        3.0: "t",
+        -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
-    "output": {
-        5: "gyro gyroscope fog output out signal raw counts count adc measured meas indicated "
-        "sensor imu dut uut kreisel",
-        2: "rate omega angular velocity speed",
-    },
-    "rate": {
-        6: "true truth table turntable drehtisch ref reference stage commanded command cmd "
-        "setpoint encoder",
-        2: "rate omega angular velocity speed",
-    },
+    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} setpoint"},
+    "rate": {6.0: f"{_TRUTH} setpoint", 2.0: _RATE, -4.5: _OUTPUT},
 }
 _SCORES = {
     part: {word: score for score, words in table.items() for word in words.split()}
     for part, table in _WORDS.items()
 }
-_OF_NO_PART, _OF_ANOTHER = (
-    set(words.split())
-    for words in (
-        "residual fit fitted error err std sigma var variance status flag valid crc checksum seq "
-        "sequence index trend delta diff acc accel accelerometer mag pressure humidity supply vdd "
-        "current heater bias corrected compensated filtered direction",
-        # A chamber's thermometer is no gyro's.
-        "start set setpoint target chamber oven ambient amb room min max board",
-    )
+_STRANGER = -0.5  # any other word
+_SIGNAL, _UNIT = 3.0, 0.25  # a unit of a raw signal, for the output; any unit
+_OF_NO_PART = (
+    "residual fit fitted error err std sigma var variance status flag valid crc checksum seq "
+    "sequence index trend delta diff acc accel accelerometer mag pressure humidity supply vdd "
+    "current heater bias corrected compensated filtered direction"
 )
 _LABELS = {
     "run": {"run", "cycle", "session", "powerup"},
@@ -62,8 +58,6 @@ _QUANTITIES = {
     "output": ("rate", "signal"),
     "rate": ("rate",),
 }
-_SIGNAL = 3.0  # how much a unit of a raw signal speaks for the output
-_STRANGER = 0.5  # what a word that says nothing takes off
 _COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
 # Numbers that large count from 1970, in these units.
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
@@ -128,8 +122,6 @@ def settle(source, request, first=None):
         place = _place(source, names[part], told)
         if place is not None:
             layout.places[part] = place
-            if names[part] not in (part, layout.name(part)):
-                layout.notes.append(f"{layout.name(part)!r} is taken for {names[part]!r}")
         elif part in request.columns:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
     if request.guess:
@@ -198,7 +190,7 @@ class _Column:
 
     def can_be(self, part):
         """Whether neither unit nor values speak against a part, nor a word against all."""
-        if self.words & _OF_NO_PART or self.quantity not in (None, *_QUANTITIES[part]):
+        if self.words & set(_OF_NO_PART.split()) or self.quantity not in (None, *_QUANTITIES[part]):
             return False
         if part == "time":
             steps = np.diff(self.numbers)
@@ -210,23 +202,11 @@ class _Column:
         return self.numbers.size > 0 and not is_flag
 
     def score(self, part):
-        """How much the name speaks for a part; zero where it does not."""
-        scores = _SCORES[part]
-        found = sum(scores.get(word, 0.0) for word in self.words)
+        """How much the name speaks for a part; zero and less where it does not."""
+        score = sum(_SCORES[part].get(word, _STRANGER) for word in self.words)
         if part == "output" and self.quantity == "signal":
-            found += _SIGNAL
-        if found == 0.0 or (part == "output" and self.is_named("rate")):
-            return 0.0
-        if part == "rate" and self.is_named("output"):
-            found -= 4.0
-        if part == "temperature":
-            found -= 3.0 * len(self.words & _OF_ANOTHER)
-        strangers = len(self.words - set(scores))
-        return found - _STRANGER * strangers + (0.25 if self.unit else 0.0)
-
-    def is_named(self, part):
-        """Whether a word is the part's own."""
-        return any(_SCORES[part].get(word, 0) > 2 for word in self.words)
+            score += _SIGNAL
+        return score + (_UNIT if self.unit else 0.0)
 
 
 def _free(part, columns, layout):

@@ -4,11 +4,9 @@ A limit is FIGURE=VALUE: bias=5deg/h says that the bias is 5 deg/h at most, with
 """
 
 import argparse
-import hashlib
 import math
 import re
 from argparse import ArgumentTypeError
-from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,7 +31,6 @@ __all__ = [
     "make_parser",
     "parse_box",
     "parse_limit",
-    "report_options",
     "request_of",
 ]
 
@@ -236,16 +233,14 @@ def parse_limit(text):
     unit = found["unit"]
     for sign, name in _SPELLINGS:
         unit = unit.replace(sign, name)
-    known = [in_rate_unit(usual, name)[0] for name in RATE_UNITS]
+    known = {name: name for name in (in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)}
     if rate_unit_of(usual) is None:
         # Without its unit, and "ppm" alone, it is clear as well.
-        known = [usual, "", usual.partition(" ")[0]]
+        known |= {"": usual, usual.partition(" ")[0]: usual}
     if unit not in known:
-        wanted = " or ".join(filter(None, dict.fromkeys(known)))
-        wanted = f"is in {wanted}" if wanted else "has no unit"
-        raise ArgumentTypeError(f"{text!r}: {figure} {wanted}; found {unit!r}.")
-    unit = unit if rate_unit_of(usual) else usual
-    return Limit(figure, float(found["value"]), unit, typed.strip())
+        wanted = " or ".join(filter(None, known)) or "no unit"
+        raise ArgumentTypeError(f"{text!r}: {figure} takes {wanted}; found {unit!r}.")
+    return Limit(figure, float(found["value"]), known[unit], typed.strip())
 
 
 class Check(NamedTuple):
@@ -282,35 +277,3 @@ class ReportOptions(NamedTuple):
     options: tuple[tuple[str, str], ...] = ()
     limits: tuple[Limit, ...] = ()
     unit: str = "auto"
-
-
-def report_options(options, paths):
-    """Those of the command's options and logs, with the files as they are now."""
-    told = [
-        (name.replace("_", "-"), _as_typed(value))
-        for name, value in sorted(vars(options).items())
-        if value is not None and value is not False and value not in ([], "")
-    ]
-    files = []
-    for path in map(Path, paths):
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-            files.append((path.name, file.tell(), digest))
-    return ReportOptions(
-        made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),
-        serial=options.serial,
-        operator=options.operator,
-        files=tuple(files),
-        options=tuple(told),
-        limits=tuple(options.limits),
-    )
-
-
-def _as_typed(value):
-    if isinstance(value, Limit):
-        return f"{value.figure}={value.text}"
-    if isinstance(value, Path):
-        return value.name
-    if isinstance(value, list | tuple):
-        return " ".join(map(_as_typed, value))
-    return str(value)

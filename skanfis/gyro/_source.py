@@ -1,9 +1,9 @@
 """The table in a file, text or Parquet: its header, its rows in pieces, and columns as numbers."""
 
 import codecs
+import contextlib
 import csv
 import re
-import warnings
 from itertools import islice
 
 import numpy as np
@@ -20,31 +20,25 @@ _LONGEST_FIELD = 2**31 - 1  # the largest limit that the module csv takes on eve
 _HEAD_BYTES = 2**16
 # Lines above the header that a logger may write, and a few rows.
 _HEAD_RECORDS = 60
-_LONGEST_NUMBER = 60
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
-_MARKS = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF32_LE: "utf-32",
-    codecs.BOM_UTF32_BE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
-_KINDS = {b"\x1f\x8b": "compressed", b"PK\x03\x04": "an archive or a workbook", b"PAR1": "Parquet"}
-_NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f\ufffd]")
-_NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?$")
-_MOMENT = re.compile(r"[0-9]{1,4}([:./-])[0-9]{1,2}(\1[0-9]|[T ,:]|$)")
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars"}
+_NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
+# A number or a moment, in full; a number with a fraction.
+_VALUE = re.compile(r"[+-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
+_FRACTION = re.compile(r"[+-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
-_CLOCK = r"[0-9]{1,6}:[0-9]{1,2}:[0-9]{1,2}(?:[.,][0-9]*)?$"
-_DATE = r"[0-9]{1,4}[./-][0-9]{1,2}[./-][0-9]{1,4}[T,\s]+[0-9]"
+_CLOCK = "hours:minutes:seconds"
 _FORMATS = [
+    _CLOCK,
     "ISO8601",
     *(
         f"{date} {clock}"
-        for date in ("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%Y/%m/%d", "%d-%m-%Y")
+        for date in ("%d.%m.%Y", "%d.%m.%y", "%m/%d/%Y", "%m/%d/%y", "%d/%m/%Y", "%Y/%m/%d")
         for clock in ("%H:%M:%S", "%H:%M:%S.%f", "%I:%M:%S %p", "%H:%M")
     ),
 ]
-_DAY = 86_400.0
+_CLOCK_ROWS = 200  # by which the form of a clock is told
+_EPOCH = pd.Timestamp(0, tz="UTC")
+_DAY = 86_400.0  # s
 
 
 def open_source(path):
@@ -65,7 +59,7 @@ class _TextSource:
         self._encoding = _find_encoding(path)
         if self._encoding != "utf-8-sig":
             self.notes.append(f"the text is read as {self._encoding.upper()}")
-        self._separator = self._find_separator()
+        self._find_separator()
         head = list(islice(self._records(), _HEAD_RECORDS))
         if not head:
             raise LogError(f"{path}: is empty.")
@@ -74,27 +68,19 @@ class _TextSource:
         self._check_lengths()
 
     def _find_separator(self):
-        """The first sign that cuts all lines into as many fields, two at least; else a comma."""
-        most, found = 1, ","
+        """The first sign that is on all lines, those of a preamble aside; else a comma."""
         for sign, name in _SEPARATORS.items():
             self._separator = sign
-            try:
-                lengths = [len(values) for _, values in islice(self._records(), _HEAD_RECORDS)]
-            except LogError:
-                continue
-            body = lengths[len(lengths) // 3 :]  # below a preamble
-            if body and min(body) == max(body) > 1:
-                if sign != ",":
-                    self.notes.append(f"columns are separated by {name}")
-                return sign
-            if lengths and lengths[0] > most:
-                most, found = lengths[0], sign
-        return found
+            lengths = [len(values) for _, values in islice(self._records(), _HEAD_RECORDS)]
+            if min(lengths[len(lengths) // 3 :], default=0) > 1:
+                self.notes.append(f"columns are separated by {name}")
+                return
+        self._separator = ","
 
     def _find_decimal(self, head):
-        numbers = [cell for _, values in head for cell in values if _NUMBER.match(cell.strip())]
-        commas = sum("," in cell for cell in numbers)
-        if self._separator == "," or commas <= sum("." in cell for cell in numbers):
+        cells = [cell.strip() for _, values in head for cell in values]
+        signs = [found[1] for cell in cells if (found := _FRACTION.match(cell))]
+        if self._separator == "," or signs.count(",") <= signs.count("."):
             return "."
         self.notes.append("decimal fractions are written with a comma")
         return ","
@@ -231,44 +217,35 @@ class _ParquetSource:
 def _find_encoding(path):
     with open(path, "rb") as file:
         head = file.read(_HEAD_BYTES)
-    for mark, name in _MARKS.items():
-        if head.startswith(mark):
-            return name
-    for mark, kind in _KINDS.items():
-        if head.startswith(mark):
-            raise LogError(f"{path}: is {kind}, not text; export it as CSV.")
-    try:
-        codecs.getincrementaldecoder("utf-8")().decode(head)
-        encoding = "utf-8-sig"
-    except UnicodeDecodeError:
-        encoding = "cp1252"
-    # Text of Windows has no such signs, and none is UTF-16 without its mark.
-    if b"\x00" in head or (
-        encoding == "cp1252" and _NO_TEXT.search(head.decode(encoding, errors="replace"))
-    ):
-        raise _no_text(path)
-    return encoding
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    for encoding in ("utf-8-sig", "cp1252"):
+        with contextlib.suppress(UnicodeDecodeError):
+            # The last sign of the head may be cut.
+            text = codecs.getincrementaldecoder(encoding)().decode(head)
+            if not _NO_TEXT.search(text):
+                return encoding
+    raise _no_text(path)
 
 
 def _no_text(path):
     return LogError(
-        f"{path}: is not text in UTF-8, UTF-16 or Windows-1252; save it as one of these."
+        f"{path}: is not text in UTF-8, UTF-16 or Windows-1252; export it as CSV in one of these."
     )
 
 
 def _is_data(values):
     """Whether most of the fields of a record that are not empty are numbers or times."""
-    filled = [cell[:_LONGEST_NUMBER] for cell in map(str.strip, values) if cell]
-    numbers = sum(bool(_NUMBER.match(cell) or _MOMENT.match(cell)) for cell in filled)
-    return 2 * numbers >= max(len(filled), 1)
+    filled = [cell.strip() for cell in values if cell.strip()]
+    return bool(filled) and 2 * sum(bool(_VALUE.match(cell)) for cell in filled) >= len(filled)
 
 
 def as_numbers(column, decimal="."):
     """A column as floats; dates and durations in s, NaN for all else."""
     if column.dtype.kind == "M":
-        return _since_1970(pd.to_datetime(column, utc=True))
+        column = pd.to_datetime(column, utc=True) - _EPOCH
     if column.dtype.kind == "m":
-        return (column / pd.Timedelta(seconds=1)).to_numpy(dtype=float)
+        return _in_seconds(column)
     if column.dtype.kind in "iuf":
         return column.to_numpy(dtype=float, na_value=np.nan)
     plain = _texts(column).str.replace(decimal, ".")
@@ -278,40 +255,21 @@ def as_numbers(column, decimal="."):
 class Clock:
     """Turns texts of one column into seconds, piece by piece; a clock goes on past midnight.
 
-    ``form`` is "clock" or a format of pandas; empty where the first values are no times.
+    ``form`` is that of most of the first values; empty where these are no times.
     """
 
     def __init__(self, sample):
-        texts = _texts(sample).dropna()
-        self.form = ""
-        self._day_first = False
+        texts = _texts(sample).dropna()[:_CLOCK_ROWS]
+        fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
+        best = max(fits, key=fits.get)
+        self.form = best if 2 * fits[best] > len(texts) else ""
         self._days, self._last = 0.0, None
-        dates = texts[texts.str.match(_DATE)]
-        if 2 * texts.str.match(_CLOCK).sum() > len(texts):
-            self.form = "clock"
-        elif 2 * len(dates) > len(texts):
-            self._day_first = "." in dates.iloc[0].split()[0]
-            self.form = next((form for form in _FORMATS if _fits(dates, form)), "mixed")
-
-    @property
-    def note(self):
-        kind = "clock times" if self.form == "clock" else f"dates and times ({self.form})"
-        return f"the time is read as {kind}, in s"
 
     def seconds(self, column):
         """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
-        texts = _texts(column)
-        if self.form != "clock":
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)
-                moments = pd.to_datetime(
-                    texts, format=self.form, dayfirst=self._day_first, errors="coerce", utc=True
-                )
-            return _since_1970(moments)
-        moments = pd.to_timedelta(texts.str.replace(",", "."), errors="coerce")
-        seconds = (moments / pd.Timedelta(seconds=1)).to_numpy(dtype=float).copy()
+        seconds = _moments(_texts(column), self.form)
         known = np.flatnonzero(np.isfinite(seconds))
-        if known.size:
+        if self.form == _CLOCK and known.size:
             values = seconds[known]
             last = values[0] if self._last is None else self._last
             days = self._days + np.cumsum(np.diff(values, prepend=last) < -0.5 * _DAY)
@@ -320,8 +278,14 @@ class Clock:
         return seconds
 
 
-def _fits(texts, form):
-    return pd.to_datetime(texts, format=form, errors="coerce", utc=True).notna().all()
+def _moments(texts, form):
+    texts = texts.str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
+    if form == _CLOCK:
+        clocks = texts.where(
+            texts.str.fullmatch(r"[0-9]{1,6}(:[0-9]{1,2}){2}(\.[0-9]*)?", na=False)
+        )
+        return _in_seconds(pd.to_timedelta(clocks, errors="coerce"))
+    return _in_seconds(pd.to_datetime(texts, format=form, errors="coerce", utc=True) - _EPOCH)
 
 
 def _texts(column):
@@ -330,6 +294,5 @@ def _texts(column):
     return texts.where(column.notna() & ~column.isin(NO_VALUE)).astype("string").str.strip()
 
 
-def _since_1970(moments):
-    since = moments - pd.Timestamp(0, tz="UTC")
-    return (since / pd.Timedelta(seconds=1)).to_numpy(dtype=float)
+def _in_seconds(durations):
+    return (durations / pd.Timedelta(seconds=1)).to_numpy(dtype=float).copy()

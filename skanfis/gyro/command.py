@@ -5,9 +5,11 @@ It writes files all together or not at all. ``--apply`` compensates logs piece b
 
 import contextlib
 import os
+import shlex
 import sys
 import tempfile
 import time
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -21,22 +23,23 @@ from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
-from ._options import PROGRAM, check_once, make_parser, report_options, request_of
+from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._split import choose_split
 from .c_code import export_c_physics
 from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
-from .log import LogFile, RunFinder, check_different, find_logs, read
+from .log import LogFile, RunFinder, digests_of, find_logs, read
 from .metrics import hysteresis
 
 __all__ = ["main"]
 
-DONE, FAILED, MISUSED, REFUSED, EXISTS = 0, 1, 2, 3, 4
+DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
+_ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 1_000_000  # that are held
 
 
@@ -44,6 +47,7 @@ def main(arguments=None):
     """Run the command; returns its exit code."""
     parser = make_parser()
     options = parser.parse_args(arguments)
+    options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _Progress(options.quiet)
     try:
         run = _apply if options.apply else _calibrate
@@ -55,11 +59,6 @@ def main(arguments=None):
         return _say_error(error, REFUSED)
     except ExistsError as error:
         return _say_error(error, EXISTS)
-    except BrokenPipeError:
-        # Whoever read the summary has seen enough; nothing more is to be flushed there at the end.
-        with contextlib.suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return FAILED
     except (OSError, ImportError, ValueError, ArithmeticError, MemoryError) as error:
         # Of what the log made of the arithmetic: one sentence too.
         return _say_error(error, FAILED)
@@ -79,7 +78,7 @@ def _calibrate(options, tell):
             reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
         )
         tell("drawing the report")
-        _write(calibration, options, paths, written)
+        _write(calibration, options, reading.digests, written)
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
@@ -186,10 +185,17 @@ def _default_inputs(log, at_rest):
     return tuple(name for name in inputs if not (at_rest and name == "output"))
 
 
-def _write(calibration, options, paths, folder):
-    names = [Path(path).name for path in paths]
-    title = printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
-    page = report_page(calibration, title, report_options(options, paths))
+def _write(calibration, options, files, folder):
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    told = ReportOptions(
+        made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),
+        serial=options.serial,
+        operator=options.operator,
+        files=files,
+        options=(("options", options.typed),),
+        limits=tuple(options.limits),
+    )
+    page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
     compensator.write_json(folder / "compensator.json")
@@ -250,7 +256,7 @@ def _apply(options, tell):
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
     request = request_of(options, sorted(needed))
-    check_different(paths)
+    digests_of(paths)
     tallies: list = []
     with _staged(target.parent) as folder:
         with open(folder / target.name, "w", encoding="utf-8", newline="") as written:
@@ -300,30 +306,25 @@ class _Inputs:
 
     def __init__(self, inputs, time_constant):
         self._inputs, self._lag = inputs, time_constant
-        self._ends = pd.DataFrame({"run": []})  # the last row of each run, and when it began
+        self._ends = None  # the last row of each run, when the run began, and its rate then
 
     def __call__(self, log):
         if not {"time", "temperature_rate"} & set(self._inputs):
             return features(log, self._inputs, self._lag)
-        log = log.assign(temperature=log.get("temperature", 0.0))
-        parts = ["time", "temperature", "output", "run"]
+        log = log.assign(temperature=log.get("temperature", 0.0))[_ON_BOARD]
+        if self._ends is None:
+            self._ends = log.iloc[:0].assign(begin=0.0, rate=0.0)
         ends = self._ends[self._ends["run"].isin(log["run"])]
-        joined = log[parts]
-        if len(ends):
-            rise = ends["rate"] * self._lag / np.expm1(-1.0)
-            before = ends.assign(
-                time=ends["time"] - self._lag, temperature=ends["temperature"] + rise
-            )
-            joined = pd.concat([before[parts], ends[parts], joined])
+        rise = ends["rate"] * self._lag / np.expm1(-1.0)
+        before = ends.assign(time=ends["time"] - self._lag, temperature=ends["temperature"] + rise)
+        joined = pd.concat([before[_ON_BOARD], ends[_ON_BOARD], log])
         X = features(joined, self._inputs, self._lag).iloc[2 * len(ends) :].set_axis(log.index)
-        begin = log.groupby("run")["time"].transform("first")
-        if len(ends):
-            begin = log["run"].map(ends.set_index("run")["begin"]).fillna(begin)
+        begin = log["run"].map(ends.set_index("run")["begin"])
+        begin = begin.fillna(log.groupby("run")["time"].transform("first"))
         if "time" in X:
             X["time"] = log["time"] - begin
-        state = log[parts].assign(begin=begin, rate=X.get("temperature_rate", 0.0))
-        ended = pd.concat([self._ends, state]) if len(self._ends) else state
-        self._ends = ended.groupby("run").tail(1)
+        state = log.assign(begin=begin, rate=X.get("temperature_rate", 0.0))
+        self._ends = pd.concat([self._ends, state]).groupby("run").tail(1)
         return X
 
 

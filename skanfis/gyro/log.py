@@ -7,7 +7,6 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 
 import hashlib
 import os
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from glob import glob
@@ -23,10 +22,9 @@ from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
 from .errors import LogError, shortened
 
-__all__ = ["LogFile", "Reading", "RunFinder", "check_different", "find_logs", "read", "read_log"]
+__all__ = ["LogFile", "Reading", "RunFinder", "digests_of", "find_logs", "read", "read_log"]
 
 _ROWS = 200_000  # of a piece, which is all that is held beside the log itself
-_CLOCK_ROWS = 200  # by which the form of a clock is told
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
@@ -90,7 +88,7 @@ def read_log(
     0   0.0         20.0  -190.0  10.0
     1   1.0         20.1  -380.0  20.0
     """
-    request = Request(columns or {}, units or {}, tuple(require))
+    request = checked_request(Request(columns or {}, units or {}, tuple(require)))
     return read([paths] if isinstance(paths, str | Path) else list(paths), request).log
 
 
@@ -108,6 +106,7 @@ class Reading:
     files: list
     notes: list
     n_rows: int
+    digests: tuple
 
     @property
     def units(self):
@@ -133,10 +132,9 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     ``tell`` is called with a line of text for every file. Of more than ``most_rows`` rows every
     k-th of each run is held, with k a power of two.
     """
-    request = checked_request(request)
     if not paths:
         raise ValueError("paths: at least one file is needed.")
-    check_different(paths)
+    digests = digests_of(paths)
     files: list[LogFile] = []
     finder, checks, thinned = RunFinder(request.guess), None, _Thinned(most_rows)
     for number, path in enumerate(paths):
@@ -158,10 +156,10 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
     if "device" in parts:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
-    notes = [*_notes_of(files), *filter(None, [finder.note, thinned.note])]
-    return Reading(
-        log, runs["file"].to_numpy()[code], table.index.to_numpy(), files, notes, thinned.n_rows
-    )
+    notes = dict.fromkeys(note for file in files for note in file.notes)
+    notes = [*notes, *filter(None, [finder.note, thinned.note])]
+    file, row = runs["file"].to_numpy()[code], table.index.to_numpy()
+    return Reading(log, file, row, files, notes, thinned.n_rows, digests)
 
 
 class LogFile:
@@ -176,10 +174,8 @@ class LogFile:
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
         self.n_rows = 0
-        if first is not None:
-            self._check_like(first)
-
-    def _check_like(self, first):
+        if first is None:
+            return
         differ = sorted(set(self.layout.places) ^ set(first.layout.places))
         if differ:
             raise LogError(f"{self.path}: the files differ in having {', '.join(differ)}.")
@@ -219,21 +215,28 @@ class LogFile:
             except LogError as error:
                 raise self.located(error, piece.index) from error
             yield piece
-        if n_left_out:
-            self._report_missing(n_left_out, lacking[lacking > 0], first)
+        if not n_left_out:
+            return
+        names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
+        counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
+        said = f"{self.path}: {n_left_out:,} of {self.n_rows:,} rows lack a value ({counts})"
+        if 2 * n_left_out > self.n_rows:
+            raise LogError(f"{said}: too many to go on without them.")
+        place = self.source.place_of(int(first))
+        self.notes.append(f"{said}; they are left out, the first of them {place}")
 
     def _clock(self):
         """What reads the time, where it is no number."""
         if "time" not in self.layout.places:
             return None
         place = self.layout.places["time"]
-        table = next(self.source.pieces([place], _CLOCK_ROWS), None)
+        table = next(self.source.pieces([place], _ROWS), None)
         if table is None or np.isfinite(as_numbers(table[place], self.source.decimal)).any():
             return None
         clock = Clock(table[place])
         if not clock.form:
             return None
-        self.notes.append(clock.note)
+        self.notes.append(f"the time is read in s, its form is {clock.form}")
         return clock
 
     def _converted(self, table, clock):
@@ -268,14 +271,6 @@ class LogFile:
         part = "" if name == error.column else f" ({error.column})"
         return LogError(f"{where}, column {name!r}{part}: {error.reason}")
 
-    def _report_missing(self, n_rows, lacking, first):
-        parts = ", ".join(f"{self.layout.name(part)!r} in {n:,}" for part, n in lacking.items())
-        said = f"{n_rows:,} of {self.n_rows:,} rows lack a value ({parts})"
-        if 2 * n_rows > self.n_rows:
-            raise LogError(f"{self.path}: {said}: too many to go on without them.")
-        place = self.source.place_of(int(first))
-        self.notes.append(f"{said}; they are left out, the first of them {place}")
-
 
 class RunFinder:
     """Finds the runs of a log that comes in pieces: by labels, else by files.
@@ -288,9 +283,8 @@ class RunFinder:
         self._by_clock = by_clock
         self._longest = None  # step of the time within a run [s]
         self._codes: dict = {}
-        # By file and device: when its clock began, its last time, the number of its run.
-        self._open: dict = {}
-        self._n_gaps = self._n_restarts = 0
+        self._open: dict = {}  # by file: when its clock began, its last time, the number of its run
+        self._is_split = False
 
     @property
     def runs(self):
@@ -299,67 +293,49 @@ class RunFinder:
 
     def codes(self, piece, file):
         """Position of each row's run among ``runs``; ``file`` tells files apart."""
-        device = piece["device"] if "device" in piece else pd.Series("", piece.index)
-        if "run" in piece:
-            run = piece["run"]
-        elif "time" in piece and self._by_clock:
-            run = self._split(device, piece["time"], file).astype(str)
+        nothing = np.full(len(piece), "", dtype=object)
+        if "run" in piece or not ("time" in piece and self._by_clock):
+            run = piece.get("run", nothing)
         else:
-            run = pd.Series("", piece.index)
-        groups = pd.DataFrame({"device": device, "run": run}).groupby(["device", "run"], sort=False)
-        own = [
-            self._codes.setdefault((file, *key), len(self._codes))
-            for key in groups.head(1).itertuples(index=False, name=None)
-        ]
-        return np.array(own)[groups.ngroup().to_numpy()]
+            run = self._split(piece["time"].to_numpy(), file)
+        code, own = pd.MultiIndex.from_arrays([piece.get("device", nothing), run]).factorize()
+        places = [self._codes.setdefault((file, *key), len(self._codes)) for key in own]
+        return np.array(places)[code]
 
-    def _split(self, device, time, file):
+    def _split(self, time, file):
         if self._longest is None:
-            self._longest = _longest_step(time, device)
-        number = pd.Series(1, time.index)
-        for name, values in time.groupby(device, sort=False):
-            begin, last, before = self._open.get((file, name), (values.iloc[0],) * 2 + (1,))
-            steps = np.diff(values, prepend=last)
-            gaps = steps > self._longest
-            restarts = np.zeros(steps.size, dtype=bool)
-            for row in np.flatnonzero(steps < 0.0).tolist():
-                restart = values.iloc[row]
-                if restart <= begin + _BEGINNING * (restart - steps[row] - begin):
-                    restarts[row], begin = True, restart
-            number[values.index] = before + np.cumsum(gaps | restarts)
-            self._open[file, name] = begin, values.iloc[-1], int(number[values.index[-1]])
-            self._n_gaps += int(gaps.sum())
-            self._n_restarts += int(restarts.sum())
-        return number
+            self._longest = _longest_step(time)
+        begin, last, number = self._open.get(file, (time[0], time[0], 1))
+        steps = np.diff(time, prepend=last)
+        starts = steps > self._longest
+        for row in np.flatnonzero(steps < 0.0):
+            if time[row] <= begin + _BEGINNING * (time[row] - steps[row] - begin):
+                starts[row], begin = True, time[row]
+        self._is_split |= bool(starts.any())
+        numbers = number + np.cumsum(starts)
+        self._open[file] = begin, time[-1], numbers[-1]
+        return numbers.astype(str).astype(object)
 
     @property
     def note(self):
         """What the clock has told, in words; empty where it tells one run."""
-        parts = []
-        if self._n_gaps:
-            gaps = _counted(self._n_gaps, "gap")
-            parts.append(f"at {gaps} of the time longer than {self._longest:.4g} s")
-        if self._n_restarts:
-            times = _counted(self._n_restarts, "time")
-            parts.append(f"where the time begins anew ({times})")
-        if not parts:
+        if not self._is_split:
             return ""
-        return f"the log is split into {_counted(len(self._codes), 'run')}, {' and '.join(parts)}"
+        return (
+            f"the log is split into {len(self._codes)} runs, where the time begins anew or steps "
+            f"by more than {self._longest:.4g} s"
+        )
 
 
-def _longest_step(time, device):
+def _longest_step(time):
     """The longest step of the time within a run, by the first piece of a log."""
-    steps = time.groupby(device, sort=False).diff()
+    steps = np.diff(time)
     forward = steps[steps > 0.0]
-    if forward.empty:
+    if forward.size == 0:
         return np.inf
-    longest = max(_SHORTEST_GAP, _STEPS * forward.median())
-    number = (steps.isna() | (steps > longest)).groupby(device).cumsum()
-    return longest if number.groupby([device, number]).size().median() >= _FEWEST_ROWS else np.inf
-
-
-def _counted(n, noun):
-    return f"{n} {noun}{'s' if n > 1 else ''}"
+    longest = max(_SHORTEST_GAP, _STEPS * float(np.median(forward)))
+    lengths = np.diff(np.flatnonzero(steps > longest), prepend=-1, append=steps.size)
+    return longest if np.median(lengths) >= _FEWEST_ROWS else np.inf
 
 
 class _Thinned:
@@ -406,17 +382,6 @@ def _names_of_runs(runs, paths, has_labels):
     return names
 
 
-def _notes_of(files):
-    """What was found out about the files; what holds for all is said once."""
-    counts = Counter(note for file in files for note in file.notes)
-    notes = [
-        note if counts[note] == len(files) else f"{file.path}: {note}"
-        for file in files
-        for note in file.notes
-    ]
-    return list(dict.fromkeys(notes))
-
-
 def find_logs(arguments):
     """The files that are named, with patterns filled in for a shell that does not."""
     return [
@@ -426,15 +391,20 @@ def find_logs(arguments):
     ]
 
 
-def check_different(paths):
-    """LogError where one log is there twice: as two runs, each would be tested by the other."""
-    seen: dict = {}
-    for path in filter(os.path.isfile, paths):
+def digests_of(paths):
+    """Name, bytes and SHA-256 of each file.
+
+    LogError where one log is there twice: as two runs, each would be tested by the other.
+    """
+    found: dict = {}
+    for path in paths:
         with open(path, "rb") as opened:
-            digest = hashlib.file_digest(opened, "sha256").digest()
-        if digest in seen:
+            digest = hashlib.file_digest(opened, "sha256").hexdigest()
+            size = opened.tell()
+        if digest in found:
             raise LogError(
-                f"{path}: holds the same bytes as {seen[digest]}; a run that is there twice would "
-                "be tested by itself. Leave one of them out."
+                f"{path}: holds the same bytes as {found[digest][0]}; a run that is there twice "
+                "would be tested by itself. Leave one of them out."
             )
-        seen[digest] = path
+        found[digest] = path, size
+    return tuple((Path(path).name, size, digest) for digest, (path, size) in found.items())

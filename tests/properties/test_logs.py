@@ -15,7 +15,10 @@ from skanfis.inspection.labels import as_label, printable
 numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
 # pandas takes blanks off the left of a field, and some words for a missing value.
 labels = st.text(
-    st.characters(codec="utf-8", exclude_characters="\r\x00,;\t|"), min_size=1, max_size=20
+    st.characters(
+        codec="utf-8", exclude_categories=["Cc"], include_characters="\n", exclude_characters=",;|"
+    ),
+    max_size=20,
 ).map(lambda text: f"r{text}")
 COLUMNS = ("time", "temperature", "output", "rate")
 
