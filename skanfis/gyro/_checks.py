@@ -34,6 +34,7 @@ _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _LONGEST_RUN = 31 * 86_400.0  # s
 _OF_A_RUN = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
+_LEAST_SPAN = 10.0  # degC, to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
 # Fewer rows tell neither a line in every input nor what is left of it.
 _FEWEST_ROWS = 20
@@ -62,7 +63,6 @@ def check_log(
     *,
     inputs: Sequence[str] = ("temperature", "output"),
     units: dict[str, Any] | None = None,
-    min_temperature_span: float = 10.0,
 ) -> pd.DataFrame:
     """Check that a log is fit for calibrating a compensator, and refuse it otherwise.
 
@@ -71,11 +71,10 @@ def check_log(
     log : DataFrame of shape (n_rows, n_parts)
         As :func:`read_log` returns it. Without a column "run" all rows are one run.
     inputs : sequence of str, default=("temperature", "output")
-        Of "time", "temperature", "temperature_rate" and "output"; they must change enough.
+        Of "time", "temperature", "temperature_rate" and "output"; they must change enough, the
+        temperature by 10 degC.
     units : dict of str to str, default=None
         Units of the file, as for :func:`read_log`, which tell a raw signal from a rate.
-    min_temperature_span : float, default=10.0
-        Smallest range of the temperature [degC], if it is an input.
 
     Returns
     -------
@@ -114,10 +113,10 @@ def check_log(
         )
     if {"temperature", "temperature_rate"} & set(inputs):
         low, high = log["temperature"].min(), log["temperature"].max()
-        if high - low < min_temperature_span:
+        if high - low < _LEAST_SPAN:
             raise LogError(
                 f"the temperature spans {high - low:.3g} degC only ({low:.4g} to {high:.4g}); "
-                f"at least {min_temperature_span:g} degC are needed to learn from it. Log over a "
+                f"at least {_LEAST_SPAN:g} degC are needed to learn from it. Log over a "
                 "wider range, or leave temperature and temperature_rate out of the inputs.",
                 "temperature",
             )
@@ -169,26 +168,24 @@ class RowChecks:
         columns = {"begin": time, "end": time, "coldest": temperature, "hottest": temperature}
         found = pd.DataFrame(columns).groupby(run, sort=False).agg(_OF_A_RUN)
         self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(_OF_A_RUN)
-        _check_durations(self._runs.loc[found.index], self._units["time"])
-
-
-def _check_durations(runs, unit):
-    duration = (runs["end"] - runs["begin"]).to_numpy()
-    if duration.max() > _LONGEST_RUN:
-        raise LogError(
-            f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a smaller "
-            f"unit than {unit}?",
-            "time",
-        )
-    heating = (runs["hottest"] - runs["coldest"]).to_numpy()
-    fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
-    if fast.any():
-        first = int(np.argmax(fast))
-        raise LogError(
-            f"the temperature changes by {heating[first]:.3g} degC within {duration[first]:.3g} s, "
-            f"which is not plausible; is time in a larger unit than {unit}?",
-            "time",
-        )
+        runs, unit = self._runs.loc[found.index], self._units["time"]
+        duration = (runs["end"] - runs["begin"]).to_numpy()
+        if duration.max() > _LONGEST_RUN:
+            raise LogError(
+                f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a "
+                f"smaller unit than {unit}?",
+                "time",
+            )
+        heating = (runs["hottest"] - runs["coldest"]).to_numpy()
+        fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
+        if fast.any():
+            first = int(np.argmax(fast))
+            raise LogError(
+                f"the temperature changes by {heating[first]:.3g} degC within "
+                f"{duration[first]:.3g} s, which is not plausible; is time in a larger unit than "
+                f"{unit}?",
+                "time",
+            )
 
 
 def check_at_rest(log, unit):
@@ -248,21 +245,18 @@ def _check_plausible(values, part, unit):
     bad = (values < low) | (values > high)
     if not bad.any():
         return
-    row = int(np.argmax(bad))
     # More than half: the unit; few: glitches of the measurement.
-    advice = ""
+    advice, others = "", []
     if bad.mean() > 0.5:
         zero, one = convert(np.array([0.0, 1.0]), part, unit)
         ends = (np.array([values.min(), values.max()]) - zero) / (one - zero)
-        others = [
-            other
-            for other in units_of(part)
-            if other not in (unit, *SIGNALS)
-            and low <= convert(ends[0], part, other)
-            and convert(ends[1], part, other) <= high
-        ]
-        if others:
-            advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+        for other in units_of(part):
+            least, most = convert(ends, part, other)
+            if other not in (unit, *SIGNALS) and low <= least and most <= high:
+                others.append(other)
+    if others:
+        advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+    row = int(np.argmax(bad))
     raise LogError(
         f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
         f"are outside {low:g} to {high:g}){advice}.",
@@ -291,25 +285,20 @@ def _check_output_follows_rate(log, units):
             "output",
         )
     slope = np.polyfit(rate, output, 1)[0]
-    if units["output"] not in SIGNALS and not 0.5 < slope < 2.0:
-        raise LogError(
-            f"changes by {slope:.4g} deg/s per deg/s of rate: {_diagnosis(slope, units)} A raw "
-            "signal with a scale factor of its own is declared as counts.",
-            "output",
-        )
-
-
-def _diagnosis(slope, units):
-    """What a slope far from 1 tells."""
-    if -2.0 < slope < -0.5:
-        return "its sign is reversed."
-    found = []
-    for part, power in (("output", 1), ("rate", -1)):
+    if units["output"] in SIGNALS or 0.5 < slope < 2.0:
+        return
+    # What a slope far from 1 tells.
+    told = "its sign is reversed." if -2.0 < slope < -0.5 else "are the units right?"
+    for part, power in (("rate", -1), ("output", 1)):
         for unit in units_of("rate"):
             ratio = convert(1.0, part, unit) / convert(1.0, part, units[part])
             if 0.7 < slope * ratio**power < 1.4:
-                found.append(f"the {part} in {unit}")
-    return f"is {' or '.join(found)}?" if found else "are the units right?"
+                told = f"is the {part} in {unit}?"
+    raise LogError(
+        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} A raw signal with a scale factor "
+        "of its own is declared as counts.",
+        "output",
+    )
 
 
 def find_glitches(log, error):

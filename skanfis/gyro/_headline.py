@@ -14,10 +14,10 @@ effects of a one-way analysis of variance, with the chi^2 interval of G - 1 degr
 Model: the root mean square over the rows of the posterior's deviation without its noise.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.stats import chi2
 
 from ..bounds import bounds, gradient_bounds
@@ -30,7 +30,7 @@ from .metrics import rms
 __all__ = [
     "ARTICLES",
     "Budget",
-    "ProvenBounds",
+    "Proven",
     "budget_of",
     "errors_and_verdict",
     "headline",
@@ -139,8 +139,7 @@ def readability_of(calibration):
     return readability(calibration.rules, X[known], left[known])
 
 
-@dataclass(frozen=True)
-class Budget:
+class Budget(NamedTuple):
     """Standard deviations [deg/s], NaN where unknown; ends of a 95 % interval; groups in range."""
 
     noise: float
@@ -154,33 +153,6 @@ class Budget:
     def combined(self):
         """Of all parts that are known."""
         return float(np.sqrt(np.nansum(np.square([self.noise, self.scatter, self.model]))))
-
-
-@dataclass(frozen=True)
-class ProvenBounds:
-    """What is proven over a box.
-
-    ``found`` are :class:`~skanfis.bounds.Bounds` of what the rules give [deg/s]. ``rate_rises`` is
-    whether the compensated rate is proven to go with the output, in the sense of the scale factor;
-    None where the output is no input, or a law beside the rules is not bounded.
-    """
-
-    found: Any
-    rate_rises: bool | None
-
-    @property
-    def largest(self):
-        """What no compensation in the box exceeds in size [deg/s]."""
-        return float(self.found.magnitude[0])
-
-    @property
-    def attained(self):
-        """The largest size that was met in the box [deg/s], and the inputs where it was."""
-        found = self.found
-        sides = [(abs(found.lowest[0]), found.at_lowest[0])]
-        sides.append((abs(found.highest[0]), found.at_highest[0]))
-        size, place = max(sides, key=lambda side: side[0])
-        return float(size), place
 
 
 def budget_of(calibration):
@@ -206,42 +178,56 @@ def budget_of(calibration):
 
 def noise_within(residual, groups, noise_of_fit=None):
     """Deviation of residuals about the means of their groups; ``noise_of_fit`` is that of all."""
-    codes = np.unique(groups, return_inverse=True)[1]
-    means = np.bincount(codes, residual) / np.bincount(codes)
-    freedom = residual.size - means.size
+    off = residual - pd.Series(residual).groupby(groups).transform("mean").to_numpy()
+    freedom = residual.size - np.unique(groups).size
     if freedom < 1:
         return np.nan
-    within = np.sum((residual - means[codes]) ** 2) / freedom
-    if noise_of_fit is None:
-        return float(np.sqrt(within))
-    every = np.mean(residual**2)
-    return float(noise_of_fit * np.sqrt(within / every)) if every else 0.0
+    within = np.sum(off**2) / freedom
+    share = 1.0 if noise_of_fit is None else noise_of_fit**2 / (np.mean(residual**2) or np.inf)
+    return float(np.sqrt(within * share))
 
 
 def scatter_between(errors, groups):
     """Deviation between groups of what the means of errors would be without noise, and its ends."""
-    codes = np.unique(groups, return_inverse=True)[1]
-    sizes = np.bincount(codes)
-    n_groups = sizes.size
+    table = pd.Series(errors).groupby(groups).agg(["size", "mean", "var"])
+    n_groups = len(table)
     if n_groups < 2:
         return np.nan, np.nan, np.nan
-    means = np.bincount(codes, errors) / sizes
-    within = np.sum((errors - means[codes]) ** 2) / max(errors.size - n_groups, 1)
-    of_noise, between = within * np.mean(1.0 / sizes), np.var(means, ddof=1)
+    squares = (table["var"].fillna(0.0) * (table["size"] - 1)).sum()
+    of_noise = squares / max(len(errors) - n_groups, 1) * np.mean(1.0 / table["size"])
+    between = table["mean"].var()
     tails = chi2.ppf(0.5 + np.array([0.5, -0.5]) * _CONFIDENCE, n_groups - 1)
-    squares = np.array([between, *((n_groups - 1) * between / tails)]) - of_noise
-    return tuple(np.sqrt(np.maximum(squares, 0.0)).tolist())
+    found = np.array([between, *((n_groups - 1) * between / tails)]) - of_noise
+    return tuple(np.sqrt(np.maximum(found, 0.0)).tolist())
+
+
+class Proven(NamedTuple):
+    """What is proven over a box.
+
+    ``found`` are :class:`~skanfis.bounds.Bounds` of what the rules give [deg/s]; no compensation in
+    the box exceeds ``largest`` in size, and ``attained`` is the largest size that was met, and the
+    inputs where it was. ``rate_rises`` is whether the compensated rate is proven to go with the
+    output, in the sense of the scale factor; None where the output is no input, or a law beside the
+    rules is not bounded.
+    """
+
+    found: Any
+    largest: float
+    attained: tuple
+    rate_rises: bool | None
 
 
 def proven_bounds(calibration):
     """Bounds over the box of the recipe, other inputs in the range of the calibration."""
-    recipe, compensator = calibration.recipe, calibration.compensator
+    recipe, own = calibration.recipe, 1.0 / calibration.compensator.scale_factor
     box = {name: (low, high) for name, low, high in recipe.box} or None
     found = bounds(calibration.rules, box, max_boxes=_MOST_BOXES)
-    if recipe.physics or "output" not in recipe.inputs:
-        return ProvenBounds(found, None)
-    # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-    slope = gradient_bounds(calibration.rules, "output", box, max_boxes=_MOST_BOXES)
-    own = 1.0 / compensator.scale_factor
-    rises = slope.upper[0] < own if own > 0.0 else slope.lower[0] > own
-    return ProvenBounds(found, bool(np.all(rises)))
+    sizes = [float(abs(found.lowest[0])), float(abs(found.highest[0]))]
+    side = int(np.argmax(sizes))
+    attained = sizes[side], (found.at_lowest[0], found.at_highest[0])[side]
+    rises = None
+    if not recipe.physics and "output" in recipe.inputs:
+        # rate = output / factor - error: its slope has the factor's sign where the error's is less.
+        slope = gradient_bounds(calibration.rules, "output", box, max_boxes=_MOST_BOXES)
+        rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
+    return Proven(found, float(found.magnitude[0]), attained, rises)

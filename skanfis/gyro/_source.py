@@ -261,7 +261,7 @@ class Clock:
     def __init__(self, sample):
         texts = _texts(sample).dropna()[:_CLOCK_ROWS]
         fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
-        best = max(fits, key=fits.get)
+        best = max(_FORMATS, key=lambda form: fits[form])
         self.form = best if 2 * fits[best] > len(texts) else ""
         self._days, self._last = 0.0, None
 

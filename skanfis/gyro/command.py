@@ -213,9 +213,8 @@ def _write(calibration, options, files, folder):
 
 def _summary(calibration, folder, notes):
     lines = errors_and_verdict(calibration)
-    if not np.ptp(calibration.rate):
-        lines += _hysteresis_line(calibration)
     lines += [
+        *_hysteresis_line(calibration),
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
         *(f"note           {note}" for note in notes),
@@ -226,7 +225,7 @@ def _summary(calibration, folder, notes):
 
 def _hysteresis_line(calibration):
     """The gap between warming and cooling of a gyro at rest; none where there is no such gap."""
-    if "temperature_rate" not in calibration.X:
+    if np.ptp(calibration.rate) or "temperature_rate" not in calibration.X:
         return []
     rows = calibration.in_range
     temperature = calibration.log["temperature"].to_numpy()[rows]

@@ -119,9 +119,7 @@ class Reading:
         return f"{file.path}, {file.source.place_of(int(self.row[row]))}"
 
     def located(self, error):
-        """An error of a check of the log in the words of the files."""
-        if error.row is not None:
-            return self.files[self.file[error.row]].located(error, self.row)
+        """An error of a check of the whole log in the words of the files."""
         where = None if len(self.files) == 1 else "the log"
         return self.files[0].located(error, where=where)
 
@@ -156,8 +154,8 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
     if "device" in parts:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
-    notes = dict.fromkeys(note for file in files for note in file.notes)
-    notes = [*notes, *filter(None, [finder.note, thinned.note])]
+    notes = [note for file in files for note in file.notes]
+    notes = list(dict.fromkeys([*notes, *filter(None, [finder.note, thinned.note])]))
     file, row = runs["file"].to_numpy()[code], table.index.to_numpy()
     return Reading(log, file, row, files, notes, thinned.n_rows, digests)
 
@@ -195,7 +193,7 @@ class LogFile:
         clock, places = self._clock(), self.layout.places
         labels = [places[part] for part in LABELS if part in places]
         lacking = pd.Series(0, index=list(places))
-        n_left_out, first = 0, None
+        n_left_out, first = 0, 0
         for piece in self.source.pieces(list(places.values()), _ROWS, labels):
             self.n_rows += len(piece)
             try:
@@ -204,8 +202,8 @@ class LogFile:
                 bad = missing.any(axis=1)
                 if bad.any():
                     lacking += missing.sum()
+                    first = first if n_left_out else int(bad.idxmax())
                     n_left_out += int(bad.sum())
-                    first = bad.idxmax() if first is None else first
                     piece = piece[~bad].copy()
                 if piece.empty:
                     continue
@@ -222,7 +220,7 @@ class LogFile:
         said = f"{self.path}: {n_left_out:,} of {self.n_rows:,} rows lack a value ({counts})"
         if 2 * n_left_out > self.n_rows:
             raise LogError(f"{said}: too many to go on without them.")
-        place = self.source.place_of(int(first))
+        place = self.source.place_of(first)
         self.notes.append(f"{said}; they are left out, the first of them {place}")
 
     def _clock(self):
@@ -384,11 +382,8 @@ def _names_of_runs(runs, paths, has_labels):
 
 def find_logs(arguments):
     """The files that are named, with patterns filled in for a shell that does not."""
-    return [
-        path
-        for argument in arguments
-        for path in (not os.path.lexists(argument) and sorted(glob(argument))) or [argument]
-    ]
+    found = [[] if os.path.lexists(name) else sorted(glob(name)) for name in arguments]
+    return [path for name, paths in zip(arguments, found, strict=True) for path in paths or [name]]
 
 
 def digests_of(paths):

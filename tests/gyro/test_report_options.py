@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis.gyro._options import check_limit, make_parser, parse_limit
+from skanfis.gyro._options import check_limit, parse_limit
 
 
 @pytest.mark.parametrize(
@@ -70,9 +70,3 @@ def test_an_interval_over_the_limit_is_said(low, high, is_sure):
     check = check_limit(parse_limit("bias=5deg/h"), table_of(1.0, low, high))
     assert check.result == "pass"
     assert (check.remark == "") == is_sure
-
-
-def test_a_bad_limit_is_told_in_one_line(capsys):
-    with pytest.raises(SystemExit):
-        make_parser().parse_args(["log.csv", "--limits", "bias=5"])
-    assert "bias takes deg/s or deg/h; found ''" in capsys.readouterr().err
