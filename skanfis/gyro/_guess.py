@@ -96,13 +96,13 @@ def checked_request(request):
 
 @dataclass
 class Layout:
-    """Places of the parts in a file and their units there; ``reasons`` are those of guesses."""
+    """Places of the parts in a file and their units there; ``others`` would do as well."""
 
     header: list
     places: dict
     units: dict
     notes: list = field(default_factory=list)
-    reasons: dict = field(default_factory=dict)
+    others: dict = field(default_factory=dict)
 
     def name(self, part):
         """The part's name in the file."""
@@ -115,7 +115,7 @@ def settle(source, request, first=None):
     if first is not None:
         names |= {part: first.name(part) for part in first.places}
     names |= request.columns
-    layout = Layout(source.header, {}, {})
+    layout = Layout(source.header, {}, dict(request.units))
     # Names that were told go first: what they have taken is not there for the others.
     for part in sorted(names, key=lambda part: part not in request.columns):
         told = {name for other, name in request.columns.items() if other != part}
@@ -132,7 +132,7 @@ def settle(source, request, first=None):
     if len(set(layout.places.values())) < len(layout.places):
         raise LogError(f"{source.path}: two parts cannot be the same column of the file.")
     layout.places = {part: layout.places[part] for part in PARTS if part in layout.places}
-    layout.units = CANONICAL | layout.units | request.units
+    layout.units = CANONICAL | layout.units
     return layout
 
 
@@ -157,7 +157,7 @@ def _guess(source, request, layout, is_first):
                 layout.places.setdefault(part, column.place)
     if called_rate is not None and called_rate not in layout.places.values():
         layout.places.setdefault("rate", called_rate)
-    _settle_units(columns, layout, request)
+    _settle_units(columns, layout)
     layout.notes += _sentences(layout, request)
 
 
@@ -223,8 +223,7 @@ def _by_name(part, columns, layout):
     # One truth in two units: that which needs no conversion.
     chosen = next((c for c in best if c.unit in CANONICAL.values()), best[0])
     layout.places[part] = chosen.place
-    others = ", ".join(repr(layout.header[c.place]) for c in best if c is not chosen)
-    layout.reasons[part] = [f"{others} would do too"] if others else []
+    layout.others[part] = [layout.header[c.place] for c in best if c is not chosen]
 
 
 def _by_unit(part, columns, layout):
@@ -232,44 +231,39 @@ def _by_unit(part, columns, layout):
     found = [column for column in _free(part, columns, layout) if column.quantity]
     if part != "rate" and len(found) == 1:
         layout.places[part] = found[0].place
-        layout.reasons[part] = ["by its unit" if found[0].unit else "because it holds times"]
 
 
-def _settle_units(columns, layout, request):
+def _settle_units(columns, layout):
     """Units that the names say, or else the values."""
-    for part in _QUANTITIES.keys() & layout.places.keys():
+    for part in _QUANTITIES.keys() & layout.places.keys() - layout.units.keys():
         column = columns[layout.places[part]]
-        values, reason = column.numbers, ""
-        if part in request.units:
-            layout.units[part] = request.units[part]
-        elif column.unit and column.quantity in _QUANTITIES[part]:
+        values = column.numbers
+        if column.unit and column.quantity in _QUANTITIES[part]:
             layout.units[part] = column.unit
         elif values.size == 0:
             continue
         elif part == "temperature" and values.min() > _COLDEST_IN_KELVIN:
-            layout.units[part], reason = "K", "by its values"
+            layout.units[part] = "K"
         elif part == "time" and values.min() > _EPOCHS[-1][0]:
             layout.units[part] = next(unit for least, unit in _EPOCHS if values.min() > least)
-            reason = "since 1970, by its values"
-        elif part == "output" and _are_counts(values):
-            layout.units[part], reason = "counts", "because they are whole numbers"
-        if reason:
-            layout.reasons.setdefault(part, []).append(f"{layout.units[part]} {reason}")
-
-
-def _are_counts(values):
-    return np.abs(values).max() > _LARGEST_RATE and (values == values.round()).all()
+        elif part == "output" and max(abs(values)) > _LARGEST_RATE and not any(values % 1.0):
+            layout.units[part] = "counts"
 
 
 def _sentences(layout, request):
     """What was guessed, in words; what is named as it should be is not worth a word."""
     told = []
     for part in (part for part in PARTS if part in layout.places):
-        name, reasons = layout.name(part), layout.reasons.get(part, [])
-        if (part in request.columns or name.strip().casefold() == part) and not reasons:
+        name, unit = layout.name(part), layout.units.get(part, "")
+        others = ", ".join(map(repr, layout.others.get(part, [])))
+        is_told = part in request.columns or name.strip().casefold() == part
+        if is_told and not others and unit in ("", CANONICAL.get(part), request.units.get(part)):
             continue
-        unit = f" in {layout.units[part]}" if part in layout.units else ""
-        told.append(f"{part} = {name!r}{unit}" + (f" ({'; '.join(reasons)})" if reasons else ""))
+        told.append(
+            f"{part} = {name!r}"
+            + (f" in {unit}" if unit else "")
+            + (f" ({others} would do too)" if others else "")
+        )
     say = "columns, as guessed: {}. Say otherwise with --columns and --units"
     return [say.format("; ".join(told))] if told else []
 

@@ -51,8 +51,6 @@ Written to a folder: the model (compensator.json), a report with tables and pict
 """
 _EPILOG = """\
 examples:
-  python -m skanfis.gyro log.csv
-  python -m skanfis.gyro cold.csv warm.csv hot.csv --output gyro7
   python -m skanfis.gyro logs/*.csv --output gyro7
   python -m skanfis.gyro log.csv --columns time=t_ms temperature=temp output=counts rate=table \\
       --units time=ms output=counts

@@ -48,10 +48,9 @@ def main(arguments=None):
     parser = make_parser()
     options = parser.parse_args(arguments)
     options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
-    tell = _Progress(options.quiet)
+    tell = _progress(options.quiet)
     try:
-        run = _apply if options.apply else _calibrate
-        run(options, tell)
+        (_apply if options.apply else _calibrate)(options, tell)
         return DONE
     except UsageError as error:
         parser.error(printable(error))  # exits
@@ -349,18 +348,17 @@ def _summary_of_rates(target, tallies):
         yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after (rows with status 0)"
 
 
-class _Progress:
-    """Lines on stderr, with the time since the start."""
+def _progress(quiet):
+    """What writes lines to stderr, with the time since the start."""
+    start = time.monotonic()
 
-    def __init__(self, quiet):
-        self._quiet = quiet
-        self._start = time.monotonic()
-
-    def __call__(self, text):
-        if not self._quiet:
-            seconds = time.monotonic() - self._start
+    def tell(text):
+        if not quiet:
+            seconds = time.monotonic() - start
             _write_to(sys.stderr, f"{seconds:7.1f} s  {printable(text)}\n")
             sys.stderr.flush()
+
+    return tell
 
 
 def _say(lines):

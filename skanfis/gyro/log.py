@@ -172,6 +172,7 @@ class LogFile:
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
         self.n_rows = 0
+        self._clock: Clock | None = None
         if first is None:
             return
         differ = sorted(set(self.layout.places) ^ set(first.layout.places))
@@ -190,14 +191,14 @@ class LogFile:
         The index is the row's position in the file, of which ``number`` is that in the log. The
         command leaves out rows that lack a value.
         """
-        clock, places = self._clock(), self.layout.places
+        places = self.layout.places
         labels = [places[part] for part in LABELS if part in places]
         lacking = pd.Series(0, index=list(places))
         n_left_out, first = 0, 0
         for piece in self.source.pieces(list(places.values()), _ROWS, labels):
             self.n_rows += len(piece)
             try:
-                piece = self._converted(piece, clock)
+                piece = self._converted(piece)
                 missing = piece.isna()
                 bad = missing.any(axis=1)
                 if bad.any():
@@ -223,33 +224,24 @@ class LogFile:
         place = self.source.place_of(first)
         self.notes.append(f"{said}; they are left out, the first of them {place}")
 
-    def _clock(self):
-        """What reads the time, where it is no number."""
-        if "time" not in self.layout.places:
-            return None
-        place = self.layout.places["time"]
-        table = next(self.source.pieces([place], _ROWS), None)
-        if table is None or np.isfinite(as_numbers(table[place], self.source.decimal)).any():
-            return None
-        clock = Clock(table[place])
-        if not clock.form:
-            return None
-        self.notes.append(f"the time is read in s, its form is {clock.form}")
-        return clock
-
-    def _converted(self, table, clock):
+    def _converted(self, table):
         piece = pd.DataFrame(index=table.index)
         for part, place in self.layout.places.items():
             column = table[place]
-            if part in LABELS:
-                piece[part] = column.astype(object)
-            else:
-                piece[part] = self._numbers(column, part, clock if part == "time" else None)
+            is_label = part in LABELS
+            piece[part] = column.astype(object) if is_label else self._numbers(column, part)
             check_values(piece[part], part, self._allow_missing)
         return piece
 
-    def _numbers(self, column, part, clock):
-        numbers = clock.seconds(column) if clock else as_numbers(column, self.source.decimal)
+    def _numbers(self, column, part):
+        numbers = as_numbers(column, self.source.decimal)
+        if part == "time" and self._clock is None and not np.isfinite(numbers).any():
+            found = Clock(column)
+            if found.form:
+                self._clock = found
+                self.notes.append(f"the time is read in s, its form is {found.form}")
+        clock = self._clock if part == "time" else None
+        numbers = clock.seconds(column) if clock else numbers
         bad = np.isnan(numbers) & (column.notna() & ~column.isin(NO_VALUE)).to_numpy()
         if bad.any():
             row = int(bad.argmax())
