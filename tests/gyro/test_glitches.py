@@ -54,8 +54,3 @@ def test_sound_logs_have_none(options):
     # Digits lost, and noise of heavy tails.
     assert found(log.round({"temperature": 0, "output": 2})) == []
     assert found(log.assign(output=log["output"] + 0.05 * g.standard_t(3, len(log)))) == []
-
-
-def test_a_log_that_never_changes_has_none():
-    log = simulated(0).assign(temperature=20.0, rate=0.0, output=0.5)
-    assert found(log) == []

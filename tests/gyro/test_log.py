@@ -29,13 +29,6 @@ def table(folder, log, name="log.csv", **options):
     return path
 
 
-def test_values_come_back(tmp_path, log):
-    read = read_log(table(tmp_path, log))
-    assert list(read) == MEASURED
-    np.testing.assert_allclose(read.drop(columns="run"), log.drop(columns="run"), rtol=1e-12)
-    assert list(read["run"].cat.categories) == ["0", "1", "2"]
-
-
 @pytest.mark.parametrize(
     ("part", "unit", "values", "expected"),
     [
@@ -54,18 +47,6 @@ def test_units_are_converted(tmp_path, part, unit, values, expected):
     frame[part] = values
     read = read_log(table(tmp_path, frame), units={part: unit})
     np.testing.assert_allclose(read[part], expected, atol=1e-12)
-
-
-def test_each_file_is_a_run(tmp_path, log):
-    paths = [
-        table(tmp_path, part.drop(columns="run"), name)
-        for name, (_, part) in zip(
-            ["cold.csv", "mild.csv", "hot.csv"], log.groupby("run"), strict=True
-        )
-    ]
-    read = read_log(paths)
-    assert list(read["run"].cat.categories) == ["cold", "mild", "hot"]
-    assert (read["run"].cat.codes == log["run"].to_numpy()).all()
 
 
 def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
@@ -204,13 +185,6 @@ def test_logs_that_are_refused(log, spoil, column, row, message):
 def test_a_raw_signal_beyond_any_converter_is_refused(log, factor):
     with pytest.raises(LogError, match="counts are not plausible"):
         check_log(log.assign(output=factor * log["output"]), units={"output": "counts"})
-
-
-def test_a_gyro_at_rest_has_a_bias_to_learn(log):
-    at_rest = log.assign(output=log["output"] - log["rate"], rate=0.0)
-    check_log(at_rest, inputs=("temperature",))
-    with pytest.raises(LogError, match="leave output out"):
-        check_log(at_rest, inputs=("temperature", "output"))
 
 
 def test_a_log_at_rest_is_told_from_one_that_moves(log):
