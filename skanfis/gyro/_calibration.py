@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from ..options import LinearExtrapolation
+from ._checks import find_glitches
 from ._columns import SIGNALS, ask
-from ._glitches import find_glitches
 from ._models import Choice, fit_model, some_rows
 from ._simpler import Simpler, simpler_compensations
 from ._split import Split

@@ -1,23 +1,24 @@
-"""Refusing a log that no compensator should learn from."""
+"""Refusing a log that no compensator should learn from, and naming rows that spoil one."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
 from ._columns import CANONICAL, SIGNALS, convert, declared_units, units_of
 from .errors import LogError
 
 __all__ = [
     "LABELS",
-    "LARGEST_AT_REST",
     "PARTS",
     "QUANTITIES",
     "RowChecks",
     "check_at_rest",
     "check_log",
     "check_values",
+    "find_glitches",
 ]
 
 QUANTITIES = ("time", "temperature", "output", "rate")
@@ -31,16 +32,30 @@ _PLAUSIBLE = {
 }
 _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _LONGEST_RUN = 31 * 86_400.0  # s
+_OF_A_RUN = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
+_LEAST_SPAN = 10.0  # degC, to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
 # Fewer rows tell neither a line in every input nor what is left of it.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
-LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
+_LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
 _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
+
+# More than so many rows of a kind support one another.
+_MOST_GLITCHES = 3
+# Times the deviation of the next row: none of a bell-shaped noise comes near, nor of Student's with
+# three degrees of freedom in a thousand logs.
+_ALONE = 5.0
+# Their median is the row's surroundings, and stands one other glitch among them.
+_N_NEIGHBOURS = 8
+# The rows farthest off, and rows among which their neighbours are sought, at most.
+_MOST_CANDIDATES, _MOST_NEIGHBOURS = 2_000, 200_000
+# A temperature moves slowly: a part of its range is a lot from one row to the next.
+_SMOOTH = 0.2
 
 
 def check_log(
@@ -48,7 +63,6 @@ def check_log(
     *,
     inputs: Sequence[str] = ("temperature", "output"),
     units: dict[str, Any] | None = None,
-    min_temperature_span: float = 10.0,
 ) -> pd.DataFrame:
     """Check that a log is fit for calibrating a compensator, and refuse it otherwise.
 
@@ -57,11 +71,10 @@ def check_log(
     log : DataFrame of shape (n_rows, n_parts)
         As :func:`read_log` returns it. Without a column "run" all rows are one run.
     inputs : sequence of str, default=("temperature", "output")
-        Of "time", "temperature", "temperature_rate" and "output"; they must change enough.
+        Of "time", "temperature", "temperature_rate" and "output"; they must change enough, the
+        temperature by 10 degC.
     units : dict of str to str, default=None
         Units of the file, as for :func:`read_log`, which tell a raw signal from a rate.
-    min_temperature_span : float, default=10.0
-        Smallest range of the temperature [degC], if it is an input.
 
     Returns
     -------
@@ -100,10 +113,10 @@ def check_log(
         )
     if {"temperature", "temperature_rate"} & set(inputs):
         low, high = log["temperature"].min(), log["temperature"].max()
-        if high - low < min_temperature_span:
+        if high - low < _LEAST_SPAN:
             raise LogError(
                 f"the temperature spans {high - low:.3g} degC only ({low:.4g} to {high:.4g}); "
-                f"at least {min_temperature_span:g} degC are needed to learn from it. Log over a "
+                f"at least {_LEAST_SPAN:g} degC are needed to learn from it. Log over a "
                 "wider range, or leave temperature and temperature_rate out of the inputs.",
                 "temperature",
             )
@@ -117,7 +130,7 @@ class RowChecks:
 
     def __init__(self, units):
         self._units = units
-        self._runs = pd.DataFrame()  # of each run: its first and last time, and its temperatures
+        self._runs = pd.DataFrame()
 
     def add(self, log):
         """LogError for the first bad row of the next piece."""
@@ -136,14 +149,14 @@ class RowChecks:
             self._check_time(log)
 
     def _check_time(self, log):
-        time = pd.Series(log["time"].to_numpy())
-        run = pd.Series(np.asarray(log["run"]) if "run" in log else np.zeros(len(log), dtype=int))
+        time = log["time"].reset_index(drop=True)
+        run = pd.Series(log["run"].to_numpy() if "run" in log else 0, time.index)
         before = time.groupby(run, sort=False).shift()
         if len(self._runs):
             before = before.fillna(run.map(self._runs["end"]).astype(float))
-        bad = (time <= before).to_numpy()
+        bad = time <= before
         if bad.any():
-            row = int(np.argmax(bad))
+            row = int(bad.idxmax())
             raise LogError(
                 f"time does not increase within a run: {time[row]:.10g} s after {before[row]:.10g} "
                 f"s ({bad.sum()} such rows). Rows must be in the order of time; if several runs "
@@ -151,36 +164,28 @@ class RowChecks:
                 "time",
                 row,
             )
-        columns = {"begin": time, "end": time}
-        if "temperature" in log:
-            temperature = pd.Series(log["temperature"].to_numpy())
-            columns |= {"coldest": temperature, "hottest": temperature}
-        kinds = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
-        kinds = {name: kinds[name] for name in columns}
-        found = pd.DataFrame(columns).groupby(run, sort=False).agg(kinds)
-        self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(kinds)
-        _check_durations(self._runs.loc[found.index], self._units["time"])
-
-
-def _check_durations(runs, unit):
-    duration = (runs["end"] - runs["begin"]).to_numpy()
-    if duration.max() > _LONGEST_RUN:
-        raise LogError(
-            f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a smaller "
-            f"unit than {unit}?",
-            "time",
-        )
-    if "hottest" not in runs:
-        return
-    heating = (runs["hottest"] - runs["coldest"]).to_numpy()
-    fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
-    if fast.any():
-        first = int(np.argmax(fast))
-        raise LogError(
-            f"the temperature changes by {heating[first]:.3g} degC within {duration[first]:.3g} s, "
-            f"which is not plausible; is time in a larger unit than {unit}?",
-            "time",
-        )
+        temperature = log["temperature"].to_numpy() if "temperature" in log else np.nan
+        columns = {"begin": time, "end": time, "coldest": temperature, "hottest": temperature}
+        found = pd.DataFrame(columns).groupby(run, sort=False).agg(_OF_A_RUN)
+        self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(_OF_A_RUN)
+        runs, unit = self._runs.loc[found.index], self._units["time"]
+        duration = (runs["end"] - runs["begin"]).to_numpy()
+        if duration.max() > _LONGEST_RUN:
+            raise LogError(
+                f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a "
+                f"smaller unit than {unit}?",
+                "time",
+            )
+        heating = (runs["hottest"] - runs["coldest"]).to_numpy()
+        fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
+        if fast.any():
+            first = int(np.argmax(fast))
+            raise LogError(
+                f"the temperature changes by {heating[first]:.3g} degC within "
+                f"{duration[first]:.3g} s, which is not plausible; is time in a larger unit than "
+                f"{unit}?",
+                "time",
+            )
 
 
 def check_at_rest(log, unit):
@@ -191,7 +196,7 @@ def check_at_rest(log, unit):
     if "rate" in log:
         rate = log["rate"].to_numpy()
         row = int(np.argmax(np.abs(rate)))
-        if abs(rate[row]) > LARGEST_AT_REST:
+        if abs(rate[row]) > _LARGEST_AT_REST:
             raise LogError(f"{rate[row]:.4g} deg/s: the gyro was not at rest.", "rate", row)
     output = log["output"].to_numpy()
     if unit not in SIGNALS:
@@ -240,21 +245,18 @@ def _check_plausible(values, part, unit):
     bad = (values < low) | (values > high)
     if not bad.any():
         return
-    row = int(np.argmax(bad))
     # More than half: the unit; few: glitches of the measurement.
-    advice = ""
+    advice, others = "", []
     if bad.mean() > 0.5:
         zero, one = convert(np.array([0.0, 1.0]), part, unit)
         ends = (np.array([values.min(), values.max()]) - zero) / (one - zero)
-        others = [
-            other
-            for other in units_of(part)
-            if other not in (unit, *SIGNALS)
-            and low <= convert(ends[0], part, other)
-            and convert(ends[1], part, other) <= high
-        ]
-        if others:
-            advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+        for other in units_of(part):
+            least, most = convert(ends, part, other)
+            if other not in (unit, *SIGNALS) and low <= least and most <= high:
+                others.append(other)
+    if others:
+        advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
+    row = int(np.argmax(bad))
     raise LogError(
         f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
         f"are outside {low:g} to {high:g}){advice}.",
@@ -283,22 +285,67 @@ def _check_output_follows_rate(log, units):
             "output",
         )
     slope = np.polyfit(rate, output, 1)[0]
-    if units["output"] not in SIGNALS and not 0.5 < slope < 2.0:
-        raise LogError(
-            f"changes by {slope:.4g} deg/s per deg/s of rate: {_diagnosis(slope, units)} A raw "
-            "signal with a scale factor of its own is declared as counts.",
-            "output",
-        )
-
-
-def _diagnosis(slope, units):
-    """What a slope far from 1 tells."""
-    if -2.0 < slope < -0.5:
-        return "its sign is reversed."
-    found = []
-    for part, power in (("output", 1), ("rate", -1)):
+    if units["output"] in SIGNALS or 0.5 < slope < 2.0:
+        return
+    # What a slope far from 1 tells.
+    told = "its sign is reversed." if -2.0 < slope < -0.5 else "are the units right?"
+    for part, power in (("rate", -1), ("output", 1)):
         for unit in units_of("rate"):
             ratio = convert(1.0, part, unit) / convert(1.0, part, units[part])
             if 0.7 < slope * ratio**power < 1.4:
-                found.append(f"the {part} in {unit}")
-    return f"is {' or '.join(found)}?" if found else "are the units right?"
+                told = f"is the {part} in {unit}?"
+    raise LogError(
+        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} A raw signal with a scale factor "
+        "of its own is declared as counts.",
+        "output",
+    )
+
+
+def find_glitches(log, error):
+    """Rows that no other row supports, and what is odd about each; ``error`` is of every row.
+
+    Two things are looked at: the error, beside that of the rows nearest in temperature, rate and
+    order, and the temperature, beside that of the rows before and after in the run. Least squares
+    bends the whole model towards one such row.
+    """
+    temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
+    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
+    by_run = pd.Series(temperature).groupby(runs)
+    around = pd.concat([by_run.shift(step) for step in (-2, -1, 1, 2)], axis=1)
+    around = around.T.fillna(log["temperature"].reset_index(drop=True)).T
+    found = {
+        row: f"the temperature of {temperature[row]:.4g} degC"
+        for row in _alone(temperature - np.median(around, axis=1), _SMOOTH * _spread(temperature))
+    }
+    # What is far from its neighbours by more than all errors spread is far from the middle too.
+    far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
+    places = np.column_stack([temperature, rate, np.arange(len(log))])
+    scale = _spread(places)
+    places /= np.where(scale > 0.0, scale, 1.0)
+    # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
+    step = -(-len(log) // _MOST_NEIGHBOURS)
+    tree = cKDTree(places[::step], balanced_tree=False)
+    nearest = step * tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
+    # Not itself, or else not the farthest.
+    own = nearest == far[:, None]
+    own[~own.any(axis=1), -1] = True
+    others = np.median(error[nearest[~own].reshape(len(far), -1)], axis=1)
+    for row in far[_alone(error[far] - others, _spread(error))].tolist():
+        output = log["output"].iloc[row]
+        found.setdefault(row, f"the output of {output:.4g} at a rate of {rate[row]:.4g} deg/s")
+    return sorted(found.items())
+
+
+def _alone(deviations, least):
+    """Rows, three at most, whose deviation is above the least and far beyond that of all others."""
+    sizes = np.abs(deviations)
+    order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]
+    for count in range(len(order) - 1, 0, -1):
+        if sizes[order[count - 1]] > max(_ALONE * sizes[order[count]], least):
+            return order[:count].tolist()
+    return []
+
+
+def _spread(values):
+    low, high = np.quantile(values, [0.05, 0.95], axis=0)
+    return high - low

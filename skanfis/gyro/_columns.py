@@ -117,12 +117,11 @@ def in_rate_unit(unit, wanted):
     return wanted + unit.removeprefix(own), RATE_UNITS[wanted] / RATE_UNITS[own]
 
 
-def check_number(value, name, *, zero=False):
-    """Return a finite positive number as a float, or raise ValueError; ``zero`` lets zero pass."""
-    wanted = "zero or a positive" if zero else "a positive"
-    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else -1.0
-    if not math.isfinite(number) or number < 0 or (number == 0 and not zero):
-        raise ValueError(f"{name}={value!r} must be {wanted} number.")
+def check_number(value, name):
+    """Return a finite positive number as a float, or raise ValueError."""
+    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    if not 0.0 < number < math.inf:
+        raise ValueError(f"{name}={value!r} must be a positive number.")
     return number
 
 

@@ -1,14 +1,45 @@
-"""Which compensation to use, in words that report and command share."""
+"""What report and command tell of a calibration: which compensation to use, and how sure it is.
+
+The uncertainty of one compensated row has three parts.
+
+Noise: W is the sum of squares of the final model's n residuals e about the means of their G groups
+(runs, devices). The rules' own estimate s of the noise has paid for the effective number of
+parameters, but takes what groups differ by for noise of rows; without that,
+noise^2 = s^2 (W / (n - G)) / (sum e^2 / n).
+
+Scatter: held-out residuals have the mean m_g and n_g rows in group g, and the mean square w^2
+within groups. What is not repeatable is scatter^2 = var(m_g) - w^2 mean(1 / n_g), the random
+effects of a one-way analysis of variance, with the chi^2 interval of G - 1 degrees of freedom.
+
+Model: the root mean square over the rows of the posterior's deviation without its noise.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
+from scipy.stats import chi2
 
+from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NOTHING, options_for
 from .displays._base import figures
 from .metrics import rms
 
-__all__ = ["ARTICLES", "errors_and_verdict", "headline", "held_out_groups", "readability_of"]
+__all__ = [
+    "ARTICLES",
+    "Budget",
+    "Proven",
+    "budget_of",
+    "errors_and_verdict",
+    "headline",
+    "held_out_groups",
+    "noise_within",
+    "proven_bounds",
+    "readability_of",
+    "scatter_between",
+]
 
 ARTICLES = {
     NOTHING: "no compensation",
@@ -18,8 +49,9 @@ ARTICLES = {
     LAW_AND_LINE: "the arcsine law and a line",
     "cubic polynomial": "a cubic polynomial",
 }
-# Evenly chosen; what is greatest on a row hardly grows with more of them.
-_MOST_ROWS = 100_000
+_MOST_ROWS = 100_000  # evenly chosen, for the rules, the noise and the model
+_CONFIDENCE = 0.95  # of every interval in the report
+_MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
 
 
 def headline(calibration, unit):
@@ -105,3 +137,97 @@ def readability_of(calibration):
     # Rows that the law refuses are no business of the rules.
     known = np.isfinite(left)
     return readability(calibration.rules, X[known], left[known])
+
+
+class Budget(NamedTuple):
+    """Standard deviations [deg/s], NaN where unknown; ends of a 95 % interval; groups in range."""
+
+    noise: float
+    scatter: float
+    scatter_low: float
+    scatter_high: float
+    model: float
+    n_groups: int
+
+    @property
+    def combined(self):
+        """Of all parts that are known."""
+        return float(np.sqrt(np.nansum(np.square([self.noise, self.scatter, self.model]))))
+
+
+def budget_of(calibration):
+    """The budget of a calibration."""
+    rules = calibration.rules[-1]
+    rows = evenly_chosen(len(calibration.X), _MOST_ROWS)
+    X, estimator = calibration.X.iloc[rows], calibration.compensator.estimator
+    rate, before = calibration.rate[rows], calibration.before[rows]
+    residual = calibration.compensator.compensate(before, estimator.predict(X)) - rate
+    answered = np.isfinite(residual)
+    groups, in_range = calibration.split.labels.astype(str), calibration.in_range
+    noise = noise_within(residual[answered], groups[rows][answered], rules.noise_std_)
+    errors = (calibration.after - calibration.rate)[in_range]
+    model = np.nan
+    if rules.noise_std_ is not None:
+        deviation = calibration.rules.predict(X[answered], return_std=True)[1]
+        # Of the difference of two squares rounding may leave less than nothing.
+        beyond = np.maximum(deviation**2 - rules.noise_std_**2, 0.0)
+        model = float(np.sqrt(np.mean(beyond)))
+    scatter, low, high = scatter_between(errors, groups[in_range])
+    return Budget(noise, scatter, low, high, model, np.unique(groups[in_range]).size)
+
+
+def noise_within(residual, groups, noise_of_fit=None):
+    """Deviation of residuals about the means of their groups; ``noise_of_fit`` is that of all."""
+    off = residual - pd.Series(residual).groupby(groups).transform("mean").to_numpy()
+    freedom = residual.size - np.unique(groups).size
+    if freedom < 1:
+        return np.nan
+    within = np.sum(off**2) / freedom
+    share = 1.0 if noise_of_fit is None else noise_of_fit**2 / (np.mean(residual**2) or np.inf)
+    return float(np.sqrt(within * share))
+
+
+def scatter_between(errors, groups):
+    """Deviation between groups of what the means of errors would be without noise, and its ends."""
+    table = pd.Series(errors).groupby(groups).agg(["size", "mean", "var"])
+    n_groups = len(table)
+    if n_groups < 2:
+        return np.nan, np.nan, np.nan
+    squares = (table["var"].fillna(0.0) * (table["size"] - 1)).sum()
+    of_noise = squares / max(len(errors) - n_groups, 1) * np.mean(1.0 / table["size"])
+    between = table["mean"].var()
+    tails = chi2.ppf(0.5 + np.array([0.5, -0.5]) * _CONFIDENCE, n_groups - 1)
+    found = np.array([between, *((n_groups - 1) * between / tails)]) - of_noise
+    return tuple(np.sqrt(np.maximum(found, 0.0)).tolist())
+
+
+class Proven(NamedTuple):
+    """What is proven over a box.
+
+    ``found`` are :class:`~skanfis.bounds.Bounds` of what the rules give [deg/s]; no compensation in
+    the box exceeds ``largest`` in size, and ``attained`` is the largest size that was met, and the
+    inputs where it was. ``rate_rises`` is whether the compensated rate is proven to go with the
+    output, in the sense of the scale factor; None where the output is no input, or a law beside the
+    rules is not bounded.
+    """
+
+    found: Any
+    largest: float
+    attained: tuple
+    rate_rises: bool | None
+
+
+def proven_bounds(calibration):
+    """Bounds over the box of the recipe, other inputs in the range of the calibration."""
+    recipe, own = calibration.recipe, 1.0 / calibration.compensator.scale_factor
+    box = {name: (low, high) for name, low, high in recipe.box} or None
+    found = bounds(calibration.rules, box, max_boxes=_MOST_BOXES)
+    sizes = [float(abs(found.lowest[0])), float(abs(found.highest[0]))]
+    side = int(np.argmax(sizes))
+    attained = sizes[side], (found.at_lowest[0], found.at_highest[0])[side]
+    rises = None
+    if not recipe.physics and "output" in recipe.inputs:
+        # rate = output / factor - error: its slope has the factor's sign where the error's is less.
+        slope = gradient_bounds(calibration.rules, "output", box, max_boxes=_MOST_BOXES)
+        rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
+    return Proven(found, float(found.magnitude[0]), attained, rises)

@@ -1,77 +1,56 @@
-"""The options of the command, and its help."""
+"""The options of the command, limits of a specification among them.
+
+A limit is FIGURE=VALUE: bias=5deg/h says that the bias is 5 deg/h at most, without its sign.
+"""
 
 import argparse
 import math
+import re
+from argparse import ArgumentTypeError
 from pathlib import Path
+from typing import NamedTuple
 
 from .. import __version__
 from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
-from ._columns import units_of
-from ._console import usage_errors
-from ._guess import Request
-from ._report_options import add_report_options
+from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
+from ._figures_of_merit import figures_of_merit
+from ._guess import Request, checked_request
 from ._split import KINDS
+from .allan import ALLAN_FIGURES
 from .compensator import INPUTS
 from .errors import UsageError, shortened
-from .log import checked_request
 
-__all__ = ["PROGRAM", "make_parser", "parse_box", "request_of"]
+__all__ = [
+    "PROGRAM",
+    "Check",
+    "Limit",
+    "ReportOptions",
+    "check_limit",
+    "check_once",
+    "make_parser",
+    "parse_box",
+    "parse_limit",
+    "request_of",
+]
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
+_FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")
+_SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
+_UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
+_AT_LEAST = ("reduction_factor",)  # of this more is better
 
-_UNITS_OF_PARTS = ("\n" + 28 * " ").join(
-    f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES
-)
-_HELP = f"""\
+_WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
 Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
 (report.html), and the rules as text (rules.txt).
-
-LOG: text with a header, such as CSV, or Parquet: one log, or one file per run
-
-reading the log:
-  --columns PART=NAME ...   names of the columns; parts: {", ".join(PARTS)}.
-                            Parts that are not named are guessed by names and units
-  --units PART=UNIT ...     units, by default those in the names, or s, degC and deg/s
-                            {_UNITS_OF_PARTS}
-  --scale-factor K          of a raw signal at rest, which does not tell it: counts per deg/s
-
-the model:
-  --inputs INPUT ...        of {", ".join(INPUTS)} (all that the log
-                            has; time, since power-on, with three runs or more)
-  --terms N,N,...           fuzzy terms per input; 'search' (default) grows them on held-out groups,
-                            'auto' leaves them to ANFISRegressor
-  --physics                 fit the arcsine law of open-loop fiber-optic gyros first, and let the
-                            fuzzy rules learn what it leaves
-
-where it holds, and how it is checked:
-  --outside POLICY          beyond the range of the calibration: hold the value at its edge (clip),
-                            go on along the tangent for a while (linear, default), or give no rate
-                            (nan); such rows are flagged in any case
-  --min-coverage SHARE      rows that the data cover less are flagged ({Recipe.min_coverage:g})
-  --box INPUT=LOW:HIGH ...  where the report proves how large the compensation can be
-  --groups KIND             what to hold out: {", ".join(KINDS)}
-
-output:
-  --apply MODEL             compensate the logs by this compensator.json instead of calibrating
-  --output PATH             folder to write to (LOG-compensator); with --apply the file
-                            (LOG-compensated.csv)
-  --c STD                   also write the model as C, compensator.h and .c, by c99 or c89
-  --saturate                with --c: hold what the rules give between the proven limits
-  --force                   replace files that exist
-  --quiet                   no progress on stderr
-  --version, --help         the version; this page
 """
-
 _EPILOG = """\
 examples:
-  python -m skanfis.gyro log.csv
-  python -m skanfis.gyro cold.csv warm.csv hot.csv --output gyro7
   python -m skanfis.gyro logs/*.csv --output gyro7
   python -m skanfis.gyro log.csv --columns time=t_ms temperature=temp output=counts rate=table \\
       --units time=ms output=counts
@@ -83,29 +62,96 @@ exit codes:
 """
 
 
-def _pairs(texts, option):
-    """Options of the form PART=NAME as a dict."""
-    found = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if not (key and equals and value):
-            raise UsageError(f"{option}: {text!r} must be of the form PART=...")
-        if key in found:
-            raise UsageError(f"{option}: {key} is given twice.")
-        found[key] = value
-    return found
+def make_parser():
+    """The parser of the command's arguments."""
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        usage=f"{PROGRAM} LOG [LOG ...] [options]\n"
+        f"       {PROGRAM} --apply MODEL LOG [LOG ...] [options]",
+        description=_WHAT,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    several = {"nargs": "+", "action": "extend", "default": []}
+    units = "; ".join(f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES)
+    factor = _number(
+        lambda k: 1e-30 <= abs(k) <= 1e30, "a number from 1e-30 to 1e30, or such a negative one"
+    )
+    share = _number(lambda s: 0 <= s <= 1, "a number from 0 to 1")
+    parser.add_argument("--version", action="version", version=f"skanfis {__version__}")
+
+    def add(name, told, **settings):
+        group.add_argument(name, help=told, **settings)
+
+    group = parser.add_argument_group("reading the log")
+    told = "text with a header, such as CSV, or Parquet: one log, or one file per run"
+    add("logs", told, nargs="+", metavar="LOG")
+    told = f"the column of {', '.join(PARTS)}; what is not named is guessed by names and units"
+    add("--columns", told, metavar="PART=NAME", **several)
+    told = f"by default those in the names, or s, degC and deg/s. {units}"
+    add("--units", told, metavar="PART=UNIT", **several)
+    told = "of a raw signal at rest, which does not tell it: counts per deg/s"
+    add("--scale-factor", told, type=factor)
+    group = parser.add_argument_group("the model")
+    told = "all that the log has; time, since power-on, with three runs or more"
+    add("--inputs", told, nargs="+", choices=INPUTS)
+    told = "fuzzy terms per input, such as 2,1,3; 'search' (default) grows them on held-out groups"
+    add("--terms", f"{told}, 'auto' leaves them to ANFISRegressor", type=_terms, default="search")
+    told = "fit the arcsine law of open-loop fiber-optic gyros first; rules learn what it leaves"
+    add("--physics", told, action="store_true")
+    group = parser.add_argument_group("where it holds, and how it is checked")
+    told = (
+        "beyond the range of the calibration, where rows are flagged: hold the value at its edge "
+        "(clip), go on along the tangent for a while (linear, default), or give no rate (nan)"
+    )
+    add("--outside", told, choices=("clip", "linear", "nan"), default=Recipe.outside)
+    told = f"rows that the data cover less are flagged ({Recipe.min_coverage:g})"
+    add("--min-coverage", told, type=share, default=Recipe.min_coverage)
+    told = "where the report proves how large the compensation can be"
+    add("--box", told, type=parse_box, metavar="INPUT=LOW:HIGH", **several)
+    add("--groups", "what to hold out", choices=KINDS, default="auto")
+    group = parser.add_argument_group("the report")
+    add("--serial", "serial number of the gyro", default="")
+    add("--operator", "who made the calibration", default="")
+    told = "of the specification, as in residual_rms=0.01deg/s (at most), reduction_factor=10"
+    add("--limits", f"{told} (at least)", type=parse_limit, metavar="FIGURE=VALUE", **several)
+    group = parser.add_argument_group("output")
+    told = "compensate the logs by this compensator.json instead of calibrating"
+    add("--apply", told, metavar="MODEL")
+    told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
+    add("--output", told, type=Path)
+    add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
+    told = "with --c: hold what the rules give between the proven limits"
+    add("--saturate", told, action="store_true")
+    add("--force", "replace files that exist", action="store_true")
+    add("--quiet", "no progress on stderr", action="store_true")
+    return parser
 
 
 def request_of(options, require):
     """What the options ask of a reading; UsageError where they name an unknown part or unit."""
-    request = Request(
-        columns=_pairs(options.columns, "--columns"),
-        units=_pairs(options.units, "--units"),
-        require=tuple(require),
-        guess=True,
-    )
-    with usage_errors():
-        return checked_request(request)
+    columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
+    try:
+        return checked_request(Request(columns, units, tuple(require), guess=True))
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def _pairs(texts, option):
+    """Options of the form PART=NAME as a dict."""
+    pairs = [text.partition("=") for text in texts]
+    for text, pair in zip(texts, pairs, strict=True):
+        if not all(pair):
+            raise UsageError(f"{option}: {text!r} must be of the form PART=...")
+    check_once(option, [part for part, *_ in pairs])
+    return {part: name for part, _, name in pairs}
+
+
+def check_once(option, names):
+    """UsageError where a name is given twice."""
+    for name in names:
+        if names.count(name) > 1:
+            raise UsageError(f"{option}: {name} is given twice.")
 
 
 def _number(is_valid, what):
@@ -117,7 +163,7 @@ def _number(is_valid, what):
         except ValueError:
             value = math.nan
         if not is_valid(value):
-            raise argparse.ArgumentTypeError(f"{shortened(text)} must be {what}")
+            raise ArgumentTypeError(f"{shortened(text)} must be {what}")
         return value
 
     return parse
@@ -131,13 +177,11 @@ def _terms(text):
     except ValueError:
         numbers = ()
     if not numbers or min(numbers) < 1:
-        raise argparse.ArgumentTypeError(
-            f"{shortened(text)} must be search, auto, or numbers such as 2,3,3"
-        )
+        raise ArgumentTypeError(f"{shortened(text)} must be search, auto, or numbers such as 2,3,3")
     n_rules = math.prod(numbers)
     if n_rules > _MOST_RULES:
         made = f"{n_rules:,}" if n_rules < 10**15 else "too many"
-        raise argparse.ArgumentTypeError(
+        raise ArgumentTypeError(
             f"{shortened(text, str)} makes {made} rules; at most {_MOST_RULES} are learnt. Use "
             "fewer terms"
         )
@@ -145,56 +189,89 @@ def _terms(text):
 
 
 def parse_box(text):
+    """A range such as ``temperature=-40:85``; ArgumentTypeError where it is none."""
     name, _, ends = text.partition("=")
     try:
         low, high = map(float, ends.split(":"))
     except ValueError:
         low = high = math.nan
     if not (name and -math.inf < low <= high < math.inf):
-        raise argparse.ArgumentTypeError(
+        raise ArgumentTypeError(
             f"{shortened(text)} must be INPUT=LOW:HIGH, two numbers, such as temperature=-40:85"
         )
     return name, low, high
 
 
-_SHARE = _number(lambda s: 0 <= s <= 1, "a number from 0 to 1")
-_FACTOR = _number(
-    lambda k: 1e-30 <= abs(k) <= 1e30, "a number from 1e-30 to 1e30, or such a negative one"
-)
+class Limit(NamedTuple):
+    """The size that a figure may have at most, or at least; ``text`` is what was typed of it."""
+
+    figure: str
+    value: float
+    unit: str
+    text: str
+
+    def keeps(self, value):
+        """Whether a value in the limit's unit keeps it."""
+        return bool(value >= self.value if self.figure in _AT_LEAST else abs(value) <= self.value)
 
 
-def make_parser():
-    """The parser of the command's arguments."""
-    parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        usage=f"{PROGRAM} LOG [LOG ...] [options]\n"
-        f"       {PROGRAM} --apply MODEL LOG [LOG ...] [options]",
-        description=_HELP,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        add_help=False,
-    )
+def parse_limit(text):
+    """A limit such as ``bias=5deg/h``; ArgumentTypeError where it is none."""
+    figure, _, typed = text.partition("=")
+    if figure not in _UNITS:
+        raise ArgumentTypeError(
+            f"{text!r} must be FIGURE=VALUE, with a figure of merit of: {', '.join(_UNITS)}."
+        )
+    usual, found = _UNITS[figure], _FORM.fullmatch(typed)
+    if found is None:
+        raise ArgumentTypeError(
+            f"{text!r}: {typed!r} must be a number, not negative, and a unit, as in "
+            f"{figure}=5{usual}."
+        )
+    unit = found["unit"]
+    for sign, name in _SPELLINGS:
+        unit = unit.replace(sign, name)
+    known = {name: name for name in (in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)}
+    if rate_unit_of(usual) is None:
+        # Without its unit, and "ppm" alone, it is clear as well.
+        known |= {"": usual, usual.partition(" ")[0]: usual}
+    if unit not in known:
+        wanted = " or ".join(filter(None, known)) or "no unit"
+        raise ArgumentTypeError(f"{text!r}: {figure} takes {wanted}; found {unit!r}.")
+    return Limit(figure, float(found["value"]), known[unit], typed.strip())
 
-    def add(name, **settings):
-        parser.add_argument(name, help=argparse.SUPPRESS, **settings)
 
-    several = {"nargs": "+", "action": "extend", "default": []}
-    parser.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)
-    add("--version", action="version", version=f"skanfis {__version__}")
-    add("logs", nargs="+", metavar="LOG")
-    add("--columns", **several)
-    add("--units", **several)
-    add("--scale-factor", type=_FACTOR)
-    add("--inputs", nargs="+", choices=INPUTS)
-    add("--terms", type=_terms, default="search")
-    add("--outside", choices=("clip", "linear", "nan"), default=Recipe.outside)
-    add("--min-coverage", type=_SHARE, default=Recipe.min_coverage)
-    add("--box", type=parse_box, **several)
-    add("--groups", choices=KINDS, default="auto")
-    add("--apply")
-    add("--output", type=Path)
-    add("--c", choices=("c99", "c89"))
-    for flag in ("--physics", "--saturate", "--force", "--quiet"):
-        add(flag, action="store_true")
-    add_report_options(parser)
-    return parser
+class Check(NamedTuple):
+    """A limit, the figure in its unit, and "pass", "fail" or "not measured"."""
+
+    limit: Limit
+    value: float
+    result: str
+    remark: str
+
+
+def check_limit(limit, lines):
+    """Whether a figure keeps its limit, by the lines of a table of :func:`gyro_report`."""
+    if limit.figure not in lines.index:
+        return Check(limit, math.nan, "not measured", "the log does not give this figure")
+    line, wanted = lines.loc[limit.figure], rate_unit_of(limit.unit)
+    factor = 1.0 if wanted is None else in_rate_unit(line["unit"], wanted)[1]
+    value, low, high = (factor * line[name] for name in ("after", "after_low", "after_high"))
+    if math.isnan(value):
+        return Check(limit, value, "not measured", line["note"])
+    is_kept = limit.keeps(value)
+    is_sure = math.isnan(low) or limit.keeps(low) == limit.keeps(high) == is_kept
+    remark = "" if is_sure else "its interval reaches over the limit"
+    return Check(limit, value, "pass" if is_kept else "fail", remark)
+
+
+class ReportOptions(NamedTuple):
+    """All may be missing. ``files`` have a name, a size [bytes] and the SHA-256 of their bytes."""
+
+    made: str = ""
+    serial: str = ""
+    operator: str = ""
+    files: tuple[tuple[str, int, str], ...] = ()
+    options: tuple[tuple[str, str], ...] = ()
+    limits: tuple[Limit, ...] = ()
+    unit: str = "auto"

@@ -6,7 +6,7 @@ import numpy as np
 
 from ._columns import RATE_UNITS, label_texts
 from ._headline import readability_of
-from ._report_options import ReportOptions, check_limit
+from ._options import ReportOptions, check_limit
 from .allan import rows_for_allan
 from .compensator import features
 from .displays._base import figures, signs

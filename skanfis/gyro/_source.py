@@ -1,87 +1,86 @@
-"""The table in a file, text or Parquet: its header, and its rows in pieces, columns by position."""
+"""The table in a file, text or Parquet: its header, its rows in pieces, and columns as numbers."""
 
 import codecs
+import contextlib
 import csv
 import re
 from itertools import islice
 
+import numpy as np
 import pandas as pd
 
-from ._values import NO_VALUE
 from .errors import LogError
 
-__all__ = ["ParquetSource", "TextSource", "open_source"]
+__all__ = ["NO_VALUE", "Clock", "as_numbers", "open_source"]
+
+# What loggers write where there is no value, beside what pandas knows.
+NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 
 _LONGEST_FIELD = 2**31 - 1  # the largest limit that the module csv takes on every system
 _HEAD_BYTES = 2**16
 # Lines above the header that a logger may write, and a few rows.
 _HEAD_RECORDS = 60
-_LONGEST_NUMBER = 60
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas"}
-_MARKS = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF32_LE: "utf-32",
-    codecs.BOM_UTF32_BE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
-_KINDS = {b"\x1f\x8b": "compressed", b"PK\x03\x04": "an archive or a workbook", b"PAR1": "Parquet"}
-_CONTROL = re.compile("[\x00-\x08\x0e-\x1f\x7f\x81\x8d\x8f\x90\x9d\ufffd]")
-_NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?$")
-_MOMENT = re.compile(r"[0-9]{1,4}([:./-])[0-9]{1,2}(\1[0-9]|[T ,:]|$)")
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars"}
+_NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
+# A number or a moment, in full; a number with a fraction.
+_VALUE = re.compile(r"[+-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
+_FRACTION = re.compile(r"[+-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
+
+_CLOCK = "hours:minutes:seconds"
+_FORMATS = [
+    _CLOCK,
+    "ISO8601",
+    *(
+        f"{date} {clock}"
+        for date in ("%d.%m.%Y", "%d.%m.%y", "%m/%d/%Y", "%m/%d/%y", "%d/%m/%Y", "%Y/%m/%d")
+        for clock in ("%H:%M:%S", "%H:%M:%S.%f", "%I:%M:%S %p", "%H:%M")
+    ),
+]
+_CLOCK_ROWS = 200  # by which the form of a clock is told
+_EPOCH = pd.Timestamp(0, tz="UTC")
+_DAY = 86_400.0  # s
 
 
-def open_source(path, separator=None, decimal=None, encoding=None):
+def open_source(path):
     """The table in a file; LogError where there is none."""
-    if str(path).lower().endswith((".parquet", ".pq")):
-        return ParquetSource(path)
-    return TextSource(path, separator, decimal, encoding)
+    is_parquet = str(path).lower().endswith((".parquet", ".pq"))
+    return _ParquetSource(path) if is_parquet else _TextSource(path)
 
 
-class TextSource:
-    """A text file with a header and one record per line; what is None is found out.
+class _TextSource:
+    """A text file with a header and one record per line.
 
-    ``header`` are the names of the columns; ``notes`` tell what was found out.
+    ``header`` are the names of the columns, ``decimal`` is the sign of the decimal fraction;
+    ``notes`` tell what was found out.
     """
 
-    def __init__(self, path, separator=None, decimal=None, encoding=None):
+    def __init__(self, path):
         self.path, self.notes = path, []
-        self.encoding = encoding or _find_encoding(path)
-        if encoding is None and self.encoding != "utf-8-sig":
-            self.notes.append(f"the text is read as {self.encoding.upper()}")
-        self.separator = separator or self._find_separator()
+        self._encoding = _find_encoding(path)
+        if self._encoding != "utf-8-sig":
+            self.notes.append(f"the text is read as {self._encoding.upper()}")
+        self._find_separator()
         head = list(islice(self._records(), _HEAD_RECORDS))
         if not head:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
-        self.decimal = decimal or self._find_decimal(head)
-        if self.separator == self.decimal:
-            raise ValueError(
-                f"separator and decimal are both {self.decimal!r}: numbers would be cut."
-            )
+        self.decimal = self._find_decimal(head)
+        self._check_lengths()
 
     def _find_separator(self):
-        """The first sign that cuts all lines into as many fields, two at least; else a comma."""
-        most, found = 1, ","
+        """The first sign that is on all lines, those of a preamble aside; else a comma."""
         for sign, name in _SEPARATORS.items():
-            self.separator = sign
-            try:
-                lengths = [len(values) for _, values in islice(self._records(), _HEAD_RECORDS)]
-            except LogError:
-                continue
-            body = lengths[len(lengths) // 3 :]  # below a preamble
-            if body and min(body) == max(body) > 1:
-                if sign != ",":
-                    self.notes.append(f"columns are separated by {name}")
-                return sign
-            if lengths and lengths[0] > most:
-                most, found = lengths[0], sign
-        return found
+            self._separator = sign
+            lengths = [len(values) for _, values in islice(self._records(), _HEAD_RECORDS)]
+            if min(lengths[len(lengths) // 3 :], default=0) > 1:
+                self.notes.append(f"columns are separated by {name}")
+                return
+        self._separator = ","
 
     def _find_decimal(self, head):
-        numbers = [cell for _, values in head for cell in values if _NUMBER.match(cell.strip())]
-        commas = sum("," in cell for cell in numbers)
-        if self.separator == "," or commas <= sum("." in cell for cell in numbers):
+        cells = [cell.strip() for _, values in head for cell in values]
+        signs = [found[1] for cell in cells if (found := _FRACTION.match(cell))]
+        if self._separator == "," or signs.count(",") <= signs.count("."):
             return "."
         self.notes.append("decimal fractions are written with a comma")
         return ","
@@ -103,6 +102,16 @@ class TextSource:
         if place:
             self.notes.append(f"the header is line {head[place][0]}")
 
+    def _check_lengths(self):
+        """Refuse rows longer than the header, which pandas would cut without a word."""
+        n_columns = len(self.header)
+        for line, values in islice(self._records(), self._n_above, None):
+            if len(values) > n_columns and "".join(values[n_columns:]).strip():
+                raise LogError(
+                    f"{self.path}, line {line}: has {len(values)} values, more than the "
+                    f"{n_columns} columns of the header."
+                )
+
     def _records(self):
         """First line, from 1, and values of every record that is not blank; quotes hide line ends.
 
@@ -111,8 +120,8 @@ class TextSource:
         limit = csv.field_size_limit(_LONGEST_FIELD)
         line = 1
         try:
-            with open(self.path, encoding=self.encoding, newline="") as file:
-                reader = csv.reader(file, delimiter=self.separator, skipinitialspace=True)
+            with open(self.path, encoding=self._encoding, newline="") as file:
+                reader = csv.reader(file, delimiter=self._separator, skipinitialspace=True)
                 for values in reader:
                     if len(values) > 1 or "".join(values).strip():
                         yield line, values
@@ -130,19 +139,19 @@ class TextSource:
         return f"line {next(islice(lines, row + self._n_above, None), row + self._n_above + 1)}"
 
     def pieces(self, places, n_rows, labels=()):
-        """Tables of so many rows: columns by their places, those of ``labels`` as texts.
+        """Tables of so many rows, columns by their places, those of ``labels`` as texts.
 
-        LogError where the file is no such table.
+        The index is the position in the file. LogError where the file is no such table.
         """
         if self._n_lines is None:
             return
         try:
-            with open(self.path, encoding=self.encoding, newline="") as file:
+            with open(self.path, encoding=self._encoding, newline="") as file:
                 for _ in range(self._n_lines):
                     file.readline()
                 yield from pd.read_csv(
                     file,
-                    sep=self.separator,
+                    sep=self._separator,
                     decimal=self.decimal,
                     skipinitialspace=True,
                     index_col=False,
@@ -161,19 +170,9 @@ class TextSource:
         except UnicodeError as error:
             raise _no_text(self.path) from error
 
-    def check_lengths(self):
-        """Refuse rows longer than the header, which pandas would cut without a word."""
-        n_columns = len(self.header)
-        for line, values in islice(self._records(), self._n_above, None):
-            if len(values) > n_columns and "".join(values[n_columns:]).strip():
-                raise LogError(
-                    f"{self.path}, line {line}: has {len(values)} values, more than the "
-                    f"{n_columns} columns of the header."
-                )
 
-
-class ParquetSource:
-    """As :class:`TextSource`, of Parquet."""
+class _ParquetSource:
+    """As a text file, of Parquet."""
 
     decimal = "."
 
@@ -204,16 +203,13 @@ class ParquetSource:
     def place_of(self, row):
         return f"row {row}"
 
-    def check_lengths(self):
-        """Every row of such a file has every column."""
-
     def pieces(self, places, n_rows, labels=()):
-        """Tables of so many rows at most, as of :class:`TextSource`."""
-        names = [self.header[place] for place in places]
+        names, begin = [self.header[place] for place in places], 0
         try:
             for batch in self._file.iter_batches(n_rows, columns=names):
-                table = {k: batch.column(self.header[k]).to_pandas() for k in places}
-                yield pd.DataFrame(table).astype(dict.fromkeys(labels, "string"))
+                columns = {k: batch.column(self.header[k]).to_pandas() for k in places}
+                table = pd.DataFrame(columns).astype(dict.fromkeys(labels, "string"))
+                yield table.set_axis(pd.RangeIndex(begin, begin := begin + len(table)))
         except self._errors as error:
             raise self._damaged(error) from error
 
@@ -221,34 +217,82 @@ class ParquetSource:
 def _find_encoding(path):
     with open(path, "rb") as file:
         head = file.read(_HEAD_BYTES)
-    for mark, name in _MARKS.items():
-        if head.startswith(mark):
-            return name
-    for mark, kind in _KINDS.items():
-        if head.startswith(mark):
-            raise LogError(f"{path}: is {kind}, not text; export it as CSV.")
-    try:
-        with open(path, encoding="utf-8") as file:
-            while b"\x00" not in head and file.read(_HEAD_BYTES):
-                pass
-        if b"\x00" not in head:
-            return "utf-8-sig"
-    except UnicodeDecodeError:
-        pass
-    if _CONTROL.search(head.decode("cp1252", errors="replace")):
-        raise _no_text(path)
-    return "cp1252"
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    for encoding in ("utf-8-sig", "cp1252"):
+        with contextlib.suppress(UnicodeDecodeError):
+            # The last sign of the head may be cut.
+            text = codecs.getincrementaldecoder(encoding)().decode(head)
+            if not _NO_TEXT.search(text):
+                return encoding
+    raise _no_text(path)
 
 
 def _no_text(path):
     return LogError(
-        f"{path}: is not text in UTF-8, UTF-16 or Windows-1252; save it as such, or name its "
-        "encoding."
+        f"{path}: is not text in UTF-8, UTF-16 or Windows-1252; export it as CSV in one of these."
     )
 
 
 def _is_data(values):
     """Whether most of the fields of a record that are not empty are numbers or times."""
-    filled = [cell[:_LONGEST_NUMBER] for cell in map(str.strip, values) if cell]
-    numbers = sum(bool(_NUMBER.match(cell) or _MOMENT.match(cell)) for cell in filled)
-    return 2 * numbers >= max(len(filled), 1)
+    filled = [cell.strip() for cell in values if cell.strip()]
+    return bool(filled) and 2 * sum(bool(_VALUE.match(cell)) for cell in filled) >= len(filled)
+
+
+def as_numbers(column, decimal="."):
+    """A column as floats; dates and durations in s, NaN for all else."""
+    if column.dtype.kind == "M":
+        column = pd.to_datetime(column, utc=True) - _EPOCH
+    if column.dtype.kind == "m":
+        return _in_seconds(column)
+    if column.dtype.kind in "iuf":
+        return column.to_numpy(dtype=float, na_value=np.nan)
+    plain = _texts(column).str.replace(decimal, ".")
+    return pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+
+
+class Clock:
+    """Turns texts of one column into seconds, piece by piece; a clock goes on past midnight.
+
+    ``form`` is that of most of the first values; empty where these are no times.
+    """
+
+    def __init__(self, sample):
+        texts = _texts(sample).dropna()[:_CLOCK_ROWS]
+        fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
+        best = max(_FORMATS, key=lambda form: fits[form])
+        self.form = best if 2 * fits[best] > len(texts) else ""
+        self._days, self._last = 0.0, None
+
+    def seconds(self, column):
+        """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
+        seconds = _moments(_texts(column), self.form)
+        known = np.flatnonzero(np.isfinite(seconds))
+        if self.form == _CLOCK and known.size:
+            values = seconds[known]
+            last = values[0] if self._last is None else self._last
+            days = self._days + np.cumsum(np.diff(values, prepend=last) < -0.5 * _DAY)
+            self._days, self._last = float(days[-1]), float(values[-1])
+            seconds[known] += _DAY * days
+        return seconds
+
+
+def _moments(texts, form):
+    texts = texts.str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
+    if form == _CLOCK:
+        clocks = texts.where(
+            texts.str.fullmatch(r"[0-9]{1,6}(:[0-9]{1,2}){2}(\.[0-9]*)?", na=False)
+        )
+        return _in_seconds(pd.to_timedelta(clocks, errors="coerce"))
+    return _in_seconds(pd.to_datetime(texts, format=form, errors="coerce", utc=True) - _EPOCH)
+
+
+def _texts(column):
+    """Texts without blanks at the ends; NaN where there is no value."""
+    texts = column.astype(object)
+    return texts.where(column.notna() & ~column.isin(NO_VALUE)).astype("string").str.strip()
+
+
+def _in_seconds(durations):
+    return (durations / pd.Timedelta(seconds=1)).to_numpy(dtype=float).copy()

@@ -1,38 +1,45 @@
-"""The command ``python -m skanfis.gyro``: from a calibration log to a checked compensator."""
+"""The command ``python -m skanfis.gyro``: from a calibration log to a checked compensator.
+
+It writes files all together or not at all. ``--apply`` compensates logs piece by piece.
+"""
 
 import contextlib
 import os
+import shlex
+import sys
+import tempfile
+import time
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from ..export import export_c
+from ..export.c.status import STATUS
 from ..inspection.labels import printable
-from ._apply import apply
-from ._budget import proven_bounds
 from ._calibration import Recipe, calibrate
-from ._checks import LABELS, check_at_rest, check_log
+from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._console import Progress, refuse_existing, say, say_error, staged, usage_errors
 from ._formulas import rules_text
-from ._headline import errors_and_verdict
-from ._options import PROGRAM, make_parser, request_of
-from ._report_options import report_options
+from ._headline import errors_and_verdict, proven_bounds
+from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._split import choose_split
 from .c_code import export_c_physics
-from .compensator import INPUTS
+from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
-from .log import find_logs, read
+from .log import LogFile, RunFinder, digests_of, find_logs, read
 from .metrics import hysteresis
 
 __all__ = ["main"]
 
-DONE, FAILED, MISUSED, REFUSED, EXISTS = 0, 1, 2, 3, 4
+DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
+_ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 1_000_000  # that are held
 
 
@@ -40,58 +47,47 @@ def main(arguments=None):
     """Run the command; returns its exit code."""
     parser = make_parser()
     options = parser.parse_args(arguments)
-    tell = Progress(quiet=options.quiet)
+    options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
+    tell = _progress(options.quiet)
     try:
-        run = apply if options.apply else _calibrate
-        run(options, tell)
+        (_apply if options.apply else _calibrate)(options, tell)
         return DONE
     except UsageError as error:
         parser.error(printable(error))  # exits
     except LogError as error:
-        return say_error(PROGRAM, error, REFUSED)
+        return _say_error(error, REFUSED)
     except ExistsError as error:
-        return say_error(PROGRAM, error, EXISTS)
-    except BrokenPipeError:
-        # Whoever read the summary has seen enough; nothing more is to be flushed there at the end.
-        with contextlib.suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return FAILED
+        return _say_error(error, EXISTS)
     except (OSError, ImportError, ValueError, ArithmeticError, MemoryError) as error:
         # Of what the log made of the arithmetic: one sentence too.
-        return say_error(PROGRAM, error, FAILED)
+        return _say_error(error, FAILED)
     except KeyboardInterrupt:
-        return say_error(PROGRAM, "interrupted; nothing was written.", INTERRUPTED)
+        return _say_error("interrupted; nothing was written.", INTERRUPTED)
 
 
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
-    with staged(folder) as written:
+    with _staged(folder) as written:
         tell(f"reading {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
-        reading, inputs = _read(options, paths, tell)
-        recipe = _recipe(options, inputs, reading.units["output"])
-        split = choose_split(reading.log, options.groups, uses_output="output" in inputs)
-        tell(f"inputs: {', '.join(inputs)}")
+        reading, recipe = _read(options, paths, tell)
+        split = choose_split(reading.log, options.groups, uses_output="output" in recipe.inputs)
+        tell(f"inputs: {', '.join(recipe.inputs)}")
         tell(f"check: {split.sentence}")
         calibration = calibrate(
             reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
         )
         tell("drawing the report")
-        _write(calibration, options, paths, written)
+        _write(calibration, options, reading.digests, written)
     for message in calibration.warnings:
         tell(f"warning: {message}")
-    say(_summary(calibration, folder, reading.notes))
+    _say(_summary(calibration, folder, reading.notes))
     tell("done, but see the warnings" if calibration.cautions else "done")
 
 
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
-    for option, names in (
-        ("--inputs", options.inputs or ()),
-        ("--box", [name for name, *_ in options.box]),
-    ):
-        for name in names:
-            if names.count(name) > 1:
-                raise UsageError(f"{option}: {name} is given twice.")
+    check_once("--inputs", options.inputs or ())
+    check_once("--box", [name for name, *_ in options.box])
     if options.saturate and not options.c:
         raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
@@ -99,19 +95,17 @@ def _where_from_and_to(options):
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
     names = (*_FILES, *(_C_FILES if options.c else ()))
-    refuse_existing([folder / name for name in names], options.force)
+    _refuse_existing([folder / name for name in names], options.force)
     check_installed()
     return folder, paths
 
 
 def _read(options, paths, tell):
-    """The checked log; returns its reading and the inputs. What was found out is told."""
+    """The reading of a checked log, and what the options ask of it. What was found out is told."""
     required = ["temperature", "output"]
     if {"time", "temperature_rate"} & set(options.inputs or ()):
         required.append("time")
-    request = request_of(options, required)
-    with usage_errors():
-        reading = read(paths, request, by_clock=True, tell=tell, most_rows=_MOST_ROWS, check=True)
+    reading = read(paths, request_of(options, required), tell=tell, most_rows=_MOST_ROWS)
     for note in reading.notes:
         tell(f"note: {note}")
     numbers = {"row": reading.n_rows}
@@ -119,12 +113,11 @@ def _read(options, paths, tell):
     tell(", ".join(f"{n:,} {name}{'s' if n > 1 else ''}" for name, n in numbers.items()))
     try:
         at_rest = _settle_rest(reading, tell)
-        inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
-        _check_options(options, inputs, reading.units["output"], at_rest)
-        check_log(reading.log, units=reading.units, inputs=inputs)
+        recipe = _recipe(options, reading, at_rest)
+        check_log(reading.log, units=reading.units, inputs=recipe.inputs)
     except LogError as error:
         raise reading.located(error) from error
-    return reading, inputs
+    return reading, recipe
 
 
 def _settle_rest(reading, tell):
@@ -147,14 +140,20 @@ def _settle_rest(reading, tell):
     return True
 
 
-def _check_options(options, inputs, unit, at_rest):
+def _recipe(options, reading, at_rest):
+    """What the options ask for; UsageError where the log does not go with them."""
+    unit = reading.units["output"]
+    inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
+    named = ", ".join(inputs)
     if options.physics and "output" not in inputs:
         raise UsageError("--physics: the arcsine law needs the output among the inputs.")
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise UsageError(
-            f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs "
-            f"{', '.join(inputs)}."
+            f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs {named}."
         )
+    for name, *_ in options.box:
+        if name not in inputs:
+            raise UsageError(f"--box: {name!r} is no input; these are {named}.")
     if options.scale_factor is not None and not (at_rest and unit in SIGNALS):
         raise UsageError("--scale-factor is for a raw signal at rest: else the rate tells it.")
     if at_rest and unit in SIGNALS and options.scale_factor is None:
@@ -163,23 +162,6 @@ def _check_options(options, inputs, unit, at_rest):
             f"data sheet (--scale-factor, {unit} per deg/s), or another unit (--units output=...).",
             "output",
         )
-
-
-def _default_inputs(log, at_rest):
-    """All that the log has; the time only where several runs can tell it from all else."""
-    inputs: tuple[str, ...] = INPUTS
-    if "time" not in log:
-        inputs = ("temperature", "output")
-    elif "run" not in log or log["run"].nunique() < 3:
-        inputs = ("temperature", "temperature_rate", "output")
-    return tuple(name for name in inputs if not (at_rest and name == "output"))
-
-
-def _recipe(options, inputs, unit):
-    """What the options ask for, of a log whose output is in a unit."""
-    for name, *_ in options.box:
-        if name not in inputs:
-            raise UsageError(f"--box: {name!r} is no input; these are {', '.join(inputs)}.")
     return Recipe(
         inputs=inputs,
         output_unit=unit if unit in SIGNALS else "deg/s",
@@ -192,33 +174,46 @@ def _recipe(options, inputs, unit):
     )
 
 
-def _write(calibration, options, paths, folder):
-    names = [Path(path).name for path in paths]
-    title = printable(names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more")
-    page = report_page(calibration, title, report_options(options, paths))
+def _default_inputs(log, at_rest):
+    """All that the log has; the time only where several runs can tell it from all else."""
+    inputs: tuple[str, ...] = INPUTS
+    if "time" not in log:
+        inputs = ("temperature", "output")
+    elif "run" not in log or log["run"].nunique() < 3:
+        inputs = ("temperature", "temperature_rate", "output")
+    return tuple(name for name in inputs if not (at_rest and name == "output"))
+
+
+def _write(calibration, options, files, folder):
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    told = ReportOptions(
+        made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),
+        serial=options.serial,
+        operator=options.operator,
+        files=files,
+        options=(("options", options.typed),),
+        limits=tuple(options.limits),
+    )
+    page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        coverage = compensator.min_coverage or None
-        path = folder / "compensator"
         export = export_c_physics if calibration.recipe.physics else export_c
         export(
             compensator.estimator,
-            path,
+            folder / "compensator",
             std=options.c,
-            min_coverage=coverage,
+            min_coverage=compensator.min_coverage or None,
             saturate=proven_bounds(calibration).found if options.saturate else None,
         )
 
 
 def _summary(calibration, folder, notes):
     lines = errors_and_verdict(calibration)
-    if not np.ptp(calibration.rate):
-        inside = calibration.inside & np.isfinite(calibration.after)
-        lines += _hysteresis_line(calibration, inside)
     lines += [
+        *_hysteresis_line(calibration),
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
         *(f"note           {note}" for note in notes),
@@ -227,10 +222,11 @@ def _summary(calibration, folder, notes):
     return lines
 
 
-def _hysteresis_line(calibration, rows):
+def _hysteresis_line(calibration):
     """The gap between warming and cooling of a gyro at rest; none where there is no such gap."""
-    if "temperature_rate" not in calibration.X:
+    if np.ptp(calibration.rate) or "temperature_rate" not in calibration.X:
         return []
+    rows = calibration.in_range
     temperature = calibration.log["temperature"].to_numpy()[rows]
     warming = 60.0 * calibration.X["temperature_rate"].to_numpy()[rows]
     errors = [(rates - calibration.rate)[rows] for rates in (calibration.before, calibration.after)]
@@ -241,3 +237,172 @@ def _hysteresis_line(calibration, rows):
     return [
         f"hysteresis     {before:.4g} deg/h between warming and cooling before, {after:.4g} after"
     ]
+
+
+def _apply(options, tell):
+    """Compensate the logs that the options name, and write the rates."""
+    paths = find_logs(options.logs)
+    if len(paths) > 1 and options.output is None:
+        raise UsageError("--apply to several logs needs --output.")
+    target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
+    _refuse_existing([target], options.force)
+    try:
+        compensator = GyroCompensator.read_json(options.apply)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
+    if "temperature_rate" in compensator.inputs:
+        needed |= {"time", "temperature"}
+    request = request_of(options, sorted(needed))
+    digests_of(paths)
+    tallies: list = []
+    with _staged(target.parent) as folder:
+        with open(folder / target.name, "w", encoding="utf-8", newline="") as written:
+            for number, path in enumerate(paths, start=1):
+                tell(f"compensating {path} ({number} of {len(paths)})")
+                file, stem = LogFile(path, request), Path(path).stem if len(paths) > 1 else ""
+                for log, rates in _compensated(file, compensator, stem, tell):
+                    labels = [name for name in ("device", "run", "time") if name in log]
+                    # Twelve digits are beyond any gyro, and short beside the 17 of a double.
+                    log[labels].join(rates).to_csv(
+                        written, index=False, header=not tallies, float_format="%.12g"
+                    )
+                    tallies.append(_tally(log, rates))
+        tell(f"writing {target}")
+    _say(_summary_of_rates(target, tallies))
+    tell("done")
+
+
+def _compensated(file, compensator, stem, tell):
+    """Pieces of a log, with labels of their runs, and what the compensator makes of them."""
+    unit, due = file.layout.units["output"], compensator.output_unit
+    if (unit if unit in SIGNALS else "deg/s") != due:
+        raise UsageError(
+            f"the model was calibrated for an output in {due}; this is in {unit} "
+            f"(--units output={due})."
+        )
+    finder, checks = RunFinder(by_clock=True), RowChecks(file.layout.units)
+    inputs_of = _Inputs(compensator.inputs, compensator.time_constant)
+    for log in file.pieces(finder, checks):
+        compensated = compensator._compensated(inputs_of(log), compensator.indicated(log))
+        labels = finder.runs["run"]
+        if "run" not in file.layout.places and stem:
+            labels = labels.map(lambda number: stem if number in "1" else f"{stem} / {number}")
+        log["run"] = labels.to_numpy()[log["run"]]
+        yield log if any(labels) else log.drop(columns="run"), compensated
+    for note in [*file.notes, *filter(None, [finder.note])]:
+        tell(f"note: {note}")
+    tell(f"{file.n_rows:,} rows")
+
+
+class _Inputs:
+    """Inputs of a compensator, piece by piece, whose runs go on from one piece to the next.
+
+    A run that goes on begins with two rows made up: the second is its last one, and between them
+    the temperature rises by what leaves the low-pass at the rate that it had there.
+    """
+
+    def __init__(self, inputs, time_constant):
+        self._inputs, self._lag = inputs, time_constant
+        self._ends = None  # the last row of each run, when the run began, and its rate then
+
+    def __call__(self, log):
+        if not {"time", "temperature_rate"} & set(self._inputs):
+            return features(log, self._inputs, self._lag)
+        log = log.assign(temperature=log.get("temperature", 0.0))[_ON_BOARD]
+        if self._ends is None:
+            self._ends = log.iloc[:0].assign(begin=0.0, rate=0.0)
+        ends = self._ends[self._ends["run"].isin(log["run"])]
+        rise = ends["rate"] * self._lag / np.expm1(-1.0)
+        before = ends.assign(time=ends["time"] - self._lag, temperature=ends["temperature"] + rise)
+        joined = pd.concat([before[_ON_BOARD], ends[_ON_BOARD], log])
+        X = features(joined, self._inputs, self._lag).iloc[2 * len(ends) :].set_axis(log.index)
+        begin = log["run"].map(ends.set_index("run")["begin"])
+        begin = begin.fillna(log.groupby("run")["time"].transform("first"))
+        if "time" in X:
+            X["time"] = log["time"] - begin
+        state = log.assign(begin=begin, rate=X.get("temperature_rate", 0.0))
+        self._ends = pd.concat([self._ends, state]).groupby("run").tail(1)
+        return X
+
+
+def _tally(log, rates):
+    """Numbers of rows by status; where the true rate is known, sums of squared errors too."""
+    tally = pd.DataFrame({"rows": 1}, index=rates.index)
+    if "rate" in log:
+        for name in ("indicated", "compensated"):
+            tally[name] = (rates[f"rate_{name}"] - log["rate"]) ** 2
+    return tally.groupby(rates["status"]).sum()
+
+
+def _summary_of_rates(target, tallies):
+    counts = pd.concat(tallies).groupby(level=0).sum() if tallies else pd.DataFrame({"rows": []})
+    rows, status = counts["rows"], counts.index
+    n_flagged = rows[status != 0].sum()
+    yield f"written        {target}: {rows.sum():,} rows, {n_flagged:,} flagged"
+    for name, bit in STATUS.items():
+        if len(rows) and (count := rows[(status & bit) != 0].sum()):
+            yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
+    if "compensated" in counts and 0 in status:
+        before, after = np.sqrt(counts.loc[0, ["indicated", "compensated"]] / rows.loc[0])
+        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after (rows with status 0)"
+
+
+def _progress(quiet):
+    """What writes lines to stderr, with the time since the start."""
+    start = time.monotonic()
+
+    def tell(text):
+        if not quiet:
+            seconds = time.monotonic() - start
+            _write_to(sys.stderr, f"{seconds:7.1f} s  {printable(text)}\n")
+            sys.stderr.flush()
+
+    return tell
+
+
+def _say(lines):
+    for line in lines:
+        _write_to(sys.stdout, f"{printable(line)}\n")
+
+
+def _say_error(error, code):
+    told = str(error) or type(error).__name__
+    if isinstance(error, OSError) and error.filename is not None and error.strerror is not None:
+        told = f"{error.filename}: {error.strerror}."
+    _write_to(sys.stderr, f"{PROGRAM}: {printable(told)}\n")
+    return code
+
+
+def _write_to(stream, text):
+    """Text to a stream, with escapes for what its encoding lacks."""
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+
+
+def _refuse_existing(paths, force):
+    for path in paths:
+        if path.is_dir():
+            raise ExistsError(f"{path} is a folder: choose another --output.")
+        if path.exists() and not force:
+            raise ExistsError(f"{path} exists already: choose another --output, or --force.")
+
+
+@contextlib.contextmanager
+def _staged(folder):
+    """A folder to write to; at the end its files go to ``folder`` all together.
+
+    Where that cannot be, or an error ends it, no file or folder is left behind.
+    """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".skanfis-", dir=folder) as name:
+            yield Path(name)
+            for path in sorted(Path(name).iterdir()):
+                os.replace(path, folder / path.name)
+    except BaseException:
+        for path in made:
+            with contextlib.suppress(OSError):  # another program has put something there
+                path.rmdir()
+        raise

@@ -13,10 +13,9 @@ import sklearn
 from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
-from ._budget import budget_of, proven_bounds
 from ._columns import RATE_UNITS, SIGNALS
 from ._formulas import formula_of, law_table, on_board, rules_text
-from ._headline import ARTICLES, headline, held_out_groups
+from ._headline import ARTICLES, budget_of, headline, held_out_groups, proven_bounds
 from ._pictures import PICTURES, draw, draw_coverage, draw_memberships
 from ._results import Results
 from ._simpler import NOTHING, options_for

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator, _log_file
+from skanfis.gyro import GyroCompensator
 from skanfis.gyro.command import main
 from skanfis.gyro.log import read_log
 
@@ -61,7 +61,7 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
     kind(log).to_csv(path, index=False)
     tables, said = [], []
     for rows in (100_000, 197):
-        monkeypatch.setattr(_log_file, "_ROWS", rows)
+        monkeypatch.setattr("skanfis.gyro.log._ROWS", rows)
         target = tmp_path / f"rates{rows}.csv"
         assert main(["--apply", str(model), str(path), "--output", str(target)]) == 0
         tables.append(pd.read_csv(target))
@@ -84,22 +84,11 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
         )
 
 
-def spoilt_time(table):
-    table.loc[250, "time"] = table.loc[249, "time"]
-
-
-def spoilt_unit(table):
-    table["time"] /= 1e4
-
-
-def spoilt_output(table):
-    table.loc[203, "output"] = 1e9
-
-
 BAD = {
-    "time": (spoilt_time, r"line 252.*time does not increase"),
-    "unit": (spoilt_unit, "time in a larger unit than s"),
-    "output": (spoilt_output, r"line 205.*not plausible"),
+    "time": (249, 0.0, r"line 251.*time does not increase"),
+    "temperature": (299, 1e4, r"line 301.*not plausible"),
+    "output": (203, 1e9, r"line 205.*not plausible"),
+    "rate": (0, 0.0, "time in a larger unit than s"),
 }
 
 
@@ -107,13 +96,13 @@ BAD = {
 def test_bad_rows_are_named_by_their_place_in_the_file(
     log, model, case, tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr(_log_file, "_ROWS", 50)
-    spoil, said = BAD[case]
-    # A run that heats by 20 degrees, of which no 50 rows do.
-    table = one_run(log).reset_index(drop=True)
-    table["temperature"] = np.linspace(20.0, 40.0, len(table))
-    table["run"] = "only"
-    spoil(table)
+    monkeypatch.setattr("skanfis.gyro.log._ROWS", 50)
+    row, value, said = BAD[case]
+    table = one_run(log).assign(run="only")
+    table.loc[row, case] = value
+    if case == "rate":
+        # Of its time a ten-thousandth: no 50 rows heat by 5 degrees, the run does.
+        table = table.assign(time=table["time"] / 1e4, temperature=table.index / 15.0)
     path = tmp_path / "log.csv"
     table.to_csv(path, index=False)
     assert main(["--apply", str(model), str(path), "--output", str(tmp_path / "x.csv")]) == 3

@@ -1,16 +1,12 @@
 """The uncertainty of a row and what is proven of it, against what was planted."""
 
-import argparse
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from skanfis.gyro._budget import budget_of, noise_within, proven_bounds, scatter_between
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._options import parse_box
-from skanfis.gyro._split import Split, choose_split
-from skanfis.gyro.command import main
+from skanfis.gyro._headline import budget_of, noise_within, proven_bounds, scatter_between
+from skanfis.gyro._split import choose_split
 
 pytestmark = pytest.mark.usefixtures("few_rivals")
 
@@ -101,31 +97,3 @@ def test_rate_goes_with_the_output_or_is_not_proven(unit, gain):
     """An axis mounted the other way round: its scale factor's sign is found of counts alone."""
     calibration = calibrated(lambda t: 1e-3 * t, gain=gain, output_unit=unit)
     assert proven_bounds(calibration).rate_rises is (unit == "counts")
-
-
-def test_one_group_in_range_leaves_the_scatter_open():
-    calibration = calibrated(lambda t: 0.0 * t)
-    labels = np.full(len(calibration.X), "one", dtype=object)
-    object.__setattr__(
-        calibration, "split", Split("run", calibration.split.folds, labels, "as one")
-    )
-    budget = budget_of(calibration)
-    assert np.isnan(budget.scatter)
-    assert budget.combined == pytest.approx(np.hypot(budget.noise, budget.model))
-
-
-@pytest.mark.parametrize("text", ["temperature", "temperature=85", "t=85:-40", "t=a:b", "t=0:inf"])
-def test_box_that_is_none_is_refused(text):
-    with pytest.raises(argparse.ArgumentTypeError, match="must be INPUT=LOW:HIGH"):
-        parse_box(text)
-
-
-def test_command_takes_a_box_and_names_an_input_that_is_none(tmp_path, capsys):
-    log = calibrated(lambda t: 0.0 * t).log
-    log.to_csv(tmp_path / "log.csv", index=False)
-    arguments = [str(tmp_path / "log.csv"), "--quiet", "--output", str(tmp_path / "out")]
-    with pytest.raises(SystemExit):
-        main([*arguments, "--terms", "1,1", "--box", "humidity=0:1"])
-    assert "--box: 'humidity' is no input; these are temperature, output." in (
-        capsys.readouterr().err
-    )

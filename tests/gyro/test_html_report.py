@@ -16,10 +16,10 @@ pytest.importorskip("jinja2")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import _pictures
-from skanfis.gyro._budget import budget_of, proven_bounds
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._formulas import formula_of, rules_text
-from skanfis.gyro._report_options import ReportOptions, parse_limit
+from skanfis.gyro._headline import budget_of, proven_bounds
+from skanfis.gyro._options import ReportOptions, parse_limit
 from skanfis.gyro._results import Results
 from skanfis.gyro._split import choose_split
 from skanfis.gyro.displays._base import figures

@@ -29,29 +29,17 @@ def table(folder, log, name="log.csv", **options):
     return path
 
 
-def test_values_come_back(tmp_path, log):
-    read = read_log(table(tmp_path, log))
-    assert list(read) == MEASURED
-    np.testing.assert_allclose(read.drop(columns="run"), log.drop(columns="run"), rtol=1e-12)
-    assert list(read["run"].cat.categories) == ["0", "1", "2"]
-
-
 @pytest.mark.parametrize(
     ("part", "unit", "values", "expected"),
     [
         ("time", "ms", [0, 1500], [0.0, 1.5]),
-        ("time", "us", [0, 1500], [0.0, 1.5e-3]),
         ("time", "min", [0, 2], [0.0, 120.0]),
-        ("time", "h", [0, 2], [0.0, 7200.0]),
         ("temperature", "K", [273.15, 300.0], [0.0, 26.85]),
         ("temperature", "degF", [32.0, 212.0], [0.0, 100.0]),
-        ("temperature", "°C", [1.0, 2.0], [1.0, 2.0]),
         ("rate", "rad/s", [0.0, np.pi], [0.0, 180.0]),
         ("rate", "deg/h", [0.0, 3600.0], [0.0, 1.0]),
-        ("rate", "rpm", [0.0, 1.0], [0.0, 6.0]),
         ("output", "mrad/s", [0.0, 1000 * np.pi], [0.0, 180.0]),
         ("output", "counts", [0.0, 7.0], [0.0, 7.0]),
-        ("output", "dps", [0.0, 7.0], [0.0, 7.0]),
     ],
 )
 def test_units_are_converted(tmp_path, part, unit, values, expected):
@@ -59,18 +47,6 @@ def test_units_are_converted(tmp_path, part, unit, values, expected):
     frame[part] = values
     read = read_log(table(tmp_path, frame), units={part: unit})
     np.testing.assert_allclose(read[part], expected, atol=1e-12)
-
-
-def test_each_file_is_a_run(tmp_path, log):
-    paths = [
-        table(tmp_path, part.drop(columns="run"), name)
-        for name, (_, part) in zip(
-            ["cold.csv", "mild.csv", "hot.csv"], log.groupby("run"), strict=True
-        )
-    ]
-    read = read_log(paths)
-    assert list(read["run"].cat.categories) == ["cold", "mild", "hot"]
-    assert (read["run"].cat.codes == log["run"].to_numpy()).all()
 
 
 def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
@@ -83,21 +59,18 @@ def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("", {}, r"log.csv: is empty"),
         ("temp,output,rate\n1,2,3\n", {}, "no column 'temperature' .* temperature=temp"),
         ("run,output,rate\n1,2,3\n", {}, "no column 'temperature' .* temperature=NAME"),
         ("temperature,output,rate\n1,2,3\n1,2,x\n", {}, r"line 3, column 'rate': 'x' is not a num"),
         ("temperature,output,rate\n1,2,3\n\n1,,3\n", {}, r"line 4, column 'output': .* missing"),
         ("T,output,rate\n1,2,3\n,2,3\n", CALLED_T, r"line 3, column 'T' \(temperature\)"),
         ("temperature,output,rate\n1,2,inf\n", {}, r"line 2, column 'rate': .* infinite"),
-        ("temperature,output,rate\n1,2,3,4\n", {}, "line 2: has . values"),
         ("temperature,output,rate\n1,2,3\n\n1,2,3,4,5\n", {}, "line 4: has . values"),
         ('temperature,output,rate\n1,2,"3\n', {}, "is no table"),
         ("temperature,output,rate,run\n1,2,3,\n", {}, "line 2, column 'run': no label"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"rate": "output"}}, "two parts"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"time": "t"}}, "'t' for the time"),
         ("temperature,output,rate,rate\n1,2,3,4\n", {}, "header has 'rate' and 'rate'; which"),
-        ("temperature,output,Rate,RATE\n1,2,3,4\n", {}, "header has 'Rate' and 'RATE'; which"),
         ('a,temperature,output,rate\n"b,\nc",1,2,x\n', {}, "line 2, column 'rate': 'x' is not"),
         ('a,temperature,output,rate\n"b\nc",1,2,3\n"d",1,2,3,4\n', {}, "line 4: has 5 values"),
         (f"temperature,output,rate\n1,2,{'3' * 200_000}x\n", {}, "line 2, column 'rate'"),
@@ -108,26 +81,14 @@ def test_files_that_are_refused(tmp_path, text, options, message):
         read_log(written(tmp_path, text), **options)
 
 
-def test_binary_files_are_refused(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_bytes(b"\x01\xfe\x00\x81,\n")
-    with pytest.raises(LogError, match="UTF-8"):
-        read_log(path)
-    path.write_bytes(b"temperature,output,rate\n1,2,3\n1,2,\x81\n")
-    with pytest.raises(LogError, match="UTF-8"):
-        read_log(path)
-
-
-QUOTED = ['"a, b,\nc, d"', '"say ""so"", twice"', '"' + 200_000 * "long, " + '"', "plain"]
-
-
-@pytest.mark.parametrize("note", QUOTED, ids=["line end", "quotes", "long", "plain"])
+@pytest.mark.parametrize(
+    "note", ['"a, b,\nc, d"', '"say ""so"", twice"', f'"{200_000 * "long, "}"']
+)
 def test_quotes_hide_separators_and_line_ends(tmp_path, note):
     text = f"note,temperature,output,rate,run\n{note},20,1,2,{note}\n\nb,21,3,4,b\n"
     read = read_log(written(tmp_path, text))
     assert read["rate"].tolist() == [2.0, 4.0]
-    plain = note.strip('"').replace('""', '"')
-    assert set(read["run"]) == {plain, "b"}
+    assert set(read["run"]) == {note[1:-1].replace('""', '"'), "b"}
 
 
 def test_names_of_columns_up_to_blanks_and_capitals(tmp_path):
@@ -146,17 +107,12 @@ def test_names_of_columns_up_to_blanks_and_capitals(tmp_path):
     assert read.iloc[0].tolist() == [20.0, 2.0, 1.0]
 
 
-def test_one_file_twice_is_refused(tmp_path, log):
+def test_files_that_are_no_log_together_are_refused(tmp_path, log):
     path = table(tmp_path, log)
-    for again in (path, tmp_path / "." / "log.csv", str(path)):
-        with pytest.raises(LogError, match=r"log.csv: holds the same bytes as .*log.csv"):
-            read_log([path, again])
-
-
-def test_files_with_different_columns_are_refused(tmp_path, log):
-    paths = [table(tmp_path, log, "a.csv"), table(tmp_path, log.drop(columns="time"), "b.csv")]
+    with pytest.raises(LogError, match=r"log.csv: holds the same bytes as .*log.csv"):
+        read_log([path, tmp_path / "." / "log.csv"])
     with pytest.raises(LogError, match=r"b.csv: the files differ in having time"):
-        read_log(paths)
+        read_log([path, table(tmp_path, log.drop(columns="time"), "b.csv")])
 
 
 @pytest.mark.parametrize(
@@ -167,12 +123,6 @@ def test_files_with_different_columns_are_refused(tmp_path, log):
         ({"units": {"time": "deg/s"}}, "time has no unit 'deg/s'.* s, ms"),
         ({"units": {"time": 1}}, "time has no unit 1: it may be in s, ms"),
         ({"require": ["speed"]}, "require: there is no 'speed'"),
-        ({"separator": ""}, "separator='' must be one character"),
-        ({"separator": "(("}, r"separator='\(\(' must be one character"),
-        ({"separator": "\n"}, "must be one character"),
-        ({"decimal": "5"}, "decimal='5' must be one character"),
-        ({"decimal": ","}, "separator and decimal are both ','"),
-        ({"encoding": "klingon"}, "klingon"),
     ],
 )
 def test_unknown_names_are_no_matter_of_the_log(tmp_path, log, options, message):
@@ -184,7 +134,6 @@ def test_unknown_names_are_no_matter_of_the_log(tmp_path, log, options, message)
 def test_good_logs_pass(log):
     assert check_log(log, inputs=("time", "temperature", "temperature_rate", "output")) is log
     check_log(log.assign(output=-3e4 * log["output"]), units={"output": "counts"})
-    check_log(log[log["run"] == 0], min_temperature_span=0.5)
     check_log(log.iloc[:3], inputs=())
     check_log(log.sort_values("time", kind="stable").reset_index(drop=True))
 
@@ -232,17 +181,10 @@ def test_logs_that_are_refused(log, spoil, column, row, message):
     assert (caught.value.column, caught.value.row) == (column, row)
 
 
-@pytest.mark.parametrize("factor", [1e-300, 1e-40, 1e40, 1e300])
+@pytest.mark.parametrize("factor", [1e-40, 1e40])
 def test_a_raw_signal_beyond_any_converter_is_refused(log, factor):
     with pytest.raises(LogError, match="counts are not plausible"):
         check_log(log.assign(output=factor * log["output"]), units={"output": "counts"})
-
-
-def test_a_gyro_at_rest_has_a_bias_to_learn(log):
-    at_rest = log.assign(output=log["output"] - log["rate"], rate=0.0)
-    check_log(at_rest, inputs=("temperature",))
-    with pytest.raises(LogError, match="leave output out"):
-        check_log(at_rest, inputs=("temperature", "output"))
 
 
 def test_a_log_at_rest_is_told_from_one_that_moves(log):

@@ -23,7 +23,7 @@ def truth():
 
 def found(path, **options):
     paths = path if isinstance(path, list) else [path]
-    return read(paths, Request(**(ASKED | options)), by_clock=True)
+    return read(paths, Request(**(ASKED | options)))
 
 
 def same(reading, truth, parts=PARTS[1:]):
@@ -75,7 +75,7 @@ def test_a_log_of_one_kind_is_read_as_it_was_meant(tmp_path, truth, kind):
     # The hour without power between runs of ten minutes.
     assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
     told = "; ".join(reading.notes)
-    for said in (f"temperature = {names[1]!r}", "split into 5 runs, at 4 gaps", "--columns"):
+    for said in (f"temperature = {names[1]!r}", "split into 5 runs", "--columns"):
         assert said in told
 
 
@@ -101,7 +101,7 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
     kept = truth.drop(index=[5, 9, 200])
     same(reading, kept, PARTS)
     said = "3 of 300 rows lack a value ('temperature' in 1, 'output' in 1, 'rate' in 1)"
-    assert any(note.startswith(said) and "line 7" in note for note in reading.notes)
+    assert any(said in note and "line 7" in note for note in reading.notes)
     for row in (4, 5, 7, 8, 250):
         line = int(kept.index[row]) + 2
         assert reading.name_row(row).endswith(f"line {line}")
@@ -113,8 +113,8 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
         found(tmp_path / "log.csv")
 
 
-@pytest.mark.parametrize("suffix", ["csv", "parquet"])
-def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth, suffix):
+def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth):
+    pytest.importorskip("pyarrow")
     table = pd.DataFrame(
         {
             "seq": range(len(truth)),
@@ -127,17 +127,14 @@ def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth, suf
             "temp_trend": np.where(truth.index % 2, 1, -1),
         }
     )
-    path = tmp_path / f"log.{suffix}"
-    if suffix == "csv":
-        table.to_csv(path, index=False)
-    else:
-        pytest.importorskip("pyarrow")
-        table.to_parquet(path)
-    reading = found(path)
-    assert list(reading.log) == ["temperature", "output", "rate"]
-    same(reading, truth, ["temperature", "rate"])
-    assert reading.units["output"] == "counts"
-    np.testing.assert_allclose(reading.log["output"], -27_000.0 * truth["output"])
+    table.to_csv(tmp_path / "log.csv", index=False)
+    table.to_parquet(tmp_path / "log.parquet")
+    for path in (tmp_path / "log.csv", tmp_path / "log.parquet"):
+        reading = found(path)
+        assert list(reading.log) == ["temperature", "output", "rate"]
+        same(reading, truth, ["temperature", "rate"])
+        assert reading.units["output"] == "counts"
+        np.testing.assert_allclose(reading.log["output"], -27_000.0 * truth["output"])
 
 
 def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
@@ -147,15 +144,13 @@ def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
         found(tmp_path / "log.csv")
     told = found(tmp_path / "log.csv", columns={"temperature": "a", "output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
-    assert "'d' is taken for 'D '" in told.notes
 
 
-@pytest.mark.parametrize("scale", [1.0, -8.0])
 @pytest.mark.parametrize("name", ["U_mV", "gyro_mV", "U [mV]"])
-def test_a_raw_signal_is_no_rate(tmp_path, truth, name, scale):
+def test_a_raw_signal_is_no_rate(tmp_path, truth, name):
     """The lone rate of a log is the gyro's own, but not where a voltage follows it."""
     table = truth[["time", "temperature"]].assign(
-        **{name: scale * truth["output"], "rate_dps": truth["rate"]}
+        **{name: -8.0 * truth["output"], "rate_dps": truth["rate"]}
     )
     table.to_csv(tmp_path / "log.csv", index=False)
     reading = found(tmp_path / "log.csv", require=("temperature", "output", "rate", "time"))
@@ -195,29 +190,21 @@ def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
     reading = found(paths)
     same(reading, truth[truth["run"].astype(int) < 3])
     assert list(reading.log["run"].cat.categories) == ["r1", "r2", "r3"]
-    assert sum("is taken for 'Temp'" in note for note in reading.notes) == 2
     assert reading.name_row(60).endswith("r2.csv, line 2")
     (folder / "r4.csv").write_bytes((folder / "r2.csv").read_bytes())
     with pytest.raises(LogError, match=r"r4.csv: holds the same bytes as .*r2.csv"):
         found([*paths, str(folder / "r4.csv")])
-
-
-def test_files_whose_outputs_are_of_two_kinds_are_refused(tmp_path, truth):
-    table = truth[["time", "temperature", "rate"]]
-    for name in ("gyro_counts", "gyro_dps"):
-        table.assign(**{name: truth["output"]}).to_csv(tmp_path / f"{name}.csv", index=False)
-    paths = [str(tmp_path / f"{name}.csv") for name in ("gyro_counts", "gyro_dps")]
-    with pytest.raises(LogError, match=r"gyro_dps.csv: the output is in deg/s, in .* in counts"):
-        found(paths)
-    same(found(paths, units={"output": "deg/s"}), pd.concat([truth, truth]))
+    table.rename(columns={"output": "gyro_counts"}).to_csv(folder / "r4.csv", index=False)
+    with pytest.raises(LogError, match=r"r4.csv: the output is in counts, in .* in deg/s"):
+        found([*paths, str(folder / "r4.csv")])
 
 
 def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, truth):
-    monkeypatch.setattr("skanfis.gyro._log_file._ROWS", 37)
+    monkeypatch.setattr("skanfis.gyro.log._ROWS", 37)
     table = truth[[*PARTS, "run"]].sort_values("time", kind="stable").reset_index(drop=True)
     table.to_csv(tmp_path / "log.csv", index=False)
     request = Request(**ASKED)
-    some = read([tmp_path / "log.csv"], request, most_rows=100, check=True)
+    some = read([tmp_path / "log.csv"], request, most_rows=100)
     place = table.groupby("run").cumcount()
     expected = table[place % 4 == 0]
     assert (some.n_rows, len(some.log)) == (300, 75)
@@ -229,7 +216,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     table.loc[290, "time"] = 0.0
     table.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(LogError, match=r"line 292, column 'time': time does not increase"):
-        read([tmp_path / "log.csv"], request, most_rows=100, check=True)
+        read([tmp_path / "log.csv"], request, most_rows=100)
 
 
 @pytest.mark.parametrize(
@@ -238,7 +225,6 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
         (np.r_[0:100, 0:100, 0:50], [1] * 100 + [2] * 100 + [3] * 50),  # set anew
         (np.r_[0:100, 100 + 500 : 700], [1] * 100 + [2] * 100),  # a rest
         (np.r_[0:100, 130:230], None),  # half a minute lost
-        (np.r_[0:50, 49, 50:149], None),  # a row out of order, which is refused later
     ],
 )
 def test_runs_are_told_by_the_time(tmp_path, times, runs):
@@ -248,6 +234,11 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
     assert ("run" in log) == (runs is not None)
     if runs is not None:
         assert log["run"].astype(int).tolist() == runs
+    # A row out of order is no run.
+    table.loc[60, "time"] = table.loc[58, "time"]
+    table.to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(LogError, match="line 62, column 'time': time does not increase"):
+        found(tmp_path / "log.csv")
 
 
 @pytest.mark.parametrize(
@@ -256,21 +247,17 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
         (b"1,2,3\n4,5,6\n", "line 1: has numbers where the names of the columns are due"),
-        (b"PK\x03\x04\x00\x00", "an archive or a workbook"),
-        (b"\x1f\x8b\x08\x00", "is compressed"),
         (bytes(range(256)), "is not text"),
+        (b"temp,gyro\n20,1\n21,\x81\n", "is not text"),
+        (b"PAR1 and nothing else", "is no Parquet that can be read"),
         (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
         (b"temp,gyro\n20,1\n21,1e999\n22,3\n", "line 3, column 'gyro' .output.: .* (inf|not a n)"),
     ],
 )  # fmt: skip
 def test_what_is_no_log_is_refused_in_words(tmp_path, content, message):
-    (tmp_path / "log.csv").write_bytes(content)
+    path = tmp_path / ("log.parquet" if content.startswith(b"PAR1") else "log.csv")
+    path.write_bytes(content)
+    if path.suffix == ".parquet":
+        pytest.importorskip("pyarrow")
     with pytest.raises(LogError, match=message):
-        found(tmp_path / "log.csv")
-
-
-def test_a_damaged_parquet_is_refused(tmp_path):
-    pytest.importorskip("pyarrow")
-    (tmp_path / "log.parquet").write_bytes(b"PAR1 and nothing else")
-    with pytest.raises(LogError, match="is no Parquet that can be read"):
-        found(tmp_path / "log.parquet")
+        found(path)

@@ -15,21 +15,7 @@ pytest.importorskip("matplotlib")
 from skanfis.gyro import command
 from skanfis.gyro.command import main
 
-_NUMBERS = [
-    "0",
-    "-1",
-    "1",
-    "2",
-    "1e-300",
-    "1e300",
-    "nan",
-    "inf",
-    "-inf",
-    "9" * 5000,
-    "1e9",
-    "",
-    "x",
-]
+_NUMBERS = ["0", "-1", "1", "2", "1e-300", "1e300", "nan", "-inf", "9" * 5000, "1e9", "", "x"]
 _WORDS = ["", " ", "time", "time=", "=", "time=a", "rate=output", "x=gyro", "é", "\udcff", "a\nb"]
 _VALUES = {
     "--columns": _WORDS,
@@ -83,24 +69,13 @@ def _logs():
     return table.to_csv(index=False).encode()
 
 
-_OPTIONS = st.one_of(
-    st.sampled_from(sorted(_VALUES)).flatmap(
-        lambda option: st.lists(
-            st.one_of(st.sampled_from(_VALUES[option]), st.text(max_size=5)), min_size=1, max_size=2
-        ).map(lambda values: [option, *values])
-    ),
-    st.sampled_from(_FLAGS).map(lambda flag: [flag]),
-)
-_PATHS = st.lists(
-    st.one_of(
-        st.sampled_from(
-            [*_FILES, "*.csv", "none.csv", "*.none", ".", "folder", "a" * 300, "a\x00b"]
-        ),
-        st.text(max_size=5),
-    ),
-    min_size=1,
-    max_size=3,
-)
+_OPTIONS = st.sampled_from(sorted(_VALUES)).flatmap(
+    lambda option: st.lists(
+        st.sampled_from(_VALUES[option]) | st.text(max_size=5), min_size=1, max_size=2
+    ).map(lambda values: [option, *values])
+) | st.sampled_from(_FLAGS).map(lambda flag: [flag])
+_NAMES = [*_FILES, "*.csv", "none.csv", "*.none", ".", "folder", "a" * 300, "a\x00b"]
+_PATHS = st.lists(st.sampled_from(_NAMES) | st.text(max_size=5), min_size=1, max_size=3)
 
 
 @given(
