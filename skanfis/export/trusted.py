@@ -16,7 +16,6 @@ TRUSTED_TYPES = [
     "skanfis.bounds.constraints.OutputLimits",
     "skanfis.learning.data.Scale",
     "skanfis.gyro.compose.ResidualRegressor",
-    "skanfis.gyro.features.ThermalLag",
     "skanfis.gyro.features.ThermalRate",
     "skanfis.gyro.features.TimeSincePowerOn",
     "skanfis.gyro.physics.OpenLoopArcsineRegressor",

@@ -5,7 +5,6 @@ docs/gyro_data.rst and docs/gyro_physics.rst say what they are for. In C, with t
 
     rate += (1.0 - exp(-h / tau)) * ((temperature - previous) / h - rate);
     previous = temperature;
-    lagged = temperature - tau * rate;
 
 A row more on the straight line between two others changes nothing.
 """
@@ -18,16 +17,13 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ..blocks import LARGE_BLOCK_ROWS, row_blocks
 from ._columns import check_column, check_number, column_position
 
-__all__ = ["ThermalLag", "ThermalRate", "TimeSincePowerOn"]
+__all__ = ["ThermalRate", "TimeSincePowerOn"]
 
 
 class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     """Features that are computed run by run, from the past rows of the run alone."""
-
-    _suffix = ""
 
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
         """Take note of the columns, and check them; nothing is learnt.
@@ -49,8 +45,6 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         ValueError
             If X is not finite or lacks a column named, or time does not increase within a run.
         """
-        if self._suffix:
-            check_number(self.time_constant, "time_constant")
         names, columns = self._columns_of(X, reset=True)
         self._time, self._run = (
             None if given is None else column_position(names, role, given)
@@ -58,12 +52,7 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         )
         if self._time is not None and self._time == self._run:
             raise ValueError(f"time={self.time!r} and run={self.run!r} are one column.")
-        self._quantities = [i for i in range(len(names)) if i not in (self._time, self._run)]
-        if self._suffix and not self._quantities:
-            raise ValueError(
-                f"X has {self.n_features_in_} feature(s), time or run: nothing to filter."
-            )
-        self._rows_by_run(names, columns)  # what transform refuses, fit refuses
+        self._compute(names, columns)  # what transform refuses, fit refuses
         return self
 
     def transform(self, X: ArrayLike) -> np.ndarray:
@@ -82,14 +71,10 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If X is not finite, has other columns than in ``fit``, or time does not increase within
-            a run.
+            As from ``fit``, or if X has other columns than there.
         """
         check_is_fitted(self)
-        order, starts, steps, quantities = self._rows_by_run(*self._columns_of(X, reset=False))
-        features = np.empty((len(order), self._n_features_out))
-        features[order] = self._compute(quantities, steps, starts)
-        return features
+        return self._compute(*self._columns_of(X, reset=False))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
         """Names of the new columns.
@@ -102,16 +87,11 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         names : ndarray of str
-            Those of the columns filtered, each with a suffix; or "time_since_power_on".
+            Of the columns filtered, each with "_rate" behind it; or "time_since_power_on".
         """
         names = super().get_feature_names_out(input_features)
         check_is_fitted(self)
-        made = [f"{names[i]}_{self._suffix}" for i in self._quantities]
-        return np.array(made if self._suffix else ["time_since_power_on"], dtype=object)
-
-    @property
-    def _n_features_out(self):
-        return len(self._quantities) if self._suffix else 1
+        return np.array(self._names_out(names), dtype=object)
 
     def _columns_of(self, X, reset):
         """Names, positions where there are none, and values of the columns of X."""
@@ -121,11 +101,10 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         columns = validate_data(self, X, reset=reset, dtype="numeric").T
         return list(range(len(columns))), list(columns)
 
-    def _rows_by_run(self, names, columns):
-        """Order of the rows by run; in this order, starts of runs, time steps and quantities."""
+    def _by_run(self, names, columns):
+        """Order of the rows by run; in it the time, and its steps, infinite where a run starts."""
         n_rows = len(columns[0])
-        runs = np.zeros(n_rows, dtype=np.intp)
-        time = np.arange(n_rows, dtype=float)
+        runs, time = np.zeros(n_rows, dtype=int), np.arange(n_rows, dtype=float)
         if self._run is not None:
             runs = pd.factorize(columns[self._run])[0]
             if np.any(runs < 0):
@@ -136,40 +115,15 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         if self._time is not None:
             time = check_column(columns[self._time], f"column {names[self._time]!r} (time)")
         order = np.argsort(runs, kind="stable")
-        starts = np.flatnonzero(np.diff(runs[order], prepend=-1))
         steps = np.diff(time[order], prepend=0.0)
-        steps[starts] = np.inf
+        steps[np.diff(runs[order], prepend=-1) != 0] = np.inf
         if (steps <= 0).any():
             hint = "" if self.run is not None else " Is this where a run starts? Then give run."
             raise ValueError(
                 f"time={self.time!r} must increase from row to row within a run; at row "
                 f"{order[(steps <= 0).argmax()]} it does not.{hint}"
             )
-        filtered = self._quantities if self._suffix else []
-        chosen = [check_column(columns[i], f"column {names[i]!r}") for i in filtered]
-        return order, starts, steps, np.array(chosen).reshape(-1, n_rows).T[order]
-
-    def _rates(self, quantities, steps, starts):
-        """Low-passed rates of change, for rows that are sorted by run.
-
-        A loop over floats, not a linear filter of SciPy: the steps may be unequal, and these are
-        the lines that run in C. A million rows take a fifth of a second.
-        """
-        gains = -np.expm1(-steps / self.time_constant)
-        restarts = np.zeros(len(steps), dtype=bool)
-        restarts[starts] = True
-        rates = np.empty(quantities.shape)
-        for column, values in enumerate(quantities.T):
-            slopes, rate = np.diff(values, prepend=values[0]) / steps, 0.0
-            for part in row_blocks(len(values), LARGE_BLOCK_ROWS):
-                # Numbers as Python's take four times the memory: some of them at a time.
-                found = []
-                block = (each[part].tolist() for each in (slopes, gains, restarts))
-                for slope, gain, restart in zip(*block, strict=True):
-                    rate = 0.0 if restart else rate + gain * (slope - rate)
-                    found.append(rate)
-                rates[part, column] = found
-        return rates
+        return order, time[order], steps
 
 
 class ThermalRate(_RunFeature):
@@ -182,9 +136,10 @@ class ThermalRate(_RunFeature):
         r_k = r_{k-1} + \left(1 - e^{-h_k / \tau}\right)
               \left[\frac{T_k - T_{k-1}}{h_k} - r_{k-1}\right], \qquad r_0 = 0,
 
-    exact for a temperature that is straight between its samples, whatever the steps :math:`h_k`. No
-    row depends on a later one. All columns but ``time`` and ``run`` are filtered, and their rates
-    are all that comes out: choose columns by a :class:`~sklearn.compose.ColumnTransformer`.
+    exact for a temperature that is straight between its samples, whatever the steps :math:`h_k`.
+    The temperature of a body that follows with a lag :math:`\tau` is :math:`T_k - \tau r_k`. All
+    columns but ``time`` and ``run`` are filtered: choose them by a
+    :class:`~sklearn.compose.ColumnTransformer`.
 
     Parameters
     ----------
@@ -203,10 +158,6 @@ class ThermalRate(_RunFeature):
     feature_names_in_ : ndarray of shape (n_features,)
         Their names, where they have names.
 
-    See Also
-    --------
-    ThermalLag : The low-passed temperature.
-
     Examples
     --------
     >>> import pandas as pd
@@ -217,8 +168,6 @@ class ThermalRate(_RunFeature):
     >>> rate.fit_transform(log).round(4)["T_rate"].tolist()
     [0.0, 0.0632, 0.0865, 0.0918, 0.0, 0.0]
     """
-
-    _suffix = "rate"
 
     def __init__(
         self,
@@ -231,58 +180,37 @@ class ThermalRate(_RunFeature):
         self.time = time
         self.run = run
 
-    def _compute(self, quantities, steps, starts):
-        return self._rates(quantities, steps, starts)
+    def _compute(self, names, columns):
+        check_number(self.time_constant, "time_constant")
+        filtered = self._filtered(names)
+        if not filtered:
+            raise ValueError(f"X has {len(names)} feature(s), time or run: nothing to filter.")
+        order, _, steps = self._by_run(names, columns)
+        gains = -np.expm1(-steps / self.time_constant)
+        rates = np.empty((len(order), len(filtered)))
+        for place, column in enumerate(filtered):
+            values = check_column(columns[column], f"column {names[column]!r}")[order]
+            slopes = np.diff(values, prepend=values[0]) / steps
+            rates[order, place] = np.fromiter(_low_passed(slopes, gains), float, len(order))
+        return rates
+
+    def _names_out(self, names):
+        return [f"{names[i]}_rate" for i in self._filtered(names)]
+
+    def _filtered(self, names):
+        return [i for i in range(len(names)) if i not in (self._time, self._run)]
 
 
-class ThermalLag(_RunFeature):
-    r"""The temperature, causally low-passed: as a body feels it that follows with a lag.
+def _low_passed(slopes, gains):
+    """Rates of change; a run starts with the slope 0 and the gain 1.
 
-    :math:`y_k = T_k - \tau \, r_k` with the rate r of :class:`ThermalRate` solves
-    :math:`\tau \, \dot y = T - y`, :math:`y_0 = T_0`.
-
-    Parameters
-    ----------
-    time_constant : float, default=300.0
-        Time constant :math:`\tau`, positive, in the unit of ``time`` (s).
-    time, run : int or str, default=None
-        Columns of X, as for :class:`ThermalRate`.
-
-    Attributes
-    ----------
-    n_features_in_ : int
-        Number of columns of X.
-    feature_names_in_ : ndarray of shape (n_features,)
-        Their names, where they have names.
-
-    See Also
-    --------
-    ThermalRate : The low-passed derivative; its notes hold here too.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis.gyro import ThermalLag
-    >>> step = np.array([[0.0], [10], [10], [10]])  # each row one unit of time after the other
-    >>> ThermalLag(2.0).fit_transform(step).ravel().round(3).tolist()
-    [0.0, 2.131, 5.227, 7.105]
+    A loop, not a linear filter of SciPy: the steps may be unequal, and these are the lines that run
+    in C. A million rows take a fifth of a second.
     """
-
-    _suffix = "lagged"
-
-    def __init__(
-        self,
-        time_constant: float = 300.0,
-        *,
-        time: int | str | None = None,
-        run: int | str | None = None,
-    ) -> None:
-        self.time_constant = time_constant
-        self.time = time
-        self.run = run
-
-    def _compute(self, quantities, steps, starts):
-        return quantities - self.time_constant * self._rates(quantities, steps, starts)
+    rate = 0.0
+    for slope, gain in zip(memoryview(slopes), memoryview(gains), strict=True):
+        rate += gain * (slope - rate)
+        yield rate
 
 
 class TimeSincePowerOn(_RunFeature):
@@ -291,8 +219,7 @@ class TimeSincePowerOn(_RunFeature):
     Parameters
     ----------
     time, run : int or str, default=None
-        Columns of X, as for :class:`ThermalRate`. :func:`group_by_run` finds runs where there is no
-        such column.
+        Columns of X, as for :class:`ThermalRate`.
 
     Attributes
     ----------
@@ -314,7 +241,12 @@ class TimeSincePowerOn(_RunFeature):
         self.time = time
         self.run = run
 
-    def _compute(self, quantities, steps, starts):
-        elapsed = np.cumsum(np.where(np.isfinite(steps), steps, 0.0))
-        n_rows = np.diff(starts, append=len(steps))
-        return (elapsed - np.repeat(elapsed[starts], n_rows))[:, None]
+    def _compute(self, names, columns):
+        order, time, steps = self._by_run(names, columns)
+        first = pd.Series(time).where(np.isinf(steps)).ffill()
+        elapsed = np.empty((len(order), 1))
+        elapsed[order, 0] = time - first
+        return elapsed
+
+    def _names_out(self, names):
+        return ["time_since_power_on"]

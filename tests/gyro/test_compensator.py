@@ -80,13 +80,6 @@ def test_the_true_rate_is_not_used(log, compensator):
     assert without.equals(compensator.apply(log))
 
 
-def test_blocks_of_rows_change_nothing(log, compensator, monkeypatch):
-    whole = compensator.apply(log)
-    monkeypatch.setattr("skanfis.gyro.compensator.LARGE_BLOCK_ROWS", 7)
-    parts = compensator.apply(log)
-    np.testing.assert_allclose(parts, whole, rtol=1e-12)
-
-
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
 def test_rows_out_of_range_are_flagged_and_follow_the_policy(log, policy):
     compensator = fitted(log, out_of_bounds=policy)

@@ -19,7 +19,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import ThermalLag, ThermalRate, TimeSincePowerOn
+from skanfis.gyro import ThermalRate, TimeSincePowerOn
 
 # A row depends on the rows before it: that is what these are for.
 NEEDS_THE_ORDER_OF_ROWS = {
@@ -37,7 +37,7 @@ def name_of(check):
     ("estimator", "check"),
     [
         pytest.param(each, check, id=f"{type(each).__name__}-{name_of(check)}")
-        for estimator in (ThermalRate(), ThermalLag(), TimeSincePowerOn())
+        for estimator in (ThermalRate(), TimeSincePowerOn())
         for each, check in estimator_checks_generator(estimator)
         if name_of(check) not in NEEDS_THE_ORDER_OF_ROWS
     ],
@@ -63,17 +63,6 @@ def _interleaved(run):
     return np.argsort(run.groupby(run).cumcount(), kind="stable")
 
 
-def reference(time, temperature, time_constant):
-    """The recursion of the documentation, word by word."""
-    rates, rate = [0.0], 0.0
-    for k in range(1, len(time)):
-        h = time[k] - time[k - 1]
-        gain = 1.0 - np.exp(-h / time_constant)
-        rate += gain * ((temperature[k] - temperature[k - 1]) / h - rate)
-        rates.append(rate)
-    return np.array(rates)
-
-
 @pytest.mark.parametrize("steps", [np.full(200, 3.0), np.geomspace(0.01, 50, 200)])
 def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     time = np.cumsum(steps)
@@ -82,7 +71,7 @@ def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     assert_allclose(rate, -0.02 * (1 - np.exp(-(time - time[0]) / 30)), rtol=1e-9)
 
 
-def test_lag_solves_its_equation_on_the_polygon_through_the_samples(rng):
+def test_temperature_less_its_rate_is_that_of_a_body_that_lags(rng):
     time = np.cumsum(rng.uniform(1, 30, 60))
     temperature = np.cumsum(rng.normal(size=60))
     solution = solve_ivp(
@@ -94,15 +83,8 @@ def test_lag_solves_its_equation_on_the_polygon_through_the_samples(rng):
         rtol=1e-8,
     )
     X = np.column_stack([time, temperature])
-    lagged = ThermalLag(80.0, time=0).fit_transform(X).ravel()
-    assert_allclose(lagged, solution.y[0], atol=1e-4)
-
-
-def test_rate_and_lag_are_two_sides_of_one_filter(log):
-    columns = log[["t", "T", "run"]]
-    rate = ThermalRate(40.0, time="t", run="run").fit_transform(columns)
-    lagged = ThermalLag(40.0, time="t", run="run").fit_transform(columns)
-    assert_allclose(lagged.ravel(), log["T"] - 40.0 * rate.ravel(), rtol=1e-12)
+    rate = ThermalRate(80.0, time=0).fit_transform(X).ravel()
+    assert_allclose(temperature - 80.0 * rate, solution.y[0], atol=1e-4)
 
 
 def test_low_pass_quietens_a_noisy_thermometer(rng):
@@ -121,7 +103,7 @@ def test_the_lines_in_c_give_the_same(log, tmp_path):
     update = "".join(
         line for line in module.__doc__.splitlines() if line.startswith("    ") and ";" in line
     )
-    assert update.count(";") == 3
+    assert update.count(";") == 2
     run = log[log["run"] == "b"]
     source = tmp_path / "recursion.c"
     source.write_text(
@@ -129,14 +111,14 @@ def test_the_lines_in_c_give_the_same(log, tmp_path):
 #include <math.h>
 #include <stdio.h>
 int main(void) {
-    double tau = 33.0, rate = 0.0, previous, lagged, time, t, temperature, h;
+    double tau = 33.0, rate = 0.0, previous, time, t, temperature, h;
     scanf("%lf %lf", &time, &previous);
     while (scanf("%lf %lf", &t, &temperature) == 2) {
         h = t - time; time = t;
 """
         + update
         + r"""
-        printf("%.17g %.17g\n", rate, lagged);
+        printf("%.17g\n", rate);
     }
     return 0;
 }
@@ -147,15 +129,12 @@ int main(void) {
     subprocess.run(["cc", source, "-o", program, "-lm"], check=True)
     lines = "\n".join(f"{t!r} {T!r}" for t, T in run[["t", "T"]].to_numpy().tolist())
     printed = subprocess.run([program], input=lines, capture_output=True, text=True, check=True)
-    in_c = np.array([line.split() for line in printed.stdout.splitlines()], dtype=float)
-    X = run[["t", "T"]].to_numpy()
-    for place, feature in enumerate((ThermalRate(33.0, time=0), ThermalLag(33.0, time=0))):
-        assert_allclose(in_c[:, place], feature.fit_transform(X).ravel()[1:], rtol=1e-12)
+    rate = ThermalRate(33.0, time=0).fit_transform(run[["t", "T"]].to_numpy())
+    assert_allclose(np.array(printed.stdout.split(), dtype=float), rate.ravel()[1:], rtol=1e-12)
 
 
 FEATURES = [
     ThermalRate(20.0, time="t", run="run"),
-    ThermalLag(20.0, time="t", run="run"),
     TimeSincePowerOn(time="t", run="run"),
 ]
 
@@ -180,7 +159,7 @@ def test_runs_do_not_know_of_each_other(feature, log):
     for name in "abc":
         rows = (columns["run"] == name).to_numpy()
         assert_array_equal(clone(feature).fit_transform(columns[rows]), features[rows])
-        assert features[rows][0] == (columns["T"][rows].iloc[0] if "Lag" in str(feature) else 0)
+        assert features[rows][0] == 0
 
 
 @pytest.mark.parametrize("feature", FEATURES, ids=lambda each: type(each).__name__)
@@ -200,7 +179,6 @@ def test_frames_of_any_kind_and_arrays_give_the_same(feature, log):
     ("feature", "names"),
     [
         (ThermalRate(time="t", run="run"), ["T_rate", "other_rate"]),
-        (ThermalLag(time="t", run="run"), ["T_lagged", "other_lagged"]),
         (TimeSincePowerOn(time="t", run="run"), ["time_since_power_on"]),
     ],
 )

@@ -160,7 +160,7 @@ class TestBeyondTheSine:
         edge, step = self.row(self.LIMIT)[0, 0], 1e4
         at, below = law.predict([[edge, REFERENCE], [edge * (1 - 1e-6), REFERENCE]])
         slope = (at - below) / (1e-6 * edge)
-        with pytest.warns(OutOfBoundsWarning, match="1 of 1 rows follow the policy out_of_bounds"):
+        with pytest.warns(OutOfBoundsWarning, match="tangent beyond max_phase=1 rad"):
             beyond = law.predict([[edge + 50 * np.sign(edge) * step, REFERENCE]])[0]
         assert beyond == pytest.approx(at + slope * 50 * np.sign(edge) * step, rel=1e-4)
 
@@ -184,7 +184,7 @@ class TestBeyondTheSine:
         X, rate = calibration(rng, max_rate=65.0)
         law = arcsine().fit(X, rate)
         faster = np.array([[planted_output(100.0, 30.0), 30.0]])
-        with pytest.warns(OutOfBoundsWarning, match="training data: 1 of 1 rows"):
+        with pytest.warns(OutOfBoundsWarning, match="1 of 1 rows follow the law"):
             assert law.predict(faster) == pytest.approx(100.0, abs=1e-5)
         assert not law.in_bounds(faster)[0]
 
