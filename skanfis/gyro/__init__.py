@@ -1,7 +1,7 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
 from ._checks import check_log
-from ._split import find_rate_levels, group_by_rate_level
+from ._split import group_by_rate_level
 from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
@@ -48,7 +48,6 @@ __all__ = [
     "bias_stability",
     "check_log",
     "export_c_physics",
-    "find_rate_levels",
     "group_by_rate_level",
     "gyro_report",
     "hysteresis",

@@ -19,7 +19,6 @@ __all__ = [
     "KINDS",
     "Split",
     "choose_split",
-    "find_rate_levels",
     "group_by_rate_level",
 ]
 
@@ -63,40 +62,6 @@ _WORDS = {
 }
 
 
-def find_rate_levels(rate: ArrayLike, *, tolerance: float | None = None) -> np.ndarray:
-    """Find the levels of a rate table in its log.
-
-    Parameters
-    ----------
-    rate : array-like of shape (n_samples,)
-        True rate, in any unit.
-    tolerance : float, default=None
-        Largest gap between neighbouring rates of one level, in the unit of ``rate``. Default: where
-        the gaps, sorted, make their clearest jump; at least 1e-4 of the largest rate.
-
-    Returns
-    -------
-    levels : ndarray of shape (n_levels,)
-        Median rate of each level, ascending. Rows of a table on its way count to the nearest.
-
-    Raises
-    ------
-    ValueError
-        If the rate changes continuously, so that there are no levels, or has missing values.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis.gyro import find_rate_levels
-    >>> encoder = np.random.default_rng(0).normal(scale=0.01, size=400)
-    >>> rate = np.tile([-50.0, -5.0, 0.0, 5.0, 50.0], 80) + encoder
-    >>> abs(find_rate_levels(rate).round(2)).tolist()
-    [50.0, 5.0, 0.0, 5.0, 50.0]
-    """
-    labels = group_by_rate_level(rate, signed=True, tolerance=tolerance)
-    return pd.Series(np.asarray(rate, dtype=float)).groupby(labels).median().to_numpy()
-
-
 def group_by_rate_level(
     rate: ArrayLike,
     *,
@@ -104,7 +69,9 @@ def group_by_rate_level(
     signed: bool = False,
     tolerance: float | None = None,
 ) -> np.ndarray:
-    """Groups that hold a level of the rate table together.
+    """Groups that hold a level of the rate table together, found from the rates themselves.
+
+    Rows of a table on its way count to the nearest level.
 
     Parameters
     ----------
@@ -116,7 +83,8 @@ def group_by_rate_level(
     signed : bool, default=False
         Whether a rate and its opposite are two levels.
     tolerance : float, default=None
-        As for :func:`find_rate_levels`.
+        Largest gap between neighbouring rates of one level, in the unit of ``rate``. Default: where
+        the gaps, sorted, make their clearest jump; at least 1e-4 of the largest rate.
 
     Returns
     -------
@@ -126,7 +94,8 @@ def group_by_rate_level(
     Raises
     ------
     ValueError
-        If the rate has no levels, or fewer than ``n_groups``.
+        If the rate changes continuously, so that it has no levels, if it has fewer than
+        ``n_groups``, or if values are missing.
 
     Examples
     --------

@@ -37,9 +37,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     residual : regressor, default=None
         Fitted to what the base leaves; None is ``ANFISRegressor()``. A Pipeline will do.
     n_rounds : int, default=1
-        How often both are fitted in turn (backfitting [1]_), the base then to the target minus what
-        the residual model predicts. Three are enough; the residual model must be too small to do
-        the base's work.
+        How often both are fitted in turn (backfitting: Buja, Hastie and Tibshirani, Annals of
+        Statistics 17, 1989), the base then to the target minus what the residual model predicts.
+        Three are enough; the residual model must be too small to do the base's work.
 
     Attributes
     ----------
@@ -53,11 +53,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     See Also
     --------
     OpenLoopArcsineRegressor : The law of an open-loop fiber-optic gyro.
-
-    References
-    ----------
-    .. [1] A. Buja, T. Hastie and R. Tibshirani, "Linear smoothers and additive models", The Annals
-       of Statistics 17 (1989) 453-510.
 
     Examples
     --------
@@ -99,7 +94,8 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,)
             Target.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, given to both parts; to a Pipeline for its last step.
+            Weights, given to both parts whatever metadata they request; to a Pipeline for its last
+            step.
         groups : array-like of shape (n_samples,), default=None
             The run, device or day of each row, given to every part whose ``fit`` takes groups, and
             to a search for its splitter.

@@ -127,18 +127,10 @@ class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
 
 
 class ThermalRate(_RunFeature):
-    r"""Rate of change of the temperature, causally low-passed.
+    r"""Rate of change of the temperature, causally low-passed; see :doc:`/gyro_data`.
 
-    A first-order low-pass of the derivative,
-
-    .. math::
-
-        r_k = r_{k-1} + \left(1 - e^{-h_k / \tau}\right)
-              \left[\frac{T_k - T_{k-1}}{h_k} - r_{k-1}\right], \qquad r_0 = 0,
-
-    exact for a temperature that is straight between its samples, whatever the steps :math:`h_k`.
-    The temperature of a body that follows with a lag :math:`\tau` is :math:`T_k - \tau r_k`. All
-    columns but ``time`` and ``run`` are filtered: choose them by a
+    The temperature of a body that follows with a lag :math:`\tau` is :math:`T - \tau r`, with the
+    rate r. All columns but ``time`` and ``run`` are filtered: choose them by a
     :class:`~sklearn.compose.ColumnTransformer`.
 
     Parameters

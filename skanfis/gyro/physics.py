@@ -74,7 +74,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
         What ``predict`` does beyond ``max_phase``: hold the phase there, go on along the tangent,
         return NaN, or raise ValueError. Rows within it but outside the training data follow the
-        law, and ``in_bounds`` flags them.
+        law; ``in_bounds`` flags them, and ``predict`` warns of them and of rows on the tangent.
 
     Attributes
     ----------
@@ -97,16 +97,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         Number of columns of X.
     feature_names_in_ : ndarray of shape (n_features,)
         Their names, where X had names that are all strings.
-
-    Warns
-    -----
-    ConstantInputWarning
-        If the temperature never changes in the training data: no dependence on it is learnt.
-    ConvergenceWarning
-        If the fit did not settle.
-    OutOfBoundsWarning
-        From ``predict`` and ``score``, of rows outside the training data, and with
-        ``out_of_bounds="linear"`` of those beyond ``max_phase``.
 
     See Also
     --------

@@ -1,8 +1,5 @@
 """Physics plus what it leaves: sums, weights, nested parameters, and flags through Pipelines."""
 
-import io
-
-import joblib
 import numpy as np
 import pytest
 from sklearn.base import clone
@@ -48,15 +45,6 @@ def test_the_second_learns_what_the_first_leaves(rng):
     np.testing.assert_allclose(model.predict(x), y, atol=1e-12)
 
 
-def test_prediction_is_the_sum_of_the_parts(data):
-    X, rate = data
-    model = compensator(n_mfs=2, agreement=1e-4).fit(X, rate)
-    total = model.base_.predict(X) + model.residual_.predict(X)
-    np.testing.assert_array_equal(model.predict(X), total)
-    left = rate - model.base_.predict(X)
-    assert np.std(rate - model.predict(X)) < 0.3 * np.std(left)
-
-
 def test_rounds_take_from_the_base_what_is_not_its_own(rng):
     """Two columns that go together: least squares in turn ends where least squares of both is."""
     x = rng.normal(size=(200, 2)) @ [[1.0, 0.7], [0.0, 0.7]]
@@ -86,15 +74,6 @@ def test_grid_search_reaches_into_the_parts(data):
     assert search.best_params_["residual__n_mfs"] == 2
     assert len(search.cv_results_["params"]) == 4
     assert clone(search.best_estimator_).get_params()["residual__n_mfs"] == 2
-
-
-def test_a_file_brings_it_back(data):
-    X, rate = data
-    model = compensator(n_mfs=2).fit(X, rate)
-    file = io.BytesIO()
-    joblib.dump(model, file)
-    file.seek(0)
-    np.testing.assert_array_equal(joblib.load(file).predict(X), model.predict(X))
 
 
 @pytest.mark.parametrize("residual", [LinearRegression(), make_pipeline(LinearRegression())])
@@ -186,18 +165,6 @@ def test_a_fit_that_fails_leaves_both_parts_of_the_one_before(data):
     with pytest.raises(ValueError, match="positive"):
         model.fit(X, 2.0 * rate)
     np.testing.assert_array_equal(model.predict(X), before)
-
-
-def test_columns_for_the_residual_model_are_selected_in_its_pipeline(data):
-    X, rate = data
-    selected = make_pipeline(
-        make_column_transformer(("passthrough", ["time", "temperature"])),
-        quick(n_mfs=2),
-    )
-    base = OpenLoopArcsineRegressor("output", "temperature")
-    model = ResidualRegressor(base, selected).fit(X, rate)
-    assert model.residual_[-1].n_features_in_ == 2
-    assert model.in_bounds(X).all()
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

@@ -53,15 +53,6 @@ def test_planted_offset_and_curvature_come_back(rng):
     np.testing.assert_allclose(law.bias_, PLANTED["bias"], rtol=1e-5)
 
 
-def test_phase_is_that_of_the_planted_law(rng):
-    X, rate = calibration(rng)
-    factor = np.polynomial.polynomial.polyval(X[:, 1] - REFERENCE, PLANTED["sagnac_factor"])
-    bias = np.polynomial.polynomial.polyval(X[:, 1] - REFERENCE, PLANTED["bias"])
-    # The planted amplitude is negative; the law's factor is positive by convention.
-    expected = factor * np.deg2rad(rate + bias)
-    np.testing.assert_allclose(arcsine().fit(X, rate).phase(X), expected, atol=1e-9)
-
-
 def test_lag_of_the_thermometer_comes_back(rng):
     """The coil is ahead of the thermometer by the lag times the thermal rate."""
     rate, shown = rng.uniform(-150, 150, 600), rng.uniform(-20, 60, 600)
