@@ -17,7 +17,6 @@ TRUSTED_TYPES = [
     "skanfis.learning.data.Scale",
     "skanfis.gyro.compose.ResidualRegressor",
     "skanfis.gyro.features.ThermalRate",
-    "skanfis.gyro.features.TimeSincePowerOn",
     "skanfis.gyro.physics.OpenLoopArcsineRegressor",
     "skanfis.intervals.conformal.ConformalRegressor",
     "skanfis.membership.bell.Bell",

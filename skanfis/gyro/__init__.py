@@ -16,7 +16,7 @@ from .displays import (
     ScaleFactorErrorDisplay,
 )
 from .errors import LogError
-from .features import ThermalRate, TimeSincePowerOn
+from .features import ThermalRate
 from .log import read_log
 from .metrics import (
     bias,
@@ -41,7 +41,6 @@ __all__ = [
     "ResidualSurfaceDisplay",
     "ScaleFactorErrorDisplay",
     "ThermalRate",
-    "TimeSincePowerOn",
     "allan_coefficients",
     "allan_deviation",
     "bias",

@@ -17,7 +17,7 @@ from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask
 from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
-from .features import ThermalRate, TimeSincePowerOn
+from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
 
 __all__ = ["INPUTS", "GyroCompensator", "features"]
@@ -242,7 +242,9 @@ def features(log, inputs, time_constant):
     columns = {}
     for name in inputs:
         if name == "time":
-            columns[name] = TimeSincePowerOn(**roles).fit_transform(clock)[:, 0]
+            runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
+            since = log["time"] - log["time"].groupby(runs).transform("first")
+            columns[name] = since.to_numpy(dtype=float)
         elif name == "temperature_rate":
             rate = ThermalRate(time_constant, **roles)
             columns[name] = rate.fit_transform(clock.assign(temperature=log["temperature"]))[:, 0]

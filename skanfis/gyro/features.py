@@ -1,7 +1,7 @@
-"""Features of a gyro's thermal state, by recursions that run on the gyro's processor too.
+"""The rate of temperature change, by a recursion that runs on the gyro's processor too.
 
-docs/gyro_data.rst and docs/gyro_physics.rst say what they are for. In C, with the state
-{rate, previous} of one run, on every sample after the first, h after the one before:
+docs/gyro_data.rst says what it is for. In C, with the state {rate, previous} of one run, on every
+sample after the first, h after the one before:
 
     rate += (1.0 - exp(-h / tau)) * ((temperature - previous) / h - rate);
     previous = temperature;
@@ -19,114 +19,10 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._columns import check_column, check_number, column_position
 
-__all__ = ["ThermalRate", "TimeSincePowerOn"]
+__all__ = ["ThermalRate"]
 
 
-class _RunFeature(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
-    """Features that are computed run by run, from the past rows of the run alone."""
-
-    def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Take note of the columns, and check them; nothing is learnt.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            A log.
-        y : None
-            Not used; here for scikit-learn.
-
-        Returns
-        -------
-        self : object
-            The transformer.
-
-        Raises
-        ------
-        ValueError
-            If X is not finite or lacks a column named, or time does not increase within a run.
-        """
-        names, columns = self._columns_of(X, reset=True)
-        self._time, self._run = (
-            None if given is None else column_position(names, role, given)
-            for role, given in (("time", self.time), ("run", self.run))
-        )
-        if self._time is not None and self._time == self._run:
-            raise ValueError(f"time={self.time!r} and run={self.run!r} are one column.")
-        self._compute(names, columns)  # what transform refuses, fit refuses
-        return self
-
-    def transform(self, X: ArrayLike) -> np.ndarray:
-        """Compute the features.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            A log: the rows of a run in time's order, whole runs. Runs may be mixed.
-
-        Returns
-        -------
-        features : ndarray of shape (n_samples, n_features_out)
-            The new columns alone.
-
-        Raises
-        ------
-        ValueError
-            As from ``fit``, or if X has other columns than there.
-        """
-        check_is_fitted(self)
-        return self._compute(*self._columns_of(X, reset=False))
-
-    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
-        """Names of the new columns.
-
-        Parameters
-        ----------
-        input_features : array-like of str or None, default=None
-            Names of the columns of X, where it had none in ``fit``.
-
-        Returns
-        -------
-        names : ndarray of str
-            Of the columns filtered, each with "_rate" behind it; or "time_since_power_on".
-        """
-        names = super().get_feature_names_out(input_features)
-        check_is_fitted(self)
-        return np.array(self._names_out(names), dtype=object)
-
-    def _columns_of(self, X, reset):
-        """Names, positions where there are none, and values of the columns of X."""
-        if hasattr(X, "columns"):
-            validate_data(self, X, reset=reset, skip_check_array=True)
-            return list(X.columns), [np.asarray(X[name]) for name in X.columns]
-        columns = validate_data(self, X, reset=reset, dtype="numeric").T
-        return list(range(len(columns))), list(columns)
-
-    def _by_run(self, names, columns):
-        """Order of the rows by run; in it the time, and its steps, infinite where a run starts."""
-        n_rows = len(columns[0])
-        runs, time = np.zeros(n_rows, dtype=int), np.arange(n_rows, dtype=float)
-        if self._run is not None:
-            runs = pd.factorize(columns[self._run])[0]
-            if np.any(runs < 0):
-                raise ValueError(
-                    f"column {names[self._run]!r} (run) has missing values, the first at row "
-                    f"{runs.argmin()}."
-                )
-        if self._time is not None:
-            time = check_column(columns[self._time], f"column {names[self._time]!r} (time)")
-        order = np.argsort(runs, kind="stable")
-        steps = np.diff(time[order], prepend=0.0)
-        steps[np.diff(runs[order], prepend=-1) != 0] = np.inf
-        if (steps <= 0).any():
-            hint = "" if self.run is not None else " Is this where a run starts? Then give run."
-            raise ValueError(
-                f"time={self.time!r} must increase from row to row within a run; at row "
-                f"{order[(steps <= 0).argmax()]} it does not.{hint}"
-            )
-        return order, time[order], steps
-
-
-class ThermalRate(_RunFeature):
+class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     r"""Rate of change of the temperature, causally low-passed; see :doc:`/gyro_data`.
 
     The temperature of a body that follows with a lag :math:`\tau` is :math:`T - \tau r`, with the
@@ -172,25 +68,113 @@ class ThermalRate(_RunFeature):
         self.time = time
         self.run = run
 
-    def _compute(self, names, columns):
+    def fit(self, X: ArrayLike, y: Any = None) -> Self:
+        """Take note of the columns, and check them; nothing is learnt.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            A log.
+        y : None
+            Not used; here for scikit-learn.
+
+        Returns
+        -------
+        self : ThermalRate
+
+        Raises
+        ------
+        ValueError
+            If X is not finite or lacks a column named, or time does not increase within a run.
+        """
         check_number(self.time_constant, "time_constant")
-        filtered = self._filtered(names)
-        if not filtered:
+        names, columns = self._columns_of(X, reset=True)
+        self._time, self._run = (
+            None if given is None else column_position(names, role, given)
+            for role, given in (("time", self.time), ("run", self.run))
+        )
+        if self._time is not None and self._time == self._run:
+            raise ValueError(f"time={self.time!r} and run={self.run!r} are one column.")
+        self._filtered = [i for i in range(len(names)) if i not in (self._time, self._run)]
+        if not self._filtered:
             raise ValueError(f"X has {len(names)} feature(s), time or run: nothing to filter.")
-        order, _, steps = self._by_run(names, columns)
+        self._rates(names, columns)  # what transform refuses, fit refuses
+        return self
+
+    def transform(self, X: ArrayLike) -> np.ndarray:
+        """Compute the rates.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            A log: the rows of a run in time's order, whole runs. Runs may be mixed.
+
+        Returns
+        -------
+        rates : ndarray of shape (n_samples, n_features_out)
+            Those of the columns filtered, alone.
+
+        Raises
+        ------
+        ValueError
+            As from ``fit``, or if X has other columns than there.
+        """
+        check_is_fitted(self)
+        return self._rates(*self._columns_of(X, reset=False))
+
+    def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
+        """Names of the new columns.
+
+        Parameters
+        ----------
+        input_features : array-like of str or None, default=None
+            Names of the columns of X, where it had none in ``fit``.
+
+        Returns
+        -------
+        names : ndarray of str
+            Of the columns filtered, each with "_rate" behind it.
+        """
+        names = super().get_feature_names_out(input_features)
+        check_is_fitted(self)
+        return np.array([f"{names[i]}_rate" for i in self._filtered], dtype=object)
+
+    def _columns_of(self, X, reset):
+        """Names, positions where there are none, and values of the columns of X."""
+        if hasattr(X, "columns"):
+            validate_data(self, X, reset=reset, skip_check_array=True)
+            return list(X.columns), [np.asarray(X[name]) for name in X.columns]
+        columns = validate_data(self, X, reset=reset, dtype="numeric").T
+        return list(range(len(columns))), list(columns)
+
+    def _rates(self, names, columns):
+        n_rows = len(columns[0])
+        runs, time = np.zeros(n_rows, dtype=int), np.arange(n_rows, dtype=float)
+        if self._run is not None:
+            runs = pd.factorize(columns[self._run])[0]
+            if np.any(runs < 0):
+                raise ValueError(
+                    f"column {names[self._run]!r} (run) has missing values, the first at row "
+                    f"{runs.argmin()}."
+                )
+        if self._time is not None:
+            time = check_column(columns[self._time], f"column {names[self._time]!r} (time)")
+        order = np.argsort(runs, kind="stable")
+        steps = np.diff(time[order], prepend=0.0)
+        steps[np.diff(runs[order], prepend=-1) != 0] = np.inf
+        if (steps <= 0).any():
+            hint = "" if self.run is not None else " Is this where a run starts? Then give run."
+            raise ValueError(
+                f"time={self.time!r} must increase from row to row within a run; at row "
+                f"{order[(steps <= 0).argmax()]} it does not.{hint}"
+            )
         gains = -np.expm1(-steps / self.time_constant)
-        rates = np.empty((len(order), len(filtered)))
-        for place, column in enumerate(filtered):
+        rates = np.empty((n_rows, len(self._filtered)))
+        for place, column in enumerate(self._filtered):
             values = check_column(columns[column], f"column {names[column]!r}")[order]
             slopes = np.diff(values, prepend=values[0]) / steps
-            rates[order, place] = np.fromiter(_low_passed(slopes, gains), float, len(order))
+            rates[order, place] = np.fromiter(_low_passed(slopes, gains), float, n_rows)
         return rates
-
-    def _names_out(self, names):
-        return [f"{names[i]}_rate" for i in self._filtered(names)]
-
-    def _filtered(self, names):
-        return [i for i in range(len(names)) if i not in (self._time, self._run)]
 
 
 def _low_passed(slopes, gains):
@@ -203,42 +187,3 @@ def _low_passed(slopes, gains):
     for slope, gain in zip(memoryview(slopes), memoryview(gains), strict=True):
         rate += gain * (slope - rate)
         yield rate
-
-
-class TimeSincePowerOn(_RunFeature):
-    """Time since the first row of the run, from a clock that goes on from run to run.
-
-    Parameters
-    ----------
-    time, run : int or str, default=None
-        Columns of X, as for :class:`ThermalRate`.
-
-    Attributes
-    ----------
-    n_features_in_ : int
-        Number of columns of X; those that are neither time nor run are not used.
-    feature_names_in_ : ndarray of shape (n_features,)
-        Their names, where they have names.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis.gyro import TimeSincePowerOn
-    >>> log = np.array([[100.0, 1], [101, 1], [103, 1], [500, 2], [501, 2]])
-    >>> TimeSincePowerOn(time=0, run=1).fit_transform(log).ravel().tolist()
-    [0.0, 1.0, 3.0, 0.0, 1.0]
-    """
-
-    def __init__(self, *, time: int | str | None = None, run: int | str | None = None) -> None:
-        self.time = time
-        self.run = run
-
-    def _compute(self, names, columns):
-        order, time, steps = self._by_run(names, columns)
-        first = pd.Series(time).where(np.isinf(steps)).ffill()
-        elapsed = np.empty((len(order), 1))
-        elapsed[order, 0] = time - first
-        return elapsed
-
-    def _names_out(self, names):
-        return ["time_since_power_on"]
