@@ -57,12 +57,11 @@ def simpler_compensations(X, rate, before, folds, rows):
                 for train, test in folds:
                     predicted[test] = make().fit(X.iloc[train], target[train]).predict(X.iloc[test])
                 model = make().fit(X.iloc[rows], target[rows])
+            if n_lost := np.count_nonzero(~np.isfinite(predicted)):
+                raise ValueError(f"it has no finite prediction for {n_lost} rows")
         except ValueError as error:
             # Of the law alone: no rate changes, or too few rows tell its coefficients.
             yield Simpler(name, predicts, missing=str(error))
-            continue
-        if n_lost := np.count_nonzero(~np.isfinite(predicted)):
-            yield Simpler(name, predicts, missing=f"it has no finite prediction for {n_lost} rows")
             continue
         yield Simpler(
             name, predicts, predicted if predicts == "rate" else before - predicted, model

@@ -237,17 +237,16 @@ class GyroCompensator:
 
 def features(log, inputs, time_constant):
     """Columns that are known on board, in the order of ``inputs``."""
-    clock = log[[part for part in ("time", "run") if part in log]]
-    roles = {"time": "time", "run": "run" if "run" in log else None}
+    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
     columns = {}
     for name in inputs:
         if name == "time":
-            runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
             since = log["time"] - log["time"].groupby(runs).transform("first")
             columns[name] = since.to_numpy(dtype=float)
         elif name == "temperature_rate":
-            rate = ThermalRate(time_constant, **roles)
-            columns[name] = rate.fit_transform(clock.assign(temperature=log["temperature"]))[:, 0]
+            rate = ThermalRate(time_constant, time="time", run="run")
+            parts = log[["time", "temperature"]].assign(run=runs)
+            columns[name] = rate.fit_transform(parts)[:, 0]
         else:
             columns[name] = log[name].to_numpy()
     return pd.DataFrame(columns, index=log.index)

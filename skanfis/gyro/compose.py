@@ -116,12 +116,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
         base = OpenLoopArcsineRegressor() if self.base is None else self.base
         residual = ANFISRegressor() if self.residual is None else self.residual
-        if sample_weight is not None:
-            for role, part in (("base", base), ("residual", residual)):
-                if not _takes(part, "sample_weight"):
-                    raise ValueError(
-                        f"sample_weight was given, but {role}={part!r} takes no weights."
-                    )
+        for role, part in (("base", base), ("residual", residual)):
+            if sample_weight is not None and not _takes(part, "sample_weight"):
+                raise ValueError(f"sample_weight was given, but {role}={part!r} takes no weights.")
         if groups is not None and not (_takes(base, "groups") or _takes(residual, "groups")):
             raise ValueError(
                 f"groups was given, but neither base={base!r} nor residual={residual!r} takes any."
@@ -168,11 +165,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Returns
         -------
         inside : ndarray of bool of shape (n_samples,)
-
-        Raises
-        ------
-        ValueError
-            If neither part has the method.
         """
         return np.logical_and.reduce(self._answers("in_bounds", X))
 
@@ -187,11 +179,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         -------
         coverage : ndarray of shape (n_samples,)
             From 0 to 1; see :meth:`skanfis.ANFISRegressor.coverage`.
-
-        Raises
-        ------
-        ValueError
-            If neither part has the method.
         """
         return np.minimum.reduce(self._answers("coverage", X))
 

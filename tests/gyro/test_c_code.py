@@ -81,12 +81,6 @@ def silent():
     return model, X
 
 
-def law_raises():
-    model, X = whole()
-    model.base_.set_params(out_of_bounds="raise", max_phase=0.3)
-    return model, X
-
-
 def rules_raise():
     """Columns by position, no temperature in the law."""
     log = simulated()
@@ -97,7 +91,7 @@ def rules_raise():
     return model, X
 
 
-CASES = [whole, everything, silent, law_raises, rules_raise]
+CASES = [whole, everything, silent, rules_raise]
 
 
 def around(X, n_rows=4000):
@@ -175,7 +169,6 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
     # Full scale in range, and that of the rates which rows far out of range mean.
     in_range = off[bits == 0].max() / np.abs(log["rate"]).max()
     everywhere = off[answered].max() / np.abs(wanted[answered]).max()
-    print(f"{label} {dtype} {std}: {in_range:.1e} in range, {everywhere:.1e} everywhere")
     assert in_range < tolerance
     assert everywhere < tolerance
     silence = y[refused & ~unsure, 0]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from sklearn.base import clone
 from sklearn.compose import make_column_transformer
-from sklearn.dummy import DummyRegressor
 from sklearn.linear_model import LinearRegression, Ridge
 from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut
 from sklearn.neighbors import KNeighborsRegressor
@@ -14,7 +13,6 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.gyro.compose import ResidualRegressor
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
 
@@ -141,13 +139,6 @@ def test_flags_of_both_parts_come_through(data, scaled):
     coverage = model.coverage(rows)
     assert coverage[0] > 0.3
     assert np.all(coverage[1:] < 1e-6)
-
-
-def test_parts_warn_for_themselves(data):
-    X, rate = data
-    model = ResidualRegressor(OpenLoopArcsineRegressor(), DummyRegressor()).fit(X, rate)
-    with pytest.warns(OutOfBoundsWarning, match="follow the law"):
-        model.predict(X.assign(temperature=90.0))
 
 
 def test_a_base_that_refuses_training_rows_is_refused(data):

@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 
-import joblib
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -11,14 +10,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from sklearn.base import clone
-from sklearn.compose import make_column_transformer
 from sklearn.exceptions import NotFittedError
-from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GroupKFold, cross_val_predict
-from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
-from skanfis.datasets import make_ofog
 from skanfis.gyro import ThermalRate
 
 # A row depends on the rows before it: that is what these are for.
@@ -167,28 +161,6 @@ def test_new_columns_have_names_and_keep_the_index(log):
     assert feature.n_features_in_ == 4
     with pytest.raises(ValueError, match="input_features"):
         feature.get_feature_names_out(["a", "b"])
-
-
-def test_works_in_a_pipeline_that_is_cross_validated_and_saved(tmp_path):
-    data = make_ofog(n_devices=1, n_runs=8, rates=[0.0], noise=0.0, random_state=0)
-    data["kind"] = "run " + data["run"].astype(str)
-    inputs = make_column_transformer(
-        ("passthrough", ["temperature", "time"]),
-        (ThermalRate(30.0, time="time", run="kind"), ["time", "temperature", "kind"]),
-        verbose_feature_names_out=False,
-    )
-    model = make_pipeline(inputs, LinearRegression())
-    split = {"cv": GroupKFold(4), "groups": data["run"]}
-    with_rate = cross_val_predict(model, data, data["error"], **split)
-    plain = make_pipeline(
-        make_column_transformer(("passthrough", ["temperature"])), LinearRegression()
-    )
-    without = cross_val_predict(plain, data, data["error"], **split)
-    assert np.std(data["error"] - with_rate) < 0.85 * np.std(data["error"] - without)
-    fitted = model.fit(data, data["error"])
-    joblib.dump(fitted, tmp_path / "model.joblib")
-    loaded = joblib.load(tmp_path / "model.joblib")
-    assert_array_equal(loaded.predict(data), fitted.predict(data))
 
 
 @pytest.mark.parametrize(
