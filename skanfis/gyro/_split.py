@@ -51,6 +51,10 @@ _ROWS_PER_LEVEL = 3
 _TURN, _SMALLEST_TURN = 0.2, 3.0
 # A turning point is looked for among so many means of each run.
 _MOST_POINTS = 5_000
+_NO_CLOCK = (
+    " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
+    "time=NAME."
+)
 _LEGS = "legs between turning points of the temperature"
 # What is held out, and what of it is counted.
 _WORDS = {
@@ -227,7 +231,14 @@ def _choose(groups, counts, has_time):
         for kind in ("level", "leg", "piece"):
             if kind in enough:
                 return kind, "too few runs to hold out"
-        raise LogError(_nothing_to_hold_out(counts, has_time))
+        found = [f"{counts[name]} {name}(s)" for name in ("device", "run") if name in counts]
+        found.append(f"{counts.get('level', 0)} rate levels")
+        clock = "" if has_time else _NO_CLOCK
+        raise LogError(
+            "the compensator could not be checked: the log has "
+            f"{', '.join(found)}. At least 3 runs (a column run, or one file each), 5 rate levels, "
+            f"or a temperature that rises and falls are needed, to be held out in turn.{clock}"
+        )
     if "level" in enough and counts["level"] <= _MOST_LEVELS:
         pairs = np.unique(np.column_stack([groups["level"], groups[whole]]), axis=0)
         # Levels, on average, that are met by two groups or more.
@@ -247,22 +258,6 @@ def _check(part, counts):
             f"cannot hold out by {part}: the log has {counts[part]} {name}(s), and at least "
             f"{_FEWEST[part]} are needed."
         )
-
-
-def _nothing_to_hold_out(counts, has_time):
-    found = [f"{counts[name]} {name}(s)" for name in ("device", "run") if name in counts]
-    found.append(f"{counts.get('level', 0)} rate levels")
-    clock = ""
-    if not has_time:
-        clock = (
-            " No column of the time was found, whose gaps would tell runs apart: name it with "
-            "--columns time=NAME."
-        )
-    return (
-        f"the compensator could not be checked: the log has {', '.join(found)}. At least 3 runs "
-        "(a column run, or one file each), 5 rate levels, or a temperature that rises and falls "
-        f"are needed, to be held out in turn.{clock}"
-    )
 
 
 def _levels(log):
