@@ -98,17 +98,6 @@ def test_weights_count_as_copies(rng):
     np.testing.assert_array_equal(weighted.minimum_, repeated.minimum_)
 
 
-def test_columns_by_name_and_place(rng):
-    pd = pytest.importorskip("pandas")
-    X, rate = calibration(rng)
-    plain = arcsine().fit(X, rate)
-    frame = pd.DataFrame({"time": np.arange(len(X)), "T": X[:, 1], "counts": X[:, 0]})
-    named = arcsine(output="counts", temperature="T").fit(frame, rate)
-    np.testing.assert_array_equal(named.predict(frame), plain.predict(X))
-    placed = arcsine(output=-1, temperature=1).fit(frame.to_numpy(), rate)
-    np.testing.assert_array_equal(placed.predict(frame.to_numpy()), plain.predict(X))
-
-
 def test_constant_temperature_is_said_and_survived(rng):
     X, rate = calibration(rng)
     X[:, 1] = REFERENCE

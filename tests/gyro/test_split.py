@@ -75,13 +75,6 @@ def test_a_rate_that_changes_continuously_has_no_levels(rate):
         group_by_rate_level(rate)
 
 
-def test_opposite_rates_are_one_level_unless_signed():
-    rate = np.tile(GRID, 3)
-    groups = group_by_rate_level(rate)
-    assert_array_equal(groups, np.rint(np.abs(rate) / 3.6))
-    assert group_by_rate_level(rate, signed=True).max() == 56
-
-
 def test_levels_are_dealt_out_by_turns():
     rate = np.tile(GRID, 3)
     groups = group_by_rate_level(rate, n_groups=5)
