@@ -20,8 +20,8 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.exceptions import OutOfBoundsWarning, SplitLeakWarning
-from skanfis.gyro import ThermalRate, check_split, group_by_rate_level
+from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.gyro import ThermalRate, group_by_rate_level
 
 # %%
 # Campaigns
@@ -162,15 +162,6 @@ figure, panel = plt.subplots(figsize=(6, 3.2), layout="constrained")
 held_out.T.plot.bar(ax=panel, rot=0, color=["0.7", "C0", "C1"])
 panel.set(yscale="log", ylabel="residual RMS [°/s]")
 panel.legend(title="held out")
-
-# %%
-# :func:`~skanfis.gyro.check_split` finds it out before any model is trained.
-
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always", SplitLeakWarning)
-    report = check_split(rate=rate, run=table["run"], **splits["runs"])
-print(caught[0].message)
-report
 
 # %%
 

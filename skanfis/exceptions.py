@@ -14,7 +14,6 @@ __all__ = [
     "InfeasibleConstraintsError",
     "OutOfBoundsWarning",
     "ReadabilityWarning",
-    "SplitLeakWarning",
     "UnderdeterminedWarning",
 ]
 
@@ -58,13 +57,6 @@ class ReadabilityWarning(UserWarning):
     """The rules of a model are not fit to be read one by one.
 
     From ``export_text`` and ``rules_table``, with the findings of ``readability_``.
-    """
-
-
-class SplitLeakWarning(UserWarning):
-    """A split tests on rate levels or runs that it was trained on.
-
-    From :func:`skanfis.gyro.check_split`; hold out whole levels or runs.
     """
 
 

@@ -36,10 +36,8 @@ from skanfis.gyro import (
     allan_deviation,
     bias,
     bias_stability,
-    check_split,
     export_c_physics,
     group_by_rate_level,
-    group_by_run,
     gyro_report,
     read_log,
 )
@@ -101,7 +99,6 @@ score: float = DaskANFISRegressor(n_mfs=3).fit(X, y).score(X, y)
 # A gyro.
 log = make_ofog(n_devices=1, n_runs=4, random_state=0)
 groups: np.ndarray = group_by_rate_level(log["rate"], n_groups=4)
-splits: pd.DataFrame = check_split(3, log["rate"], groups=groups)
 rates: np.ndarray = ThermalRate(60.0, time="time", run="run").fit_transform(log)
 law = OpenLoopArcsineRegressor("output", "temperature", bias_degree=2)
 composed = ResidualRegressor(law, ANFISRegressor(n_mfs=2)).fit(log, log["rate"])
@@ -136,8 +133,6 @@ sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
 lower, upper = sure.predict_interval(frame, coverage=0.95)
 model.partial_fit(frame, y, forgetting=0.99)
 stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
-labels: np.ndarray = group_by_run(log["time"])
 export_text(model, precision="many")  # type: ignore[arg-type]
 export_c(model, min_coverage="most")  # type: ignore[arg-type]
 model.coverage(None)  # type: ignore[arg-type]
-check_split(3, log["rate"], groups=groups, tolerance="small")  # type: ignore[arg-type]

@@ -1,6 +1,7 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
 from ._checks import check_log
+from ._split import group_by_rate_level
 from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
@@ -15,8 +16,7 @@ from .displays import (
     ScaleFactorErrorDisplay,
 )
 from .errors import LogError
-from .features import ThermalLag, ThermalRate, TimeSincePowerOn
-from .groups import check_split, find_rate_levels, group_by_rate_level, group_by_run
+from .features import ThermalRate
 from .log import read_log
 from .metrics import (
     bias,
@@ -40,19 +40,14 @@ __all__ = [
     "ResidualRegressor",
     "ResidualSurfaceDisplay",
     "ScaleFactorErrorDisplay",
-    "ThermalLag",
     "ThermalRate",
-    "TimeSincePowerOn",
     "allan_coefficients",
     "allan_deviation",
     "bias",
     "bias_stability",
     "check_log",
-    "check_split",
     "export_c_physics",
-    "find_rate_levels",
     "group_by_rate_level",
-    "group_by_run",
     "gyro_report",
     "hysteresis",
     "input_error",

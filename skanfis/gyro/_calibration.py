@@ -1,4 +1,13 @@
-"""From a checked log to a compensator, and to predictions of every row by models new to it."""
+"""From a checked log to a compensator, to predictions of every row by models new to it, a verdict.
+
+Recommended is the simplest compensation that no more elaborate one beats decisively, all of them
+judged on the same held-out rows. How many times smaller the elaborate one's error is, is the
+geometric mean over the groups held out of the ratio of RMS errors, with the interval of Student's t
+at 95 %: a mean of squares alone would be decided by a group ten times larger than the others.
+"Decisively" means that the interval lies above 1.02, and that the RMS over all rows falls by more
+than this, where one bad group shows. The models of different folds share training rows: the
+interval is a little too narrow.
+"""
 
 import warnings
 from dataclasses import dataclass
@@ -6,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student
 
 from ..options import LinearExtrapolation
 from ._checks import find_glitches
@@ -13,15 +23,19 @@ from ._columns import SIGNALS, ask
 from ._models import Choice, fit_model, some_rows
 from ._simpler import Simpler, simpler_compensations
 from ._split import Split
-from ._verdict import Verdict, judge
 from .compensator import GyroCompensator, features
 from .errors import LogError
 from .metrics import rms, scale_factor
 
-__all__ = ["MODEL", "Calibration", "Recipe", "calibrate"]
+__all__ = ["Calibration", "Recipe", "Verdict", "calibrate", "judge"]
 
-# Its name in a verdict.
-MODEL = "this model"
+_TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
+_MOST_FIT_ROWS = 100_000
+# Of a verdict: the name of the model in it, and what a gain must be above to be worth having.
+_MODEL, _LEAST_GAIN = "this model", 1.02
+_CONFIDENCE = 0.95
+# Errors smaller than this part of the uncompensated one are rounding, and equal.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -38,11 +52,46 @@ class Recipe:
     physics: bool = False
     outside: str = "linear"
     max_extrapolation: float | Literal["auto"] = LinearExtrapolation().max_extrapolation
-    time_constant: float = 30.0
     min_coverage: float = 0.1
-    fit_rows: int = 100_000
-    n_jobs: int | None = None
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How many times smaller one error is than another; ``low``, ``high``: NaN for one group."""
+
+    factor: float
+    low: float
+    high: float
+    of_all_rows: float
+
+    @property
+    def is_decisive(self):
+        """Whether it is above what scatter alone could give, and worth having."""
+        return self.low > _LEAST_GAIN and self.of_all_rows > _LEAST_GAIN
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """RMS errors [deg/s] by name, the simplest first and the model last, and the name to use.
+
+    ``gains`` has those of the model over each of the others.
+    """
+
+    rms: dict[str, float]
+    gains: dict[str, Gain]
+    n_groups: int
+    recommended: str
+
+    @property
+    def model(self):
+        """Name of the model that was judged."""
+        return list(self.rms)[-1]
+
+    @property
+    def model_is_worth_it(self):
+        """Whether the model is the one to use."""
+        return self.recommended == self.model
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,21 +150,33 @@ class Calibration:
 
     def cautions_in(self, unit, per_unit=1.0):
         """The same, with errors in another unit, of which ``per_unit`` are 1 deg/s."""
-        before, after = (per_unit * (rate - self.rate) for rate in (self.before, self.after))
-        return [*_what_is_worse(before, after, self.inside, unit), *self.glitches]
+        found = []
+        for rows, where in ((self.inside, "in range"), (~self.inside, "out of range")):
+            answered = rows & np.isfinite(self.after)
+            if not answered.any():
+                continue
+            was, became = (
+                rms(per_unit * (rates - self.rate)[answered]) for rates in (self.before, self.after)
+            )
+            if became > was:
+                found.append(
+                    f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
+                    f"{became:.4g} {unit} RMS."
+                )
+        return found + self.glitches
 
 
-def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, n_rows=None):
+def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None):
     """Compensate every row by a model that is new to it, fit to all rows, and judge.
 
     ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
-    ``made`` are inputs that are there already, and ``n_rows`` is of how many rows these are some.
+    ``n_rows`` is of how many rows these are some.
     """
     factor = 1.0
     if recipe.output_unit in SIGNALS:
         at_rest = np.ptp(log["rate"]) == 0.0
         factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
-    X = features(log, recipe.inputs, recipe.time_constant, made)
+    X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
     glitches = [
         f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
@@ -130,7 +191,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, 
     folds, choices = [], []
     for number, (train, test) in enumerate(split.folds, 1):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
-        rows = some_rows(train, recipe.fit_rows, X, rng)
+        rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
         folds.append((rows, test))
         with warnings.catch_warnings():
             # The final fit warns of the same.
@@ -145,7 +206,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, 
             f"that the model had seen while its group was held out ({split.kind}). Log groups that "
             "overlap in temperature, rate and time."
         )
-    rows = some_rows(np.arange(len(X)), recipe.fit_rows, X, rng)
+    rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows))
     tell(f"fitting to {rows.size:,} rows")
@@ -164,13 +225,13 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, 
         predicts="rate" if recipe.physics else "error",
         scale_factor=factor,
         output_unit=recipe.output_unit,
-        time_constant=recipe.time_constant,
+        time_constant=_TIME_CONSTANT,
         min_coverage=recipe.min_coverage,
     )
     after = compensator.compensate(before, predicted)
     # The same rows for all: those that the model answered in range.
     judged = inside & np.isfinite(after)
-    rates = {each.name: each.after for each in simpler if each.after is not None} | {MODEL: after}
+    rates = {each.name: each.after for each in simpler if each.after is not None} | {_MODEL: after}
     errors = {name: (compensated - rate)[judged] for name, compensated in rates.items()}
     return Calibration(
         recipe=recipe,
@@ -192,15 +253,34 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, made=None, 
     )
 
 
-def _what_is_worse(before, after, inside, unit):
-    """Sentences about the held-out rows, in range and out of it, that are better left alone."""
-    for rows, where in ((inside, "in range"), (~inside, "out of range")):
-        answered = rows & np.isfinite(after)
-        if not answered.any():
-            continue
-        was, became = rms(before[answered]), rms(after[answered])
-        if became > was:
-            yield (
-                f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
-                f"{became:.4g} {unit} RMS."
-            )
+def judge(errors, groups):
+    """Judge compensations by their errors on the same rows, and what was held out together.
+
+    ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
+    """
+    codes = np.unique(groups.astype(str), return_inverse=True)[1]
+    counts = np.bincount(codes)
+    of_all = {name: rms(error) for name, error in errors.items()}
+    floor = _ROUNDING * next(iter(of_all.values())) or np.finfo(float).tiny
+    logs = {}
+    for name, error in errors.items():
+        by_group = np.sqrt(np.bincount(codes, error**2) / counts)
+        logs[name] = np.log(np.maximum([*by_group, of_all[name]], floor))
+    names = list(errors)
+    recommended = next(
+        name
+        for place, name in enumerate(names)
+        if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
+    )
+    gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
+    return Verdict(of_all, gains, counts.size, recommended)
+
+
+def _gain(logs):
+    """From logarithms of ratios of RMS errors, by group and over all rows."""
+    *by_group, of_all = logs
+    n, mean = len(by_group), np.mean(by_group)
+    half = np.nan
+    if n > 1:
+        half = student.ppf(0.5 + 0.5 * _CONFIDENCE, n - 1) * np.std(by_group, ddof=1) / np.sqrt(n)
+    return Gain(*(float(np.exp(value)) for value in (mean, mean - half, mean + half, of_all)))

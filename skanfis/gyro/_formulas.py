@@ -3,10 +3,10 @@
 from ..export import fold
 from ..inspection import export_text
 from ._headline import readability_of
-from ._law_text import law_text
 from ._simpler import LAW_AND_LINE
+from .physics import past_phase
 
-__all__ = ["formula_of", "law_table", "on_board", "rules_text"]
+__all__ = ["formula_of", "law_table", "law_text", "on_board", "rules_text"]
 
 
 def formula_of(calibration, name):
@@ -35,15 +35,43 @@ def rules_text(calibration, found=None):
     # Folded, a model knows of no readability in training, and the text has the caution once.
     if calibration.recipe.physics:
         rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
-        law = law_text(estimator.base_, calibration.recipe.inputs, calibration.recipe.output_unit)
+        law = law_text(estimator.base_, calibration.recipe)
         return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
     return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
+
+
+def law_text(law, recipe):
+    """The fitted law as a formula with its units, and what happens past the arcsine."""
+    names = [recipe.inputs[j] for j in law.columns_]
+    amplitude, sagnac, bias = map(_in_powers, (law.amplitude_, law.sagnac_factor_, law.bias_))
+    formula = (
+        f"rate [deg/s] = arcsin(({names[0]} [{recipe.output_unit}]{_term(-law.offset_)}) "
+        f"/ ({amplitude})) / ({sagnac}) - ({bias})"
+    )
+    if len(names) > 1:
+        lag = _term(law.thermometer_lag_, f" s * {names[2]} [degC/s]") if len(names) > 2 else ""
+        formula += f", t = {names[1]} [degC]{lag}{_term(-law.reference_temperature_)}"
+    policy = past_phase(law.out_of_bounds, "rate")
+    return f"{formula}\nBeyond a phase (the arcsin) of {law.max_phase:g} rad {policy}."
+
+
+def _in_powers(coefficients):
+    """Of t, the lowest first."""
+    text = f"{coefficients[0]:.8g}"
+    for power, value in enumerate(coefficients[1:], start=1):
+        text += _term(value, " t" if power == 1 else f" t^{power}")
+    return text
+
+
+def _term(value, factor=""):
+    """What is to be added, with its sign; nothing for zero."""
+    return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
 
 
 def law_table(law, recipe):
     """The arcsine law as a formula and by its coefficients."""
     lines = [
-        law_text(law, recipe.inputs, recipe.output_unit),
+        law_text(law, recipe),
         f"at {law.reference_temperature_:.6g} °C; powers of the difference, lowest first",
     ]
     for name in ("amplitude_", "sagnac_factor_", "bias_"):

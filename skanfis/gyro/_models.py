@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass
 from math import prod
+from typing import Any
 
 import numpy as np
 from sklearn.linear_model import LinearRegression
@@ -18,7 +19,6 @@ from .physics import OpenLoopArcsineRegressor
 __all__ = [
     "Choice",
     "fit_model",
-    "make_estimator",
     "make_law",
     "make_law_and_line",
     "make_polynomial",
@@ -46,41 +46,31 @@ class Choice:
 def fit_model(X, target, groups, recipe):
     """The estimator of a recipe, fitted, and its choice; what is not given is told by groups."""
     degree = _law_degree(X, target, groups, recipe) if recipe.physics else 1
-    if not isinstance(recipe.terms, str):
-        estimator = make_estimator(recipe, (degree, recipe.terms)).fit(X, target)
-        return estimator, Choice(degree, recipe.terms)
-    left = target
-    if recipe.physics:
-        left = target - make_law(recipe.inputs, degree, "linear").fit(X, target).predict(X)
-    rules = _make_rules(recipe, None).fit(X, left, anfisregressor__groups=groups)
-    choice = Choice(degree, *_terms_of(rules[-1], left.std()))
+    rules, choice = _make_rules(recipe, recipe.terms), Choice(degree, recipe.terms)
+    if isinstance(recipe.terms, str):
+        left = target
+        if recipe.physics:
+            left = target - make_law(recipe.inputs, degree, "linear").fit(X, target).predict(X)
+        rules.fit(X, left, anfisregressor__groups=groups)
+        choice = Choice(degree, *_terms_of(rules[-1], left.std()))
+    elif not recipe.physics:
+        rules.fit(X, target)
     if not recipe.physics:
         return rules, choice
     # In every round the same terms: looked for once, in what the law leaves.
-    return make_estimator(recipe, (degree, choice.terms)).fit(X, target), choice
-
-
-def make_estimator(recipe, choice):
-    """The estimator of a recipe; ``choice`` is the degree of the law and the numbers of terms."""
-    degree, terms = choice
-    rules = _make_rules(recipe, terms)
-    if not recipe.physics:
-        return rules
-    law = make_law(recipe.inputs, degree, recipe.outside)
-    return ResidualRegressor(law, rules, n_rounds=_ROUNDS)
+    law, rules = make_law(recipe.inputs, degree, recipe.outside), _make_rules(recipe, choice.terms)
+    return ResidualRegressor(law, rules, n_rounds=_ROUNDS).fit(X, target), choice
 
 
 def _make_rules(recipe, terms):
+    """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
     outside = recipe.outside
     if outside == "linear":
         outside = LinearExtrapolation(recipe.max_extrapolation)
-    options = {"out_of_bounds": outside, "n_jobs": recipe.n_jobs}
-    if terms is not None:
-        anfis = ANFISRegressor(list(terms), **options)
-    else:
-        partition = "grid" if recipe.terms == "search" else "auto"
-        anfis = ANFISRegressor(partition=partition, **options)
-    return make_pipeline(StandardScaler(), anfis)
+    structure: dict[str, Any] = {"partition": "grid" if recipe.terms == "search" else "auto"}
+    if isinstance(terms, tuple):
+        structure = {"n_mfs": list(terms)}
+    return make_pipeline(StandardScaler(), ANFISRegressor(**structure, out_of_bounds=outside))
 
 
 def _terms_of(anfis, unit):

@@ -47,11 +47,25 @@ def simpler_compensations(X, rate, before, folds, rows):
     """
     yield Simpler(NOTHING, after=before)
     for name, make, predicts in _kinds(list(X)):
+        target = rate if predicts == "rate" else before - rate
+        predicted = np.full(len(X), np.nan)
         try:
-            yield Simpler(name, predicts, *_fitted(make, predicts, X, rate, before, folds, rows))
+            with warnings.catch_warnings():
+                # What it is worth is measured.
+                for category in (ConvergenceWarning, ConstantInputWarning, OutOfBoundsWarning):
+                    warnings.simplefilter("ignore", category)
+                for train, test in folds:
+                    predicted[test] = make().fit(X.iloc[train], target[train]).predict(X.iloc[test])
+                model = make().fit(X.iloc[rows], target[rows])
+            if n_lost := np.count_nonzero(~np.isfinite(predicted)):
+                raise ValueError(f"it has no finite prediction for {n_lost} rows")
         except ValueError as error:
             # Of the law alone: no rate changes, or too few rows tell its coefficients.
             yield Simpler(name, predicts, missing=str(error))
+            continue
+        yield Simpler(
+            name, predicts, predicted if predicts == "rate" else before - predicted, model
+        )
 
 
 def _kinds(inputs):
@@ -62,24 +76,6 @@ def _kinds(inputs):
         yield "arcsine law", partial(make_law, inputs, 1, "linear"), "rate"
         yield LAW_AND_LINE, partial(make_law_and_line, inputs), "rate"
     yield "cubic polynomial", partial(make_polynomial, 3), "error"
-
-
-def _fitted(make, predicts, X, rate, before, folds, rows):
-    """The held-out compensated rate, and the model of all rows."""
-    target = rate if predicts == "rate" else before - rate
-    predicted = np.full(len(X), np.nan)
-    with warnings.catch_warnings():
-        # What it is worth is measured.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        warnings.simplefilter("ignore", ConstantInputWarning)
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
-        for train, test in folds:
-            predicted[test] = make().fit(X.iloc[train], target[train]).predict(X.iloc[test])
-        model = make().fit(X.iloc[rows], target[rows])
-    if not np.isfinite(predicted).all():
-        n_lost = np.count_nonzero(~np.isfinite(predicted))
-        raise ValueError(f"it has no finite prediction for {n_lost} rows")
-    return (predicted if predicts == "rate" else before - predicted), model
 
 
 def options_for(name, n_inputs):

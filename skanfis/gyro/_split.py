@@ -1,15 +1,37 @@
-"""Which rows to hold out: whole devices or runs, rate levels that could be learnt, or legs."""
+"""What a split must not tear apart (runs, devices, levels of a rate table), and which to choose.
+
+Groups are integers, one per row, as scikit-learn's splitters take them. docs/gyro_splits.rst says
+why levels must be held out.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
 from sklearn.model_selection import GroupKFold
+from sklearn.utils import check_scalar
 
-from ._columns import label_texts
+from ._columns import check_column, check_number, label_texts
 from .errors import LogError
-from .groups import find_rate_levels, group_by_rate_level
 
-__all__ = ["KINDS", "Split", "choose_split"]
+__all__ = [
+    "KINDS",
+    "Split",
+    "choose_split",
+    "group_by_rate_level",
+]
+
+# Relative to the largest rate: rates closer than that are one to any table.
+_SMALLEST_TOLERANCE = 1e-4
+# Gaps between levels are at least so many times those within a level.
+_CLEAR_JUMP = 3.0
+# Of the rows: so many may lie in clusters too wide for a level.
+_SHARE_TOO_WIDE = 0.05
+# Of the range: rates without a clear jump that reach so much of it are spread over it.
+_SHARE_COVERED = 0.05
+# A cluster of so few rows, relative to a typical level, is of a table on its way.
+_FEW_ROWS = 0.1
 
 KINDS = ("auto", "device", "run", "level", "device+level", "run+level", "leg", "piece")
 
@@ -29,6 +51,123 @@ _ROWS_PER_LEVEL = 3
 _TURN, _SMALLEST_TURN = 0.2, 3.0
 # A turning point is looked for among so many means of each run.
 _MOST_POINTS = 5_000
+_NO_CLOCK = (
+    " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
+    "time=NAME."
+)
+_LEGS = "legs between turning points of the temperature"
+# What is held out, and what of it is counted.
+_WORDS = {
+    "device": ("whole devices", "devices"),
+    "run": ("whole runs", "runs"),
+    "level": ("rate levels", "levels"),
+    "leg": (f"whole {_LEGS}", "legs"),
+    "piece": (f"pieces of the {_LEGS}", f"legs, {_N_FOLDS} pieces of each"),
+}
+
+
+def group_by_rate_level(
+    rate: ArrayLike,
+    *,
+    n_groups: int | None = None,
+    signed: bool = False,
+    tolerance: float | None = None,
+) -> np.ndarray:
+    """Groups that hold a level of the rate table together, found from the rates themselves.
+
+    Rows of a table on its way count to the nearest level.
+
+    Parameters
+    ----------
+    rate : array-like of shape (n_samples,)
+        True rate, in any unit.
+    n_groups : int, default=None
+        Number of groups, at least 2: levels are dealt out to them by turns, so that each has levels
+        from the whole range. Default: a group for each level.
+    signed : bool, default=False
+        Whether a rate and its opposite are two levels.
+    tolerance : float, default=None
+        Largest gap between neighbouring rates of one level, in the unit of ``rate``. Default: where
+        the gaps, sorted, make their clearest jump; at least 1e-4 of the largest rate.
+
+    Returns
+    -------
+    groups : ndarray of int of shape (n_samples,)
+        Number of the group of each row, from 0; of the level without ``n_groups``.
+
+    Raises
+    ------
+    ValueError
+        If the rate changes continuously, so that it has no levels, if it has fewer than
+        ``n_groups``, or if values are missing.
+
+    Examples
+    --------
+    >>> from sklearn.model_selection import LeaveOneGroupOut
+    >>> from skanfis.gyro import group_by_rate_level
+    >>> rate = [-20.0, -10, 0, 10, 20, -20, -10, 0, 10, 20]
+    >>> group_by_rate_level(rate).tolist()
+    [2, 1, 0, 1, 2, 2, 1, 0, 1, 2]
+    >>> group_by_rate_level(rate, n_groups=2).tolist()
+    [0, 1, 0, 1, 0, 0, 1, 0, 1, 0]
+    >>> LeaveOneGroupOut().get_n_splits(groups=group_by_rate_level(rate, signed=True))
+    5
+    """
+    rate = check_column(rate, "rate")
+    labels = _level_numbers(rate if signed else np.abs(rate), tolerance)
+    if labels is None:
+        raise ValueError(
+            f"rate has no levels: it changes continuously between {rate.min():g} and "
+            f"{rate.max():g}. If a table went from level to level, leave out the rows in between, "
+            "or give tolerance. If not, no level can be memorised: hold out runs or devices."
+        )
+    if n_groups is None:
+        return labels
+    n_groups, n_levels = check_scalar(n_groups, "n_groups", int, min_val=2), labels.max() + 1
+    if n_levels < n_groups:
+        raise ValueError(f"n_groups={n_groups}: the rate has no more than {n_levels} levels.")
+    return labels % n_groups
+
+
+def _level_numbers(rate, tolerance):
+    """Number of each row's level, lowest first; None where the rate changes continuously."""
+    values, inverse, n_rows = np.unique(rate, return_inverse=True, return_counts=True)
+    gaps = np.diff(values)
+    smallest = _SMALLEST_TOLERANCE * np.abs(values).max()
+    if tolerance is None:
+        tolerance = _clearest_tolerance(gaps, smallest)
+    else:
+        tolerance = check_number(tolerance, "tolerance")
+    first = np.flatnonzero(np.concatenate([[True], gaps > tolerance]))
+    clusters = np.searchsorted(first, inverse, side="right") - 1
+    n_rows = np.add.reduceat(n_rows, first)
+    low, high = values[first], values[np.append(first[1:], len(values)) - 1]
+    # A cluster that is wider than it is far from the next is no level.
+    between = np.concatenate([[np.inf], low[1:] - high[:-1], [np.inf]])
+    widest = np.minimum(between[:-1], between[1:])
+    if len(low) == 1:  # nothing is next
+        widest = np.maximum(0.01 * np.abs(high), 10.0 * tolerance)
+    if n_rows[high - low > widest].sum() > _SHARE_TOO_WIDE * len(rate):
+        return None
+    others = np.sort(n_rows)[:-1]  # a gyro may rest for most of the log
+    typical = np.median(np.repeat(others, others)) if others.size else 0
+    centers = 0.5 * (low + high)
+    levels = centers[n_rows >= _FEW_ROWS * typical]
+    is_spread = len(levels) * smallest > _SHARE_COVERED * (high[-1] - low[0]) > 0
+    if tolerance == smallest and is_spread:
+        return None
+    # Each cluster to the nearest level, which is its own if it is one.
+    return np.searchsorted(0.5 * (levels[1:] + levels[:-1]), centers)[clusters]
+
+
+def _clearest_tolerance(gaps, smallest):
+    """Gap that tells levels apart, from the gaps between all different rates."""
+    wide = np.sort(np.append(gaps[gaps > smallest], smallest))
+    if len(wide) == 1:
+        return smallest
+    jumps = wide[1:] / wide[:-1]
+    place = jumps.argmax()
+    return np.sqrt(wide[place] * wide[place + 1]) if jumps[place] >= _CLEAR_JUMP else smallest
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +188,12 @@ def choose_split(log, kind="auto", *, uses_output=True):
 
     ``uses_output`` says whether the compensator sees the output: only then can it tell levels.
     """
-    groups = {name: _numbers(log[name]) for name in ("device", "run") if name in log}
+    # Numbers in the order of the names, whatever the order of the files.
+    groups = {
+        name: np.unique(label_texts(log[name]).astype(str), return_inverse=True)[1]
+        for name in ("device", "run")
+        if name in log
+    }
     levels = _levels(log) if uses_output else None
     if levels is not None:
         groups["level"] = levels
@@ -59,24 +203,24 @@ def choose_split(log, kind="auto", *, uses_output=True):
     reason = "as asked for"
     if kind == "auto":
         kind, reason = _choose(groups, counts, "time" in log)
+    if kind == "piece":
+        reason += "; whether a cycle repeats, so few cannot show"
     parts = kind.split("+")
     for part in parts:
         _check(part, counts)
-    if kind in ("leg", "piece"):
-        legs = groups["leg"]
-        folds = legs % min(_N_FOLDS, counts["leg"]) if kind == "leg" else cut_legs(legs)
-        what = f"whole legs between turning points of the temperature held out ({counts[kind]} legs"
-        if kind == "piece":
-            what = f"{what.replace('whole', 'pieces of the')}, {_N_FOLDS} pieces of each"
-            reason += "; whether a cycle repeats, so few cannot show"
-        folds = _hold_out(folds)
-        labels = _name_legs(legs, log["temperature"].to_numpy())
-        return Split(kind, folds, labels, f"{what}, {len(folds)} folds; {reason})")
-    folds = _folds(log, parts, groups)
-    named = {part: "rate levels" if part == "level" else f"whole {part}s" for part in parts}
-    told = ", ".join(f"{counts[part]} {named[part].split()[-1]}" for part in parts)
-    sentence = f"{' and '.join(named.values())} held out ({told}, {len(folds)} folds; {reason})"
-    return Split(kind, folds, _labels(log, parts[0]), sentence)
+    numbers = np.column_stack([_fold_numbers(part, groups[part], len(parts)) for part in parts])
+    # Rows of the same run, or of the same level, are neither trained on nor tested.
+    folds = [
+        (
+            np.flatnonzero((numbers != fold).all(axis=1)),
+            np.flatnonzero((numbers == fold).all(axis=1)),
+        )
+        for fold in np.unique(numbers, axis=0)
+    ]
+    what = " and ".join(_WORDS[part][0] for part in parts)
+    counted = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
+    sentence = f"{what} held out ({counted}, {len(folds)} folds; {reason})"
+    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence)
 
 
 def _choose(groups, counts, has_time):
@@ -87,7 +231,14 @@ def _choose(groups, counts, has_time):
         for kind in ("level", "leg", "piece"):
             if kind in enough:
                 return kind, "too few runs to hold out"
-        raise LogError(_nothing_to_hold_out(counts, has_time))
+        found = [f"{counts[name]} {name}(s)" for name in ("device", "run") if name in counts]
+        found.append(f"{counts.get('level', 0)} rate levels")
+        clock = "" if has_time else _NO_CLOCK
+        raise LogError(
+            "the compensator could not be checked: the log has "
+            f"{', '.join(found)}. At least 3 runs (a column run, or one file each), 5 rate levels, "
+            f"or a temperature that rises and falls are needed, to be held out in turn.{clock}"
+        )
     if "level" in enough and counts["level"] <= _MOST_LEVELS:
         pairs = np.unique(np.column_stack([groups["level"], groups[whole]]), axis=0)
         # Levels, on average, that are met by two groups or more.
@@ -109,27 +260,6 @@ def _check(part, counts):
         )
 
 
-def _nothing_to_hold_out(counts, has_time):
-    found = [f"{counts[name]} {name}(s)" for name in ("device", "run") if name in counts]
-    found.append(f"{counts.get('level', 0)} rate levels")
-    clock = ""
-    if not has_time:
-        clock = (
-            " No column of the time was found, whose gaps would tell runs apart: name it with "
-            "--columns time=NAME."
-        )
-    return (
-        f"the compensator could not be checked: the log has {', '.join(found)}. At least 3 runs "
-        "(a column run, or one file each), 5 rate levels, or a temperature that rises and falls "
-        f"are needed, to be held out in turn.{clock}"
-    )
-
-
-def _numbers(labels):
-    """Numbers of labels in the order of their names, whatever the order of the files."""
-    return np.unique(label_texts(labels).astype(str), return_inverse=True)[1]
-
-
 def _levels(log):
     """Number of each row's level of |rate|; None where the rate changes continuously."""
     try:
@@ -140,39 +270,32 @@ def _levels(log):
     return levels if np.unique(levels).size * _ROWS_PER_LEVEL <= levels.size else None
 
 
-def _folds(log, parts, groups):
-    fold = level = np.zeros(len(log), dtype=int)
-    if parts[-1] == "level":
-        n_levels = _N_LEVEL_FOLDS_BESIDE if len(parts) > 1 else _N_FOLDS
-        level = group_by_rate_level(log["rate"].to_numpy(), n_groups=n_levels)
-        if len(parts) == 1:
-            return _hold_out(level)
-    numbers, fold = groups[parts[0]], fold.copy()
-    splitter = GroupKFold(min(_N_FOLDS, np.unique(numbers).size))
-    for place, (_, test) in enumerate(splitter.split(numbers, groups=numbers)):
-        fold[test] = place
-    if len(parts) == 1:
-        return _hold_out(fold)
-    # Rows of the same run, or of the same level, are neither trained on nor tested.
-    return [
-        (
-            np.flatnonzero((fold != place) & (level != part)),
-            np.flatnonzero((fold == place) & (level == part)),
-        )
-        for place, part in np.unique(np.column_stack([fold, level]), axis=0)
-    ]
+def _fold_numbers(part, groups, n_parts):
+    """Number of the fold that tests each row, as far as one part of a split decides."""
+    if part == "level":
+        return groups % (_N_LEVEL_FOLDS_BESIDE if n_parts > 1 else _N_FOLDS)
+    if part == "piece":
+        return cut_legs(groups)
+    n_folds = min(_N_FOLDS, np.unique(groups).size)
+    if part == "leg":
+        return groups % n_folds
+    numbers = np.empty_like(groups)
+    for place, (_, test) in enumerate(GroupKFold(n_folds).split(groups, groups=groups)):
+        numbers[test] = place
+    return numbers
 
 
-def _hold_out(fold):
-    return [(np.flatnonzero(fold != n), np.flatnonzero(fold == n)) for n in np.unique(fold)]
-
-
-def _labels(log, part):
-    if part != "level":
+def _labels(log, part, groups):
+    """A label for each row's group, such as "|25| °/s", or "2: 25 to 71 °C" for a leg."""
+    if part in ("device", "run"):
         return label_texts(log[part])
-    levels = find_rate_levels(np.abs(log["rate"].to_numpy()))
-    names = np.array([f"|{level:.4g}| °/s" for level in levels], dtype=object)
-    return names[group_by_rate_level(log["rate"].to_numpy())]
+    if part == "level":
+        levels = log["rate"].abs().groupby(groups).median()
+        names = [f"|{level:.4g}| °/s" for level in levels]
+    else:
+        ends = log["temperature"].groupby(groups).agg(["first", "last"]).to_numpy()
+        names = [f"{leg}: {a:.0f} to {b:.0f} °C" for leg, (a, b) in enumerate(ends, start=1)]
+    return np.array(names, dtype=object)[groups]
 
 
 def find_legs(temperature, run=None):
@@ -196,19 +319,16 @@ def _turns(temperature, least):
     width = -(-temperature.size // _MOST_POINTS)
     starts = np.arange(0, temperature.size, width)
     means = np.add.reduceat(temperature, starts) / np.diff(starts, append=temperature.size)
-    turns, rising = [], 0
+    turns, rising = [], 0  # the sign of the way, 0 while it is not known
     low = high = 0  # places of the extremes since the last turn
     for place, value in enumerate(means.tolist()):
         low = place if value < means[low] else low
         high = place if value > means[high] else high
         if rising >= 0 and means[high] - value > least:
-            # The first way may have begun before this turn.
-            began = rising or (high > 0 and means[high] - means[:high].min() > least)
-            turns += [high] if began else []
+            turns += [high] if rising else []
             rising, low = -1, place
         elif rising <= 0 and value - means[low] > least:
-            began = rising or (low > 0 and means[:low].max() - means[low] > least)
-            turns += [low] if began else []
+            turns += [low] if rising else []
             rising, high = 1, place
     return starts[np.array(turns, dtype=int)]
 
@@ -219,17 +339,6 @@ def cut_legs(legs):
     With a piece of a leg that warms goes one at another temperature of the next, which cools: the
     model has seen each temperature one way.
     """
-    folds = np.empty(legs.size, dtype=int)
-    for leg in np.unique(legs):
-        rows = np.flatnonzero(legs == leg)
-        folds[rows] = (np.arange(rows.size) * _N_FOLDS // rows.size + 2 * leg) % _N_FOLDS
-    return folds
-
-
-def _name_legs(legs, temperature):
-    """A label for each row's leg, such as "2: 25 to 71 °C"."""
-    names = np.empty(legs.max() + 1, dtype=object)
-    for leg in np.unique(legs):
-        values = temperature[legs == leg]
-        names[leg] = f"{leg + 1}: {values[0]:.0f} to {values[-1]:.0f} °C"
-    return names[legs]
+    by_leg = pd.Series(legs).groupby(legs)
+    pieces = by_leg.cumcount() * _N_FOLDS // by_leg.transform("size")
+    return ((pieces + 2 * legs) % _N_FOLDS).to_numpy()

@@ -12,7 +12,6 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.polynomial import Polynomial
 from scipy.stats import qmc
 
@@ -31,7 +30,6 @@ from ..export.c.builder import (
     header_of,
     index_type,
     input_lines,
-    literals,
     policy_line,
     rejection,
     self_test,
@@ -39,8 +37,8 @@ from ..export.c.builder import (
     write_files,
 )
 from ..policies import SILENT
-from ._law_text import past_phase
 from .compose import law_and_rules
+from .physics import past_phase
 
 __all__ = ["export_c_physics"]
 
@@ -139,6 +137,7 @@ def export_c_physics(
 
     The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from
     one row of raw inputs, and a status, as :func:`skanfis.export.export_c` does for rules alone.
+    Of rows outside the range of either part see :doc:`/gyro_physics`.
 
     Parameters
     ----------
@@ -146,19 +145,8 @@ def export_c_physics(
         Of an :class:`OpenLoopArcsineRegressor`, and an ANFIS or a Pipeline of scalers, selections
         of columns and an ANFIS; or a search over such. The inputs of the function are the columns
         that either part takes, in the order of X; the header names them.
-    path : str or path-like, default=None
-        Where to write, without a suffix: "out/gyro" makes out/gyro.h and out/gyro.c. None writes
-        nothing.
-    name : str, default=None
-        What all identifiers start with, at most 14 letters, digits and underscores. None takes the
-        last part of ``path``.
-    dtype : {"double", "float"}, default="double"
-        Type of inputs, outputs, tables and arithmetic.
-    std : {"c99", "c89"}, default="c99"
-        The oldest standard that a compiler must know.
-    min_coverage : float or None, default=0.1
-        Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
-        leaves that out.
+    path, name, dtype, std, min_coverage
+        As of :func:`skanfis.export.export_c`; ``name`` has at most 14 characters.
     saturate : Bounds or array-like of shape (1, 2), default=None
         Limits between which what the rules add to the law is held. None holds nothing.
 
@@ -175,12 +163,6 @@ def export_c_physics(
         go beyond what "float" holds.
     TypeError
         If ``estimator`` is no such composition.
-
-    Notes
-    -----
-    ``NAME_OUT_OF_RANGE`` is set where ``estimator.in_bounds`` is False. Either part then follows
-    its own ``out_of_bounds``; where one of them has no answer, or the rate is not finite, there is
-    none.
 
     Examples
     --------
@@ -223,14 +205,24 @@ def export_c_physics(
 
 
 class _Composition:
-    """Both parts, and what of the law is rounded to the type; ``columns`` are the inputs in X."""
+    """Both parts on the inputs of the function, ``names``, and what of the law is rounded.
+
+    Rounded to the type are the law's range, the model of the rules, ``reference`` and
+    ``polynomials``; not the law's coefficients.
+    """
 
     def __init__(self, law, rules, part, dtype):
-        self.law, self.rules, self.part, self.dtype = law, rules, part, dtype
-        self.columns = np.union1d(law.columns_, rules.positions)
-        self.law_inputs = np.searchsorted(self.columns, law.columns_)
-        self.rules_inputs = np.searchsorted(self.columns, rules.positions)
-        self.low, self.high = self.rounded(law.minimum_), self.rounded(law.maximum_)
+        self.part, self.dtype = part, dtype
+        columns = np.union1d(law.columns_, rules.positions)
+        given = getattr(law, "feature_names_in_", None)
+        self.names = [f"x{j}" if given is None else given[j] for j in columns]
+        self.law = copy(law)
+        vars(self.law).pop("feature_names_in_", None)  # it takes rows without names
+        self.law.n_features_in_ = columns.size
+        self.law.columns_ = np.searchsorted(columns, law.columns_)
+        self.law.minimum_, self.law.maximum_ = map(self.rounded, (law.minimum_, law.maximum_))
+        positions = np.searchsorted(columns, rules.positions)
+        self.rules = replace(rules, model=part.model, positions=positions)
         self.reference = self.rounded(law.reference_temperature_)
         # Coefficients about the reference as it is rounded.
         shift = Polynomial([float(self.reference) - law.reference_temperature_, 1.0])
@@ -255,35 +247,29 @@ class _Composition:
     @property
     def box(self):
         """Of every input, within which both parts know it."""
-        low, high = np.full(self.columns.size, -np.inf), np.full(self.columns.size, np.inf)
-        model = self.rules.model
-        ranges = [(self.law_inputs, self.low, self.high)]
-        ranges.append((self.rules_inputs, *map(self.rounded, (model.minimum, model.maximum))))
-        for places, least, most in ranges:
+        low, high = np.full((2, len(self.names)), [[-np.inf], [np.inf]])
+        for places, least, most in (
+            (self.law.columns_, self.law.minimum_, self.law.maximum_),
+            (self.rules.positions, self.part.low, self.part.high),
+        ):
             low[places] = np.maximum(low[places], least)
             high[places] = np.minimum(high[places], most)
         return low, high
 
-    def table(self, X):
-        """Rows as both parts take them, out of rows of the function's inputs."""
-        whole = np.zeros((len(X), self.law.n_features_in_))
-        whole[:, self.columns] = X
-        names = getattr(self.law, "feature_names_in_", None)
-        return whole if names is None else pd.DataFrame(whole, columns=names)
-
 
 def _law_source(dialect, whole, silent):
     """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
-    law, real, inputs, number = whole.law, dialect.real, whole.law_inputs, dialect.number
-    tables = {"law_low": (real, whole.low), "law_high": (real, whole.high)}
-    tables |= {key: (real, values) for key, values in whole.polynomials.items()}
-    for key, places in (("law_input", inputs), ("rules_input", whole.rules_inputs)):
-        tables[key] = (index_type(places), places)
+    law, number, inputs, places = (
+        whole.law,
+        dialect.number,
+        whole.law.columns_,
+        whole.rules.positions,
+    )
+    tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.polynomials}
     parts = ["/* Of the law: where it was fitted, powers of the temperature, columns of x. */\n"]
-    parts += [
-        dialect.write(f"static const {kind} $name_{key}[{values.size}] =\n{literals(values)};\n\n")
-        for key, (kind, values) in tables.items()
-    ]
+    parts += [f"{dialect.table(key, values)}\n" for key, values in tables.items()]
+    for key, columns in (("law_input", inputs), ("rules_input", places)):
+        parts.append(f"{dialect.table(key, columns, index_type(columns))}\n")
     asin = dialect.write("$ASIN(")
     parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
     parts += [dialect.write(rejection(silent, dialect.std)).lstrip() + "\n"]
@@ -296,31 +282,31 @@ def _law_source(dialect, whole, silent):
     within = "    }\n    phase = $ASIN(sine);\n" if law.out_of_bounds in SILENT else _WITHIN
     template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
     template = template.replace("$temperature", temperature).replace("$within", within)
-    rules = dialect.name + _SUFFIX
-    return "".join(parts) + dialect.write(
-        template.replace("$beyond", _BEYOND[law.out_of_bounds]),
-        rules=rules,
-        n_rules_inputs=whole.rules_inputs.size,
-        n_law=inputs.size,
-        output=inputs[0],
-        offset=number(law.offset_),
-        limit=number(np.sin(law.max_phase)),
-        max_phase=number(law.max_phase),
-        slope=number(1.0 / np.cos(law.max_phase)),
-        **{f"n_{key}": values.size for key, values in whole.polynomials.items()},
-    )
+    parts += [
+        dialect.write(
+            template.replace("$beyond", _BEYOND[law.out_of_bounds]),
+            rules=dialect.name + _SUFFIX,
+            n_rules_inputs=places.size,
+            n_law=inputs.size,
+            output=inputs[0],
+            offset=number(law.offset_),
+            limit=number(np.sin(law.max_phase)),
+            max_phase=number(law.max_phase),
+            slope=number(1.0 / np.cos(law.max_phase)),
+            **{f"n_{key}": values.size for key, values in whole.polynomials.items()},
+        )
+    ]
+    return "".join(parts)
 
 
 def _header(whole, dialect, price):
     law, part, model = whole.law, whole.part, whole.rules.model
-    given = getattr(law, "feature_names_in_", None)
-    names = [f"x{j}" if given is None else given[j] for j in whole.columns]
     lines = [
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
         f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "an arcsine, "),
         "",
-        *input_lines(names, *whole.box),
+        *input_lines(whole.names, *whole.box),
         "Outputs y:",
         "  [0] rate, in the unit of the training data",
         "",
@@ -334,13 +320,13 @@ def _header(whole, dialect, price):
         low, high = part.limits[0]
         lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
     title = "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
-    return header_of(title, lines, dialect, whole.columns.size, 1)
+    return header_of(title, lines, dialect, len(whole.names), 1)
 
 
 def _cost(whole):
     of_rules, itemsize = whole.part.cost, whole.dtype.itemsize
     sizes = [values.size for values in whole.polynomials.values()]
-    n_inputs, n_rules_inputs = whole.law_inputs.size, whole.rules_inputs.size
+    n_inputs, n_rules_inputs = whole.law.columns_.size, whole.rules.positions.size
     table_bytes = itemsize * (sum(sizes) + 2 * n_inputs) + n_inputs + n_rules_inputs
     return replace(
         of_rules,
@@ -356,58 +342,46 @@ def _known_answers(whole):
 
     Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
     """
-    law, part, dtype = whole.law, whole.part, whole.dtype
-    rules, min_coverage = replace(whole.rules, model=part.model), part.min_coverage
+    law, rules, part = whole.law, whole.rules, whole.part
     low, high = whole.box
     points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
     kind = np.arange(len(points)) % 4
     reach = np.where(kind % 2, 1.0, 2.0)[:, None]
     X = low + (high - low) * (0.5 + reach * (points - 0.5))
-    output = whole.law_inputs[0]
+    output = law.columns_[0]
     swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
     X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
-    X = np.vstack([low, high, X]).astype(dtype)
-    rows = whole.table(X.astype(float))
+    X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
     # NaN past the amplitude.
-    phase, coverage = np.abs(law.phase(rows)), rules.coverage(rows)
+    phase, coverage = np.abs(law.phase(X)), rules.coverage(X)
     sure = ~(np.abs(phase - law.max_phase) < 1e-3)
-    if min_coverage is not None:
-        sure &= np.abs(coverage - min_coverage) > 1e-3 * min_coverage
+    if part.min_coverage is not None:
+        sure &= np.abs(coverage - part.min_coverage) > 1e-3 * part.min_coverage
     chosen = np.flatnonzero(sure)[:ROWS]
     X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= law.max_phase)[chosen]
-    rows = whole.table(X.astype(float))
-
-    def outside(inputs, least, most):
-        return ((X[:, inputs] < least) | (X[:, inputs] > most)).any(axis=1)
-
-    beside = outside(whole.rules_inputs, part.low, part.high)
-    out = beside | beyond | outside(whole.law_inputs, whole.low, whole.high)
     silent = beyond & (law.out_of_bounds in SILENT)
-    silent |= beside & (rules.model.out_of_bounds in SILENT)
+    silent |= ~rules.in_bounds(X) & (rules.model.out_of_bounds in SILENT)
     with warnings.catch_warnings():
         # The status tells, row by row.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
-        of_law = _answering(law).predict(rows)
-    model, z = _answering(rules.model), np.asarray(rows)[:, rules.positions]
+        of_law = copy(law).set_params(out_of_bounds=_answering(law)).predict(X)
+    model, z = rules.model.with_out_of_bounds(_answering(rules.model)), X[:, rules.positions]
     of_rules = model.predict(z)
     if part.limits is not None:
         of_rules = np.clip(of_rules, *part.limits.T.astype(float))
-    silent |= ~np.isfinite(of_law.astype(dtype))
-    status = STATUS["OUT_OF_RANGE"] * out | STATUS["NO_OUTPUT"] * silent
-    if min_coverage is not None:
-        status |= STATUS["UNCOVERED"] * (~silent & (coverage < min_coverage))
+    silent |= ~np.isfinite(of_law.astype(whole.dtype))
+    status = STATUS["OUT_OF_RANGE"] * ~(law.in_bounds(X) & rules.in_bounds(X))
+    status |= STATUS["NO_OUTPUT"] * silent
+    if part.min_coverage is not None:
+        status |= STATUS["UNCOVERED"] * (~silent & (coverage < part.min_coverage))
     y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
     # What rounding of the sine is magnified by, too.
     steepest = np.abs(of_law[~silent]).max(initial=0.0)
     steepest = max(steepest, np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
-    size = size_of_sum(model, z, of_rules) + steepest
-    tolerance = TOLERANCE[dtype] * size
-    return X, y.astype(dtype), status, tolerance.astype(dtype)
+    tolerance = TOLERANCE[whole.dtype] * (size_of_sum(model, z, of_rules) + steepest)
+    return X.astype(whole.dtype), y.astype(whole.dtype), status, tolerance.astype(whole.dtype)
 
 
 def _answering(part):
-    """A part that answers everywhere: by its own policy, or the nearest where that gives none."""
-    policy = "linear" if part.out_of_bounds == "linear" else "clip"
-    if hasattr(part, "set_params"):
-        return copy(part).set_params(out_of_bounds=policy)
-    return part.with_out_of_bounds(policy)
+    """The policy by which a part answers everywhere: its own, or the nearest where it is silent."""
+    return "linear" if part.out_of_bounds == "linear" else "clip"

@@ -10,23 +10,27 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 
-from ..blocks import LARGE_BLOCK_ROWS, row_blocks
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json, found_by_search
 from ..export.c.status import STATUS
 from ..export.json_reader import parse_json
-from ..export.limits import SMALLEST_NUMBER, number, shown
+from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask
-from ._law_text import law_document, read_law
 from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
-from .features import ThermalRate, TimeSincePowerOn
+from .features import ThermalRate
+from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
 
-__all__ = ["GyroCompensator"]
+__all__ = ["INPUTS", "GyroCompensator", "features"]
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
 _KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
+# Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
+_POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
+_NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
+_RANGE = ("minimum", "maximum")
+_PARAMETERS = ("max_phase", "out_of_bounds")
 # As of a model alone: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
 # It is shown in tables and on axes.
@@ -127,9 +131,11 @@ class GyroCompensator:
 
     def _compensated(self, X, indicated):
         """What :meth:`apply` gives, of the estimator's inputs."""
-        blocks = [self._apply_block(X.iloc[part]) for part in row_blocks(len(X), LARGE_BLOCK_ROWS)]
-        predicted, inside, coverage = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-        compensated = self.compensate(indicated, predicted)
+        with warnings.catch_warnings():
+            # The status tells, row by row.
+            warnings.simplefilter("ignore", OutOfBoundsWarning)
+            compensated = self.compensate(indicated, self.estimator.predict(X))
+        inside, coverage = (ask(self.estimator, name, X) for name in ("in_bounds", "coverage"))
         refused = ~np.isfinite(compensated)
         compensated[refused] = np.nan
         status = (
@@ -181,16 +187,17 @@ class GyroCompensator:
         OSError
             If the file cannot be written.
         """
-        found = found_by_search(self.estimator)
+        found, law = found_by_search(self.estimator), None
         if isinstance(found, ResidualRegressor):
-            law, rules = law_and_rules(found)
+            fitted, rules = law_and_rules(found)
+            law = _law_document(fitted, self.inputs)
         else:
-            law, rules = None, FrozenRules.of(found, len(self.inputs))
+            rules = FrozenRules.of(found, len(self.inputs))
         document = {
             "format": _FORMAT,
             "version": _VERSION,
             **{key: getattr(self, key) for key in _KEYS},
-            "law": None if law is None else law_document(law, self.inputs),
+            "law": law,
             "columns": [self.inputs[j] for j in rules.positions],
             "model": json.loads(export_json(rules.model)),
         }
@@ -220,40 +227,26 @@ class GyroCompensator:
         OSError
             If it cannot be opened.
         """
+        data = read_bytes(path, _MOST_BYTES)
         try:
-            with open(path, "rb") as file:
-                data = file.read(_MOST_BYTES + 1)
-            if len(data) > _MOST_BYTES:
-                raise ValueError(f"it has more than {_MOST_BYTES} bytes")
-            document = json.loads(data.decode("utf-8"))
-            return cls(**_settings(document))
+            return cls(**_settings(json.loads(data.decode("utf-8"))))
         except (ValueError, RecursionError) as error:
             reason = str(error).removesuffix(".")
             raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
 
-    def _apply_block(self, X):
-        with warnings.catch_warnings():
-            # The status tells, row by row.
-            warnings.simplefilter("ignore", OutOfBoundsWarning)
-            predicted = self.estimator.predict(X)
-        inside = ask(self.estimator, "in_bounds", X)
-        return predicted, inside, ask(self.estimator, "coverage", X)
 
-
-def features(log, inputs, time_constant, made=None):
-    """Columns that are known on board, in the order of ``inputs``; ``made`` are there already."""
-    made = made or {}
-    clock = log[[part for part in ("time", "run") if part in log]]
-    roles = {"time": "time", "run": "run" if "run" in log else None}
+def features(log, inputs, time_constant):
+    """Columns that are known on board, in the order of ``inputs``."""
+    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
     columns = {}
     for name in inputs:
-        if name in made:
-            columns[name] = made[name]
-        elif name == "time":
-            columns[name] = TimeSincePowerOn(**roles).fit_transform(clock)[:, 0]
+        if name == "time":
+            since = log["time"] - log["time"].groupby(runs).transform("first")
+            columns[name] = since.to_numpy(dtype=float)
         elif name == "temperature_rate":
-            rate = ThermalRate(time_constant, **roles)
-            columns[name] = rate.fit_transform(clock.assign(temperature=log["temperature"]))[:, 0]
+            rate = ThermalRate(time_constant, time="time", run="run")
+            parts = log[["time", "temperature"]].assign(run=runs)
+            columns[name] = rate.fit_transform(parts)[:, 0]
         else:
             columns[name] = log[name].to_numpy()
     return pd.DataFrame(columns, index=log.index)
@@ -267,24 +260,18 @@ def _settings(document):
         raise ValueError(f"its version is {document.get('version')!r}, this reads {_VERSION}")
     if set(document) != {"format", "version", "law", "columns", "model", *_KEYS}:
         raise ValueError(f"its keys are {', '.join(document)}")
-    inputs = document["inputs"]
+    inputs, columns, unit = (document[key] for key in ("inputs", "columns", "output_unit"))
     if not _are_of(inputs, INPUTS):
         raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
     if document["predicts"] not in ("error", "rate"):
         raise ValueError(f"predicts is {document['predicts']!r}")
-    scale_factor = number(document["scale_factor"], "scale_factor")
     numbers = {
-        # Its sign is that of the axis.
-        "scale_factor": np.copysign(
-            number(abs(scale_factor), "scale_factor, in size", SMALLEST_NUMBER), scale_factor
-        ).item(),
+        "scale_factor": _divisor(document["scale_factor"], "scale_factor"),
         "time_constant": number(document["time_constant"], "time_constant", SMALLEST_NUMBER),
         "min_coverage": number(document["min_coverage"], "min_coverage", 0.0, 1.0),
     }
-    unit = document["output_unit"]
     if not (isinstance(unit, str) and unit.isprintable() and 0 < len(unit) <= _LONGEST_UNIT):
         raise ValueError(f"output_unit: {shown(unit)} is not the name of a unit")
-    columns = document["columns"]
     try:
         model = parse_json(json.dumps(document["model"]))
     except ValueError as error:
@@ -293,11 +280,71 @@ def _settings(document):
         raise ValueError(f"columns is {columns!r}; they must be of the inputs")
     if model.n_inputs != len(columns) or model.n_outputs != 1:
         raise ValueError(f"its model has {model.n_inputs} inputs and {model.n_outputs} outputs")
-    settings = {key: document[key] for key in _KEYS} | numbers
     estimator = FrozenRules(model, np.array([inputs.index(name) for name in columns]))
     if document["law"] is not None:
-        estimator = joined(read_law(document["law"], inputs), estimator)
+        estimator = joined(_read_law(document["law"], inputs), estimator)
+    settings = {key: document[key] for key in _KEYS} | numbers
     return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
+
+
+def _law_document(law, inputs):
+    """Content of a file for a fitted law; ``inputs`` are the names of all columns of X."""
+    return {
+        "columns": [inputs[j] for j in law.columns_],
+        **{key: getattr(law, f"{key}_").tolist() for key in (*_POLYNOMIALS, *_RANGE)},
+        **{key: getattr(law, f"{key}_") for key in _NUMBERS},
+        "max_phase": float(law.max_phase),
+        "out_of_bounds": law.out_of_bounds,
+    }
+
+
+def _read_law(document, inputs):
+    """The fitted law that a file's content describes; ValueError where it is none."""
+    keys = ("columns", *_POLYNOMIALS, *_NUMBERS, *_RANGE, *_PARAMETERS)
+    if not isinstance(document, dict) or set(document) != set(keys):
+        raise ValueError(f"its law must be an object with the keys {', '.join(keys)}")
+    columns = document["columns"]
+    if not _are_of(columns, inputs) or len(columns) > len(ROLES):
+        raise ValueError(f"the law's columns are {columns!r}; they must be 1 to 3 of the inputs")
+    longest = 1 + HIGHEST_DEGREE if len(columns) > 1 else 1
+    fitted = {key: _list_of_numbers(document[key], key, 1, longest) for key in _POLYNOMIALS}
+    for key in ("amplitude", "sagnac_factor"):
+        _divisor(document[key][0], f"law.{key}[0]")
+    degrees = [fitted[key].size - 1 for key in _POLYNOMIALS]
+    for key in _RANGE:
+        fitted[key] = _list_of_numbers(document[key], key, len(columns), len(columns))
+    if (fitted["minimum"] > fitted["maximum"]).any():
+        raise ValueError("the law's minimum is above its maximum")
+    fitted |= {key: number(document[key], f"law.{key}") for key in _NUMBERS}
+    if len(columns) < len(ROLES) and fitted["thermometer_lag"] != 0.0:
+        raise ValueError("the law has a thermometer_lag and no column for the temperature's rate")
+    number(document["max_phase"], "law.max_phase", 0.0, np.pi / 2.0)
+    law = OpenLoopArcsineRegressor(
+        **dict(zip(ROLES, [*columns, None, None], strict=False)),
+        **dict(zip(DEGREES, degrees, strict=True)),
+        reference_temperature=fitted["reference_temperature"],
+        **{key: document[key] for key in _PARAMETERS},
+    )
+    check_parameters(law)
+    for key, value in fitted.items():
+        setattr(law, f"{key}_", value)
+    law.n_features_in_ = len(inputs)
+    law.feature_names_in_ = np.array(inputs, dtype=object)
+    law.columns_ = [inputs.index(name) for name in columns]
+    return law
+
+
+def _divisor(value, where):
+    """A number of either sign that something is divided by."""
+    size = number(abs(number(value, where)), f"{where}, in size", SMALLEST_NUMBER)
+    return size if value > 0 else -size
+
+
+def _list_of_numbers(values, key, fewest, most):
+    if not isinstance(values, list) or not fewest <= len(values) <= most:
+        count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
+        raise ValueError(f"law.{key}: {shown(values)} must be a list of {count} number(s)")
+    return np.array([number(value, f"law.{key}[{k}]") for k, value in enumerate(values)])
 
 
 def _are_of(names, known):

@@ -5,12 +5,8 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn import get_config
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.pipeline import Pipeline
-from sklearn.utils import Bunch, get_tags
-from sklearn.utils.metadata_routing import MetadataRouter, MethodMapping, process_routing
-from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import (
     check_is_fitted,
     check_scalar,
@@ -27,19 +23,6 @@ from .physics import OpenLoopArcsineRegressor, check_parameters
 __all__ = ["FrozenRules", "ResidualRegressor", "joined", "law_and_rules"]
 
 
-def _some_part_has(method):
-    """A check for ``available_if``: that the base or the residual model offers ``method``."""
-
-    def check(self):
-        for part in self._parts():
-            # AttributeError with the part's own words where it has no such method.
-            if hasattr(_last_step(part), method):
-                return True
-        raise AttributeError(f"Neither base nor residual of {self!r} has the method {method!r}.")
-
-    return check
-
-
 class ResidualRegressor(RegressorMixin, BaseEstimator):
     """A base regressor, and another that learns what it leaves: the prediction is their sum.
 
@@ -54,9 +37,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     residual : regressor, default=None
         Fitted to what the base leaves; None is ``ANFISRegressor()``. A Pipeline will do.
     n_rounds : int, default=1
-        How often both are fitted in turn (backfitting [1]_), the base then to the target minus what
-        the residual model predicts. Three are enough; the residual model must be too small to do
-        the base's work.
+        How often both are fitted in turn (backfitting: Buja, Hastie and Tibshirani, Annals of
+        Statistics 17, 1989), the base then to the target minus what the residual model predicts.
+        Three are enough; the residual model must be too small to do the base's work.
 
     Attributes
     ----------
@@ -70,11 +53,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     See Also
     --------
     OpenLoopArcsineRegressor : The law of an open-loop fiber-optic gyro.
-
-    References
-    ----------
-    .. [1] A. Buja, T. Hastie and R. Tibshirani, "Linear smoothers and additive models", The Annals
-       of Statistics 17 (1989) 453-510.
 
     Examples
     --------
@@ -98,20 +76,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
         tags.regressor_tags.poor_score = self.base is None
-        tags.input_tags.sparse = all(get_tags(part).input_tags.sparse for part in self._unfitted())
         return tags
-
-    def get_metadata_routing(self) -> MetadataRouter:
-        """Metadata routing of this object, with both parts.
-
-        Returns
-        -------
-        routing : MetadataRouter
-        """
-        to_both = MethodMapping().add(caller="fit", callee="fit")
-        base, residual = self._unfitted()
-        router = MetadataRouter(owner=type(self).__name__)
-        return router.add(base=base, residual=residual, method_mapping=to_both)
 
     def fit(
         self,
@@ -129,7 +94,8 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,)
             Target.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, given to both parts; to a Pipeline for its last step.
+            Weights, given to both parts whatever metadata they request; to a Pipeline for its last
+            step.
         groups : array-like of shape (n_samples,), default=None
             The run, device or day of each row, given to every part whose ``fit`` takes groups, and
             to a search for its splitter.
@@ -148,11 +114,19 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         # Each part checks X for itself, here and in predict; only its columns are taken note of.
         validate_data(self, X, skip_check_array=True)
         target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
-        base, residual = self._unfitted()
-        given = self._given_by_part(base, residual, sample_weight, groups)
+        base = OpenLoopArcsineRegressor() if self.base is None else self.base
+        residual = ANFISRegressor() if self.residual is None else self.residual
+        for role, part in (("base", base), ("residual", residual)):
+            if sample_weight is not None and not _takes(part, "sample_weight"):
+                raise ValueError(f"sample_weight was given, but {role}={part!r} takes no weights.")
+        if groups is not None and not (_takes(base, "groups") or _takes(residual, "groups")):
+            raise ValueError(
+                f"groups was given, but neither base={base!r} nor residual={residual!r} takes any."
+            )
+        given = {"sample_weight": sample_weight, "groups": groups}
         learnt = np.zeros(target.size)
         for _ in range(self.n_rounds):
-            fitted_base = clone(base).fit(X, target - learnt, **given.base)
+            fitted_base = clone(base).fit(X, target - learnt, **_arguments(base, given))
             left = target - fitted_base.predict(X)
             refused = ~np.isfinite(left)
             if refused.any():
@@ -161,7 +135,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
                     "rows: nothing is left there for the residual model to learn. Drop these rows, "
                     "or give the base a policy that answers."
                 )
-            fitted_residual = clone(residual).fit(X, left, **given.residual)
+            fitted_residual = clone(residual).fit(X, left, **_arguments(residual, given))
             learnt = fitted_residual.predict(X)
         # Both at once: a fit that is interrupted leaves no parts of two fits.
         self.base_, self.residual_ = fitted_base, fitted_residual
@@ -181,8 +155,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return self.base_.predict(X) + self.residual_.predict(X)
 
-    @available_if(_some_part_has("in_bounds"))
-    def in_bounds(self, X: ArrayLike):
+    def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in bounds of every part that has such; through Pipelines too.
 
         Parameters
@@ -193,11 +166,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         -------
         inside : ndarray of bool of shape (n_samples,)
         """
-        check_is_fitted(self)
         return np.logical_and.reduce(self._answers("in_bounds", X))
 
-    @available_if(_some_part_has("coverage"))
-    def coverage(self, X: ArrayLike):
+    def coverage(self, X: ArrayLike) -> np.ndarray:
         """Tell how well the training data cover each row: the least that a part says.
 
         Parameters
@@ -209,38 +180,15 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         coverage : ndarray of shape (n_samples,)
             From 0 to 1; see :meth:`skanfis.ANFISRegressor.coverage`.
         """
-        check_is_fitted(self)
         return np.minimum.reduce(self._answers("coverage", X))
-
-    def _unfitted(self):
-        """Both parts, with the defaults in the place of None."""
-        base = OpenLoopArcsineRegressor() if self.base is None else self.base
-        residual = ANFISRegressor() if self.residual is None else self.residual
-        return base, residual
-
-    def _parts(self):
-        return (self.base_, self.residual_) if hasattr(self, "residual_") else self._unfitted()
 
     def _answers(self, method, X):
         """What the parts that have ``method`` answer."""
-        return [ask(part, method, X) for part in self._parts() if hasattr(_last_step(part), method)]
-
-    def _given_by_part(self, base, residual, sample_weight, groups):
-        """Keyword arguments of each part's fit."""
-        given = {"sample_weight": sample_weight, "groups": groups}
-        given = {name: value for name, value in given.items() if value is not None}
-        if given and get_config()["enable_metadata_routing"]:
-            routed = process_routing(self, "fit", **given)
-            return Bunch(base=routed.base.fit, residual=routed.residual.fit)
-        parts = Bunch(base=base, residual=residual)
-        for role, part in parts.items():
-            if "sample_weight" in given and not _takes(part, "sample_weight"):
-                raise ValueError(f"sample_weight was given, but {role}={part!r} takes no weights.")
-        if "groups" in given and not any(_takes(part, "groups") for part in parts.values()):
-            raise ValueError(
-                f"groups was given, but neither base={base!r} nor residual={residual!r} takes any."
-            )
-        return Bunch(**{role: _arguments(part, given) for role, part in parts.items()})
+        check_is_fitted(self)
+        parts = [self.base_, self.residual_]
+        able = [part for part in parts if hasattr(_last_step(part), method)]
+        # Of parts of which none is able, the residual model says so.
+        return [ask(part, method, X) for part in able or parts[1:]]
 
 
 def _last_step(estimator):
@@ -257,7 +205,11 @@ def _takes(estimator, name):
 def _arguments(estimator, given):
     """What of the given ones the estimator's fit takes, by the names that it goes by there."""
     step = f"{estimator.steps[-1][0]}__" if isinstance(estimator, Pipeline) else ""
-    return {f"{step}{name}": value for name, value in given.items() if _takes(estimator, name)}
+    return {
+        f"{step}{name}": value
+        for name, value in given.items()
+        if value is not None and _takes(estimator, name)
+    }
 
 
 @dataclass(frozen=True, eq=False)

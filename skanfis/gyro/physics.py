@@ -1,25 +1,47 @@
-"""The law of the open-loop interferometer, fitted to a calibration log and inverted."""
+"""The law of the open-loop interferometer, fitted to a calibration log and inverted.
+
+The squared error of the *output* is minimised: there the noise is white and of one size, and the
+law is defined for every rate. docs/gyro_physics.rst has the formulas.
+"""
 
 import warnings
+from types import SimpleNamespace
 from typing import Self
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.polynomial.polynomial import polyval
+from numpy.polynomial.polynomial import polyval, polyvander
 from numpy.typing import ArrayLike
+from scipy.optimize import least_squares, root
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
-from ..policies import OUT_OF_BOUNDS
+from ..policies import OUT_OF_BOUNDS, SILENT
 from ._columns import check_weights, column_position
-from ._law_fit import MAX_EVALUATIONS, check_log, fit_law, standardise
 
-__all__ = ["HIGHEST_DEGREE", "ROLES", "OpenLoopArcsineRegressor", "check_parameters"]
+__all__ = [
+    "DEGREES",
+    "HIGHEST_DEGREE",
+    "ROLES",
+    "OpenLoopArcsineRegressor",
+    "check_parameters",
+    "past_phase",
+]
 
 HIGHEST_DEGREE = 5
+DEGREES = ("amplitude_degree", "sagnac_degree", "bias_degree")
 ROLES = ("output", "temperature", "temperature_rate")
+# Phase at the largest rate [rad]. Below 0.01 the sine is a straight line to 20 ppm; from pi/2 on
+# two rates give one output.
+_SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
+# A tenth of a radian apart: the fit goes the rest of the way.
+_STARTING_PHASES = np.linspace(0.1, 1.5, 15)
+# A dozen coefficients at most: the start needs few rows, and the fit to all begins with some.
+_ROWS_FOR_START, _ROWS_FOR_TRIAL = 2_000, 10_000
+_MAX_EVALUATIONS = 200
+_NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 
 
 class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
@@ -52,16 +74,13 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     out_of_bounds : {"clip", "linear", "nan", "raise"}, default="clip"
         What ``predict`` does beyond ``max_phase``: hold the phase there, go on along the tangent,
         return NaN, or raise ValueError. Rows within it but outside the training data follow the
-        law, and ``in_bounds`` flags them.
+        law; ``in_bounds`` flags them, and ``predict`` warns of them and of rows on the tangent.
 
     Attributes
     ----------
-    amplitude_ : ndarray of shape (amplitude_degree + 1,)
-        Coefficients of A in powers of T minus ``reference_temperature_``, lowest first.
-    sagnac_factor_ : ndarray of shape (sagnac_degree + 1,)
-        Coefficients of K, in rad per unit of the target.
-    bias_ : ndarray of shape (bias_degree + 1,)
-        Coefficients of b, in the unit of the target.
+    amplitude_, sagnac_factor_, bias_ : ndarray of shape (degree + 1,)
+        Coefficients of A, K and b in powers of T minus ``reference_temperature_``, lowest first; K
+        in rad per unit of the target.
     offset_ : float
         V0, in the unit of the output; zero unless fitted.
     thermometer_lag_ : float
@@ -78,16 +97,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         Number of columns of X.
     feature_names_in_ : ndarray of shape (n_features,)
         Their names, where X had names that are all strings.
-
-    Warns
-    -----
-    ConstantInputWarning
-        If the temperature never changes in the training data: no dependence on it is learnt.
-    ConvergenceWarning
-        If the fit did not settle.
-    OutOfBoundsWarning
-        From ``predict`` and ``score``, of rows outside the training data, and with
-        ``out_of_bounds="linear"`` of those beyond ``max_phase``.
 
     See Also
     --------
@@ -165,15 +174,15 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         columns = self._find_columns()
         counts = weights > 0
         used = inputs[counts][:, columns]
-        log = standardise(used, rate[counts].astype(float), weights[counts])
+        log = _standardised(used, rate[counts].astype(float), weights[counts])
         log.degrees, log.has_offset = self._degrees(used), bool(self.fit_offset)
-        check_log(log)
-        law, n_evaluations, has_settled = fit_law(log)
+        _check_log(log)
+        parameters, self.n_iter_, has_settled = _fit_law(log)
         if not has_settled:
-            message = f"The law did not settle within {MAX_EVALUATIONS} evaluations."
+            message = f"The law did not settle within {_MAX_EVALUATIONS} evaluations."
             warnings.warn(message, ConvergenceWarning, stacklevel=2)
-        self._keep(log, law)
-        self.n_iter_, self.columns_ = n_evaluations, columns
+        self._keep(log, _law_of(parameters, log))
+        self.columns_ = columns
         self.minimum_, self.maximum_ = used.min(axis=0), used.max(axis=0)
         return self
 
@@ -193,35 +202,27 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         ------
         ValueError
             If X is not finite; or, with ``out_of_bounds="raise"``, goes beyond ``max_phase``.
-
-        Warns
-        -----
-        OutOfBoundsWarning
-            If rows are extrapolated to.
         """
         check_parameters(self)
         used = self._used(X)
         sine, limit = self._sine(used), np.sin(self.max_phase)
         beyond = np.abs(sine) > limit
-        meaning = f"their output means a Sagnac phase beyond max_phase={self.max_phase:g} rad."
         if beyond.any() and self.out_of_bounds == "raise":
-            raise ValueError(f"{beyond.sum()} of {beyond.size} rows cannot be inverted: {meaning}")
-        messages = []
-        outside = self._outside(used) & ~beyond
-        if outside.any():
-            messages.append(
-                f"X lies outside the training data: {outside.sum()} of {outside.size} rows are of "
-                "another output or temperature and follow the law there."
+            raise ValueError(
+                f"{beyond.sum()} of {beyond.size} rows cannot be inverted: their output means a "
+                f"Sagnac phase beyond max_phase={self.max_phase:g} rad."
             )
-        if beyond.any() and self.out_of_bounds == "linear":
-            messages.append(
-                f"{beyond.sum()} of {beyond.size} rows follow the policy out_of_bounds='linear': "
-                f"{meaning}"
+        outside, goes_on = self._outside(used), self.out_of_bounds == "linear"
+        told = outside | beyond if goes_on else outside & ~beyond
+        if told.any():
+            warnings.warn(
+                f"X lies outside the training data: {told.sum()} of {told.size} rows follow the "
+                f"law there, or its tangent beyond max_phase={self.max_phase:g} rad.",
+                OutOfBoundsWarning,
+                stacklevel=2,
             )
-        if messages:
-            warnings.warn(" ".join(messages), OutOfBoundsWarning, stacklevel=2)
         phase = np.arcsin(np.clip(sine, -limit, limit))
-        if self.out_of_bounds == "linear":
+        if goes_on:
             further = np.where(beyond, np.abs(sine) - limit, 0.0) / np.cos(self.max_phase)
             phase += np.sign(sine) * further
         elif self.out_of_bounds == "nan":
@@ -241,9 +242,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         phase : ndarray of shape (n_samples,)
             From -pi/2 to pi/2 [rad]; NaN where the output is larger than the amplitude.
         """
-        sine = self._sine(self._used(X))
-        defined = np.abs(sine) <= 1.0
-        return np.where(defined, np.arcsin(np.where(defined, sine, 0.0)), np.nan)
+        with np.errstate(invalid="ignore"):
+            return np.arcsin(self._sine(self._used(X)))
 
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in the range of the training data and within ``max_phase``.
@@ -280,8 +280,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
                 ConstantInputWarning,
                 stacklevel=3,
             )
-        degrees = (self.amplitude_degree, self.sagnac_degree, self.bias_degree)
-        return tuple(min(degree, n_values - 1) for degree in degrees)
+        return tuple(min(getattr(self, degree), n_values - 1) for degree in DEGREES)
 
     def _keep(self, log, law):
         """Coefficients in the units of X and y, in powers of T minus the reference."""
@@ -326,19 +325,147 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
 def check_parameters(law):
     """Raise ValueError where a parameter of an OpenLoopArcsineRegressor is not what it must be."""
-    for name in ("amplitude_degree", "sagnac_degree", "bias_degree"):
+    for name in DEGREES:
         check_scalar(getattr(law, name), name, (int, np.integer), min_val=0, max_val=HIGHEST_DEGREE)
-    check_scalar(
-        law.max_phase,
-        "max_phase",
-        (float, int, np.floating),
-        min_val=0.0,
-        max_val=np.pi / 2.0,
-        include_boundaries="neither",
-    )
+    real, ends = (float, int, np.floating), {"min_val": 0.0, "max_val": np.pi / 2.0}
+    check_scalar(law.max_phase, "max_phase", real, **ends, include_boundaries="neither")
     if law.out_of_bounds not in OUT_OF_BOUNDS:
         raise ValueError(
             f"out_of_bounds={law.out_of_bounds!r} must be one of {', '.join(OUT_OF_BOUNDS)}."
         )
     if law.reference_temperature is not None and not np.isfinite(law.reference_temperature):
         raise ValueError(f"reference_temperature={law.reference_temperature} must be finite.")
+
+
+def past_phase(policy, what):
+    """What happens beyond the largest phase, as a clause; ``what`` there is none of in silence."""
+    if policy in SILENT:
+        return f"there is no {what}"
+    return "the phase is held there" if policy == "clip" else "the law goes on along its tangent"
+
+
+def _standardised(used, rate, weights):
+    """The log with outputs of RMS 1, rates up to 1, and temperature about 0 with spread 1."""
+    output, temperature, thermal_rate = np.pad(used, ((0, 0), (0, len(ROLES) - used.shape[1]))).T
+    mean = np.average(temperature, weights=weights)
+    std = np.sqrt(np.average((temperature - mean) ** 2, weights=weights))
+    if np.ptp(temperature) == 0:
+        mean, std = temperature[0], 1.0
+    output_unit = np.sqrt(np.average(output**2, weights=weights)) or 1.0
+    rate_unit = np.abs(rate).max() or 1.0
+    thermal_unit = np.abs(thermal_rate).max() or 1.0
+    columns = (
+        output / output_unit,
+        rate / rate_unit,
+        (temperature - mean) / std,
+        thermal_rate / thermal_unit,
+        np.sqrt(weights),
+    )
+    return SimpleNamespace(
+        columns=np.stack(columns),
+        output_unit=output_unit,
+        rate_unit=rate_unit,
+        thermal_unit=thermal_unit,
+        mean=mean,
+        std=std,
+        has_lag=used.shape[1] == len(ROLES),
+    )
+
+
+def _check_log(log):
+    n_coefficients = sum(log.degrees) + 3 + log.has_lag + log.has_offset
+    output, rate = log.columns[:2]
+    if rate.size < n_coefficients:
+        raise ValueError(
+            f"The law has {n_coefficients} coefficients; n_samples = {rate.size} rows cannot tell "
+            "them. Give more rows, or lower the degrees."
+        )
+    for name, values in (("the output", output), ("the rate (y)", rate)):
+        if np.ptp(values) == 0:
+            raise ValueError(f"No scale factor can be found: {name} never changes.")
+
+
+def _law_of(parameters, log):
+    """The law from the vector that the solver works on: s = A k_0, K, b, then lag and offset.
+
+    Where the sine is nearly straight, A and K cannot be told apart, but s can.
+    """
+    ends = np.cumsum([degree + 1 for degree in log.degrees])
+    s, k, b, rest = np.split(parameters, ends)
+    lag, offset = rest[0] if log.has_lag else 0.0, rest[-1] if log.has_offset else 0.0
+    return SimpleNamespace(a=s / k[0], k=k, b=b, lag=lag, offset=offset)
+
+
+def _misfit(parameters, columns, log):
+    """Modelled minus measured output, by the root of the weight."""
+    output, rate, tau, rho, root_weights = columns
+    law = _law_of(parameters, log)
+    tau = tau + law.lag * rho
+    phase = polyval(tau, law.k) * (rate + polyval(tau, law.b))
+    return root_weights * (polyval(tau, law.a) * np.sin(phase) + law.offset - output)
+
+
+def _jacobian(parameters, columns, log):
+    """By complex steps: no difference is taken, and the derivative is exact to rounding."""
+    steps = parameters + 1e-30j * np.eye(parameters.size)
+    return np.stack([_misfit(step, columns, log).imag for step in steps], axis=1) * 1e30
+
+
+def _fit_law(log):
+    """The solver's vector at the minimum, the number of evaluations, and whether it settled."""
+    n_rows = log.columns.shape[1]
+    start = _start(log.columns[:, :: max(1, n_rows // _ROWS_FOR_START)], log)
+    lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
+    first_of_sagnac = log.degrees[0] + 1
+    lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
+    # Of a long log some rows show the way; few steps on all are left then.
+    for step in sorted({max(1, n_rows // _ROWS_FOR_TRIAL), 1}, reverse=True):
+        fitted = least_squares(
+            _misfit,
+            start,
+            jac=_jacobian,
+            bounds=(lower, upper),
+            x_scale="jac",
+            # Tight, and not by the cost: where the law fits badly, that is flat before the end.
+            ftol=None,
+            xtol=1e-12,
+            gtol=1e-13,
+            max_nfev=_MAX_EVALUATIONS,
+            args=(log.columns[:, ::step], log),
+        )
+        start = fitted.x
+    # On a large log the noise is far above the eighth digit, and every pass has its price.
+    if n_rows <= _ROWS_FOR_TRIAL:
+        start = _polished(start, log)
+    return start, fitted.nfev, fitted.status != 0
+
+
+def _polished(parameters, log):
+    """The nearby zero of the gradient: costs tell a minimum to eight digits only."""
+
+    def gradient(trial):
+        return _jacobian(trial, log.columns, log).T @ _misfit(trial, log.columns, log)
+
+    found = root(gradient, parameters, method="hybr", options={"xtol": 1e-14, "maxfev": 60}).x
+    return found if np.abs(found - parameters).max() < _NEARBY else parameters
+
+
+def _start(columns, log):
+    """The best of several phases, the rest of the law by linear least squares; no lag.
+
+    For given K the law is linear in A cos(K b) and A sin(K b).
+    """
+    output, rate, tau, _, weights = columns
+    powers, target = polyvander(tau, log.degrees[0]), weights * output
+    trials = []
+    for phase in _STARTING_PHASES:
+        basis = np.column_stack([powers * np.sin(phase * rate)[:, None], np.cos(phase * rate)])
+        design = weights[:, None] * basis
+        found = np.linalg.lstsq(design, target, rcond=None)[0]
+        trials.append((np.sum((design @ found - target) ** 2), phase, found))
+    _, phase, found = min(trials, key=lambda trial: trial[0])
+    # tan(K b) = (A sin K b) / (A cos K b); a bias beyond the largest rate is no start.
+    bias = np.arctan2(found[-1] * np.sign(found[0]), np.abs(found[0])) / phase
+    k, b = np.zeros(log.degrees[1] + 1), np.zeros(log.degrees[2] + 1)
+    k[0], b[0] = phase, np.clip(bias, -1.0, 1.0)
+    return np.concatenate([phase * found[:-1], k, b, np.zeros(log.has_lag + log.has_offset)])

@@ -23,9 +23,7 @@ from skanfis.export.fis.reader import parse_fis
 from skanfis.gyro import (
     OpenLoopArcsineRegressor,
     ResidualRegressor,
-    ThermalLag,
     ThermalRate,
-    TimeSincePowerOn,
 )
 from skanfis.intervals import ConformalRegressor
 from skanfis.learning import SOLVERS, Hybrid
@@ -73,11 +71,11 @@ def compensator():
     """Of a gyro: what its log does not say, a law, and rules for what the law leaves."""
     g = np.random.default_rng(1)
     log = np.column_stack([np.arange(60.0), 20.0 + np.arange(60.0) / 60.0, g.uniform(-1, 1, 60)])
-    parts = (TimeSincePowerOn(time=0), ThermalRate(30.0, time=0), ThermalLag(30.0, time=0))
-    features = [(type(part).__name__, part, [0, 1]) for part in parts]
     law = OpenLoopArcsineRegressor(output=-1, temperature=1)
     return make_pipeline(
-        ColumnTransformer([*features, ("log", "passthrough", [1, 2])]),
+        ColumnTransformer(
+            [("rate", ThermalRate(30.0, time=0), [0, 1]), ("log", "passthrough", [0, 1, 2])]
+        ),
         ResidualRegressor(law, quick(n_mfs=1)),
     ).fit(log, log[:, 2] + 0.1 * log[:, 2] ** 3)
 

@@ -81,12 +81,6 @@ def silent():
     return model, X
 
 
-def law_raises():
-    model, X = whole()
-    model.base_.set_params(out_of_bounds="raise", max_phase=0.3)
-    return model, X
-
-
 def rules_raise():
     """Columns by position, no temperature in the law."""
     log = simulated()
@@ -97,7 +91,7 @@ def rules_raise():
     return model, X
 
 
-CASES = [whole, everything, silent, law_raises, rules_raise]
+CASES = [whole, everything, silent, rules_raise]
 
 
 def around(X, n_rows=4000):
@@ -175,7 +169,6 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
     # Full scale in range, and that of the rates which rows far out of range mean.
     in_range = off[bits == 0].max() / np.abs(log["rate"]).max()
     everywhere = off[answered].max() / np.abs(wanted[answered]).max()
-    print(f"{label} {dtype} {std}: {in_range:.1e} in range, {everywhere:.1e} everywhere")
     assert in_range < tolerance
     assert everywhere < tolerance
     silence = y[refused & ~unsure, 0]
@@ -279,25 +272,12 @@ def test_refuses_what_it_cannot_write(log, parts, error, message):
         export_c_physics(refused(log, **parts), name="gyro")
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"name": "gyroscope_number"}, "with 14 or fewer"),
-        ({"name": None}, "give either"),
-        ({"dtype": "half"}, "dtype='half'"),
-        ({"std": "c11"}, "std='c11'"),
-        ({"min_coverage": 2.0}, "min_coverage=2.0"),
-    ],
-)
-def test_refuses_bad_parameters(log, options, message):
-    with pytest.raises(ValueError, match=message):
-        export_c_physics(refused(log), **{"name": "gyro", **options})
-
-
 def test_refuses_what_is_no_composition(log):
     with pytest.raises(TypeError, match="fitted ResidualRegressor"):
         export_c_physics(ANFISRegressor(n_mfs=1), name="gyro")
     model = refused(log)
+    with pytest.raises(ValueError, match="with 14 or fewer"):
+        export_c_physics(model, name="gyroscope_number")
     model.base_.amplitude_ = model.base_.amplitude_ * 1e40
     with pytest.raises(ValueError, match="Single precision cannot hold"):
         export_c_physics(model, name="gyro", dtype="float")

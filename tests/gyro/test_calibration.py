@@ -70,8 +70,6 @@ def test_the_planted_truth_is_recommended(truth, request):
     verdict = calibration.verdict
     assert verdict.recommended == truth, verdict
     title, sentence = headline(calibration, "deg/s")
-    said = " ".join(errors_and_verdict(calibration))
-    assert title in said
     if truth == "this model":
         assert title == "The fuzzy rules are worth it"
         return

@@ -49,23 +49,6 @@ def compensator(log):
     return fitted(log)
 
 
-def test_features_are_those_on_board(log, compensator):
-    X = compensator.features(log)
-    assert tuple(X) == INPUTS
-    for run in log["run"].unique():
-        rows = (log["run"] == run).to_numpy()
-        time, temperature = log["time"][rows].to_numpy(), log["temperature"][rows].to_numpy()
-        np.testing.assert_array_equal(X["time"][rows], time - time[0])
-        rate, previous, expected = 0.0, temperature[0], []
-        for k, now in enumerate(temperature):
-            if k:
-                step = time[k] - time[k - 1]
-                rate += (1 - np.exp(-step / 60.0)) * ((now - previous) / step - rate)
-            previous = now
-            expected.append(rate)
-        np.testing.assert_allclose(X["temperature_rate"][rows], expected, atol=1e-12)
-
-
 def test_compensates(log, compensator):
     compensated = compensator.apply(log)
     assert (compensated["status"] == 0).all()
@@ -73,18 +56,6 @@ def test_compensates(log, compensator):
     after = compensated["rate_compensated"] - log["rate"]
     assert after.std() < before.std() / 100
     np.testing.assert_allclose(compensated["rate_indicated"], log["output"] / FACTOR)
-
-
-def test_the_true_rate_is_not_used(log, compensator):
-    without = compensator.apply(log.drop(columns="rate"))
-    assert without.equals(compensator.apply(log))
-
-
-def test_blocks_of_rows_change_nothing(log, compensator, monkeypatch):
-    whole = compensator.apply(log)
-    monkeypatch.setattr("skanfis.gyro.compensator.LARGE_BLOCK_ROWS", 7)
-    parts = compensator.apply(log)
-    np.testing.assert_allclose(parts, whole, rtol=1e-12)
 
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
@@ -118,45 +89,31 @@ def test_rows_hardly_covered_are_flagged(log):
     assert (careless.apply(far)["status"] == 1).all()
 
 
-def test_status_is_that_of_the_exported_c(log):
-    from skanfis.export import export_c
-
-    header = export_c(fitted(log).estimator, name="gyro").header
-    for name, bit in {"OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}.items():
-        assert f"#define GYRO_{name} {bit}" in header
-
-
 def with_physics(log, **parameters):
     """Law and rules; the rules on chosen columns, in another order than the inputs."""
     shell = GyroCompensator(None, INPUTS, predicts="rate", scale_factor=FACTOR)
-    parameters = {
-        "temperature": "temperature",
-    } | parameters
-    law = OpenLoopArcsineRegressor("output", **parameters)
+    law = OpenLoopArcsineRegressor("output", **{"temperature": "temperature"} | parameters)
     chosen = make_column_transformer((StandardScaler(), ["output", "time"]))
     rules = make_pipeline(chosen, quick([1, 2]))
     model = ResidualRegressor(law, rules).fit(shell.features(log), log["rate"])
     return GyroCompensator(model, INPUTS, predicts="rate", scale_factor=FACTOR)
 
 
-def test_physics_predicts_the_rate(log):
-    compensated = with_physics(log).apply(log)
-    assert (compensated["rate_compensated"] - log["rate"]).std() < 0.02
-
-
 @pytest.mark.parametrize(
     "parameters",
     [
+        None,  # rules alone
         {},
         {"temperature_rate": "temperature_rate", "amplitude_degree": 3, "fit_offset": True},
         {"temperature": None, "max_phase": 0.5, "out_of_bounds": "nan"},
         {"reference_temperature": 20, "max_phase": 0.5, "out_of_bounds": "linear"},
     ],
 )
-def test_json_of_physics_gives_the_same_compensator(log, parameters, tmp_path):
-    if "temperature" in parameters:
-        log = log.assign(output=-log["output"])
-    compensator = with_physics(log, **parameters)
+def test_json_gives_the_same_compensator(log, compensator, parameters, tmp_path):
+    if parameters is not None:
+        if "temperature" in parameters:
+            log = log.assign(output=-log["output"])
+        compensator = with_physics(log, **parameters)
     path = tmp_path / "compensator.json"
     compensator.write_json(path)
     read = GyroCompensator.read_json(path)
@@ -166,6 +123,9 @@ def test_json_of_physics_gives_the_same_compensator(log, parameters, tmp_path):
     np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-12)
     read.write_json(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_text() == path.read_text()
+    assert (read.inputs, read.scale_factor) == (INPUTS, FACTOR)
+    if parameters is None:
+        return
     # What was read can be written as C too.
     codes = [export_c_physics(part.estimator, name="gyro") for part in (compensator, read)]
     assert codes[0] == codes[1]
@@ -195,28 +155,20 @@ def of_law(**changes):
     ("change", "message"),
     [
         (lambda document: document | {"law": {}}, "its law must be an object with the keys"),
-        (lambda document: document | {"law": []}, "its law must be an object with the keys"),
         (of_law(more=1), "its law must be an object with the keys"),
         (of_law(columns=["output", "speed"]), "the law's columns are"),
-        (of_law(columns=["output", "output"]), "the law's columns are"),
-        (of_law(columns=[]), "the law's columns are"),
         (of_law(columns="output"), "the law's columns are"),
         (of_law(columns=["output"]), r"law\.amplitude: .* must be a list of 1 number"),
         (of_law(amplitude=[1.0] * 7), r"law\.amplitude: .* must be a list of 1 to 6 number"),
-        (of_law(bias=[]), r"law\.bias: .* must be a list of 1 to 6 number"),
         (of_law(sagnac_factor=[float("nan")]), r"law\.sagnac_factor\[0\]: nan is not a number"),
         (of_law(sagnac_factor=[0.0, 1.0]), r"law\.sagnac_factor\[0\], in size: 0.0 is not"),
-        (of_law(amplitude=[0, 1]), r"law\.amplitude\[0\], in size: 0.0 is not"),
-        (of_law(sagnac_factor=["1"]), r"law\.sagnac_factor\[0\]: '1' is not a number"),
         (of_law(offset=True), r"law\.offset: True is not a number"),
         (of_law(offset=1e60), r"law\.offset: 1e\+60 is not a number of size up to 1e\+50"),
         (of_law(minimum=[0.0]), r"law\.minimum: .* must be a list of 2 number"),
         (of_law(minimum=[1e30, 0.0]), "the law's minimum is above its maximum"),
         (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),
-        (of_law(max_phase=2.0), "max_phase"),
         (of_law(max_phase="1"), r"law\.max_phase: '1' is not a number from 0 to 1.57"),
         (of_law(out_of_bounds="hold"), "out_of_bounds='hold' must be one of"),
-        (of_law(out_of_bounds=[]), "out_of_bounds"),
     ],
 )
 def test_other_laws_are_refused(log, physics_json, tmp_path, change, message):
@@ -242,18 +194,6 @@ def test_other_estimators_are_not_written(log, tmp_path):
     assert not path.exists()
 
 
-def test_json_gives_the_same_compensator(log, compensator, tmp_path):
-    path = tmp_path / "compensator.json"
-    compensator.write_json(path)
-    read = GyroCompensator.read_json(path)
-    shifted = log.assign(temperature=log["temperature"] + 5.0)
-    one, two = compensator.apply(shifted), read.apply(shifted)
-    np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-12)
-    assert (read.inputs, read.scale_factor, read.output_unit) == (INPUTS, FACTOR, "counts")
-    read.write_json(tmp_path / "again.json")
-    assert (tmp_path / "again.json").read_text() == path.read_text()
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -263,18 +203,12 @@ def test_json_gives_the_same_compensator(log, compensator, tmp_path):
         (lambda document: document | {"more": 1}, "its keys are"),
         (lambda document: document | {"inputs": ["speed"]}, "inputs is"),
         (lambda document: document | {"inputs": ["time"]}, "columns is"),
-        (lambda document: document | {"inputs": ["time"] * 4}, "inputs is"),
         (lambda document: document | {"columns": ["time"]}, "its model has 4 inputs"),
-        (lambda document: document | {"columns": ["time"] * 4}, "columns is"),
-        (lambda document: document | {"columns": 4}, "columns is"),
         (lambda document: document | {"predicts": "phase"}, "predicts is 'phase'"),
-        (lambda document: document | {"scale_factor": "1"}, "scale_factor: '1' is not a number"),
         (lambda document: document | {"scale_factor": 0}, "scale_factor, in size: 0.0 is not a"),
         (lambda document: document | {"scale_factor": 10**60}, "scale_factor: 10.*is not a number"),
         (lambda document: document | {"time_constant": 0.0}, "time_constant: 0.0 is not a number"),
         (lambda document: document | {"min_coverage": 1.5}, "min_coverage: 1.5 is not a .* 0 to 1"),
-        (lambda document: document | {"time_constant": True}, "time_constant: True is not a"),
-        (lambda document: document | {"output_unit": 3}, "output_unit: 3 is not the name"),
         (lambda document: document | {"output_unit": "\x1b[2J"}, r"output_unit: '\\x1b\[2J"),
         (lambda document: document | {"model": {}}, "is no gyro compensator"),
     ],

@@ -3,7 +3,6 @@
 import shutil
 import subprocess
 
-import joblib
 import numpy as np
 import pandas as pd
 import polars as pl
@@ -11,15 +10,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from sklearn.base import clone
-from sklearn.compose import make_column_transformer
 from sklearn.exceptions import NotFittedError
-from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GroupKFold, cross_val_predict
-from sklearn.pipeline import make_pipeline
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
-from skanfis.datasets import make_ofog
-from skanfis.gyro import ThermalLag, ThermalRate, TimeSincePowerOn
+from skanfis.gyro import ThermalRate
 
 # A row depends on the rows before it: that is what these are for.
 NEEDS_THE_ORDER_OF_ROWS = {
@@ -36,9 +30,8 @@ def name_of(check):
 @pytest.mark.parametrize(
     ("estimator", "check"),
     [
-        pytest.param(each, check, id=f"{type(each).__name__}-{name_of(check)}")
-        for estimator in (ThermalRate(), ThermalLag(), TimeSincePowerOn())
-        for each, check in estimator_checks_generator(estimator)
+        pytest.param(each, check, id=name_of(check))
+        for each, check in estimator_checks_generator(ThermalRate())
         if name_of(check) not in NEEDS_THE_ORDER_OF_ROWS
     ],
 )
@@ -63,17 +56,6 @@ def _interleaved(run):
     return np.argsort(run.groupby(run).cumcount(), kind="stable")
 
 
-def reference(time, temperature, time_constant):
-    """The recursion of the documentation, word by word."""
-    rates, rate = [0.0], 0.0
-    for k in range(1, len(time)):
-        h = time[k] - time[k - 1]
-        gain = 1.0 - np.exp(-h / time_constant)
-        rate += gain * ((temperature[k] - temperature[k - 1]) / h - rate)
-        rates.append(rate)
-    return np.array(rates)
-
-
 @pytest.mark.parametrize("steps", [np.full(200, 3.0), np.geomspace(0.01, 50, 200)])
 def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     time = np.cumsum(steps)
@@ -82,7 +64,7 @@ def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     assert_allclose(rate, -0.02 * (1 - np.exp(-(time - time[0]) / 30)), rtol=1e-9)
 
 
-def test_lag_solves_its_equation_on_the_polygon_through_the_samples(rng):
+def test_temperature_less_its_rate_is_that_of_a_body_that_lags(rng):
     time = np.cumsum(rng.uniform(1, 30, 60))
     temperature = np.cumsum(rng.normal(size=60))
     solution = solve_ivp(
@@ -94,24 +76,8 @@ def test_lag_solves_its_equation_on_the_polygon_through_the_samples(rng):
         rtol=1e-8,
     )
     X = np.column_stack([time, temperature])
-    lagged = ThermalLag(80.0, time=0).fit_transform(X).ravel()
-    assert_allclose(lagged, solution.y[0], atol=1e-4)
-
-
-def test_rate_and_lag_are_two_sides_of_one_filter(log):
-    columns = log[["t", "T", "run"]]
-    rate = ThermalRate(40.0, time="t", run="run").fit_transform(columns)
-    lagged = ThermalLag(40.0, time="t", run="run").fit_transform(columns)
-    assert_allclose(lagged.ravel(), log["T"] - 40.0 * rate.ravel(), rtol=1e-12)
-
-
-def test_low_pass_quietens_a_noisy_thermometer(rng):
-    time = np.arange(20_000.0)
-    X = np.column_stack([time, 0.01 * time + rng.normal(scale=0.1, size=time.size)])
-    rate = ThermalRate(60.0, time=0).fit_transform(X).ravel()[600:]
-    assert_allclose(rate.mean(), 0.01, rtol=0.01)
-    # White noise sigma: the difference of noise and low-passed noise, over tau.
-    assert_allclose(rate.std(), 0.1 / 60, rtol=0.05)
+    rate = ThermalRate(80.0, time=0).fit_transform(X).ravel()
+    assert_allclose(temperature - 80.0 * rate, solution.y[0], atol=1e-4)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -121,7 +87,7 @@ def test_the_lines_in_c_give_the_same(log, tmp_path):
     update = "".join(
         line for line in module.__doc__.splitlines() if line.startswith("    ") and ";" in line
     )
-    assert update.count(";") == 3
+    assert update.count(";") == 2
     run = log[log["run"] == "b"]
     source = tmp_path / "recursion.c"
     source.write_text(
@@ -129,14 +95,14 @@ def test_the_lines_in_c_give_the_same(log, tmp_path):
 #include <math.h>
 #include <stdio.h>
 int main(void) {
-    double tau = 33.0, rate = 0.0, previous, lagged, time, t, temperature, h;
+    double tau = 33.0, rate = 0.0, previous, time, t, temperature, h;
     scanf("%lf %lf", &time, &previous);
     while (scanf("%lf %lf", &t, &temperature) == 2) {
         h = t - time; time = t;
 """
         + update
         + r"""
-        printf("%.17g %.17g\n", rate, lagged);
+        printf("%.17g\n", rate);
     }
     return 0;
 }
@@ -147,106 +113,54 @@ int main(void) {
     subprocess.run(["cc", source, "-o", program, "-lm"], check=True)
     lines = "\n".join(f"{t!r} {T!r}" for t, T in run[["t", "T"]].to_numpy().tolist())
     printed = subprocess.run([program], input=lines, capture_output=True, text=True, check=True)
-    in_c = np.array([line.split() for line in printed.stdout.splitlines()], dtype=float)
-    X = run[["t", "T"]].to_numpy()
-    for place, feature in enumerate((ThermalRate(33.0, time=0), ThermalLag(33.0, time=0))):
-        assert_allclose(in_c[:, place], feature.fit_transform(X).ravel()[1:], rtol=1e-12)
+    rate = ThermalRate(33.0, time=0).fit_transform(run[["t", "T"]].to_numpy())
+    assert_allclose(np.array(printed.stdout.split(), dtype=float), rate.ravel()[1:], rtol=1e-12)
 
 
-FEATURES = [
-    ThermalRate(20.0, time="t", run="run"),
-    ThermalLag(20.0, time="t", run="run"),
-    TimeSincePowerOn(time="t", run="run"),
-]
+FEATURE = ThermalRate(20.0, time="t", run="run")
 
 
-@pytest.mark.parametrize("feature", FEATURES, ids=lambda each: type(each).__name__)
-def test_future_does_not_alter_the_past(feature, log):
+def test_future_does_not_alter_the_past(log):
     columns = log[["t", "T", "run"]]
-    features = clone(feature).fit_transform(columns)
+    features = clone(FEATURE).fit_transform(columns)
     # Row by row, as on the gyro: the last of all rows so far is the newest.
     for n_rows in range(1, len(columns) + 1):
-        so_far = clone(feature).fit_transform(columns[:n_rows])
+        so_far = clone(FEATURE).fit_transform(columns[:n_rows])
         assert_array_equal(so_far[-1], features[n_rows - 1])
     later = columns.copy()
     later.loc[later.index[30:], "T"] += 1e6
-    assert_array_equal(clone(feature).fit_transform(later)[:30], features[:30])
+    assert_array_equal(clone(FEATURE).fit_transform(later)[:30], features[:30])
 
 
-@pytest.mark.parametrize("feature", FEATURES, ids=lambda each: type(each).__name__)
-def test_runs_do_not_know_of_each_other(feature, log):
+def test_runs_do_not_know_of_each_other(log):
     columns = log[["t", "T", "run"]]
-    features = clone(feature).fit_transform(columns)
+    features = clone(FEATURE).fit_transform(columns)
     for name in "abc":
         rows = (columns["run"] == name).to_numpy()
-        assert_array_equal(clone(feature).fit_transform(columns[rows]), features[rows])
-        assert features[rows][0] == (columns["T"][rows].iloc[0] if "Lag" in str(feature) else 0)
+        assert_array_equal(clone(FEATURE).fit_transform(columns[rows]), features[rows])
+        assert features[rows][0] == 0
 
 
-@pytest.mark.parametrize("feature", FEATURES, ids=lambda each: type(each).__name__)
-def test_frames_of_any_kind_and_arrays_give_the_same(feature, log):
+def test_frames_of_any_kind_and_arrays_give_the_same(log):
     columns = log[["t", "T", "run"]]
-    features = clone(feature).fit_transform(columns)
+    features = clone(FEATURE).fit_transform(columns)
     polars = pl.DataFrame(columns.to_dict("list"))
-    assert_array_equal(clone(feature).fit_transform(polars), features)
+    assert_array_equal(clone(FEATURE).fit_transform(polars), features)
     categorical = columns.assign(run=columns["run"].astype("category"))
-    assert_array_equal(clone(feature).fit_transform(categorical), features)
+    assert_array_equal(clone(FEATURE).fit_transform(categorical), features)
     numbered = columns.assign(run=pd.factorize(columns["run"])[0]).to_numpy()
-    by_position = clone(feature).set_params(time=0, run=-1)
+    by_position = clone(FEATURE).set_params(time=0, run=-1)
     assert_array_equal(by_position.fit_transform(numbered), features)
 
 
-@pytest.mark.parametrize(
-    ("feature", "names"),
-    [
-        (ThermalRate(time="t", run="run"), ["T_rate", "other_rate"]),
-        (ThermalLag(time="t", run="run"), ["T_lagged", "other_lagged"]),
-        (TimeSincePowerOn(time="t", run="run"), ["time_since_power_on"]),
-    ],
-)
-def test_new_columns_have_names_and_keep_the_index(feature, names, log):
+def test_new_columns_have_names_and_keep_the_index(log):
+    feature = clone(FEATURE)
     made = feature.set_output(transform="pandas").fit_transform(log)
-    assert list(made.columns) == names == list(feature.get_feature_names_out())
+    assert list(made.columns) == ["T_rate", "other_rate"] == list(feature.get_feature_names_out())
     assert_array_equal(made.index, log.index)
     assert feature.n_features_in_ == 4
     with pytest.raises(ValueError, match="input_features"):
         feature.get_feature_names_out(["a", "b"])
-
-
-def test_time_since_power_on_is_that_of_the_simulation():
-    data = make_ofog(n_devices=2, n_runs=2, n_power_ups=2, duration=600.0, random_state=0)
-    clock = 1e5 + 10.0 * np.arange(len(data))
-    feature = TimeSincePowerOn(time="clock", run="power_up")
-    elapsed = feature.fit_transform(data.assign(clock=clock, note="text is no matter"))
-    assert_allclose(elapsed.ravel(), data["time"], atol=1e-9)
-
-
-def test_works_in_a_pipeline_that_is_cross_validated_and_saved(tmp_path):
-    data = make_ofog(n_devices=1, n_runs=8, rates=[0.0], noise=0.0, random_state=0)
-    data["kind"] = "run " + data["run"].astype(str)
-    inputs = make_column_transformer(
-        ("passthrough", ["temperature"]),
-        (ThermalRate(30.0, time="time", run="kind"), ["time", "temperature", "kind"]),
-        (TimeSincePowerOn(time="time", run="kind"), ["time", "kind"]),
-        verbose_feature_names_out=False,
-    )
-    model = make_pipeline(inputs, LinearRegression())
-    split = {"cv": GroupKFold(4), "groups": data["run"]}
-    with_rate = cross_val_predict(model, data, data["error"], **split)
-    plain = make_pipeline(
-        make_column_transformer(("passthrough", ["temperature"])), LinearRegression()
-    )
-    without = cross_val_predict(plain, data, data["error"], **split)
-    assert np.std(data["error"] - with_rate) < 0.85 * np.std(data["error"] - without)
-    fitted = model.fit(data, data["error"])
-    assert list(fitted[0].get_feature_names_out()) == [
-        "temperature",
-        "temperature_rate",
-        "time_since_power_on",
-    ]
-    joblib.dump(fitted, tmp_path / "model.joblib")
-    loaded = joblib.load(tmp_path / "model.joblib")
-    assert_array_equal(loaded.predict(data), fitted.predict(data))
 
 
 @pytest.mark.parametrize(

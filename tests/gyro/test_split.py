@@ -1,14 +1,92 @@
-"""Which rows are held out: what the log calls for, and no row twice."""
+"""Rate levels found, and which rows are held out: what the log calls for, and no row twice."""
 
 from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import LogError, check_split
+from skanfis.gyro import LogError, group_by_rate_level
 from skanfis.gyro._split import choose_split, cut_legs, find_legs
+
+GRID = np.linspace(-100.8, 100.8, 57)  # steps of 3.6 deg/s
+UNEVEN = np.array([-100.0, -30, -10, -3, -1, -0.3, 0, 0.3, 1, 3, 10, 30, 100])
+FINE = np.linspace(-100, 100, 401)
+
+
+def levels_of(rate, **options):
+    """The median rate of each level."""
+    groups = group_by_rate_level(rate, signed=True, **options)
+    return pd.Series(rate).groupby(groups).median().to_numpy()
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("noise", [0.0, 1e-9, 0.01])
+@pytest.mark.parametrize("levels", [GRID, UNEVEN, FINE], ids=["grid", "uneven", "fine"])
+def test_levels_are_found_whatever_their_spacing_noise_and_unit(levels, noise, unit, rng):
+    true = rng.permutation(np.repeat(levels, 50))
+    rate = unit * (true + rng.normal(scale=noise, size=true.size))
+    found = levels_of(rate)
+    assert_allclose(found, unit * levels, atol=unit * (0.7 * noise + 1e-9))
+    groups = group_by_rate_level(rate, signed=True)
+    assert_array_equal(groups, np.searchsorted(levels, true))
+
+
+def test_rows_on_the_way_between_levels_count_to_the_nearest(rng):
+    # A fifth of the rows, as with a sluggish table.
+    way = rng.uniform(-100.8, 100.8, 1500)
+    rate = np.concatenate([np.repeat(GRID, 100), way])
+    assert_allclose(levels_of(rate), GRID, atol=0.01)
+    expected = np.abs(rate[:, None] - GRID).argmin(axis=1)
+    assert_array_equal(group_by_rate_level(rate, signed=True), expected)
+
+
+def test_one_level_is_a_level():
+    assert levels_of(np.zeros(9)).tolist() == [0.0]
+    assert levels_of([38.69, 38.69, 38.69]).tolist() == pytest.approx([38.69])
+    assert levels_of([7.0]).tolist() == [7.0]
+    at_rest = np.random.default_rng(0).normal(scale=1e-3, size=500)
+    assert levels_of(at_rest, tolerance=0.01) == pytest.approx([0.0], abs=1e-3)
+
+
+def test_tolerance_decides_where_it_is_given():
+    rate = np.array([0.0, 0.4, 0.8, 5.0, 5.3])
+    assert_allclose(levels_of(rate, tolerance=0.5), [0.4, 5.15])
+    assert_allclose(levels_of(rate, tolerance=0.35), [0.0, 0.4, 0.8, 5.15])
+    for tolerance in (0.0, -1.0, float("nan"), "0.1"):
+        with pytest.raises(ValueError, match="must be a positive number"):
+            levels_of(rate, tolerance=tolerance)
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        np.random.default_rng(0).uniform(-100, 100, 1500),
+        np.random.default_rng(0).uniform(-100, 100, 500_000),
+        100 * np.sin(np.arange(100_000) / 5000.0),
+        np.random.default_rng(0).normal(size=100_000),
+    ],
+    ids=["1500", "500000", "sine", "normal"],
+)
+def test_a_rate_that_changes_continuously_has_no_levels(rate):
+    with pytest.raises(ValueError, match=r"no levels: it changes continuously between -"):
+        group_by_rate_level(rate)
+
+
+def test_levels_are_dealt_out_by_turns():
+    rate = np.tile(GRID, 3)
+    groups = group_by_rate_level(rate, n_groups=5)
+    assert_array_equal(groups, np.rint(np.abs(rate) / 3.6).astype(int) % 5)
+    # Every group reaches over the whole range.
+    reach = pd.Series(np.abs(rate)).groupby(groups).agg(["min", "max"])
+    assert reach["min"].max() < 20
+    assert reach["max"].min() > 85
+    with pytest.raises(ValueError, match=r"n_groups=30: the rate has no more than 29 levels"):
+        group_by_rate_level(rate, n_groups=30)
+    with pytest.raises(ValueError, match="n_groups == 1, must be >= 2"):
+        group_by_rate_level(rate, n_groups=1)
 
 
 def log_of(**options):
@@ -42,11 +120,10 @@ def test_choice(options, kind):
 
 def test_a_choice_never_leaks():
     log = log_of(n_devices=1, n_runs=4, n_rate_levels=9)
-    split = choose_split(log)
-    # SplitLeakWarning is an error here. Levels of one size and two signs are held out together.
-    report = check_split(split.folds, log["rate"], run=log["run"])
-    assert report["shared_levels"].max() == 0
-    assert report["shared_runs"].max() == 0
+    for train, test in choose_split(log).folds:
+        # Levels of one size and two signs are held out together.
+        assert not np.isin(log["rate"].abs()[test], log["rate"].abs()[train]).any()
+        assert not np.isin(log["run"][test], log["run"][train]).any()
 
 
 def test_levels_do_not_matter_to_a_compensator_that_does_not_see_the_output():

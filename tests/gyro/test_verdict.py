@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
-from skanfis.gyro._verdict import judge
+from skanfis.gyro._calibration import judge
 
 N_GROUPS, N_ROWS = 8, 50
 GROUPS = np.repeat(np.arange(N_GROUPS), N_ROWS)

@@ -7,7 +7,8 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor
-from skanfis.gyro._law_text import law_text
+from skanfis.gyro._calibration import Recipe
+from skanfis.gyro._formulas import law_text
 
 
 def computed(text, columns):
@@ -40,21 +41,9 @@ def test_the_formula_is_the_law(options):
     X = X[["time", "output", "temperature", "thermal_rate"]]
     law = OpenLoopArcsineRegressor("output", **{"temperature": "temperature"} | options)
     law.fit(X, log["rate"])
-    text = law_text(law, list(X), "counts")
+    text = law_text(law, Recipe(tuple(X), "counts"))
     assert text.startswith("rate [deg/s] = arcsin((output [counts]")
     assert ("s * thermal_rate [degC/s]" in text) == ("temperature_rate" in options)
+    assert text.endswith("Beyond a phase (the arcsin) of 1.2 rad the phase is held there.")
     values = {name: X[name].to_numpy() for name in X}
     np.testing.assert_allclose(computed(text, values), law.predict(X), rtol=1e-6, atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("policy", "words"),
-    [("clip", "held"), ("linear", "tangent"), ("nan", "no rate"), ("raise", "no rate")],
-)
-def test_says_what_happens_past_the_sine(policy, words):
-    log = make_ofog(n_devices=1, n_runs=2, duration=600, random_state=0)
-    law = OpenLoopArcsineRegressor(out_of_bounds=policy, max_phase=1.0)
-    law.fit(log[["output", "temperature"]].to_numpy(), log["rate"])
-    last = law_text(law, ["output", "temperature"]).splitlines()[1]
-    assert last.startswith("Beyond a phase (the arcsin) of 1 rad")
-    assert words in last
