@@ -375,7 +375,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         losses = fitted.validation_losses
         self.validation_loss_curve_ = None if losses is None else np.array(losses)
         self.readability_ = self._readability(data)
-        for name in ("_chunks", "_chunk_settings", "_first_weights", "n_samples_seen_"):
+        for name in ("_sums", "_chunk_settings", "_first_weights", "n_samples_seen_"):
             self.__dict__.pop(name, None)
         if callbacks is not None:
             callbacks.end(self.model_)
@@ -492,7 +492,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         sample_weight: ArrayLike | None = None,
         *,
         forgetting: float = 1.0,
-        window: int | None = None,
     ) -> Self:
         r"""Learn from a chunk of rows, going on from those before; premises stay.
 
@@ -513,9 +512,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             Above 0 and at most 1: with every row that has weight, the weights of all rows before it
             are multiplied by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count. The
             box and the counts of coverage do not forget.
-        window : int, default=None
-            Only the rows of the last so many calls count; each of their sums is kept. Calls before
-            that had no window are one. None keeps one sum, of all rows.
 
         Returns
         -------
@@ -545,41 +541,37 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         >>> model.n_samples_seen_
         120
         """
-        chunk_checks.check_forgetting(forgetting, window)
+        chunk_checks.check_forgetting(forgetting)
         before = self.__dict__.copy()
         try:
-            self._learn_chunk(X, y, sample_weight, float(forgetting), window)
+            self._learn_chunk(X, y, sample_weight, float(forgetting))
         except BaseException:
             self.__dict__ = before
             raise
         return self
 
-    def _learn_chunk(self, X, y, sample_weight, forgetting, window):
+    def _learn_chunk(self, X, y, sample_weight, forgetting):
         """Add the sums of a chunk to those before, or begin with them."""
-        chunks = getattr(self, "_chunks", ())
-        if chunks:
+        before = getattr(self, "_sums", None)
+        if before is not None:
             chunk_checks.check_settings(self, self._chunk_settings)
         data = self._check_training_data(X, y, sample_weight, None, is_chunk=True)
         n_rows = data.X.shape[0]
         weight = chunk_checks.faded_weights(data.sample_weight, n_rows, forgetting)
         rows = (data.X, data.y, weight)
-        if chunks:
-            base, own, is_fitted = chunks[0].base, chunks[0].consequent_inputs, False
-            chunk_checks.check_outputs(base, data.y.shape[1], data.output_names)
+        if before is None:
+            base, own, is_fitted = self._begin_chunks(X, y, data, weight)
+            self._sums = RowSums.of(base, own, *rows)
+        else:
+            is_fitted = False
+            chunk_checks.check_outputs(before.base, data.y.shape[1], data.output_names)
             if n_rows == 0:
                 return
-        else:
-            base, own, is_fitted = self._begin_chunks(X, y, data, weight)
-        chunks = (*chunks, RowSums.of(base, own, *rows))
-        if window is not None:
-            self._chunks = chunks[-window:]
-        else:
-            *older, latest = chunks
-            older = [one.faded(forgetting**n_rows) for one in older]
-            self._chunks = (reduce(RowSums.plus, [*older, latest]),)
+            latest = RowSums.of(before.base, before.consequent_inputs, *rows)
+            self._sums = before.faded(forgetting**n_rows).plus(latest)
         if is_fitted:
             # What this fit has found holds for further rows too, as a prior of fixed strength.
-            self._first_weights = fitted_weights(self, self._chunks[0])
+            self._first_weights = fitted_weights(self, self._sums)
         else:
             self._solve_chunks()
             self.readability_ = readability_of_rows(self.model_, *rows)
@@ -613,9 +605,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return replace(self.model_, posterior=None), request.consequent_inputs, is_fitted
 
     def _solve_chunks(self):
-        """The model of all chunks that count."""
+        """The model of all rows so far."""
         first = getattr(self, "_first_weights", None)
-        solved = solve(reduce(RowSums.plus, self._chunks), given_weights(self), first)
+        solved = solve(self._sums, given_weights(self), first)
         self.model_ = solved.model.with_out_of_bounds(*policy_of(self.out_of_bounds))
         self.n_iter_ = 1
         self.loss_curve_ = np.full(2, solved.mean_squared_error)
@@ -657,17 +649,17 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         """
         models, sums = (self, *others), []
         for place, model in enumerate(models):
-            chunks = getattr(model, "_chunks", None)
-            if not chunks:
+            own = getattr(model, "_sums", None)
+            if own is None:
                 raise ValueError(
                     f"Model {place} of merge has not been trained by partial_fit "
                     f"({type(model).__name__}): there are no sums over its rows to add."
                 )
-            sums.append(reduce(RowSums.plus, chunks))
+            sums.append(own)
             chunk_checks.check_same_premises(sums[0], sums[-1], place)
         merged = copy(self)
         merged.__dict__.pop("readability_", None)
-        merged._chunks = (reduce(RowSums.plus, sums),)
+        merged._sums = reduce(RowSums.plus, sums)
         merged._solve_chunks()
         merged.n_samples_seen_ = sum(model.n_samples_seen_ for model in models)
         return merged

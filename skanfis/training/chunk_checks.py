@@ -1,7 +1,7 @@
 """What ``partial_fit`` and ``merge`` refuse, and why: rows are seen but once."""
 
 from dataclasses import replace
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -29,25 +29,13 @@ _SMALLEST_WEIGHT, _LARGEST = 1e-100, 1e100
 _ROUNDING = 1e-12
 
 
-def check_forgetting(forgetting, window):
-    """Raise ValueError where a forgetting factor or a window is out of range, or both are given."""
+def check_forgetting(forgetting):
+    """Raise ValueError where a forgetting factor is out of range."""
     is_number = isinstance(forgetting, Real) and not isinstance(forgetting, bool)
     if not is_number or not 0.0 < float(forgetting) <= 1.0:
         raise ValueError(
             f"forgetting={forgetting!r} must be a number above 0 and at most 1: the weights of all "
             "rows before are multiplied by it with every row; 1 forgets nothing."
-        )
-    if window is None:
-        return
-    if isinstance(window, bool) or not isinstance(window, Integral) or window < 1:
-        raise ValueError(
-            f"window={window!r} must be a whole number of 1 or more, the number of calls that "
-            "count, or None for all."
-        )
-    if forgetting != 1.0:
-        raise ValueError(
-            f"window={window} and forgetting={forgetting:g} are two ways to let old rows go: give "
-            "one of them."
         )
 
 

@@ -123,37 +123,6 @@ def test_forgetting_is_a_fit_with_fading_weights(premises):
     assert model.noise_std_ > 0.0
 
 
-@pytest.mark.parametrize("kind", ["given", "weighted", "auto"])
-def test_window_is_the_rows_of_the_last_calls(premises, kind):
-    X, y = surface()
-    # What leaves is far larger than what stays, and of other scales: nothing of it may be left.
-    X[:120, 0] *= 3.0
-    y[:120] *= 1e9
-    settings = {"partition": premises, "solver": "lse"}
-    if kind != "auto":
-        settings |= {"agreement": 0.01, "alpha": 0.01}
-    weight = np.linspace(1.0, 2.0, 300) if kind == "weighted" else None
-    latest = None if weight is None else weight[130:]
-    expected = ANFISRegressor(**settings).partial_fit(X[130:], y[130:], latest)
-    model = ANFISRegressor(**settings)
-    model = in_chunks(model, X, y, [100, 30, 150, 1, 19], weight, window=3)
-    assert difference(model, expected, X[130:]) < EXACT
-    for name in ("minimum", "maximum", "spread", "rule_rows", "output_limits"):
-        found, whole = getattr(model.model_, name), getattr(expected.model_, name)
-        assert found == pytest.approx(whole, rel=1e-9, abs=1e-9), name
-    assert model.n_samples_seen_ == 300
-    # It may shrink, survives a file, and what is in it goes along to a merge.
-    model = pickle.loads(pickle.dumps(model)).partial_fit(X[:10], y[:10], window=2)
-    rows = np.r_[281:300, :10]
-    other = ANFISRegressor(**settings).partial_fit(X[30:60], y[30:60])
-    weight = np.ones(300) if weight is None else weight
-    weight[:10] = 1.0
-    expected = ANFISRegressor(**settings).partial_fit(X[rows], y[rows], weight[rows])
-    assert difference(model, expected, X[rows]) < EXACT
-    merged, both = model.merge(other), expected.merge(other)
-    assert difference(merged, both, X[rows]) < EXACT
-
-
 def test_drift_of_inputs_costs_no_digits(premises):
     """The first chunk lies a million of its own deviations from the rest."""
     X, y = surface()
@@ -301,11 +270,9 @@ def chunk(premises, **settings):
     [
         *(({"forgetting": f}, "forgetting=.*above 0 and at most 1") for f in (0.0, 1.01, np.nan)),
         *(({"forgetting": f}, "forgetting=.*above 0 and at most 1") for f in ("0.9", True, None)),
-        *(({"window": w}, "window=.* a whole number of 1 or more") for w in (0, -5, 10.0, True)),
-        ({"window": 50, "forgetting": 0.9}, "two ways to let old rows go"),
     ],
 )
-def test_forgetting_and_window_out_of_range(premises, given, said):
+def test_forgetting_out_of_range(premises, given, said):
     with pytest.raises(ValueError, match=said):
         chunk(premises).partial_fit(*surface(), **given)
 
