@@ -71,7 +71,7 @@ class TSKModel:
         What coverage, deviations and the limits of outputs are made of, as far as there are data.
     term_names, output_names : tuple of str
         Where not given, see ``naming``.
-    told_extrapolation : float or None
+    rows_extrapolation : float or None
         L for which the outermost training rows speak, see ``training.freezing``.
     """
 
@@ -92,7 +92,7 @@ class TSKModel:
     output_names: tuple[str, ...] = ()
     target: TargetRange | None = None
     posterior: Posterior | None = None
-    told_extrapolation: float | None = None
+    rows_extrapolation: float | None = None
 
     def __post_init__(self):
         if not self.term_names:
@@ -294,7 +294,7 @@ class TSKModel:
 
         A line that goes on bends beyond them by no more than it leaves of the target.
         """
-        told, target, posterior = self.told_extrapolation, self.target, self.posterior
+        told, target, posterior = self.rows_extrapolation, self.target, self.posterior
         if told is None:
             return self.max_extrapolation
         if self.n_rules > 1 or told == MAX_EXTRAPOLATION or target is None or posterior is None:

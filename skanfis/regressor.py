@@ -810,8 +810,12 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         if keep is not None:
             X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
             groups = None if groups is None else groups[keep]
-        wishes = Constraints.read(self.monotonic_cst, self.constraints, names, targets.shape[1])
-        return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, wishes)
+        constraints = Constraints.read(
+            self.monotonic_cst, self.constraints, names, targets.shape[1]
+        )
+        return ValidatedData(
+            X, targets, sample_weight, groups, names, output_names, keep, constraints
+        )
 
     def _check_inputs(self, X):
         """Rows to predict, as an array."""

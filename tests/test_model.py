@@ -206,7 +206,7 @@ def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rn
 def test_auto_is_what_the_rows_told_and_what_is_set_where_there_were_none():
     far = build(grid()).with_out_of_bounds("linear", 2.0)
     assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 2.0
-    told = replace(far, told_extrapolation=3.0)
+    told = replace(far, rows_extrapolation=3.0)
     assert told.n_rules > 1
     assert told.with_out_of_bounds("linear", "auto").max_extrapolation == 3.0
 

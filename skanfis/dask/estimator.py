@@ -115,7 +115,7 @@ class DaskANFISRegressor(ANFISRegressor):
             )
         data = ClusterData.of(Partitions.of(X, y, sample_weight, groups))
         layout = data.partitions.layout
-        wishes = Constraints.read(
+        constraints = Constraints.read(
             self.monotonic_cst, self.constraints, layout.input_names, len(layout.output_names)
         )
         if not is_many(data.rows()):
@@ -134,7 +134,7 @@ class DaskANFISRegressor(ANFISRegressor):
                 )
         self._check_columns(X, reset=True)
         self._single_output = y.ndim == 1
-        return replace(data, wishes=wishes)
+        return replace(data, constraints=constraints)
 
     def _readability(self, data):
         if not isinstance(data, ClusterData):

@@ -290,7 +290,7 @@ class ClusterData:
 
     partitions: Partitions
     described: _Described
-    wishes: Constraints | None = None
+    constraints: Constraints | None = None
 
     @classmethod
     def of(cls, partitions):

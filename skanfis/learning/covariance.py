@@ -109,14 +109,14 @@ def _premises(problem, premise, evaluation):
     try:
         inverse = NormalFactor(hessian + stiffness * identity).half_solve(identity)
     except FloatingPointError:
-        inverse = _of_what_is_told(hessian, stiffness)
+        inverse = _positive_part(hessian, stiffness)
     n_determined = len(inverse) - stiffness * float(np.sum(inverse**2))
     premises = inverse @ transposed
     cross = np.stack([premises @ half.T for half in raw.cross])
     return premises, cross, n_determined
 
 
-def _of_what_is_told(hessian, stiffness):
+def _positive_part(hessian, stiffness):
     """R^-1 of the directions in which a Gauss-Newton matrix is more than rounding.
 
     It has no negative eigenvalue but for what rounding leaves of large numbers, as beside a row so

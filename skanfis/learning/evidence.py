@@ -142,16 +142,16 @@ class Laplace:
     n_columns: int
 
     @cached_property
-    def held_before(self):
+    def trace_before(self):
         """Of each part of the penalty, by its weight, the trace in the prior.
 
-        These and ``held_after`` take as long as all the rest, and are seldom asked of the last of
+        These and ``trace_after`` take as long as all the rest, and are seldom asked of the last of
         several posteriors.
         """
         return self._held(self.prior, float(self.curvature.size))
 
     @cached_property
-    def held_after(self):
+    def trace_after(self):
         """The same in the posterior: how many parameters each part holds."""
         stiffness = self.penalty.stiffness
         # Without stiffness nothing is held, not even where there is no curvature either.
@@ -166,9 +166,9 @@ class Laplace:
         return found
 
     @property
-    def n_held(self):
+    def n_restrained(self):
         """How many parameters the whole penalty holds."""
-        return float(np.sum(self.held_after))
+        return float(np.sum(self.trace_after))
 
     @property
     def freedom(self):
@@ -205,12 +205,12 @@ class Laplace:
     @property
     def n_effective(self):
         """Effective number of all parameters: of consequents, what the penalty leaves free."""
-        return self.n_columns + self.curvature.size - self.n_held
+        return self.n_columns + self.curvature.size - self.n_restrained
 
     @property
     def n_effective_premises(self):
         """Effective number of the displacements: of each, the part that the data decide on."""
-        return self.curvature.size - float(self.held_after[_STIFFNESS])
+        return self.curvature.size - float(self.trace_after[_STIFFNESS])
 
 
 def laplace(
@@ -288,9 +288,9 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
     """
     penalty, line = posterior.penalty, posterior.line
     now = line.weights(penalty)
-    before, outputs = posterior.held_before, np.full(now.size, posterior.n_outputs)
+    before, outputs = posterior.trace_before, np.full(now.size, posterior.n_outputs)
     outputs[_STIFFNESS] = 1
-    determined = outputs * np.maximum(before - posterior.held_after, 0.0)
+    determined = outputs * np.maximum(before - posterior.trace_after, 0.0)
     # What next to nothing is paid for may come out negative.
     cost = posterior.n_rows / posterior.noise_variance * np.maximum(posterior.paid, 0.0)
     if posterior.curvature.size:

@@ -191,7 +191,7 @@ def _range(term, raw, reach):
     # A term that is true to one side for good has its flank on the other.
     flanks = [side for side in truth if side[0] < GREATEST_CROSSING] or [truth[0]]
     is_true = np.min(flanks, axis=0) >= LEAST_TRUTH
-    is_apart = np.max(flanks, axis=0) <= GREATEST_CROSSING
+    is_distinct = np.max(flanks, axis=0) <= GREATEST_CROSSING
     least = changes[is_true.argmax()] if is_true.any() else 0.0
-    most = changes[np.flatnonzero(is_apart)[-1]] if is_apart.any() else 0.0
+    most = changes[np.flatnonzero(is_distinct)[-1]] if is_distinct.any() else 0.0
     return min(least, -_MOBILE), max(most, 0.0)

@@ -13,7 +13,7 @@ from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
 from .tuning import Tuned
 
-__all__ = ["MOST_RULES", "Candidate", "RuleBases", "terms_asked_for"]
+__all__ = ["MOST_RULES", "Candidate", "RuleBases", "term_scores"]
 
 # More nobody reads.
 MOST_RULES = 36
@@ -82,7 +82,7 @@ class RuleBases:
         return KMeans(candidate.size, n_init=1, random_state=self.seed)
 
 
-def terms_asked_for(tuned: Tuned, inputs: np.ndarray, centers: np.ndarray):
+def term_scores(tuned: Tuned, inputs: np.ndarray, centers: np.ndarray):
     """How much the residual of a linear model asks for two terms on each input, (n_inputs,).
 
     With w the share of the upper of two Gaussian terms on an input, at ``centers``, (n_inputs, 2),

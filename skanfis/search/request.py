@@ -114,7 +114,7 @@ class StructureRequest:
         """A start found on a sample, with the weights that were not given those of all rows."""
         free = [key for key in FREE if key not in self.weights]
         ratio = effective_weight(sample) / effective_weight(rows)
-        return replace(start, penalty=scaled(start.penalty, free, ratio, start.is_held))
+        return replace(start, penalty=scaled(start.penalty, free, ratio, start.agreement_is_raised))
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""

@@ -18,7 +18,7 @@ from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
 from ..learning.premise import Premise
 from ..membership import Membership
-from .candidates import MOST_RULES, Candidate, terms_asked_for
+from .candidates import MOST_RULES, Candidate, term_scores
 from .start import Start
 from .trials import Trials
 from .tuning import scaled, settled, with_rules_that_hold
@@ -84,16 +84,16 @@ class StructureSearch:
         tuned = with_rules_that_hold(tuned, premise, trials.free, n_sample)
         return Start(
             tuned.problem.antecedent,
-            scaled(tuned.penalty, trials.free, n_sample / trials.n_all, tuned.is_held),
+            scaled(tuned.penalty, trials.free, n_sample / trials.n_all, tuned.agreement_is_raised),
             settled(tuned.displacement),
-            is_held=tuned.is_held,
+            agreement_is_raised=tuned.agreement_is_raised,
             candidates=trials.report(),
         )
 
     def choose(self, partition) -> Candidate:
         """The best candidate; all that were tried are in ``trials.scores``."""
         best = Candidate((1,) * self.n_inputs)
-        self.trials.beat(best)
+        self.trials.compare_with(best)
         self._screen(best)
         if partition in ("auto", "grid"):
             best = self._grow_grid(best)
@@ -107,7 +107,7 @@ class StructureSearch:
         trials = self.trials
         trials.score(best)
         while True:
-            trials.beat(best)
+            trials.compare_with(best)
             # One that promises little now may promise more beside others' terms: none is dropped.
             grown = filter(self._is_small, [_with_one_more(best, j) for j in self.inputs])
             promising = trials.promising(grown)
@@ -124,8 +124,8 @@ class StructureSearch:
             return
         trials = self.trials
         centers = np.array([trials.spacing.centers(j, 2) for j in self.inputs])
-        asked = terms_asked_for(trials.tuned(linear), self.inputs, centers)
-        self.inputs = self.inputs[np.argsort(-asked, kind="stable")[:_SCREENED]]
+        scores = term_scores(trials.tuned(linear), self.inputs, centers)
+        self.inputs = self.inputs[np.argsort(-scores, kind="stable")[:_SCREENED]]
         trials.rule_bases = replace(trials.rule_bases, inputs=self.inputs)
 
     def _n_trained(self, candidate):

@@ -48,7 +48,7 @@ class Start:
     displacement: np.ndarray | None = None  # of the premises; None is zero
     is_free: bool = False  # whether terms have no bounds (see ``premise``)
     # Agreement is such that the strongest rule holds alone: it does not fall as the rows rise.
-    is_held: bool = False
+    agreement_is_raised: bool = False
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
 
@@ -91,10 +91,10 @@ def tuned_start(
         best = with_rules_that_hold(best, premise, free, n_sample)
     return Start(
         antecedent,
-        scaled(best.penalty, free, n_sample / effective_weight(rows), best.is_held),
+        scaled(best.penalty, free, n_sample / effective_weight(rows), best.agreement_is_raised),
         settled(best.displacement),
         is_free,
-        best.is_held,
+        best.agreement_is_raised,
     )
 
 

@@ -3,7 +3,7 @@ r"""Short trainings of candidate structures on a sample of the rows, and what ea
 No row is held out: the weights of every candidate's penalty are found by the evidence (``tuning``),
 and its error on rows left out one by one follows from the training on all of them
 (``Tuned.expected_error``). Out of the running are candidates with a term that is hardly true on any
-row, and those that the rows do not tell between them (``_unknown_between``).
+row, and those that the rows do not tell between them (``_undetermined_share``).
 
 Rows that come in groups, runs of an instrument say, are more alike within a group than any
 criterion on the same rows can know. Where the groups are given, the score is instead the error of
@@ -90,17 +90,17 @@ class Trials:
         self.sample = search_sample(rows, most)
         self.spacing = Spacing(self.sample)
         self.rule_bases = RuleBases(families, inputs, self.spacing, seed)
-        self.places = _places_between(self.sample)
+        self.places = _midpoints(self.sample)
         self.n_sample, self.n_all = effective_weight(self.sample), effective_weight(rows)
         self.folds = _folds(self.sample.groups)
         self.scores: dict[Candidate, float] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self._found: dict[Candidate, Tuned] = {}
-        self._to_beat: np.ndarray | float = 0.0
+        self._error_to_match: np.ndarray | float = 0.0
 
-    def beat(self, best: Candidate):
+    def compare_with(self, best: Candidate):
         """Have candidates compared with the best so far at places between rows."""
-        self._to_beat = _error_between(self.tuned(best), self.places)[1]
+        self._error_to_match = _error_at(self.tuned(best), self.places)[1]
 
     def promising(self, candidates):
         """Candidates by their expected error before the premises move, best first."""
@@ -130,7 +130,7 @@ class Trials:
         if self.folds:
             return self._held_out_error(candidate)
         tuned = self.tuned(candidate)
-        if self._unknown_between(tuned) > _MOST_UNKNOWN:
+        if self._undetermined_share(tuned) > _MOST_UNKNOWN:
             return np.inf
         if _has_idle_term(self.sample, tuned.evaluation.antecedent):
             return np.inf
@@ -153,7 +153,7 @@ class Trials:
             return self.score(candidate)
         return np.sqrt(self.expected(self.tuned(candidate)))
 
-    def _unknown_between(self, tuned):
+    def _undetermined_share(self, tuned):
         """The part of the places between rows where a single row would tell more than all do.
 
         Unless the error to be expected there, (1 + leverage) sigma^2, is no more than that of the
@@ -161,8 +161,8 @@ class Trials:
         """
         if tuned.problem.antecedent.n_rules == 1:
             return 0.0
-        leverage, error = _error_between(tuned, self.places)
-        return float(np.mean((leverage > 1.0) & (error > self._to_beat)))
+        leverage, error = _error_at(tuned, self.places)
+        return float(np.mean((leverage > 1.0) & (error > self._error_to_match)))
 
     def _held_out_error(self, candidate):
         """Root of the mean squared error on groups left out, in the range of the others.
@@ -253,7 +253,7 @@ def _is_too_many(candidate, n_rows):
     return candidate.clustering in ("k-means", "fcm") and candidate.size > n_rows
 
 
-def _places_between(rows: StandardisedData):
+def _midpoints(rows: StandardisedData):
     """Places half-way between rows and the nearest of twenty others, (n_inputs, n_places)."""
     rng, X, n_places = np.random.default_rng(_SEED), rows.X, min(rows.n_rows, _MOST_PLACES)
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
@@ -268,7 +268,7 @@ def _places_between(rows: StandardisedData):
     return np.ascontiguousarray(0.5 * (X[own] + X[nearest]).T)
 
 
-def _error_between(tuned: Tuned, places):
+def _error_at(tuned: Tuned, places):
     """Leverage at some places, and the squared error to be expected there."""
     leverage = tuned.problem.leverage_at(tuned.solved, places, tuned.posterior.n_rows)
     return leverage, (1.0 + leverage) * tuned.posterior.noise_variance

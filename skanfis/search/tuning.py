@@ -84,7 +84,7 @@ class Tuned:
     evaluation: Evaluation
     displacement: np.ndarray
     posterior: Laplace
-    is_held: bool = False  # agreement was raised until the strongest rule holds alone
+    agreement_is_raised: bool = False  # agreement was raised until the strongest rule holds alone
 
     @property
     def penalty(self):
@@ -286,7 +286,7 @@ def with_rules_that_hold(tuned: Tuned, premise: Premise, free, n_rows: float) ->
         if not found.expected_error <= worth * tuned.expected_error:
             break
         best = found
-    return best if best is tuned else replace(best, is_held=True)
+    return best if best is tuned else replace(best, agreement_is_raised=True)
 
 
 def settled(displacement):
@@ -294,14 +294,14 @@ def settled(displacement):
     return np.round(displacement, _DIGITS)
 
 
-def scaled(penalty: Penalty, free, ratio, is_held=False):
+def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
     """The free weights times a ratio: relative to a mean over rows, they fall with their number.
 
     But agreement that makes rules hold one by one does so for any number of rows. More digits than
     three say nothing, and would carry rounding errors into the model.
     """
     own = {
-        "agreement": penalty.agreement / (ratio if is_held else 1.0),
+        "agreement": penalty.agreement / (ratio if agreement_is_raised else 1.0),
         "alpha": penalty.alpha,
         "slope": penalty.rho,
         "stiffness": penalty.stiffness,

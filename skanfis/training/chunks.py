@@ -131,7 +131,7 @@ class RowSums:
             weighted = every if weight is None else every * weight
             second += np.stack([(own_strength * weighted) @ every.T for own_strength in strengths])
             farthest = np.vstack([farthest, np.column_stack([rule, raw.T[row]])])
-            farthest = _farthest(farthest, second, rows.inputs)
+            farthest = _far_rows(farthest, second, rows.inputs)
             basis_rows = basis(Z[own])
             weighted = basis_rows if weight is None else basis_rows * weight
             design.accumulate(gram, shares, basis_rows, weighted)
@@ -193,7 +193,7 @@ class RowSums:
             extent=np.maximum(one.extent, two.extent),
             distinct=_distinct(distinct, _ROWS_EACH * len(self.slope)),
             distinct_inputs=_distinct(distinct_inputs, both.second.shape[1]),
-            farthest=_farthest(farthest, both.second, inputs),
+            farthest=_far_rows(farthest, both.second, inputs),
         )
 
     def _on(self, inputs: Scale, targets: Scale):
@@ -204,16 +204,16 @@ class RowSums:
         # sum s phi, since strengths sum to one; and sum s y likewise.
         every = self.gram[:, :: self.n_basis].sum(axis=1)
         total = self.slope[:: self.n_basis].sum(axis=0)
-        gram = _carried(self.gram, *own)
+        gram = _rescaled(self.gram, *own)
         return replace(
             self,
             inputs=inputs,
             targets=targets,
-            gram=_carried(np.ascontiguousarray(gram.T), *own),
-            slope=_carried(g * self.slope + t * every[:, None], *own),
+            gram=_rescaled(np.ascontiguousarray(gram.T), *own),
+            slope=_rescaled(g * self.slope + t * every[:, None], *own),
             square=g**2 * self.square + 2.0 * t * g * total + t**2 * self.weight,
             second=np.stack(
-                [_carried(_carried(one, shift, factor).T, shift, factor) for one in self.second]
+                [_rescaled(_rescaled(one, shift, factor).T, shift, factor) for one in self.second]
             ),
         )
 
@@ -264,7 +264,7 @@ def _change(old: Scale, new: Scale):
     return (old.offset - new.offset) / new.scale, old.scale / new.scale
 
 
-def _carried(sums, shift, factor):
+def _rescaled(sums, shift, factor):
     """Sums of [1, z] times something, rule by rule along the first axis, on [1, t + g z]."""
     blocks = sums.reshape(-1, 1 + shift.size, sums.shape[-1]).copy()
     blocks[:, 1:] *= factor[:, None]
@@ -303,7 +303,7 @@ def _distances(farthest, second, scale):
     return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)
 
 
-def _farthest(rows, second, scale):
+def _far_rows(rows, second, scale):
     """Of rows by their rules the few farthest of each: one more row may change who is."""
     rules, distance = _distances(rows, second, scale)
     order = np.lexsort((-distance, rules))

@@ -29,7 +29,7 @@ class ValidatedData:
     input_names, output_names : sequence of str
     kept : ndarray of bool of shape (n_given_rows,), optional
         Which of the rows given have weight and are here, if not all.
-    wishes : Constraints, optional
+    constraints : Constraints, optional
         What is known of the target, in the user's units.
     """
 
@@ -40,7 +40,7 @@ class ValidatedData:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     kept: np.ndarray | None = None
-    wishes: Constraints | None = None
+    constraints: Constraints | None = None
 
     def rows(self, indices=slice(None)):
         """Some of the rows, on scales of their own."""

@@ -29,12 +29,12 @@ from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
 from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
-from .freezing import ModelBuilder, as_given, told_by_outermost
+from .freezing import ModelBuilder, as_given, extrapolation_distance
 from .pruning import redundant_rules, rule_statistics
 from .robust import (
     huber_weights,
-    resistant,
     reweighted,
+    robust_start,
     without_outliers,
     without_weight,
 )
@@ -189,7 +189,7 @@ class _Fit:
         The first start has seen outliers, and what comes of it too. Once the weights are settled,
         training starts afresh without the rows of less than half their weight.
         """
-        self.rows, weights = resistant(self.rows)
+        self.rows, weights = robust_start(self.rows)
         if self.held_out is not None:
             self.held_out = replace(self.held_out, targets=self.rows.targets)
         _, weights = self._robust_turns(weights)
@@ -239,7 +239,7 @@ class _Fit:
         n_rows = effective_weight(run.problem.rows)
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
         model = replace(builder.model(run.start, run.evaluation, firing), posterior=posterior)
-        model = replace(model, told_extrapolation=told_by_outermost(model, rows))
+        model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
         fitted = Fitted(
             model,
@@ -249,20 +249,20 @@ class _Fit:
             None if weights is None else self.data.spread_over_rows(weights, self.trained_on),
             run.validation_losses,
         )
-        return fitted if self.data.wishes is None else self._constrained(fitted, run)
+        return fitted if self.data.constraints is None else self._constrained(fitted, run)
 
     def _constrained(self, fitted, run):
         """The nearest model that keeps what is known, its result, and a report."""
-        evaluation, model, wishes = run.evaluation, fitted.model, self.data.wishes
+        evaluation, model, constraints = run.evaluation, fitted.model, self.data.constraints
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         in_user_units = self.builder.in_user_units
         evaluation, report, solved = constrained(
-            model, evaluation, run.problem, wishes, in_user_units
+            model, evaluation, run.problem, constraints, in_user_units
         )
         model = replace(model, coefficients=in_user_units(evaluation.coefficients))
-        target = model.target.within(wishes.lower, wishes.upper, wishes.values)
+        target = model.target.within(constraints.lower, constraints.upper, constraints.values)
         posterior = model.posterior.given(model, solved.known)
         return replace(
             fitted,

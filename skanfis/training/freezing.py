@@ -34,7 +34,7 @@ from ..search import (
 from .data import Fitted, ValidatedData
 from .pruning import redundant_rules, rule_statistics
 
-__all__ = ["ModelBuilder", "as_given", "in_user_units", "told_by_outermost"]
+__all__ = ["ModelBuilder", "as_given", "extrapolation_distance", "in_user_units"]
 
 _DISTANCES = (MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST)
 # Less of the squared error is more than chance: with a half in place of a quarter, one fit in
@@ -133,7 +133,7 @@ def as_given(estimator, data, model) -> Fitted:
     return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
 
 
-def told_by_outermost(model: TSKModel, rows: StandardisedData) -> float:
+def extrapolation_distance(model: TSKModel, rows: StandardisedData) -> float:
     """L of the tangent beyond the data, in standard deviations of every input, a half or more.
 
     ``model`` is in the user's units, ``rows`` are those that it was trained on.

@@ -29,7 +29,7 @@ from sklearn.linear_model import HuberRegressor
 from ..blocks import BLOCK_ROWS
 from ..learning.data import column_statistics
 
-__all__ = ["huber_weights", "resistant", "reweighted", "without_outliers"]
+__all__ = ["huber_weights", "reweighted", "robust_start", "without_outliers"]
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
@@ -58,7 +58,7 @@ def huber_weights(problem, evaluation, epsilon, sample_weight=None):
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
-def resistant(rows):
+def robust_start(rows):
     """The rows with the target's scale as it is without what is far off, and their weights."""
     weights = np.ones(rows.n_rows)
     some = rows

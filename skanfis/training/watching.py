@@ -21,8 +21,8 @@ def watch_all(*watchers):
         return None
 
     def watch(n_iter, evaluation):
-        wishes = [watcher(n_iter, evaluation) for watcher in present]
-        return any(wishes)
+        constraints = [watcher(n_iter, evaluation) for watcher in present]
+        return any(constraints)
 
     return watch
 

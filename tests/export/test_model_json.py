@@ -41,7 +41,7 @@ def assert_same(read, model):
         elif field.name in ("support", "target", "posterior") and ours is not None:
             for part in fields(ours):
                 assert_array_equal(getattr(theirs, part.name), getattr(ours, part.name))
-        elif field.name == "told_extrapolation":
+        elif field.name == "rows_extrapolation":
             assert theirs is None  # what came of it is in the file
         else:
             assert_array_equal(theirs, ours)

@@ -55,7 +55,7 @@ def posterior(rows, antecedent, order, penalty, at=FIRST, n_rows=None):
 
 def n_effective(found):
     """Effective number of parameters, consequents of one output and premises."""
-    return found.n_columns + found.curvature.size - found.held_after.sum()
+    return found.n_columns + found.curvature.size - found.trace_after.sum()
 
 
 def with_pulls(penalty, line, g):

@@ -354,17 +354,17 @@ def request_for(counts, weights):
     )
 
 
-@pytest.mark.parametrize("is_held", [False, True])
-def test_weights_found_on_a_sample_are_for_all_rows(data, is_held, rng):
+@pytest.mark.parametrize("agreement_is_raised", [False, True])
+def test_weights_found_on_a_sample_are_for_all_rows(data, agreement_is_raised, rng):
     X, y = data[0].to_numpy(), data[1].to_numpy()[:, None]
     weight = rng.uniform(0.5, 1.5, len(y))
     rows = StandardisedData.of(X, y, weight)
     sample = replace(rows, X=X[:60], y=y[:60], sample_weight=weight[:60])
     found = Penalty(agreement=0.01, alpha=0.02, slope=0.03, stiffness=0.04)
-    start = Start(None, found, is_held=is_held)
+    start = Start(None, found, agreement_is_raised=agreement_is_raised)
     asked = request_for([2, 1, 1], {"alpha": 0.02}).for_all(start, sample, rows).penalty
     # Relative to a mean over rows they fall with their number; one that is given stays as it is.
     ratio = weight[:60].sum() / weight.sum()
     assert asked.alpha == 0.02
-    assert_allclose(asked.agreement, 0.01 * (1.0 if is_held else ratio), rtol=5e-3)
+    assert_allclose(asked.agreement, 0.01 * (1.0 if agreement_is_raised else ratio), rtol=5e-3)
     assert_allclose([asked.slope, asked.stiffness], np.multiply([0.03, 0.04], ratio), rtol=5e-3)

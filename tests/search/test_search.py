@@ -15,7 +15,7 @@ from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Gaussian
 from skanfis.search import search
-from skanfis.search.candidates import Candidate, terms_asked_for
+from skanfis.search.candidates import Candidate, term_scores
 from skanfis.search.trials import Trials
 
 pytestmark = pytest.mark.theory
@@ -240,7 +240,7 @@ def test_screening_is_by_correlations_of_weighted_rows(rng):
         parts = [(s * w * b) @ r / np.sqrt(s @ (w * b) ** 2) for b in basis.T]
         statistic.append(np.sum(np.square(parts)))
     centers = np.array([found.trials.spacing.centers(j, 2) for j in every])
-    asked = terms_asked_for(found.trials.tuned(linear), every, centers)
+    asked = term_scores(found.trials.tuned(linear), every, centers)
     assert_allclose(asked, statistic, rtol=1e-9)
     found._screen(linear)
     assert_array_equal(found.inputs, np.argsort(statistic)[::-1][: search._SCREENED])

@@ -129,12 +129,14 @@ def test_leverage_is_that_of_the_dense_design(rng):
     leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), places, 180)
     assert_allclose(leverage, expected, rtol=1e-4)
     noise = tuned.posterior.noise_variance
-    assert found._unknown_between(tuned) == np.mean(expected > 1.0) > 0.075
+    assert found._undetermined_share(tuned) == np.mean(expected > 1.0) > 0.075
     # A place is known well enough if the smaller model is expected to err by more there.
-    found._to_beat = noise * np.where(np.arange(places.shape[1]) % 2, 1.0 + 2.0 * expected, 1.0)
+    found._error_to_match = noise * np.where(
+        np.arange(places.shape[1]) % 2, 1.0 + 2.0 * expected, 1.0
+    )
     part = np.mean((expected > 1.0)[::2]) / 2
     assert 0.0 < part < np.mean(expected > 1.0)
-    assert found._unknown_between(tuned) == part
+    assert found._undetermined_share(tuned) == part
 
 
 @pytest.mark.parametrize(

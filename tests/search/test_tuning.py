@@ -51,17 +51,19 @@ def test_turns_go_on_from_where_they_were_left(two_rules):
     assert_allclose(more.displacement, whole.displacement, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("limit", "worth", "is_held"), [(0.8, 1.2, True), (0.01, 1.2, False)])
+@pytest.mark.parametrize(
+    ("limit", "worth", "agreement_is_raised"), [(0.8, 1.2, True), (0.01, 1.2, False)]
+)
 def test_agreement_rises_until_rules_hold_or_the_price_is_too_high(
-    limit, worth, is_held, monkeypatch, two_rules
+    limit, worth, agreement_is_raised, monkeypatch, two_rules
 ):
     apart = tuning.tune(*two_rules, FREE, 100.0)
     limit *= apart.problem.strongest_alone(apart.evaluation)
     monkeypatch.setattr(tuning, "_HOLDS", limit)
     monkeypatch.setattr(tuning, "_HOLDS_WELL", np.inf)
     found = tuning.with_rules_that_hold(apart, two_rules[1], FREE, 100.0)
-    assert found.is_held is is_held
-    if not is_held:
+    assert found.agreement_is_raised is agreement_is_raised
+    if not agreement_is_raised:
         assert found.problem.strongest_alone(found.evaluation) > limit
         return
     assert found.problem.strongest_alone(found.evaluation) <= limit

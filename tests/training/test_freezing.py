@@ -50,7 +50,7 @@ def test_distance_is_that_of_the_definition(case):
     Y = np.column_stack([X @ [1.0, -2.0, 0.5], np.tanh(X[:, 0]) + X[:, 1]])[:, : 1 + case % 2]
     Y = Y + [0.0, 0.05][case // 3] * g.normal(size=Y.shape)
     model = quick(2).fit(X, Y)
-    assert model.model_.told_extrapolation == by_definition(model, X, Y)
+    assert model.model_.rows_extrapolation == by_definition(model, X, Y)
 
 
 def far_rows(g, n_rows=300):
@@ -91,9 +91,9 @@ def test_weights_are_copies_and_order_is_of_no_account(rng):
     y = X[:, 0] * X[:, 1]
     times = rng.integers(1, 4, size=60)
     told = [
-        quick(2).fit(X, y, sample_weight=times).model_.told_extrapolation,
-        quick(2).fit(np.repeat(X, times, axis=0), np.repeat(y, times)).model_.told_extrapolation,
-        quick(2).fit(X[::-1], y[::-1], sample_weight=times[::-1]).model_.told_extrapolation,
+        quick(2).fit(X, y, sample_weight=times).model_.rows_extrapolation,
+        quick(2).fit(np.repeat(X, times, axis=0), np.repeat(y, times)).model_.rows_extrapolation,
+        quick(2).fit(X[::-1], y[::-1], sample_weight=times[::-1]).model_.rows_extrapolation,
     ]
     assert_array_equal(told, told[0])
 

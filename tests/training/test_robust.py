@@ -107,7 +107,7 @@ def test_outliers_do_not_decide_on_the_start(settings, size):
     is_outlier = np.isin(np.arange(300), g.choice(300, 5, replace=False))
     model = ANFISRegressor(loss="huber", **settings).fit(X, y + size * is_outlier)
     errors = model.predict(X) - truth
-    # Half of the noise; without a resistant start 18 and 0.9.
+    # Half of the noise; without a robust_start start 18 and 0.9.
     assert np.sqrt(np.mean(errors[~is_outlier] ** 2)) < 0.02
 
 
