@@ -63,18 +63,9 @@ _RANDOM = (
     "quantisation",
     "thermometer_noise",
 )
-_CONDITIONS = {
-    "duration": 3600.0,
-    "sampling_interval": 10.0,
-    "max_rate": 100.0,
-    "n_rate_levels": None,
-    "rates": None,
-    "dwell_time": 120.0,
-    "ambient_range": (-20.0, 50.0),
-}
-# Coefficients and conditions that differ from those above.
-_PRESETS: dict[str, tuple[dict, dict]] = {
-    "open_loop": ({}, {}),
+# Coefficients that differ from those above, and the largest rate of the table [deg/s].
+_PRESETS: dict[str, tuple[dict, float]] = {
+    "open_loop": ({}, 100.0),
     # A cubic of x^2 / 6 with x = K Omega leaves 0.151 x^2 / 6 RMS of full scale about its best
     # line: 1000 ppm at 375 deg/s.
     "linearised": (
@@ -84,26 +75,7 @@ _PRESETS: dict[str, tuple[dict, dict]] = {
             "amplitude_temperature": -5.0,
             "warm_up_scale_factor": 100.0,
         },
-        {"max_rate": 375.0},
-    ),
-    # Table 1 of the founding paper: at 38.69 deg/s some 39.99 deg/s are indicated, although the
-    # sine takes 0.5 % away; a start that is over within 20 s; rows scatter by 0.005 deg/s.
-    "paper": (
-        {
-            "scale_factor": 36_950.0,
-            "warm_up": -1440.0,
-            "warm_up_time": 5.0,
-            "self_heating": 0.5,
-            "thermal_time": 300.0,
-            "angle_random_walk": 1.3,
-            "thermometer_noise": 0.25,
-        },
-        {
-            "duration": 380.0,
-            "sampling_interval": 20.0,
-            "rates": (38.69,),
-            "ambient_range": (20.4, 20.8),
-        },
+        375.0,
     ),
 }
 _CONSTRAINTS = {
@@ -113,12 +85,12 @@ _CONSTRAINTS = {
     "n_runs": [_AT_LEAST_ONE],
     "n_power_ups": [_AT_LEAST_ONE],
     "off_time": [_NOT_NEGATIVE],
-    "duration": [_POSITIVE, None],
-    "sampling_interval": [_POSITIVE, None],
+    "duration": [_POSITIVE],
+    "sampling_interval": [_POSITIVE],
     "max_rate": [_POSITIVE, None],
     "n_rate_levels": [_AT_LEAST_TWO, None],
     "rate_order": [StrOptions({"random", "sweep"})],
-    "dwell_time": [_POSITIVE, None],
+    "dwell_time": [_POSITIVE],
     "n_soaks": [_AT_LEAST_TWO],
     "max_residual_heat": [_PART],
     "noise": [_NOT_NEGATIVE],
@@ -137,14 +109,14 @@ def make_ofog(
     n_runs: int = 8,
     n_power_ups: int = 1,
     off_time: float = 600.0,
-    duration: float | None = None,
-    sampling_interval: float | None = None,
+    duration: float = 3600.0,
+    sampling_interval: float = 10.0,
     max_rate: float | None = None,
     n_rate_levels: int | None = None,
     rates: ArrayLike | None = None,
     rate_order: str = "random",
-    dwell_time: float | None = None,
-    ambient_range: Any = None,
+    dwell_time: float = 120.0,
+    ambient_range: Any = (-20.0, 50.0),
     n_soaks: int = 5,
     max_residual_heat: float = 0.5,
     noise: float = 1.0,
@@ -155,31 +127,25 @@ def make_ofog(
     """Simulate thermal runs of open-loop fiber-optic gyros on a rate table (regression).
 
     Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the
-    table steps through rates of both signs. The table has the error that a compensation must learn,
-    and every part of it. A compensator on board knows the columns time, temperature and output (or
-    counts), and no others. Hold out whole runs (``run``) or devices (``device``), never single
-    rows: neighbours are nearly equal. Formulas, coefficients and presets: :doc:`/gyro_simulator`.
+    table steps through rates of both signs. A compensator on board knows the columns time,
+    temperature and output (or counts), and no others. Hold out whole runs (``run``) or devices
+    (``device``), never single rows: neighbours are nearly equal. Formulas, coefficients and
+    presets: :doc:`/gyro_simulator`.
 
     Parameters
     ----------
-    preset : {"open_loop", "linearised", "paper"}, default="open_loop"
-        Gyro and conditions to start from: an open loop without correction; the same with 1000 ppm
-        of nonlinearity and -50 ppm/degC left; 19 rows at 38.69 deg/s as in :func:`load_ofog`.
+    preset : {"open_loop", "linearised"}, default="open_loop"
+        An open loop without correction; the same with 1000 ppm of nonlinearity and -50 ppm/degC
+        left.
     profile : {"constant", "soaks", "ramps"}, default="constant"
         Chamber during a run: one temperature, ``n_soaks`` of them in turn, or a ramp up and down,
         which takes ``duration``.
-    n_devices : int, default=3
-        Number of gyros.
-    n_runs : int, default=8
-        Runs per device. Each begins in another of as many equal parts of the ambient range.
-    n_power_ups : int, default=1
-        Power-ups in each run, ``off_time`` apart.
-    off_time : float, default=600
-        Time without power between two power-ups [s], rounded to ``sampling_interval``.
-    duration : float, default=None
-        Length of each power-up [s]. Default: 3600; "paper" 380.
-    sampling_interval : float, default=None
-        Time between rows [s]; a row is the mean over the interval. Default: 10; "paper" 20.
+    n_devices, n_runs : int, default=3, 8
+        Gyros, and runs of each, which begin in as many equal parts of the ambient range.
+    n_power_ups, off_time : int, float, default=1, 600.0
+        Power-ups in each run, and the time without power between two of them [s].
+    duration, sampling_interval : float, default=3600.0, 10.0
+        Length of each power-up, and time between rows [s]; a row is the mean over the interval.
     max_rate : float, default=None
         Largest rate of the table [deg/s], at which the Sagnac phase of every device must be below
         pi/2 (some 340 deg/s for "open_loop"). Default: 100; "linearised" 375.
@@ -187,22 +153,20 @@ def make_ofog(
         Number of equally spaced rates from ``-max_rate`` to ``max_rate``, which all runs share.
         Default: every dwell has a rate of its own.
     rates : array-like of shape (n_rates,), default=None
-        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest. "paper": 38.69.
+        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest.
     rate_order : {"random", "sweep"}, default="random"
         Each rate once, at random, before any comes again; or up and down.
-    dwell_time : float, default=None
-        Time at each rate [s], rounded to ``sampling_interval``. Default: 120.
-    ambient_range : tuple of two floats, default=None
-        Temperatures of the chamber [degC], within -60 and 100. Default: -20 and 50; "paper" 20.4
-        and 20.8.
+    dwell_time : float, default=120.0
+        Time at each rate [s], rounded to ``sampling_interval``.
+    ambient_range : tuple of two floats, default=(-20.0, 50.0)
+        Temperatures of the chamber [degC], within -60 and 100.
     n_soaks : int, default=5
         Number of temperatures of the profile "soaks".
     max_residual_heat : float, default=0.5
         A run starts with a part of the self-heating, up to this one, in the coil; 0: cold starts.
-    noise : float, default=1.0
-        Factor on all that is random within a device.
-    device_spread : float, default=1.0
-        Factor in [0, 1] on the tolerances of the population.
+    noise, device_spread : float, default=1.0
+        Factors on all that is random within a device, and, in [0, 1], on the tolerances of the
+        population.
     coefficients : dict of str to float, default=None
         Nominal values in place of the preset's, by their names in :doc:`/gyro_simulator`. Zero
         turns an effect off.
@@ -217,10 +181,7 @@ def make_ofog(
         temperature of the gyro's thermometer [degC] and its rate without noise,
         temperature_rate [degC/s]; ambient [degC]; true rate [deg/s]; counts; output, the indicated
         rate; error, output - rate; noise, which no compensation can foresee, at the input [deg/s];
-        run, power_up and device. Then the parts of the error [deg/s]: nonlinearity, scale_factor,
-        wavelength, amplitude, warm_up_scale_factor, bias, bias_temperature, warm_up,
-        bias_temperature_rate, bias_repeatability, bias_instability, rate_random_walk,
-        angle_random_walk and quantisation.
+        run, power_up and device. Then the parts of the error [deg/s], which sum to it.
 
     Raises
     ------
@@ -244,32 +205,40 @@ def make_ofog(
     """
     given = locals()
     validate_parameter_constraints(_CONSTRAINTS, given, "make_ofog")
+    for name in ("duration", "dwell_time"):
+        if given[name] < sampling_interval:
+            raise ValueError(
+                f"{name}={given[name]} must be at least the sampling_interval, "
+                f"{sampling_interval} s."
+            )
     nominal = _nominal_device(preset, coefficients)
-    conditions = _conditions(preset, {name: given[name] for name in _CONDITIONS})
-    interval = conditions.sampling_interval
     schedule = Schedule(
         # 0.3 / 0.1 is 2.9999999999999996, and three samples are meant.
-        n_samples=int(conditions.duration / interval * (1.0 + 1e-12)),
-        sampling_interval=interval,
+        n_samples=int(duration / sampling_interval * (1.0 + 1e-12)),
+        sampling_interval=sampling_interval,
         n_power_ups=n_power_ups,
-        n_off=round(off_time / interval),
+        n_off=round(off_time / sampling_interval),
         profile=profile,
-        ambient_range=conditions.ambient_range,
+        ambient_range=_ambient_range(ambient_range),
         n_soaks=n_soaks,
     )
-    _check_phase(nominal, device_spread, conditions)
+    largest, levels = _table_rates(preset, max_rate, n_rate_levels, rates)
+    _check_phase(nominal, device_spread, schedule.ambient_range, largest, rates is not None)
     generator: np.random.RandomState = check_random_state(random_state)
     devices = _draw_devices(nominal, n_devices, device_spread, noise, generator)
     # All runs before the first row: the noise of one must not move the temperature of the next.
     runs = list(_draw_runs(devices, n_runs, schedule, max_residual_heat, generator))
+    n_held = round(dwell_time / sampling_interval)
     power_ups: list[dict] = []
     for run, (device, start, biases) in enumerate(runs):
         thermal_history = temperatures(devices[device], schedule, *start)
         for thermal, bias in zip(thermal_history, biases, strict=True):
-            rate = _draw_rates(schedule.n_samples, conditions, rate_order, generator)
+            n_dwells = -(-schedule.n_samples // n_held)
+            dwells = _draw_rates(n_dwells, largest, levels, rate_order, generator)
+            rate = np.repeat(dwells, n_held)[: schedule.n_samples]
             normals = generator.standard_normal((4, rate.size))
             measurement, parts = simulate_power_up(
-                devices[device], bias, schedule.time, rate, thermal, normals, interval
+                devices[device], bias, schedule.time, rate, thermal, normals, sampling_interval
             )
             labels = {"run": run, "power_up": len(power_ups), "device": device}
             columns = {name: np.full(rate.size, label) for name, label in labels.items()}
@@ -295,32 +264,21 @@ def _nominal_device(preset, coefficients):
     return nominal | _PRESETS[preset][0] | {name: float(value) for name, value in given.items()}
 
 
-def _conditions(preset, given):
-    """The preset's conditions but for those given, checked; ``levels`` are the table's rates."""
-    given = {name: value for name, value in given.items() if value is not None}
-    levels = sorted({"max_rate", "n_rate_levels"} & set(given))
-    if levels and "rates" in given:
-        raise ValueError(f"rates is given together with {levels}; it takes their place.")
-    if levels:
-        given["rates"] = None
-    found = SimpleNamespace(**_CONDITIONS | _PRESETS[preset][1] | given)
-    for name in ("duration", "dwell_time"):
-        if getattr(found, name) < found.sampling_interval:
-            raise ValueError(
-                f"{name}={getattr(found, name)} must be at least the sampling_interval, "
-                f"{found.sampling_interval} s."
-            )
-    found.ambient_range = _ambient_range(found.ambient_range)
-    found.levels = None
-    if found.rates is not None:
-        rates = np.asarray(found.rates, dtype=float)
-        if rates.ndim != 1 or not rates.size or not np.isfinite(rates).all():
-            raise ValueError(f"rates must be a list of finite rates in deg/s; got {found.rates!r}.")
-        found.levels = np.unique(rates)
-        found.max_rate = float(np.abs(rates).max())
-    elif found.n_rate_levels is not None:
-        found.levels = np.linspace(-found.max_rate, found.max_rate, found.n_rate_levels)
-    return found
+def _table_rates(preset, max_rate, n_rate_levels, rates):
+    """Largest rate of the table, and its levels; None where every dwell has its own."""
+    if rates is None:
+        largest = _PRESETS[preset][1] if max_rate is None else max_rate
+        if n_rate_levels is None:
+            return largest, None
+        return largest, np.linspace(-largest, largest, n_rate_levels)
+    options = {"max_rate": max_rate, "n_rate_levels": n_rate_levels}
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise ValueError(f"rates is given together with {given}; it takes their place.")
+    found = np.asarray(rates, dtype=float)
+    if found.ndim != 1 or not found.size or not np.isfinite(found).all():
+        raise ValueError(f"rates must be a list of finite rates in deg/s; got {rates!r}.")
+    return float(np.abs(found).max()), np.unique(found)
 
 
 def _ambient_range(given):
@@ -344,7 +302,7 @@ def _tolerances(nominal):
     }
 
 
-def _check_phase(nominal, spread, conditions):
+def _check_phase(nominal, spread, ambient_range, largest, are_given):
     """Refuse rates at which some device of the population would leave the sine's rising branch.
 
     Beyond a Sagnac phase of pi / 2 two rates give one output, and no compensation can tell them.
@@ -354,17 +312,16 @@ def _check_phase(nominal, spread, conditions):
         abs(nominal[name]) + spread * tolerances[name]
         for name in ("sagnac_factor", "sagnac_temperature", "self_heating")
     )
-    coldest, hottest = conditions.ambient_range
+    coldest, hottest = ambient_range
     difference = max(
         REFERENCE_TEMPERATURE - coldest, hottest + self_heating - REFERENCE_TEMPERATURE
     )
     limit = 90.0 / (factor * (1.0 + 1e-6 * by_temperature * difference))
-    if conditions.max_rate >= limit:
-        name = "max_rate" if conditions.rates is None else "largest of abs(rates)"
+    if largest >= limit:
+        name = "largest of abs(rates)" if are_given else "max_rate"
         raise ValueError(
-            f"{name} == {conditions.max_rate}, must be < {limit:.4g} deg/s: from there on the "
-            "Sagnac phase reaches pi / 2 in some device of this population, and the arcsine is "
-            "not defined."
+            f"{name} == {largest}, must be < {limit:.4g} deg/s: from there on the Sagnac phase "
+            "reaches pi / 2 in some device of this population, and the arcsine is not defined."
         )
 
 
@@ -401,25 +358,20 @@ def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
         )
 
 
-def _draw_rates(n_samples, conditions, order, random_state):
-    """True rate of each sample of a power-up: each level comes once before any comes again.
+def _draw_rates(n_dwells, largest, levels, order, random_state):
+    """True rate of each dwell of a power-up: each level comes once before any comes again.
 
     Without levels there is one rate in each of as many equal parts of the range as there are
     dwells.
     """
-    levels = conditions.levels
-    n_held = round(conditions.dwell_time / conditions.sampling_interval)
-    n_dwells = -(-n_samples // n_held)
     if levels is None:
         parts = np.arange(n_dwells) + random_state.uniform(size=n_dwells)
-        rates = conditions.max_rate * (2.0 * parts / n_dwells - 1.0)
+        rates = largest * (2.0 * parts / n_dwells - 1.0)
         if order == "sweep":
-            rates = np.concatenate([rates[::2], rates[1::2][::-1]])
-        else:
-            rates = random_state.permutation(rates)
-    elif order == "sweep":
-        rates = np.resize(np.concatenate([levels, levels[-2:0:-1]]), n_dwells)
-    else:
-        n_passes = -(-n_dwells // levels.size)
-        rates = np.concatenate([random_state.permutation(levels) for _ in range(n_passes)])
-    return np.repeat(rates[:n_dwells], n_held)[:n_samples]
+            return np.concatenate([rates[::2], rates[1::2][::-1]])
+        return random_state.permutation(rates)
+    if order == "sweep":
+        return np.resize(np.concatenate([levels, levels[-2:0:-1]]), n_dwells)
+    n_passes = -(-n_dwells // levels.size)
+    passes = [random_state.permutation(levels) for _ in range(n_passes)]
+    return np.concatenate(passes)[:n_dwells]

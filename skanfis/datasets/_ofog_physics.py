@@ -81,11 +81,10 @@ def temperatures(device, schedule, start, rising, residual_heat):
         off = schedule.ambient(first + n_on, schedule.n_off + 1, start, rising)
         warm = on + device.self_heating
         coil = first_order_lag(warm, coil_start, device.thermal_time, interval)
-        thermometer = first_order_lag(coil, thermometer_start, device.thermometer_lag, interval)
+        lag = device.thermometer_lag
+        thermometer = first_order_lag(coil, thermometer_start, lag, interval)
         coil_rate = (warm - coil) / device.thermal_time
-        thermometer_rate = coil_rate
-        if device.thermometer_lag:
-            thermometer_rate = (coil - thermometer) / device.thermometer_lag
+        thermometer_rate = (coil - thermometer) / lag if lag else coil_rate
         yield SimpleNamespace(
             ambient=on[:-1],
             coil=coil[:-1],
@@ -94,8 +93,7 @@ def temperatures(device, schedule, start, rising, residual_heat):
             thermometer_rate=thermometer_rate[:-1],
         )
         coil = first_order_lag(off, coil[-1], device.thermal_time, interval)
-        last = thermometer[-1]
-        thermometer_start = first_order_lag(coil, last, device.thermometer_lag, interval)[-1]
+        thermometer_start = first_order_lag(coil, thermometer[-1], lag, interval)[-1]
         coil_start = coil[-1]
 
 
@@ -157,7 +155,8 @@ def simulate_power_up(device, turn_on_bias, time, rate, thermal, normals, sampli
         "output": output,
         "error": output - rate,
         "noise": sum(biases[name] for name in RANDOM_BIASES)
-        + rate_by_output(rate + bias, *optics) * (white + parts["quantisation"]),
+        # A unit of noise of the output is worth 1 over the response's slope at the input.
+        + (1.0 / bias_gain(rate + bias, 0.0, *optics)) * (white + parts["quantisation"]),
     }
     return measurement, parts
 
@@ -178,12 +177,6 @@ def bias_gain(rate, bias, sagnac_factor, relative_factor, amplitude):
     half_phase = 0.5 * factor * np.deg2rad(bias)
     phase = factor * np.deg2rad(rate) + half_phase
     return amplitude * relative_factor * np.cos(phase) * np.sinc(half_phase / np.pi)
-
-
-def rate_by_output(rate, sagnac_factor, relative_factor, amplitude):
-    """What a unit of noise of the output is worth at the input: 1 over the response's slope."""
-    factor = sagnac_factor * relative_factor
-    return 1.0 / (amplitude * relative_factor * np.cos(factor * np.deg2rad(rate)))
 
 
 def first_order_lag(values, start, time_constant, sampling_interval):
