@@ -5,28 +5,19 @@ from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
 from .compose import ResidualRegressor
-from .displays import (
-    AllanDisplay,
-    CoverageDisplay,
-    ErrorDisplay,
-    GroupResidualDisplay,
-    HysteresisDisplay,
-    ResidualSurfaceDisplay,
-    ScaleFactorErrorDisplay,
-)
+from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay
 from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
 from .groups import check_split, find_rate_levels, group_by_rate_level, group_by_run
 from .log import read_log
-from .metrics import (
-    bias,
-    bias_stability,
-    hysteresis,
-    input_error,
-    scale_factor,
-)
 from .physics import OpenLoopArcsineRegressor
 from .report import gyro_report
+from .thermal_displays import (
+    CoverageDisplay,
+    HysteresisDisplay,
+    ResidualSurfaceDisplay,
+    ScaleFactorErrorDisplay,
+)
 
 __all__ = [
     "AllanDisplay",
@@ -45,8 +36,6 @@ __all__ = [
     "TimeSincePowerOn",
     "allan_coefficients",
     "allan_deviation",
-    "bias",
-    "bias_stability",
     "check_log",
     "check_split",
     "export_c_physics",
@@ -54,8 +43,5 @@ __all__ = [
     "group_by_rate_level",
     "group_by_run",
     "gyro_report",
-    "hysteresis",
-    "input_error",
     "read_log",
-    "scale_factor",
 ]

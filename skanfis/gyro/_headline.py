@@ -5,7 +5,7 @@ import numpy as np
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NOTHING, options_for
-from .displays._base import figures
+from .displays import figures
 from .metrics import rms
 
 __all__ = ["ARTICLES", "errors_and_verdict", "headline", "held_out_groups", "readability_of"]

@@ -1,26 +1,105 @@
-"""What the sections and pictures of a calibration's report have in common."""
+"""What the report shows of a calibration: errors, figures of merit, limits, and pictures."""
 
+import base64
+import io
+import re
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ._columns import RATE_UNITS, label_texts
+from ..inspection import MembershipDisplay
+from ._columns import RATE_UNITS, evenly_chosen, label_texts
 from ._headline import readability_of
 from ._report_options import ReportOptions, check_limit
 from .allan import rows_for_allan
 from .compensator import features
-from .displays._base import figures, signs
+from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures, signs
 from .metrics import rms
 from .report import gyro_report
+from .thermal_displays import (
+    CoverageDisplay,
+    HysteresisDisplay,
+    ResidualSurfaceDisplay,
+    ScaleFactorErrorDisplay,
+)
 
-__all__ = ["Results"]
+__all__ = ["Picture", "Results"]
 
 _PER_MINUTE = 60.0
 _SMALL = 0.05  # deg/s
+_CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls
+_DOTS_PER_INCH = 160  # sharp in print
+_FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
+_MOST_ROWS_SHOWN = 20_000  # rows beyond cover one another
+# Display and caption by name of the files; of a caption the first sentence is read out to those who
+# cannot see the picture.
+_PICTURES = {
+    "error-by-time": (ErrorDisplay, "Error against time, before and after."),
+    "error-by-temperature": (ErrorDisplay, "Error against temperature, before and after."),
+    "scale-factor-error": (
+        ScaleFactorErrorDisplay,
+        "Scale-factor error against rate, in three bands of temperature.",
+    ),
+    "hysteresis": (
+        HysteresisDisplay,
+        "Bias against temperature, while warming and while cooling. What depends on the rate is "
+        "taken off, other than in the table. Temperature alone cannot close a loop.",
+    ),
+    "residual-surface": (
+        ResidualSurfaceDisplay,
+        "Mean residual and number of rows over temperature and rate.",
+    ),
+    "held-out-groups": (GroupResidualDisplay, "RMS error of every held-out group."),
+    "allan-deviation": (
+        AllanDisplay,
+        "Allan deviation of the error, over the runs that are in range from end to end.",
+    ),
+}
+_COVERAGE = (
+    "Coverage over temperature and output; other inputs at their medians. Hatched cells hold no "
+    "row: what is said there is a guess from their neighbours. Rows outside the dashed line are "
+    "flagged, and within it those beyond the dotted line, where there is one."
+)
+
+
+class Picture(NamedTuple):
+    """What a page shows: a PNG image, what those who cannot see it are told, CSV files; in base64.
+
+    ``is_tall`` tells how the picture stands on paper.
+    """
+
+    image: str
+    alt: str
+    caption: str
+    files: dict[str, str]
+    is_tall: bool
+
+    @classmethod
+    def of(cls, subject, figure, tables, caption):
+        """The figure painted, and its tables as files."""
+        file = io.BytesIO()
+        # Software and date would make two reports on the same log differ.
+        figure.savefig(file, format="png", dpi=_DOTS_PER_INCH, metadata={"Software": None})
+        files = {}
+        for name, table in tables.items():
+            # What a spreadsheet would take for a formula has an apostrophe in front.
+            texts = {
+                column: [_FORMULA.sub(r"'\g<0>", str(value)) for value in table[column]]
+                for column in table.select_dtypes(exclude="number")
+            }
+            table = table.assign(**texts)
+            text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
+            ending = f"-{name}" if len(tables) > 1 else ""
+            files[f"{subject}{ending}.csv"] = _base64(text.encode("utf-8"))
+        width, height = figure.get_size_inches()
+        alt = caption.partition(".")[0]
+        return cls(_base64(file.getvalue()), alt, caption, files, height > width)
 
 
 class Results:
-    """What several parts of the report need; rates are NaN where a row was out of range."""
+    """What the sections of the report need; rates are NaN where a row was out of range."""
 
     def __init__(self, calibration, options=None):
         self.calibration = calibration
@@ -98,3 +177,80 @@ class Results:
     def readability(self):
         """Whether the rules can be read one by one."""
         return readability_of(self.calibration)
+
+    def pictures(self):
+        """The pictures of the held-out rows that have a sense on this log."""
+        from matplotlib.figure import Figure
+
+        arguments = self._arguments()
+        for subject, (kind, caption) in _PICTURES.items():
+            if subject not in arguments:
+                continue
+            options = arguments[subject]
+            rows = options.pop("rows", slice(None))
+            rates = (each[rows] for each in (self.rate, self.before, self.after))
+            unit = None if kind is ScaleFactorErrorDisplay else self.unit
+            figure = Figure(layout="constrained")
+            display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
+            yield Picture.of(subject, figure, display.tables(), caption)
+
+    def _arguments(self):
+        """What each picture is made of, where it has a sense."""
+        temperature, change = self.temperature, self.temperature_rate
+        label = "temperature [degC]"
+        found = {
+            "error-by-temperature": {"position": temperature, "position_label": label},
+            "held-out-groups": {"groups": self.calibration.split.labels.astype(str)},
+        }
+        if self.time is not None:
+            label = "time since power-on [s]"
+            found["error-by-time"] = {"position": self.since_power_on, "position_label": label}
+        if np.ptp(self.rate):
+            for subject in ("scale-factor-error", "residual-surface"):
+                found[subject] = {"temperature": temperature}
+        if change is not None and change.min() < -_CLEARLY < _CLEARLY < change.max():
+            found["hysteresis"] = {"temperature": temperature, "temperature_rate": change}
+        if isinstance(self.of_allan, dict):
+            found["allan-deviation"] = dict(self.of_allan)
+        return found
+
+    def coverage(self):
+        """The picture of the coverage; none where temperature or output is no input."""
+        from matplotlib.figure import Figure
+
+        calibration = self.calibration
+        if not {"temperature", "output"} <= set(calibration.X):
+            return
+        figure = Figure(layout="constrained")
+        display = CoverageDisplay.from_estimator(
+            calibration.compensator.estimator,
+            calibration.X,
+            min_coverage=calibration.compensator.min_coverage,
+            units={"output": calibration.recipe.output_unit, "temperature_rate": "degC/s"},
+            ax=figure,
+        )
+        yield Picture.of("coverage", figure, display.tables(), _COVERAGE)
+
+    def memberships(self):
+        """The picture of the membership functions; none where no input has terms."""
+        from matplotlib.figure import Figure
+
+        rules, X = self.calibration.rules, self.calibration.X
+        n_inputs = len({term["input"] for term in rules[-1].memberships_})
+        if not n_inputs:
+            return
+        figure = Figure(figsize=(6.2, 0.6 + 1.9 * n_inputs), layout="constrained")
+        axes = list(figure.subplots(n_inputs, squeeze=False).ravel())
+        shown = X.iloc[evenly_chosen(len(X), _MOST_ROWS_SHOWN)]
+        display = MembershipDisplay.from_estimator(rules, shown, ax=axes)
+        parts = []
+        for each in display.inputs:
+            for term, before, after in zip(each.term_names, each.before, each.after, strict=True):
+                truths = {"value": each.grid, "truth before": before, "truth after": after}
+                parts.append(pd.DataFrame({"input": each.input_name, "term": term} | truths))
+        caption = "Membership functions before training (dashed) and after, over the data."
+        yield Picture.of("fuzzy-terms", figure, {"terms": pd.concat(parts)}, caption)
+
+
+def _base64(data):
+    return base64.b64encode(data).decode("ascii")

@@ -17,10 +17,9 @@ from ._budget import budget_of, proven_bounds
 from ._columns import RATE_UNITS, SIGNALS
 from ._formulas import formula_of, law_table, on_board, rules_text
 from ._headline import ARTICLES, headline, held_out_groups
-from ._pictures import PICTURES, draw, draw_coverage, draw_memberships
 from ._results import Results
 from ._simpler import NOTHING, options_for
-from .displays._base import figures, signs
+from .displays import figures, signs
 from .metrics import rms
 
 __all__ = ["check_installed", "report_page"]
@@ -220,8 +219,7 @@ def _merit(results):
 
 
 def _pictures(results):
-    found = [picture for plan in PICTURES if (picture := draw(plan, results)) is not None]
-    blocks = [Block("pictures", found)]
+    blocks = [Block("pictures", list(results.pictures()))]
     if isinstance(results.of_allan, str):
         blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
     return "Pictures", blocks
@@ -241,9 +239,8 @@ def _use(results):
         "that --c writes flags the same rows with the same numbers."
     )
     ends = calibration.X.agg(["min", "max"]).T
-    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy())]
-    if (picture := draw_coverage(calibration)) is not None:
-        blocks.append(Block("pictures", [picture]))
+    pictures = Block("pictures", list(results.coverage()))
+    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy()), pictures]
     return "Where it may be used", blocks
 
 
@@ -289,8 +286,7 @@ def _rules(results):
         law = law_table(calibration.compensator.estimator.base_, calibration.recipe)
         text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
-    if (picture := draw_memberships(calibration)) is not None:
-        blocks.append(Block("pictures", [picture]))
+    blocks.append(Block("pictures", list(results.memberships())))
     findings = results.readability.findings
     text, steps = rules_text(calibration, results.readability), on_board(calibration.compensator)
     n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
