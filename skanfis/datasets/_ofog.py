@@ -20,7 +20,6 @@ _NOT_NEGATIVE = Interval(Real, 0, None, closed="left")
 _POSITIVE = Interval(Real, 0, None, closed="neither")
 _PART = Interval(Real, 0, 1, closed="both")
 _AT_LEAST_ONE = Interval(Integral, 1, None, closed="left")
-_AT_LEAST_TWO = Interval(Integral, 2, None, closed="left")
 
 
 def _within(limit):
@@ -88,10 +87,8 @@ _CONSTRAINTS = {
     "duration": [_POSITIVE],
     "sampling_interval": [_POSITIVE],
     "max_rate": [_POSITIVE, None],
-    "n_rate_levels": [_AT_LEAST_TWO, None],
-    "rate_order": [StrOptions({"random", "sweep"})],
+    "n_rate_levels": [Interval(Integral, 2, None, closed="left"), None],
     "dwell_time": [_POSITIVE],
-    "n_soaks": [_AT_LEAST_TWO],
     "max_residual_heat": [_PART],
     "noise": [_NOT_NEGATIVE],
     "device_spread": [_PART],
@@ -114,10 +111,8 @@ def make_ofog(
     max_rate: float | None = None,
     n_rate_levels: int | None = None,
     rates: ArrayLike | None = None,
-    rate_order: str = "random",
     dwell_time: float = 120.0,
     ambient_range: Any = (-20.0, 50.0),
-    n_soaks: int = 5,
     max_residual_heat: float = 0.5,
     noise: float = 1.0,
     device_spread: float = 1.0,
@@ -138,7 +133,7 @@ def make_ofog(
         An open loop without correction; the same with 1000 ppm of nonlinearity and -50 ppm/degC
         left.
     profile : {"constant", "soaks", "ramps"}, default="constant"
-        Chamber during a run: one temperature, ``n_soaks`` of them in turn, or a ramp up and down,
+        Chamber during a run: one temperature, five of them up and down, or a ramp up and down,
         which takes ``duration``.
     n_devices, n_runs : int, default=3, 8
         Gyros, and runs of each, which begin in as many equal parts of the ambient range.
@@ -153,15 +148,12 @@ def make_ofog(
         Number of equally spaced rates from ``-max_rate`` to ``max_rate``, which all runs share.
         Default: every dwell has a rate of its own.
     rates : array-like of shape (n_rates,), default=None
-        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest.
-    rate_order : {"random", "sweep"}, default="random"
-        Each rate once, at random, before any comes again; or up and down.
+        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest. Each comes once,
+        at random, before any comes again.
     dwell_time : float, default=120.0
         Time at each rate [s], rounded to ``sampling_interval``.
     ambient_range : tuple of two floats, default=(-20.0, 50.0)
         Temperatures of the chamber [degC], within -60 and 100.
-    n_soaks : int, default=5
-        Number of temperatures of the profile "soaks".
     max_residual_heat : float, default=0.5
         A run starts with a part of the self-heating, up to this one, in the coil; 0: cold starts.
     noise, device_spread : float, default=1.0
@@ -220,7 +212,6 @@ def make_ofog(
         n_off=round(off_time / sampling_interval),
         profile=profile,
         ambient_range=_ambient_range(ambient_range),
-        n_soaks=n_soaks,
     )
     largest, levels = _table_rates(preset, max_rate, n_rate_levels, rates)
     _check_phase(nominal, device_spread, schedule.ambient_range, largest, rates is not None)
@@ -234,7 +225,7 @@ def make_ofog(
         thermal_history = temperatures(devices[device], schedule, *start)
         for thermal, bias in zip(thermal_history, biases, strict=True):
             n_dwells = -(-schedule.n_samples // n_held)
-            dwells = _draw_rates(n_dwells, largest, levels, rate_order, generator)
+            dwells = _draw_rates(n_dwells, largest, levels, generator)
             rate = np.repeat(dwells, n_held)[: schedule.n_samples]
             normals = generator.standard_normal((4, rate.size))
             measurement, parts = simulate_power_up(
@@ -358,7 +349,7 @@ def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
         )
 
 
-def _draw_rates(n_dwells, largest, levels, order, random_state):
+def _draw_rates(n_dwells, largest, levels, random_state):
     """True rate of each dwell of a power-up: each level comes once before any comes again.
 
     Without levels there is one rate in each of as many equal parts of the range as there are
@@ -366,12 +357,7 @@ def _draw_rates(n_dwells, largest, levels, order, random_state):
     """
     if levels is None:
         parts = np.arange(n_dwells) + random_state.uniform(size=n_dwells)
-        rates = largest * (2.0 * parts / n_dwells - 1.0)
-        if order == "sweep":
-            return np.concatenate([rates[::2], rates[1::2][::-1]])
-        return random_state.permutation(rates)
-    if order == "sweep":
-        return np.resize(np.concatenate([levels, levels[-2:0:-1]]), n_dwells)
+        return random_state.permutation(largest * (2.0 * parts / n_dwells - 1.0))
     n_passes = -(-n_dwells // levels.size)
     passes = [random_state.permutation(levels) for _ in range(n_passes)]
     return np.concatenate(passes)[:n_dwells]

@@ -24,6 +24,7 @@ RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
 
 _PER_HOUR = 1.0 / 3600.0  # deg/h in deg/s, and an arc second in deg
 _PPM = 1e-6
+_N_SOAKS = 5
 # The largest Allan deviation of a Gauss-Markov process in its standard deviations, and the flat one
 # of flicker noise in its coefficient (IEEE 952, annex on Allan variance).
 _ALLAN_MAXIMUM_OF_GAUSS_MARKOV = 0.437 * np.sqrt(2.0)
@@ -40,7 +41,6 @@ class Schedule:
     n_off: int  # samples between two power-ups, without power
     profile: str
     ambient_range: tuple[float, float]  # degC
-    n_soaks: int
 
     @property
     def time(self):
@@ -60,8 +60,7 @@ class Schedule:
         clock = self.sampling_interval * (first + np.arange(n_samples))
         triangle = 1.0 - np.abs(2.0 * ((phase + clock / period) % 1.0) - 1.0)
         if self.profile == "soaks":
-            n_steps = self.n_soaks - 1
-            triangle = np.rint(n_steps * triangle) / n_steps
+            triangle = np.rint((_N_SOAKS - 1) * triangle) / (_N_SOAKS - 1)
         return low + span * triangle
 
 

@@ -193,8 +193,7 @@ def _instead(results):
 
 def _merit(results):
     """The figures of merit of all rows in range, and the limits."""
-    table = results.merit[~results.merit["figure"].str.startswith("rows")]
-    lines = []
+    table, lines = results.merit, []
     for _, line in table[table[["before", "after"]].notna().any(axis=1)].iterrows():
         cells = []
         for side in ("before", "after"):
@@ -202,7 +201,7 @@ def _merit(results):
             cells += [_shown(value), _interval(low, high)]
         lines.append((_words(line["figure"]), *cells, signs(line["unit"])))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit"]
-    resampled = results.merit.attrs["resampled"]["all"]
+    resampled = results.merit.attrs["resampled"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
     for note, part in table[table["note"] != ""].groupby("note", sort=False):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))

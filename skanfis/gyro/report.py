@@ -1,4 +1,4 @@
-"""One table of all figures of merit, per group, before and after, with bootstrap intervals."""
+"""One table of all figures of merit, before and after, with bootstrap intervals."""
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,6 @@ from .metrics import LARGEST_VALUES, figures_of_merit, input_error, rows_by_run,
 
 __all__ = ["gyro_report"]
 
-_VALUES = ["before", "before_low", "before_high", "after", "after_low", "after_high"]
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
 _N_BLOCKS = 30
@@ -30,28 +29,27 @@ def gyro_report(
     temperature_rate: ArrayLike | None = None,
     time: ArrayLike | None = None,
     run: ArrayLike | None = None,
-    groups: ArrayLike | None = None,
     full_scale: float | None = None,
     allan: bool = False,
     n_resamples: int = 200,
     rate_unit: str | None = None,
     random_state: int | np.random.RandomState | None = None,
 ) -> pd.DataFrame:
-    """Tabulate the figures of merit of a gyro per group, before and after its compensation.
+    """Tabulate the figures of merit of a gyro, before and after its compensation.
 
-    Give held-out predictions. Intervals, of 95 %, are of a bootstrap over runs where a group has
-    five or more, and otherwise over some thirty blocks of rows.
+    Give held-out predictions. Intervals, of 95 %, are of a bootstrap over runs where there are five
+    or more, and otherwise over some thirty blocks of rows.
 
     Parameters
     ----------
     rate, before : array-like of shape (n_rows,)
         True rate, and rate indicated without compensation [deg/s].
     after : array-like of shape (n_rows,), default=None
-        Compensated rate [deg/s]; rows where it is NaN are counted and left out of all figures.
+        Compensated rate [deg/s]; rows where it is NaN are left out.
     temperature, temperature_rate, time : array-like of shape (n_rows,), default=None
         [degC], [degC/min], and [s], increasing within each run, for the figures that need them.
-    run, groups : array-like of shape (n_rows,), default=None
-        Labels of the runs (None is one run), and of groups that get a table of their own.
+    run : array-like of shape (n_rows,), default=None
+        Labels of the runs; None is one run.
     full_scale : float, default=None
         Rate of full scale [deg/s]; None is the largest true rate.
     allan : bool, default=False
@@ -66,9 +64,9 @@ def gyro_report(
     Returns
     -------
     report : DataFrame
-        One row per group, "all" first, and figure. Columns: group, figure, unit; before,
-        before_low, before_high; the same of after; note, which says why a figure or an interval is
-        missing. ``report.attrs["resampled"]`` has "runs" or "blocks of rows" by group.
+        One row per figure. Columns: figure, unit; before, before_low, before_high; the same of
+        after; note, which says why a figure or an interval is missing. The attribute "resampled"
+        is "runs" or "blocks of rows".
 
     Raises
     ------
@@ -88,8 +86,12 @@ def gyro_report(
     [1000.0, 36.0]
     """
     columns = {"rate": rate, "before": before, "after": after, "temperature": temperature}
-    columns |= {"temperature_rate": temperature_rate, "time": time, "run": run, "groups": groups}
-    table = table_of(columns, labels=("run", "groups"), gaps=("after",))
+    columns |= {"temperature_rate": temperature_rate, "time": time, "run": run}
+    table = table_of(columns, labels=("run",), gaps=("after",))
+    sides = ["before", "after"] if "after" in table else ["before"]
+    is_answered = table[sides[-1]].notna()
+    if not is_answered.any():
+        raise ValueError("after is NaN in all rows: the compensator refused them.")
     full_scale = table["rate"].abs().max() if full_scale is None else full_scale
     if not full_scale > 0:
         raise ValueError(f"full_scale={full_scale} must be positive; give it for a log at rest.")
@@ -107,60 +109,38 @@ def gyro_report(
         for figure in figures_of_merit(full_scale)
         if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
     ]
-    generator = check_random_state(random_state)
-    parts = [("all", table)]
-    if groups is not None:
-        parts += table.groupby("groups", sort=False, dropna=False)
-    lines, resampled = [], {}
-    for group, part in parts:
-        seed = generator.randint(2**31 - 1)
-        found, resampled[group] = _lines(part, figures, allan, n_resamples, seed)
-        lines += [{"group": group} | line for line in found]
-    report = pd.DataFrame(lines, columns=["group", "figure", "unit", *_VALUES, "note"])
-    if after is None:
-        report = report.drop(columns=_VALUES[3:])
-    if rate_unit is not None:
-        units, factors = zip(*(in_rate_unit(u, rate_unit) for u in report["unit"]), strict=True)
-        values = report.columns.intersection(_VALUES)
-        report = report.assign(unit=units, **report[values].mul(np.array(factors), axis=0))
+    units, kind = _units(table[is_answered])
+    # A generator of its own, so that one given moves on by one number alone.
+    generator = np.random.RandomState(check_random_state(random_state).randint(2**31 - 1))
+    draws = [generator.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
+    names = [(figure.name, figure.unit) for figure in figures]
+    names += ALLAN_FIGURES.items() if allan else []
+    report, notes = pd.DataFrame(names, columns=["figure", "unit"]), {}
+    for side in sides:
+        cells = _cells(table[is_answered], side, figures, units, kind, draws)
+        cells += _allan_cells(table, side, is_answered.to_numpy()) if allan else []
+        *values, notes[side] = zip(*cells, strict=True)
+        report[[side, f"{side}_low", f"{side}_high"]] = np.transpose(values)
     # Before compensation nothing is reduced.
-    report.loc[report["figure"] == "reduction_factor", _VALUES[:3]] = np.nan
-    report.attrs["resampled"] = resampled
+    report.loc[report["figure"] == "reduction_factor", report.columns[2:5]] = np.nan
+    if rate_unit is not None:
+        own, factors = zip(*(in_rate_unit(u, rate_unit) for u in report["unit"]), strict=True)
+        report = report.assign(unit=own, **report.iloc[:, 2:].mul(np.array(factors), axis=0))
+    report["note"] = list(map(_joined, pd.DataFrame(notes).to_dict("records")))
+    report.attrs["resampled"] = kind
     return report
 
 
-def _lines(part, figures, allan, n_resamples, seed):
-    """Lines of one group, and what was resampled."""
-    sides = [side for side in ("before", "after") if side in part]
-    is_answered = part[sides[-1]].notna()
-    answered = part[is_answered]
-    units, kind = _units(answered)
-    random_state = np.random.RandomState(seed)
-    n_resamples = n_resamples if units else 0
-    draws = [random_state.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
-    lines = [{"figure": "rows", "before": float(len(part)), "after": float(len(part))}]
-    if "after" in part:
-        lines.append({"figure": "rows_refused", "after": float((~is_answered).sum())})
-    lines = [line | {"unit": "", "note": ""} for line in lines]
-    cells = {side: _cells(answered, side, figures, units, kind, draws) for side in sides}
-    names = [(figure.name, figure.unit) for figure in figures]
-    if allan:
-        names += ALLAN_FIGURES.items()
-        for side, found in cells.items():
-            found += _allan_cells(part, side, is_answered.to_numpy())
-    for (name, unit), *found in zip(names, *cells.values(), strict=True):
-        line, notes = {"figure": name, "unit": unit}, [note for *_, note in found]
-        for side, (value, low, high, _) in zip(sides, found, strict=True):
-            line |= {side: value, f"{side}_low": low, f"{side}_high": high}
-        told = [f"{side}: {note}" for side, note in zip(sides, notes, strict=True) if note]
-        line["note"] = notes[0] if len({*notes}) == 1 else "; ".join(told)
-        lines.append(line)
-    return lines, kind
+def _joined(notes):
+    """One note of both sides, where they are alike, or each with its side."""
+    if len({*notes.values()}) == 1:
+        return notes["before"]
+    return "; ".join(f"{side}: {note}" for side, note in notes.items() if note)
 
 
 def _units(rows):
     """The rows of each run, or of blocks of rows within the runs; and which of both."""
-    runs = rows_by_run(rows.get("run"), len(rows)) if len(rows) else []
+    runs = rows_by_run(rows.get("run"), len(rows))
     if len(runs) >= _FEWEST_RUNS:
         return runs, "runs"
     length = max(1, -(-len(rows) // _N_BLOCKS))
@@ -170,8 +150,6 @@ def _units(rows):
 
 def _cells(table, side, figures, units, kind, draws):
     """Value, ends of the interval, and a note, of each figure."""
-    if table.empty:
-        return [(np.nan, np.nan, np.nan, "no row is left in this group")] * len(figures)
     step = max(1, -(-len(table) // _MOST_ROWS))
     thinned = [unit[::step] for unit in units]
     rows = _columns(table, side)

@@ -173,15 +173,6 @@ def test_every_rate_is_held_once_before_any_comes_again():
     assert not np.array_equal(order, np.sort(order))
 
 
-def test_rates_in_a_sweep_go_up_and_down_again():
-    order = dwells_of(duration=36.0, rates=[-10.0, 0.0, 10.0], rate_order="sweep")
-    assert_array_equal(order, [-10, 0, 10, 0, -10, 0, 10, 0, -10])
-    steps = np.diff(dwells_of(duration=400.0, rate_order="sweep"))
-    assert (steps[:49] > 0).all()
-    assert (steps[50:] < 0).all()
-    assert set(dwells_of(duration=40.0, rates=[38.69], rate_order="sweep")) == {38.69}
-
-
 def test_phase_is_refused_exactly_where_a_device_reaches_a_quarter_turn():
     small = {"n_devices": 1, "n_runs": 1, "duration": 10.0}
     nominal = {"device_spread": 0.0, "coefficients": {"sagnac_temperature": 0.0}}

@@ -16,7 +16,7 @@ NOMINAL = {name: entry[0] for name, entry in _POPULATION.items()}
 # Those that are no size of an effect stay: an interferometer without them is none.
 STRUCTURAL = ("amplitude", "sagnac_factor", "warm_up_time", "thermal_time", "correlation_time")
 IDEAL = NOMINAL | {name: 0.0 for name in NOMINAL if name not in STRUCTURAL}
-SCHEDULE = Schedule(720, 5.0, 1, 0, "constant", (-20.0, 60.0), 5)
+SCHEDULE = Schedule(720, 5.0, 1, 0, "constant", (-20.0, 60.0))
 TIME = SCHEDULE.time
 RATE = np.repeat(np.linspace(-120, 120, 9), 80)
 OPTICS = (0.2536, 0.98, 1.01)

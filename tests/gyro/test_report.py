@@ -1,4 +1,4 @@
-"""The table of figures: planted truth, before and after, groups, intervals and what is missing."""
+"""The table of figures: planted truth, before and after, intervals and what is missing."""
 
 import numpy as np
 import pandas as pd
@@ -44,8 +44,8 @@ def report_of(log, *names, **options):
     return gyro_report(log["rate"], log["before"], log["after"], **columns, **options)
 
 
-def figures(report, group="all"):
-    return report[report["group"] == group].set_index("figure")
+def figures(report):
+    return report.set_index("figure")
 
 
 ALL = ("temperature", "temperature_rate", "time", "run")
@@ -68,7 +68,6 @@ def test_planted_truth_is_in_the_table(log):
     assert table.loc["residual_peak", "before"] == residual.abs().max()
     assert table.loc["residual_peak_to_peak", "before"] == np.ptp(residual)
     assert table.loc["reduction_factor", "after"] == pytest.approx(10.0)
-    assert table.loc["rows", "after"] == len(log)
 
 
 @pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
@@ -84,24 +83,6 @@ def test_one_unit_for_every_rate(log, unit):
         np.testing.assert_allclose(one.loc[name, VALUES].astype(float), expected, rtol=1e-12)
 
 
-def test_groups_are_tables_of_their_own_in_order_of_appearance(log):
-    labels = np.where(log["run"] < 4, "warm", "cold")
-    report = report_of(log, *ALL, groups=labels, n_resamples=10)
-    assert list(report["group"].unique()) == ["all", "warm", "cold"]
-    # A group that is called as the whole takes nothing of it.
-    named = report_of(log, groups=np.full(len(log), "all"), n_resamples=0)
-    assert len(named) == 2 * len(report_of(log, n_resamples=0))
-    warm = log["run"] < 4
-    alone = report_of(log[warm], *ALL, full_scale=log["rate"].abs().max(), n_resamples=0)
-    together = figures(report, "warm")
-    np.testing.assert_allclose(together["before"], figures(alone)["before"], equal_nan=True)
-    assert report.attrs["resampled"] == {
-        "all": "runs",
-        "warm": "blocks of rows",
-        "cold": "blocks of rows",
-    }
-
-
 def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
     one, two = report_of(log, *ALL), report_of(log, *ALL)
     pd.testing.assert_frame_equal(one, two)
@@ -111,7 +92,8 @@ def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
         assert len(known) >= 13
         assert (known[f"{side}_low"] <= known[f"{side}_high"]).all()
     alone = gyro_report(log["rate"], log["before"], random_state=0, n_resamples=0)
-    assert list(alone.columns) == ["group", "figure", "unit", *VALUES[:3], "note"]
+    assert list(alone.columns) == ["figure", "unit", *VALUES[:3], "note"]
+    assert (one.attrs["resampled"], alone.attrs["resampled"]) == ("runs", "blocks of rows")
     assert "reduction_factor" not in set(alone["figure"])
     assert table.loc["residual_peak", "note"] == "largest value: no interval"
 
@@ -130,20 +112,12 @@ def test_interval_is_that_of_the_runs_not_of_the_rows(rng):
     assert bias["before_high"] - bias["before_low"] == pytest.approx(expected, rel=0.12)
 
 
-def test_refused_rows_are_counted_and_left_out_of_both_sides(log):
+def test_refused_rows_are_left_out_of_both_sides(log):
     refused = np.arange(len(log)) % 10 == 0
     patchy = log.assign(after=log["after"].where(~refused))
-    table = figures(report_of(patchy, "run"))
-    kept = figures(report_of(log[~refused], "run"))
-    assert table.loc["rows_refused", "after"] == refused.sum()
-    assert table.loc["residual_rms", "before"] == kept.loc["residual_rms", "before"]
-    assert table.loc["bias", "after"] == kept.loc["bias", "after"]
+    pd.testing.assert_frame_equal(report_of(patchy, "run"), report_of(log[~refused], "run"))
     # What has no column is left out.
-    assert not {"hysteresis", "bias_stability_10s"} & set(table.index)
-    whole = log.assign(after=log["after"].where(log["run"] > 0))
-    table = figures(report_of(whole, groups=log["run"], n_resamples=0), group=0)
-    assert table.loc["rows_refused", "after"] == 100
-    assert table.loc["residual_rms", "note"] == "no row is left in this group"
+    assert not {"hysteresis", "bias_stability_10s"} & set(report_of(log, "run")["figure"])
 
 
 def test_nonlinearity_is_not_that_of_the_noise(rng):
@@ -188,6 +162,7 @@ def test_allan_deviation_is_read(rng):
     [
         ({"before": [1.0, np.nan]}, "before must be finite"),
         ({"after": [1.0, np.inf]}, "after must be finite"),
+        ({"after": [np.nan, np.nan]}, "after is NaN in all rows"),
         ({"after": [1.0]}, "after has 1 rows where the other columns have 2"),
         ({"before": []}, "before is empty"),
         ({"before": [[1.0, 2.0]]}, "before must have one dimension"),
