@@ -116,6 +116,6 @@ groups = GroupResidualDisplay.from_predictions(*rates, groups=log["run"])
 #
 # The last picture is of the model itself, trained on all runs: outside the dashed line it flags.
 
-coverage = CoverageDisplay.from_estimator(model.fit(X, log["error"]), X, units={"dT/dt": "degC/s"})
+coverage = CoverageDisplay.from_estimator(model.fit(X, log["error"]), X)
 
 plt.show()

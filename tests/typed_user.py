@@ -32,7 +32,6 @@ from skanfis.gyro import (
     OpenLoopArcsineRegressor,
     ResidualRegressor,
     ThermalRate,
-    allan_coefficients,
     allan_deviation,
     check_split,
     export_c_physics,
@@ -109,8 +108,7 @@ compensator = GyroCompensator(composed, ("output", "temperature"), predicts="rat
 compensator.write_json("compensator.json")
 applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read_log("a.csv"))
 report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
-curve = allan_deviation(log["error"], 1.0)
-walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
+curve: pd.DataFrame = allan_deviation(log["error"], 1.0)
 dwells: np.ndarray = log["rate"].to_numpy()
 picture: ErrorDisplay = ErrorDisplay.from_predictions(dwells, dwells, dwells, position=dwells)
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()

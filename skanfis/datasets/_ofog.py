@@ -54,31 +54,15 @@ _POPULATION = {
     "thermometer_noise": (0.0, 0.2, 0.0, _NOT_NEGATIVE),
 }
 # What the factor on the noise multiplies.
-_RANDOM = (
+_RANDOM = [
     "bias_repeatability",
     "angle_random_walk",
     "bias_instability",
     "rate_random_walk",
     "quantisation",
     "thermometer_noise",
-)
-# Coefficients that differ from those above, and the largest rate of the table [deg/s].
-_PRESETS: dict[str, tuple[dict, float]] = {
-    "open_loop": ({}, 100.0),
-    # A cubic of x^2 / 6 with x = K Omega leaves 0.151 x^2 / 6 RMS of full scale about its best
-    # line: 1000 ppm at 375 deg/s.
-    "linearised": (
-        {
-            "sagnac_factor": 0.0304,
-            "sagnac_temperature": -45.0,
-            "amplitude_temperature": -5.0,
-            "warm_up_scale_factor": 100.0,
-        },
-        375.0,
-    ),
-}
+]
 _CONSTRAINTS = {
-    "preset": [StrOptions(set(_PRESETS))],
     "profile": [StrOptions({"constant", "soaks", "ramps"})],
     "n_devices": [_AT_LEAST_ONE],
     "n_runs": [_AT_LEAST_ONE],
@@ -100,7 +84,6 @@ _COLDEST, _HOTTEST = -60.0, 100.0  # degC
 
 def make_ofog(
     *,
-    preset: str = "open_loop",
     profile: str = "constant",
     n_devices: int = 3,
     n_runs: int = 8,
@@ -124,14 +107,11 @@ def make_ofog(
     Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the
     table steps through rates of both signs. A compensator on board knows the columns time,
     temperature and output (or counts), and no others. Hold out whole runs (``run``) or devices
-    (``device``), never single rows: neighbours are nearly equal. Formulas, coefficients and
-    presets: :doc:`/gyro_simulator`.
+    (``device``), never single rows: neighbours are nearly equal. :doc:`/gyro_simulator` has the
+    formulas and coefficients.
 
     Parameters
     ----------
-    preset : {"open_loop", "linearised"}, default="open_loop"
-        An open loop without correction; the same with 1000 ppm of nonlinearity and -50 ppm/degC
-        left.
     profile : {"constant", "soaks", "ramps"}, default="constant"
         Chamber during a run: one temperature, five of them up and down, or a ramp up and down,
         which takes ``duration``.
@@ -141,15 +121,12 @@ def make_ofog(
         Power-ups in each run, and the time without power between two of them [s].
     duration, sampling_interval : float, default=3600.0, 10.0
         Length of each power-up, and time between rows [s]; a row is the mean over the interval.
-    max_rate : float, default=None
-        Largest rate of the table [deg/s], at which the Sagnac phase of every device must be below
-        pi/2 (some 340 deg/s for "open_loop"). Default: 100; "linearised" 375.
-    n_rate_levels : int, default=None
-        Number of equally spaced rates from ``-max_rate`` to ``max_rate``, which all runs share.
-        Default: every dwell has a rate of its own.
+    max_rate, n_rate_levels : float, int, default=None
+        Largest rate of the table [deg/s], 100 by default, at which the Sagnac phase of every device
+        must be below pi/2; and the number of equally spaced rates, which all runs share. By default
+        every dwell has a rate of its own.
     rates : array-like of shape (n_rates,), default=None
-        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest. Each comes once,
-        at random, before any comes again.
+        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest.
     dwell_time : float, default=120.0
         Time at each rate [s], rounded to ``sampling_interval``.
     ambient_range : tuple of two floats, default=(-20.0, 50.0)
@@ -160,8 +137,7 @@ def make_ofog(
         Factors on all that is random within a device, and, in [0, 1], on the tolerances of the
         population.
     coefficients : dict of str to float, default=None
-        Nominal values in place of the preset's, by their names in :doc:`/gyro_simulator`. Zero
-        turns an effect off.
+        Nominal values by their names in :doc:`/gyro_simulator`. Zero turns an effect off.
     random_state : int, RandomState instance or None, default=None
         Seed. Changing ``noise``, ``coefficients`` or ``device_spread`` leaves all that is drawn as
         it was, up to its size.
@@ -181,10 +157,6 @@ def make_ofog(
         If a parameter is of the wrong type or out of its range, or ``rates`` is given together with
         ``max_rate`` or ``n_rate_levels``.
 
-    See Also
-    --------
-    load_ofog : The founding paper's Table 1, as printed.
-
     Examples
     --------
     >>> from skanfis.datasets import make_ofog
@@ -203,7 +175,7 @@ def make_ofog(
                 f"{name}={given[name]} must be at least the sampling_interval, "
                 f"{sampling_interval} s."
             )
-    nominal = _nominal_device(preset, coefficients)
+    nominal = _nominal_device(coefficients)
     schedule = Schedule(
         # 0.3 / 0.1 is 2.9999999999999996, and three samples are meant.
         n_samples=int(duration / sampling_interval * (1.0 + 1e-12)),
@@ -213,18 +185,18 @@ def make_ofog(
         profile=profile,
         ambient_range=_ambient_range(ambient_range),
     )
-    largest, levels = _table_rates(preset, max_rate, n_rate_levels, rates)
-    _check_phase(nominal, device_spread, schedule.ambient_range, largest, rates is not None)
+    largest, levels = _table_rates(max_rate, n_rate_levels, rates)
+    _check_phase(nominal, device_spread, schedule.ambient_range, largest)
     generator: np.random.RandomState = check_random_state(random_state)
     devices = _draw_devices(nominal, n_devices, device_spread, noise, generator)
     # All runs before the first row: the noise of one must not move the temperature of the next.
     runs = list(_draw_runs(devices, n_runs, schedule, max_residual_heat, generator))
     n_held = round(dwell_time / sampling_interval)
-    power_ups: list[dict] = []
+    n_dwells = -(-schedule.n_samples // n_held)
+    power_ups: list[pd.DataFrame] = []
     for run, (device, start, biases) in enumerate(runs):
         thermal_history = temperatures(devices[device], schedule, *start)
         for thermal, bias in zip(thermal_history, biases, strict=True):
-            n_dwells = -(-schedule.n_samples // n_held)
             dwells = _draw_rates(n_dwells, largest, levels, generator)
             rate = np.repeat(dwells, n_held)[: schedule.n_samples]
             normals = generator.standard_normal((4, rate.size))
@@ -232,17 +204,14 @@ def make_ofog(
                 devices[device], bias, schedule.time, rate, thermal, normals, sampling_interval
             )
             labels = {"run": run, "power_up": len(power_ups), "device": device}
-            columns = {name: np.full(rate.size, label) for name, label in labels.items()}
-            power_ups.append(measurement | columns | parts)
-    # Each piece goes as soon as it is joined, so that the table is in memory once.
-    names = list(power_ups[0])
-    data = {name: np.concatenate([each.pop(name) for each in power_ups]) for name in names}
+            power_ups.append(pd.DataFrame(measurement | labels | parts))
+    data = pd.concat(power_ups, ignore_index=True)
     data["counts"] = nominal["amplitude"] * np.deg2rad(nominal["sagnac_factor"]) * data["output"]
-    return pd.DataFrame(data, copy=False)
+    return data
 
 
-def _nominal_device(preset, coefficients):
-    """Coefficients of the preset's gyro but for those given, checked."""
+def _nominal_device(coefficients):
+    """Coefficients of the population but for those given, checked."""
     given = {} if coefficients is None else dict(coefficients)
     unknown = [name for name in given if name not in _POPULATION]
     if unknown:
@@ -252,13 +221,13 @@ def _nominal_device(preset, coefficients):
     constraints = {name: [entry[-1]] for name, entry in _POPULATION.items()}
     validate_parameter_constraints(constraints, given, "make_ofog's coefficients")
     nominal = {name: entry[0] for name, entry in _POPULATION.items()}
-    return nominal | _PRESETS[preset][0] | {name: float(value) for name, value in given.items()}
+    return nominal | {name: float(value) for name, value in given.items()}
 
 
-def _table_rates(preset, max_rate, n_rate_levels, rates):
+def _table_rates(max_rate, n_rate_levels, rates):
     """Largest rate of the table, and its levels; None where every dwell has its own."""
     if rates is None:
-        largest = _PRESETS[preset][1] if max_rate is None else max_rate
+        largest = 100.0 if max_rate is None else max_rate
         if n_rate_levels is None:
             return largest, None
         return largest, np.linspace(-largest, largest, n_rate_levels)
@@ -293,7 +262,7 @@ def _tolerances(nominal):
     }
 
 
-def _check_phase(nominal, spread, ambient_range, largest, are_given):
+def _check_phase(nominal, spread, ambient_range, largest):
     """Refuse rates at which some device of the population would leave the sine's rising branch.
 
     Beyond a Sagnac phase of pi / 2 two rates give one output, and no compensation can tell them.
@@ -303,16 +272,14 @@ def _check_phase(nominal, spread, ambient_range, largest, are_given):
         abs(nominal[name]) + spread * tolerances[name]
         for name in ("sagnac_factor", "sagnac_temperature", "self_heating")
     )
-    coldest, hottest = ambient_range
-    difference = max(
-        REFERENCE_TEMPERATURE - coldest, hottest + self_heating - REFERENCE_TEMPERATURE
-    )
+    cold, warm = (end - REFERENCE_TEMPERATURE for end in ambient_range)
+    difference = max(-cold, warm + self_heating)
     limit = 90.0 / (factor * (1.0 + 1e-6 * by_temperature * difference))
     if largest >= limit:
-        name = "largest of abs(rates)" if are_given else "max_rate"
         raise ValueError(
-            f"{name} == {largest}, must be < {limit:.4g} deg/s: from there on the Sagnac phase "
-            "reaches pi / 2 in some device of this population, and the arcsine is not defined."
+            f"The largest rate is {largest} and must be < {limit:.4g} deg/s: from there on the "
+            "Sagnac phase reaches pi / 2 in some device of this population, and the arcsine is not "
+            "defined."
         )
 
 
@@ -320,13 +287,10 @@ def _draw_devices(nominal, n_devices, spread, noise, random_state):
     """Devices whose coefficients are uniform within ``spread`` times their tolerance."""
     tolerances = np.array(list(_tolerances(nominal).values()))
     draws = random_state.uniform(-spread, spread, size=(n_devices, tolerances.size))
-    devices = []
-    for offsets in draws * tolerances:
-        pairs = zip(_POPULATION, offsets.tolist(), strict=True)
-        device = {name: nominal[name] + offset for name, offset in pairs}
-        device |= {name: noise * device[name] for name in _RANDOM}
-        devices.append(SimpleNamespace(**device))
-    return devices
+    offsets = draws * tolerances
+    devices = pd.DataFrame(offsets + np.array(list(nominal.values())), columns=list(nominal))
+    devices[_RANDOM] *= noise
+    return [SimpleNamespace(**device) for device in devices.to_dict("records")]
 
 
 def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
@@ -343,10 +307,8 @@ def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
         heats = random_state.uniform(0.0, max_residual_heat, size=n_runs)
         normals = random_state.standard_normal((n_runs, schedule.n_power_ups))
         starts = zip(ambients, rising, heats, strict=True)
-        yield from (
-            (number, start, device.bias_repeatability * each)
-            for start, each in zip(starts, normals, strict=True)
-        )
+        for start, each in zip(starts, normals, strict=True):
+            yield number, start, device.bias_repeatability * each
 
 
 def _draw_rates(n_dwells, largest, levels, random_state):

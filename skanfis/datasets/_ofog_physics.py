@@ -10,17 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.signal import lfilter
 
-__all__ = [
-    "RANDOM_BIASES",
-    "REFERENCE_TEMPERATURE",
-    "Schedule",
-    "simulate_power_up",
-    "temperatures",
-]
+__all__ = ["REFERENCE_TEMPERATURE", "Schedule", "simulate_power_up", "temperatures"]
 
 REFERENCE_TEMPERATURE = 25.0  # degC, where the factory calibrates the scale factor
 # Biases that nobody can foresee, the one drawn at power-on included.
-RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
+_RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
 
 _PER_HOUR = 1.0 / 3600.0  # deg/h in deg/s, and an arc second in deg
 _PPM = 1e-6
@@ -153,7 +147,7 @@ def simulate_power_up(device, turn_on_bias, time, rate, thermal, normals, sampli
         "counts": output,
         "output": output,
         "error": output - rate,
-        "noise": sum(biases[name] for name in RANDOM_BIASES)
+        "noise": sum(biases[name] for name in _RANDOM_BIASES)
         # A unit of noise of the output is worth 1 over the response's slope at the input.
         + (1.0 / bias_gain(rate + bias, 0.0, *optics)) * (white + parts["quantisation"]),
     }

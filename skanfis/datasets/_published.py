@@ -1,7 +1,5 @@
 """Data of papers: the benchmarks of Jang 1993 by their formulas, and Table 1 of Sun et al. 2009."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from sklearn.utils import Bunch
@@ -36,50 +34,37 @@ _TABLE = (
 )
 
 _DESCRIPTION = """\
-Open-loop fiber-optic gyro, Table 1 of Sun et al. 2009
-------------------------------------------------------
-
-:Number of rows: 19, one every 20 s from 0 to 360 s
-:Features: time since power-on [s], temperature [degC], angular rate [deg/s]
-:Target: output of the gyro [deg/s]
-:Missing values: none
+Open-loop fiber-optic gyro: time since power-on [s], temperature [degC], rate and output [deg/s].
 
 Source: Y. Liu, Y. Sun, Y. Lu, D. Li, L. Li, Y. Pan, "Study of ANFIS Modeling Algorithm for
 Eliminating the Fiber Optic Gyro Nonlinear Error", Chinese Journal of Lasers 36 (Supplement 2),
-2009, 27-29, doi:10.3788/CJL200936s2.0027. The values are kept exactly as printed.
+2009, 27-29, doi:10.3788/CJL200936s2.0027, Table 1. The values are kept exactly as printed.
 
 Do not judge a model by its fit to this table:
 
 * The text speaks of 20 rows; 19 are printed.
-* The rate column is damaged. Its fractional parts agree (standard deviation 0.005 deg/s), while
-  the digit before the point jumps between 7, 8 and 9 from row to row, without any trace of the
-  jump in the output, which stays at 39.99 deg/s.
-* The outputs 39.5906 (at 0 s) and 39.7843 (at 280 s) stand apart from all others by far more than
-  these differ among themselves.
+* The rate column is damaged: its fractional parts agree (standard deviation 0.005 deg/s), while
+  the digit before the point jumps between 7, 8 and 9, and the output stays at 39.99 deg/s.
+* The outputs 39.5906 (at 0 s) and 39.7843 (at 280 s) stand apart from all others.
 * All temperatures lie between 20.47 and 21.32 degC: one window of 1 degC.
 * The paper trains 36 rules, that is 108 linear parameters, on these rows, and tests only on
   0 to 120 s of the same rows. No row is left to test a model on.
 """
 
 
-def load_ofog(*, return_X_y: bool = False) -> Any:
+def load_ofog() -> Bunch:
     """Load Table 1 of the founding paper: 19 rows of an open-loop fiber-optic gyro (regression).
 
     A historical document, kept as printed, and no benchmark: the column of rates is damaged, two
     outputs stand apart, and all rows lie in one window of 1 degC. ``DESCR`` has the details. For
     data to develop a compensation on, see :func:`make_ofog`.
 
-    Parameters
-    ----------
-    return_X_y : bool, default=False
-        Return ``(data, target)`` in place of a Bunch.
-
     Returns
     -------
-    table : :class:`~sklearn.utils.Bunch`, or tuple if ``return_X_y=True``
+    table : :class:`~sklearn.utils.Bunch`
         With DataFrames ``data`` (19, 3): time since power-on [s], temperature [degC], angular rate
         [deg/s]; ``target`` (19,): output of the gyro [deg/s]; ``frame``, both together; and
-        ``feature_names``, ``target_names`` and ``DESCR``.
+        ``DESCR``.
 
     Examples
     --------
@@ -89,16 +74,7 @@ def load_ofog(*, return_X_y: bool = False) -> Any:
     """
     frame = pd.DataFrame(_TABLE, columns=["time", "temperature", "rate", "output"], dtype=float)
     data, target = frame.drop(columns="output"), frame["output"]
-    if return_X_y:
-        return data, target
-    return Bunch(
-        data=data,
-        target=target,
-        frame=frame,
-        feature_names=list(data),
-        target_names=["output"],
-        DESCR=_DESCRIPTION,
-    )
+    return Bunch(data=data, target=target, frame=frame, DESCR=_DESCRIPTION)
 
 
 def make_jang_sinc(*, midpoints: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -138,7 +114,8 @@ def make_jang_sinc(*, midpoints: bool = False) -> tuple[np.ndarray, np.ndarray]:
 def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
     """Make Jang's second problem: y = (1 + x1^0.5 + x2^-1 + x3^-1.5)^2.
 
-    Jang's figure of merit is the mean of 100 abs(y - prediction) / abs(y).
+    It is example 2 of the paper that :func:`make_jang_sinc` names. Jang's figure of merit is the
+    mean of 100 abs(y - prediction) / abs(y).
 
     Parameters
     ----------
@@ -157,10 +134,6 @@ def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray
     ValueError
         If ``subset`` is unknown.
 
-    References
-    ----------
-    As for :func:`make_jang_sinc`, example 2.
-
     Examples
     --------
     >>> from skanfis.datasets import make_jang_three_input
@@ -175,7 +148,7 @@ def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray
 
 
 def make_mackey_glass(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
-    """Make Jang's fourth problem: predict the chaotic Mackey-Glass series.
+    """Make Jang's fourth problem: predict the chaotic Mackey-Glass series (Science 197, 1977).
 
     The series solves dx/dt = 0.2 x(t - 17) / (1 + x(t - 17)^10) - 0.1 x(t) with x(0) = 1.2, and
     zero before. From its values at t - 18, t - 12, t - 6 and t, the value at t + 6 is to be
@@ -197,11 +170,6 @@ def make_mackey_glass(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
     ------
     ValueError
         If ``subset`` is unknown.
-
-    References
-    ----------
-    M. C. Mackey, L. Glass, "Oscillation and Chaos in Physiological Control Systems", Science 197,
-    1977, 287-289. Jang as for :func:`make_jang_sinc`, example 4.
 
     Examples
     --------

@@ -1,7 +1,6 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
 from ._checks import check_log
-from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
 from .compose import ResidualRegressor
@@ -10,6 +9,7 @@ from .errors import LogError
 from .features import ThermalLag, ThermalRate, TimeSincePowerOn
 from .groups import check_split, find_rate_levels, group_by_rate_level, group_by_run
 from .log import read_log
+from .metrics import allan_deviation
 from .physics import OpenLoopArcsineRegressor
 from .report import gyro_report
 from .thermal_displays import (
@@ -34,7 +34,6 @@ __all__ = [
     "ThermalLag",
     "ThermalRate",
     "TimeSincePowerOn",
-    "allan_coefficients",
     "allan_deviation",
     "check_log",
     "check_split",

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of
-from .allan import ALLAN_FIGURES
-from .metrics import figures_of_merit
+from .metrics import ALLAN_FIGURES, figures_of_merit
 
 __all__ = [
     "Check",

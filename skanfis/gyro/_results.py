@@ -4,6 +4,7 @@ import base64
 import io
 import re
 from functools import cached_property
+from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +14,9 @@ from ..inspection import MembershipDisplay
 from ._columns import RATE_UNITS, evenly_chosen, label_texts
 from ._headline import readability_of
 from ._report_options import ReportOptions, check_limit
-from .allan import rows_for_allan
 from .compensator import features
 from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures, signs
-from .metrics import rms
+from .metrics import rms, rows_for_allan
 from .report import gyro_report
 from .thermal_displays import (
     CoverageDisplay,
@@ -111,13 +111,11 @@ class Results:
         self.error_before = (self.before - self.rate)[self.in_range]
         self.error_after = (self.after - self.rate)[self.in_range]
         self.temperature = self.log["temperature"].to_numpy()
-        self.temperature_rate = self.time = self.since_power_on = self.run = None
+        self.temperature_rate = self.time = self.run = None
         if "temperature_rate" in calibration.X:
             self.temperature_rate = _PER_MINUTE * calibration.X["temperature_rate"].to_numpy()
         if "time" in self.log:
             self.time = self.log["time"].to_numpy()
-            times = features(self.log, ("time",), time_constant=1.0)
-            self.since_power_on = times["time"].to_numpy()
         if "run" in self.log:
             self.run = label_texts(self.log["run"])
         self.unit = self.options.unit
@@ -128,7 +126,7 @@ class Results:
 
     def shown(self, error):
         """An error [deg/s] in the unit for errors, without it; a dash where it is not known."""
-        return figures(RATE_UNITS[self.unit] * error) if np.isfinite(error) else "–"
+        return figures(RATE_UNITS[self.unit] * error)
 
     @cached_property
     def merit(self):
@@ -152,9 +150,7 @@ class Results:
     @cached_property
     def of_allan(self):
         """Arguments of an AllanDisplay, or why there is none."""
-        try:
-            import allantools  # noqa: F401
-        except ImportError:
+        if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:
             return "the log has no time"
@@ -180,8 +176,6 @@ class Results:
 
     def pictures(self):
         """The pictures of the held-out rows that have a sense on this log."""
-        from matplotlib.figure import Figure
-
         arguments = self._arguments()
         for subject, (kind, caption) in _PICTURES.items():
             if subject not in arguments:
@@ -190,7 +184,7 @@ class Results:
             rows = options.pop("rows", slice(None))
             rates = (each[rows] for each in (self.rate, self.before, self.after))
             unit = None if kind is ScaleFactorErrorDisplay else self.unit
-            figure = Figure(layout="constrained")
+            figure = _figure()
             display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
             yield Picture.of(subject, figure, display.tables(), caption)
 
@@ -204,7 +198,8 @@ class Results:
         }
         if self.time is not None:
             label = "time since power-on [s]"
-            found["error-by-time"] = {"position": self.since_power_on, "position_label": label}
+            time = features(self.log, ("time",), time_constant=1.0)["time"]
+            found["error-by-time"] = {"position": time, "position_label": label}
         if np.ptp(self.rate):
             for subject in ("scale-factor-error", "residual-surface"):
                 found[subject] = {"temperature": temperature}
@@ -216,30 +211,26 @@ class Results:
 
     def coverage(self):
         """The picture of the coverage; none where temperature or output is no input."""
-        from matplotlib.figure import Figure
-
         calibration = self.calibration
         if not {"temperature", "output"} <= set(calibration.X):
             return
-        figure = Figure(layout="constrained")
+        figure = _figure()
         display = CoverageDisplay.from_estimator(
             calibration.compensator.estimator,
             calibration.X,
             min_coverage=calibration.compensator.min_coverage,
-            units={"output": calibration.recipe.output_unit, "temperature_rate": "degC/s"},
+            output_unit=calibration.recipe.output_unit,
             ax=figure,
         )
         yield Picture.of("coverage", figure, display.tables(), _COVERAGE)
 
     def memberships(self):
         """The picture of the membership functions; none where no input has terms."""
-        from matplotlib.figure import Figure
-
         rules, X = self.calibration.rules, self.calibration.X
         n_inputs = len({term["input"] for term in rules[-1].memberships_})
         if not n_inputs:
             return
-        figure = Figure(figsize=(6.2, 0.6 + 1.9 * n_inputs), layout="constrained")
+        figure = _figure(figsize=(6.2, 0.6 + 1.9 * n_inputs))
         axes = list(figure.subplots(n_inputs, squeeze=False).ravel())
         shown = X.iloc[evenly_chosen(len(X), _MOST_ROWS_SHOWN)]
         display = MembershipDisplay.from_estimator(rules, shown, ax=axes)
@@ -250,6 +241,13 @@ class Results:
                 parts.append(pd.DataFrame({"input": each.input_name, "term": term} | truths))
         caption = "Membership functions before training (dashed) and after, over the data."
         yield Picture.of("fuzzy-terms", figure, {"terms": pd.concat(parts)}, caption)
+
+
+def _figure(**options):
+    """A figure that is not pyplot's, which would look for a screen."""
+    from matplotlib.figure import Figure
+
+    return Figure(layout="constrained", **options)
 
 
 def _base64(data):

@@ -1,6 +1,5 @@
 """Pictures of a compensation, after scikit-learn's Displays: they store tables and draw them."""
 
-import textwrap
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
@@ -10,22 +9,9 @@ from numpy.typing import ArrayLike
 
 from ..inspection.labels import as_label
 from ._columns import PER_HOUR, RATE_UNITS, evenly_chosen
-from .allan import allan_coefficients, allan_deviation
-from .metrics import rms, table_of
+from .metrics import allan_deviation, allan_figures, rms, table_of
 
-__all__ = [
-    "SIDES",
-    "TWO_ROWS",
-    "AllanDisplay",
-    "ErrorDisplay",
-    "GroupResidualDisplay",
-    "GyroDisplay",
-    "bins_of",
-    "dress",
-    "figures",
-    "mark_decades",
-    "signs",
-]
+__all__ = ["AllanDisplay", "ErrorDisplay", "GroupResidualDisplay"]
 
 # Colours that the colour-blind can tell apart.
 SIDES = {"before": "#d55e00", "after": "#0072b2"}
@@ -35,10 +21,10 @@ TWO_ROWS = {"nrows": 2, "sharex": True}
 _N_BANDS, _N_POINTS = 300, 3_000
 # The worst groups: more lines cannot be read.
 _MOST_GROUPS = 30
-_CAUTION = (
-    "Smoothing is not compensation: a filter lowers the left of a curve and hides as much of the "
-    "motion. What a compensation takes away lies on the right, at long averaging times."
-)
+_CAUTION = """\
+Smoothing is not compensation: a filter lowers the left of a curve and hides
+as much of the motion. What a compensation takes away lies on the right, at
+long averaging times."""
 
 
 class GyroDisplay:
@@ -316,18 +302,17 @@ class AllanDisplay(GyroDisplay):
         mark_decades(panel.xaxis, *panel.get_xlim())
         mark_decades(panel.yaxis, *panel.get_ylim())
         panel.legend(frameon=False)
-        panel.set_title("\n".join(textwrap.wrap(_CAUTION, 76)), loc="left", fontsize="small")
+        panel.set_title(_CAUTION, loc="left", fontsize="small")
 
     def _coefficients(self, time, deviation):
         """What is read off a curve, in words."""
         factor = RATE_UNITS[self._unit] / RATE_UNITS["deg/h"]
         try:
-            read = allan_coefficients(time, deviation / factor)
+            (walk, _), (instability, _), *_ = allan_figures(time, deviation / factor).values()
         except ValueError:
             return ""  # too few points, or no noise at all
-        walk, instability = read.angle_random_walk, read.bias_instability
-        text = "" if walk is None else f", N = {figures(walk)} °/√h"
-        if instability is not None:
+        text = "" if np.isnan(walk) else f", N = {figures(walk)} °/√h"
+        if np.isfinite(instability):
             text += f", B = {figures(factor * instability)} {signs(self._unit)}"
         return text
 
@@ -358,20 +343,19 @@ def signs(text):
 
 
 def figures(value):
-    """A number with three digits that count, without an exponent where it can be."""
+    """A number with three digits that count, without an exponent where it can be; NaN is a dash."""
     if value == 0 or not np.isfinite(value):
-        return f"{value:g}"
+        return "–" if np.isnan(value) else f"{value:g}"
     decimals = max(2 - int(np.floor(np.log10(abs(value)))), 0)
     return f"{value:,.{decimals}f}" if decimals < 8 else f"{value:.2e}"
 
 
 def mark_decades(axis, low, high):
     """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     decades = np.log10(high / low)
     digits = (1, 2, 3, 5) if decades < 1.0 else (1, 3) if decades < 3.0 else (1,)
     axis.set_major_locator(LogLocator(subs=digits, numticks=8))
-    form = FuncFormatter(lambda v, _: f"{v:,.0f}" if 100.0 <= v < 1e6 else f"{v:.3g}")
-    axis.set_major_formatter(form)
+    axis.set_major_formatter("{x:,g}")
     axis.set_minor_formatter(NullFormatter())

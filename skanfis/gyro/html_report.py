@@ -59,7 +59,9 @@ def report_page(calibration, title, options=None):
         reasons=map(signs, _reasons(results)),
         cautions=[f"Warning: {sentence}" for sentence in cautions],
         sections=[section for make in sections if (section := make(results))],
-        footer=f"Made by {_programs()}. Figures of merit in the terms of IEEE Std 952.",
+        footer=f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
+        f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}. "
+        "Figures of merit in the terms of IEEE Std 952.",
     )
 
 
@@ -111,9 +113,10 @@ def _reasons(results):
 def _identity(results):
     """What is needed to find this calibration again, and to repeat it."""
     options = results.options
-    names = "device, serial number", "operator", "made"
-    entries = [each or "not given" for each in (options.serial, options.operator, options.made)]
-    blocks = [_table(["what", "entry"], zip(names, entries, strict=True))]
+    entries = {"device, serial number": options.serial, "operator": options.operator}
+    entries |= {"made": options.made}
+    lines = [(name, entry or "not given") for name, entry in entries.items()]
+    blocks = [_table(["what", "entry"], lines)]
     if options.files:
         blocks.append(_table(["file of the log", "bytes", "SHA-256"], options.files))
     text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
@@ -198,7 +201,7 @@ def _merit(results):
         cells = []
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
-            cells += [_shown(value), _interval(low, high)]
+            cells += [figures(value), _interval(low, high)]
         lines.append((_words(line["figure"]), *cells, signs(line["unit"])))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit"]
     resampled = results.merit.attrs["resampled"]
@@ -207,7 +210,7 @@ def _merit(results):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
         checks = [
-            (_words(limit.figure), signs(limit.text), _shown(value), signs(limit.unit), *told)
+            (_words(limit.figure), signs(limit.text), figures(value), signs(limit.unit), *told)
             for limit, value, *told in results.checks
         ]
         caption = "After compensation by the fuzzy rules, on the held-out rows in range"
@@ -273,7 +276,8 @@ def _sure(results):
         Block("soft", _BUDGET),
         Block("heading", "What is proven"),
         _table(["over the box below", "result"], proven),
-        _box(calibration, names, _rounded(certain.found.box)),
+        # What rounding leaves of zero, where a box is in the units before a scaler, is zero.
+        _box(calibration, names, np.round(certain.found.box, 9) + 0.0),
         Block("soft", _PROOF),
     ]
 
@@ -334,15 +338,6 @@ def _interval(low, high, shown=figures):
     return f"[{shown(low)}, {shown(high)}]" if np.isfinite([low, high]).all() else ""
 
 
-def _shown(value):
-    return figures(value) if np.isfinite(value) else "–"
-
-
-def _rounded(values):
-    """What rounding leaves of zero, where a box is in the units before a scaler, is zero."""
-    return np.round(values, 9) + 0.0
-
-
 def _words(name):
     return name.replace("_", " ")
 
@@ -354,11 +349,3 @@ def _unit_of(calibration, name):
 def _terms_text(terms):
     """Numbers of fuzzy terms in words."""
     return f"terms {' × '.join(map(str, terms))}" if terms else "structure left to ANFISRegressor"
-
-
-def _programs():
-    """The programs that figures depend on, with their versions."""
-    return (
-        f"skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy {np.__version__}, "
-        f"SciPy {scipy.__version__} and Python {platform.python_version()}"
-    )

@@ -3,6 +3,9 @@
 Every column has one value per row: rates in deg/s, temperatures in degC, times in s. The error at
 the input is the output over its scale factor, less the true rate; biases are of it, in deg/h. Where
 a figure does not exist these functions raise ValueError with the reason; they never return NaN.
+
+N, B and K are read off the Allan deviation [deg/h] of tau [h]: N sqrt(1 / tau) where its slope is
+-1/2, B sqrt(2 ln 2 / pi) at its minimum, and K sqrt(tau / 3) where its slope is +1/2.
 """
 
 from collections.abc import Callable
@@ -11,10 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from ._columns import PER_HOUR, check_column, check_labels
 
-__all__ = ["LARGEST_VALUES", "figures_of_merit", "input_error", "rms", "rows_by_run", "table_of"]
+__all__ = ["allan_deviation", "figures_of_merit", "hysteresis", "rms", "scale_factor"]
 
 _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
@@ -23,6 +27,19 @@ _HYSTERESIS_BINS, _ROWS_PER_MEAN = 20, 5
 _RATE_BINS = 101
 # The largest value of a resample says nothing of the largest to come.
 LARGEST_VALUES = ("residual_peak", "residual_peak_to_peak")
+ALLAN_FIGURES = {
+    "angle_random_walk": "deg/sqrt(h)",
+    "bias_instability": "deg/h",
+    "allan_minimum": "deg/h",
+    "rate_random_walk": "deg/h/sqrt(h)",
+}
+_FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
+_POINTS_PER_SLOPE = 3  # two points have no check
+# Neighbouring processes differ by a half in slope: a third of that tells them apart.
+_SLOPE_TOLERANCE = 0.15
+# A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
+_ROWS_PER_TIME = 10
+_UNEVEN = 0.01  # largest deviation of the time between rows, relative
 
 
 class Figure(NamedTuple):
@@ -60,23 +77,35 @@ def figures_of_merit(full_scale=1.0):
     rates, error, residual = ("rate", "output"), ("error",), ("residual",)
     heat, ramp = "temperature", "temperature_rate"
     largest, root = (partial(_nonlinearity, full_scale=full_scale, size=s) for s in (_peak, rms))
-    full, spread = "ppm of full scale", partial(np.std, ddof=1)
+    full = "ppm of full scale"
     slope, slope_in_ramp = (partial(_bias_sensitivity, name=name) for name in (heat, ramp))
     short, long = (partial(_squares_of_means, over=seconds) for seconds in (10.0, 100.0))
     timed, pooled = ("error", "time"), _pooled_deviation
+
+    def bias(error):
+        return PER_HOUR * error.mean()
+
+    def spread(values):
+        return np.std(values, ddof=1)
+
+    def relative_spread(slopes):
+        return _PPM * spread(slopes) / abs(np.mean(slopes))
+
     return [
         Figure("residual_rms", "deg/s", rms, residual),
         Figure("residual_peak", "deg/s", _peak, residual),
         Figure("residual_peak_to_peak", "deg/s", np.ptp, residual),
         Figure("reduction_factor", "", _reduction, ("rate", "before", "after")),
-        Figure("scale_factor_error", "ppm", _off_one, rates),
+        Figure(
+            "scale_factor_error", "ppm", lambda *line: _PPM * (scale_factor(*line) - 1.0), rates
+        ),
         Figure("scale_factor_nonlinearity", full, largest, rates),
         Figure("scale_factor_nonlinearity_rms", full, root, rates),
         Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
-        Figure("scale_factor_repeatability", "ppm", scale_factor, rates, "", _relative_spread, 2),
+        Figure("scale_factor_repeatability", "ppm", scale_factor, rates, "", relative_spread, 2),
         Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
-        Figure("bias", "deg/h", _bias, error),
-        Figure("bias_repeatability", "deg/h", _bias, error, "", spread, 2),
+        Figure("bias", "deg/h", bias, error),
+        Figure("bias_repeatability", "deg/h", bias, error, "", spread, 2),
         Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), ramp),
         Figure("bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), heat),
         Figure("hysteresis", "deg/h", hysteresis, ("error", heat, ramp)),
@@ -98,8 +127,7 @@ def table_of(columns, labels=(), gaps=()):
         if name in labels:
             found[name] = check_labels(values, name, n_rows)
         elif name in gaps:
-            numbers = np.asarray(values)
-            numbers = numbers if numbers.dtype.kind in "fiu" else numbers.astype(object)
+            numbers = np.asarray(values, dtype=object)
             is_gap = pd.isna(numbers)
             filled = check_column(np.where(is_gap, 0.0, numbers), name, n_rows)
             found[name] = np.where(is_gap, np.nan, filled)
@@ -142,18 +170,123 @@ def hysteresis(error, temperature, temperature_rate) -> float:
     low = max(temperature[side].min() for side in sides)
     high = max(low, min(temperature[side].max() for side in sides))
     edges = np.linspace(low, high, _HYSTERESIS_BINS + 1)
-    counts, sums = (
-        np.array([np.histogram(temperature[side], edges, weights=w[side])[0] for side in sides])
-        for w in (np.ones_like(error), error)
-    )
-    met = (counts >= _ROWS_PER_MEAN).all(axis=0)
-    if not met.any():
+    shared = (temperature >= low) & (temperature <= high) & (temperature_rate != 0)
+    keys = [np.digitize(temperature[shared], edges[1:-1]), sides[0][shared]]
+    means = pd.Series(error[shared]).groupby(keys).agg(["mean", "size"])
+    gaps = means["mean"].where(means["size"] >= _ROWS_PER_MEAN).unstack().diff(axis=1)
+    if gaps.isna().all(axis=None):
         raise ValueError(
             "No hysteresis: warming and cooling share no temperature at which both have "
             f"{_ROWS_PER_MEAN} rows."
         )
-    warming, cooling = sums[:, met] / counts[:, met]
-    return float(PER_HOUR * np.abs(warming - cooling).max())
+    return float(PER_HOUR * gaps.abs().max(axis=None))
+
+
+def allan_deviation(
+    error: ArrayLike, sampling_interval: float, *, run: ArrayLike | None = None
+) -> pd.DataFrame:
+    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
+
+    Parameters
+    ----------
+    error : array-like of shape (n_rows,)
+        Error at the input, evenly sampled within each run [deg/s].
+    sampling_interval : float
+        Time between rows, positive [s].
+    run : array-like of shape (n_rows,), default=None
+        Labels of the runs, whose variances are averaged; None is one run.
+
+    Returns
+    -------
+    curve : DataFrame of shape (n_times, 4)
+        averaging_time [s]; deviation [deg/h]; its standard error [deg/h]; n, the differences.
+
+    Raises
+    ------
+    ImportError
+        If allantools is not installed.
+    ValueError
+        If ``sampling_interval`` is not positive, or no run has ten rows.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import allan_deviation
+    >>> white = np.random.default_rng(0).normal(scale=1 / 3600, size=4096)  # deg/s
+    >>> curve = allan_deviation(white, 1.0)  # doctest: +SKIP
+    >>> curve["deviation"].iloc[0].round(1)  # doctest: +SKIP
+    1.0
+    """
+    try:
+        from allantools import oadev
+    except ImportError as reason:
+        raise ImportError(
+            "The Allan deviation needs allantools: pip install allantools."
+        ) from reason
+    error = check_column(error, "error")
+    if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
+        raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
+    parts = []
+    for rows in rows_by_run(run, error.size):
+        if rows.size < _ROWS_PER_TIME:
+            continue
+        times, deviations, _, counts = oadev(
+            PER_HOUR * error[rows], rate=1.0 / sampling_interval, data_type="freq", taus="octave"
+        )
+        multiple = np.round(times / sampling_interval)
+        part = pd.DataFrame({"multiple": multiple, "sum": counts * deviations**2, "n": counts})
+        parts.append(part[multiple * _ROWS_PER_TIME <= rows.size])
+    if not parts:
+        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
+    sums = pd.concat(parts).groupby("multiple", as_index=False).sum()
+    curve = pd.DataFrame({"averaging_time": sums["multiple"] * sampling_interval})
+    curve["deviation"] = np.sqrt(sums["sum"] / sums["n"])
+    curve["error"] = curve["deviation"] / np.sqrt(sums["n"])
+    return curve.assign(n=sums["n"].astype(int))
+
+
+def allan_figures(tau, deviation):
+    """Of each figure its value, NaN where the curve [s, deg/h] has none, and why it has none.
+
+    A slope is found where a line through three neighbouring points has it within 0.15; the lowest
+    such line counts, before the minimum for N and after it for K. A minimum at an end is none.
+    """
+    if tau.size < _POINTS_PER_SLOPE:
+        raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")
+    if deviation.min() <= 0:
+        raise ValueError(f"deviation must be positive; its smallest value is {deviation.min():g}.")
+    lowest = int(np.argmin(deviation))
+    minimum, no_minimum = deviation[lowest], ""
+    if lowest in (0, tau.size - 1):
+        side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
+        minimum = np.nan
+        no_minimum = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
+    walk, no_walk = _level(tau[: lowest + 1], deviation[: lowest + 1], -0.5)
+    drift, no_drift = _level(tau[lowest:], deviation[lowest:], 0.5)
+    return {
+        # sigma sqrt(tau) is N where the slope is -1/2: 1 deg/h at 1 s is 1/60 deg/sqrt(h).
+        "angle_random_walk": (walk / 60.0, no_walk),
+        "bias_instability": (minimum / _FLICKER, no_minimum),
+        "allan_minimum": (minimum, no_minimum),
+        # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
+        "rate_random_walk": (drift * np.sqrt(3.0) * 60.0, no_drift),
+    }
+
+
+def rows_for_allan(time, run, answered):
+    """Rows of the runs that were answered from end to end, and the time between them [s].
+
+    ValueError says why there is no Allan deviation.
+    """
+    runs = [rows for rows in rows_by_run(run, time.size) if answered[rows].all()]
+    if not runs:
+        raise ValueError("no run is in range from end to end")
+    if max(map(len, runs)) < _ROWS_PER_TIME:
+        raise ValueError(f"no run in range has {_ROWS_PER_TIME} rows")
+    steps = np.concatenate([np.diff(time[rows]) for rows in runs])
+    if np.abs(steps - np.median(steps)).max() > _UNEVEN * np.median(steps):
+        raise ValueError("the rows are not evenly spaced in time")
+    return np.sort(np.concatenate(runs)), float(np.median(steps))
 
 
 def _line(rate, output):
@@ -166,10 +299,6 @@ def _line(rate, output):
     return slope, middle - slope * mean
 
 
-def _bias(error):
-    return PER_HOUR * error.mean()
-
-
 def _peak(values):
     return np.abs(values).max()
 
@@ -179,14 +308,6 @@ def _reduction(rate, before, after):
     if left == 0:
         raise ValueError("after is zero everywhere: a factor without bound.")
     return rms(before - rate) / left
-
-
-def _off_one(rate, output):
-    return _PPM * (scale_factor(rate, output) - 1.0)
-
-
-def _relative_spread(slopes):
-    return _PPM * np.std(slopes, ddof=1) / abs(np.mean(slopes))
 
 
 def _nonlinearity(rate, output, full_scale, size):
@@ -267,3 +388,18 @@ def _pooled_deviation(squares):
     if degrees_of_freedom == 0:
         raise ValueError("No bias stability: no run is as long as two averaging times.")
     return float(PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
+
+
+def _level(tau, deviation, slope):
+    """Level of the lowest line of this slope along the curve; NaN and why where it has none."""
+    x, y = np.log(tau), np.log(deviation)
+    levels = []
+    for start in range(x.size - _POINTS_PER_SLOPE + 1):
+        window = slice(start, start + _POINTS_PER_SLOPE)
+        if abs(np.polyfit(x[window], y[window], 1)[0] - slope) <= _SLOPE_TOLERANCE:
+            levels.append(np.mean(y[window] - slope * x[window]))
+    return (
+        (np.exp(min(levels)), "")
+        if levels
+        else (np.nan, f"no slope of {'+' if slope > 0 else '-'}1/2")
+    )

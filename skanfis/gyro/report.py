@@ -5,9 +5,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
+from . import metrics
 from ._columns import RATE_UNITS, in_rate_unit
-from .allan import ALLAN_FIGURES, allan_coefficients, allan_deviation, rows_for_allan
-from .metrics import LARGEST_VALUES, figures_of_merit, input_error, rows_by_run, table_of
 
 __all__ = ["gyro_report"]
 
@@ -73,8 +72,7 @@ def gyro_report(
     ImportError
         If ``allan=True`` and allantools is not installed.
     ValueError
-        If a column is not one of finite numbers as long as the others, or a parameter is out of its
-        range.
+        If a column is not as long as the others or not finite, or a parameter is out of its range.
 
     Examples
     --------
@@ -87,7 +85,7 @@ def gyro_report(
     """
     columns = {"rate": rate, "before": before, "after": after, "temperature": temperature}
     columns |= {"temperature_rate": temperature_rate, "time": time, "run": run}
-    table = table_of(columns, labels=("run",), gaps=("after",))
+    table = metrics.table_of(columns, labels=("run",), gaps=("after",))
     sides = ["before", "after"] if "after" in table else ["before"]
     is_answered = table[sides[-1]].notna()
     if not is_answered.any():
@@ -106,7 +104,7 @@ def gyro_report(
     given = {*table, "output", "residual", "error"}
     figures = [
         figure
-        for figure in figures_of_merit(full_scale)
+        for figure in metrics.figures_of_merit(full_scale)
         if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
     ]
     units, kind = _units(table[is_answered])
@@ -114,7 +112,7 @@ def gyro_report(
     generator = np.random.RandomState(check_random_state(random_state).randint(2**31 - 1))
     draws = [generator.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
     names = [(figure.name, figure.unit) for figure in figures]
-    names += ALLAN_FIGURES.items() if allan else []
+    names += metrics.ALLAN_FIGURES.items() if allan else []
     report, notes = pd.DataFrame(names, columns=["figure", "unit"]), {}
     for side in sides:
         cells = _cells(table[is_answered], side, figures, units, kind, draws)
@@ -140,7 +138,7 @@ def _joined(notes):
 
 def _units(rows):
     """The rows of each run, or of blocks of rows within the runs; and which of both."""
-    runs = rows_by_run(rows.get("run"), len(rows))
+    runs = metrics.rows_by_run(rows.get("run"), len(rows))
     if len(runs) >= _FEWEST_RUNS:
         return runs, "runs"
     length = max(1, -(-len(rows) // _N_BLOCKS))
@@ -170,7 +168,7 @@ def _cells(table, side, figures, units, kind, draws):
 def _interval(figure, rows, samples, draws, kind):
     """Ends of the interval, and why it has none."""
     nothing = (np.nan, np.nan)
-    if figure.name in LARGEST_VALUES:
+    if figure.name in metrics.LARGEST_VALUES:
         return nothing, "largest value: no interval"
     if figure.combine is None:
         spread = np.array([_or_nan(figure.of, sample)[0] for sample in samples])
@@ -189,7 +187,7 @@ def _columns(table, side):
     """The columns with the output of one side, its residual, and its error at the input."""
     rows = {name: table[name].to_numpy() for name in table}
     rate, output = rows["rate"], rows[side]
-    error = input_error(rate, output)
+    error = metrics.input_error(rate, output)
     return rows | {"output": output, "residual": output - rate, "error": error}
 
 
@@ -198,15 +196,14 @@ def _allan_cells(part, side, is_answered):
     time = part["time"].to_numpy()
     run = part["run"].to_numpy() if "run" in part else np.zeros(len(part))
     try:
-        rows, interval = rows_for_allan(time, run, is_answered)
+        rows, interval = metrics.rows_for_allan(time, run, is_answered)
         error = (part[side] - part["rate"]).to_numpy()[rows]
-        curve = allan_deviation(error, interval, run=run[rows])
-        read = allan_coefficients(curve["averaging_time"], curve["deviation"])
+        curve = metrics.allan_deviation(error, interval, run=run[rows])
+        found = metrics.allan_figures(*curve[["averaging_time", "deviation"]].to_numpy().T)
     except ValueError as reason:
-        return [(np.nan, np.nan, np.nan, str(reason))] * len(ALLAN_FIGURES)
-    notes = dict.fromkeys(ALLAN_FIGURES, "no interval: see the standard errors of allan_deviation")
-    notes |= read.notes
-    return [(getattr(read, n) or np.nan, np.nan, np.nan, note) for n, note in notes.items()]
+        return [(np.nan, np.nan, np.nan, str(reason))] * len(metrics.ALLAN_FIGURES)
+    usual = "no interval: see the standard errors of allan_deviation"
+    return [(value, np.nan, np.nan, note or usual) for value, note in found.values()]
 
 
 def _or_nan(function, *arguments):

@@ -5,7 +5,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import pandas as pd
 
-from ..inspection.labels import as_label
 from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, TWO_ROWS, GyroDisplay, bins_of, dress, figures, mark_decades, signs
 
@@ -32,7 +31,6 @@ _MARGIN = 0.15
 _NEARLY_ALL = 0.995
 _NO_DATA = "#e9e9e6"
 _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some, full
-_UNITS = {"temperature": "degC", "output": "deg/s", "time": "s", "temperature_rate": "degC/min"}
 
 
 class ScaleFactorErrorDisplay(GyroDisplay):
@@ -118,15 +116,12 @@ class HysteresisDisplay(GyroDisplay):
 
     Examples
     --------
-    >>> import numpy as np
     >>> from skanfis.gyro import HysteresisDisplay
-    >>> rate, angle = np.zeros(2001), np.linspace(0, 2 * np.pi, 2001)
-    >>> options = {"temperature": np.sin(angle), "temperature_rate": np.cos(angle)}
-    >>> before = 10 * np.cos(angle) / 3600
-    >>> display = HysteresisDisplay.from_predictions(rate, before, rate, **options)
-    >>> bias = display.tables()["bias"]
-    >>> round((bias.iloc[:, 1] - bias.iloc[:, 2]).max())  # before, while warming and cooling
-    20
+    >>> options = {"temperature": range(60), "temperature_rate": [1, 1, 1, -1, -1, -1] * 10}
+    >>> rates = [0] * 60, [0.01, 0.01, 0.01, 0, 0, 0] * 10, [0] * 60
+    >>> display = HysteresisDisplay.from_predictions(*rates, **options)
+    >>> round(display.tables()["bias"]["bias before, warming [deg/h]"].max())
+    36
     """
 
     _PER_ROW = ("temperature", "temperature_rate")
@@ -227,7 +222,7 @@ class ResidualSurfaceDisplay(GyroDisplay):
 
 
 class CoverageDisplay(GyroDisplay):
-    """Where the calibration data cover what a compensator may be asked: a map over two inputs.
+    """Where the calibration data cover what a compensator may be asked, by temperature and output.
 
     Cells without a row are hatched; in the others the colour is the coverage, from 0 to 1. Outside
     the dashed line rows are flagged, and within it where the coverage is below ``min_coverage``,
@@ -263,9 +258,7 @@ class CoverageDisplay(GyroDisplay):
         estimator: Any,
         X: Any,
         *,
-        x: str = "temperature",
-        y: str = "output",
-        units: dict[str, Any] | None = None,
+        output_unit: str = "deg/s",
         min_coverage: float = 0.1,
         ax: Any = None,
     ) -> Self:
@@ -276,11 +269,9 @@ class CoverageDisplay(GyroDisplay):
         estimator : estimator
             Fitted, with methods ``coverage`` and ``in_bounds``, or a Pipeline that ends in such.
         X : DataFrame of shape (n_rows, n_inputs)
-            Rows to draw; other inputs are at their medians.
-        x, y : str, default="temperature", "output"
-            Columns of X that the axes stand for.
-        units : dict, default=None
-            Units of columns, by name.
+            Rows to draw, with columns temperature and output; other inputs are at their medians.
+        output_unit : str, default="deg/s"
+            Unit of the column output.
         min_coverage : float, default=0.1
             Rows that are covered less are flagged.
         ax : matplotlib Figure or axes, default=None
@@ -290,22 +281,18 @@ class CoverageDisplay(GyroDisplay):
         -------
         display : CoverageDisplay
         """
-        for name in (x, y):
+        labels = {"temperature": "temperature [degC]", "output": f"output [{output_unit}]"}
+        for name in labels:
             if name not in X:
                 raise ValueError(f"{name!r} is no column of X, which has {', '.join(X)}.")
-        units = _UNITS | (units or {})
-        labels = {
-            name: name.replace("_", " ") + (f" [{units[name]}]" if name in units else "")
-            for name in (x, y)
-        }
         rows = pd.DataFrame({label: check_column(X[name], name) for name, label in labels.items()})
         steps = np.linspace(-_MARGIN, 1.0 + _MARGIN, _N_POINTS)
         axes = (rows[label].min() + steps * np.ptp(rows[label]) for label in rows)
-        places = dict(zip((x, y), (each.ravel() for each in np.meshgrid(*axes)), strict=True))
+        places = dict(zip(labels, (each.ravel() for each in np.meshgrid(*axes)), strict=True))
         grid = pd.DataFrame(X.median().to_dict() | places)[list(X)]
         cells, numbers = _cells(dict(rows))
         cells["rows"] = np.bincount(numbers, minlength=len(cells))
-        points = grid[[x, y]].rename(columns=labels)
+        points = grid[list(labels)].rename(columns=labels)
         points["coverage"] = ask(estimator, "coverage", grid)
         points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
         numbers = _cell_numbers({label: points[label] for label in rows}, _edges(cells))
@@ -337,7 +324,7 @@ class CoverageDisplay(GyroDisplay):
             panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
         empty = np.mean(cells["rows"] == 0)
         title = f"{empty:.0%} of the cells in range are empty (hatched)"
-        dress(panel, as_label(labels[0]), as_label(labels[1]), title)
+        dress(panel, *labels, title)
         panel.grid(False)
 
 

@@ -107,10 +107,5 @@ def test_table_has_the_defects_that_its_description_states():
 def test_bunch_holds_one_table_which_the_next_does_not_share():
     bunch = load_ofog()
     pd.testing.assert_frame_equal(bunch.data.assign(output=bunch.target), bunch.frame)
-    assert bunch.feature_names == list(bunch.data)
-    assert bunch.target_names == [bunch.target.name]
-    X, y = load_ofog(return_X_y=True)
-    pd.testing.assert_frame_equal(X, bunch.data)
-    pd.testing.assert_series_equal(y, bunch.target)
     bunch.frame.iloc[0, 0] = -1.0
     assert load_ofog().frame.iloc[0, 0] == 0.0
