@@ -145,11 +145,10 @@ def make_ofog(
     Returns
     -------
     data : DataFrame of shape (n_devices * n_runs * n_power_ups * n_samples, 26)
-        Runs one after another, in time's order. The measurement: time since power-on [s];
-        temperature of the gyro's thermometer [degC] and its rate without noise,
-        temperature_rate [degC/s]; ambient [degC]; true rate [deg/s]; counts; output, the indicated
-        rate; error, output - rate; noise, which no compensation can foresee, at the input [deg/s];
-        run, power_up and device. Then the parts of the error [deg/s], which sum to it.
+        Runs in turn: time since power-on [s]; temperature of the gyro's thermometer [degC] and its
+        rate without noise [degC/s]; ambient [degC]; true rate [deg/s]; counts; output, the
+        indicated rate; error, output - rate; noise, which no compensation can foresee, at the
+        input; run, power_up and device; then the parts of the error [deg/s], which sum to it.
 
     Raises
     ------
@@ -201,7 +200,7 @@ def make_ofog(
             rate = np.repeat(dwells, n_held)[: schedule.n_samples]
             normals = generator.standard_normal((4, rate.size))
             measurement, parts = simulate_power_up(
-                devices[device], bias, schedule.time, rate, thermal, normals, sampling_interval
+                devices[device], bias, rate, thermal, normals, sampling_interval
             )
             labels = {"run": run, "power_up": len(power_ups), "device": device}
             power_ups.append(pd.DataFrame(measurement | labels | parts))
@@ -263,10 +262,7 @@ def _tolerances(nominal):
 
 
 def _check_phase(nominal, spread, ambient_range, largest):
-    """Refuse rates at which some device of the population would leave the sine's rising branch.
-
-    Beyond a Sagnac phase of pi / 2 two rates give one output, and no compensation can tell them.
-    """
+    """Refuse rates of a Sagnac phase of pi / 2: beyond it, two rates give one output."""
     tolerances = _tolerances(nominal)
     factor, by_temperature, self_heating = (
         abs(nominal[name]) + spread * tolerances[name]

@@ -19,10 +19,9 @@ _RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
 _PER_HOUR = 1.0 / 3600.0  # deg/h in deg/s, and an arc second in deg
 _PPM = 1e-6
 _N_SOAKS = 5
-# The largest Allan deviation of a Gauss-Markov process in its standard deviations, and the flat one
-# of flicker noise in its coefficient (IEEE 952, annex on Allan variance).
-_ALLAN_MAXIMUM_OF_GAUSS_MARKOV = 0.437 * np.sqrt(2.0)
-_ALLAN_FLOOR_OF_FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)
+# The flat Allan deviation of flicker noise in its coefficient, over the largest of a Gauss-Markov
+# process in its standard deviations (IEEE 952, annex on Allan variance).
+_GAUSS_MARKOV = np.sqrt(2.0 * np.log(2.0) / np.pi) / (0.437 * np.sqrt(2.0))
 
 
 @dataclass(frozen=True)
@@ -35,11 +34,6 @@ class Schedule:
     n_off: int  # samples between two power-ups, without power
     profile: str
     ambient_range: tuple[float, float]  # degC
-
-    @property
-    def time(self):
-        """Time since power-on [s]."""
-        return self.sampling_interval * np.arange(self.n_samples)
 
     def ambient(self, first, n_samples, start, rising):
         """Temperature of the chamber [degC] at samples of the run's clock, from ``first`` on."""
@@ -90,13 +84,13 @@ def temperatures(device, schedule, start, rising, residual_heat):
         coil_start = coil[-1]
 
 
-def simulate_power_up(device, turn_on_bias, time, rate, thermal, normals, sampling_interval):
+def simulate_power_up(device, turn_on_bias, rate, thermal, normals, sampling_interval):
     """Columns of the measurement and of the parts of its error, for one power-up.
 
     ``thermal`` is of :func:`temperatures`; ``normals`` are four rows of standard normal numbers,
     for bias instability, rate random walk, angle random walk and thermometer.
     """
-    h = sampling_interval
+    h, time = sampling_interval, sampling_interval * np.arange(rate.size)
     warm = thermal.coil - REFERENCE_TEMPERATURE
     settling = np.exp(-time / device.warm_up_time)
     relative = 1.0 + _PPM * device.sagnac_temperature * warm  # K(T) / K0
@@ -203,8 +197,7 @@ def quantised(rate, coefficient, sampling_interval):
 
 def bias_instability(standard_normal, coefficient, correlation_time, sampling_interval):
     """Stationary Gauss-Markov noise [deg/s], whose Allan deviation peaks at 0.664 B, B in deg/h."""
-    ratio = _ALLAN_FLOOR_OF_FLICKER / _ALLAN_MAXIMUM_OF_GAUSS_MARKOV
-    deviation = ratio * coefficient * _PER_HOUR
+    deviation = _GAUSS_MARKOV * coefficient * _PER_HOUR
     interval = sampling_interval / correlation_time
     innovations = np.sqrt(-np.expm1(-2.0 * interval)) * standard_normal
     innovations[0] = standard_normal[0]

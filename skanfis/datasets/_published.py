@@ -55,9 +55,8 @@ Do not judge a model by its fit to this table:
 def load_ofog() -> Bunch:
     """Load Table 1 of the founding paper: 19 rows of an open-loop fiber-optic gyro (regression).
 
-    A historical document, kept as printed, and no benchmark: the column of rates is damaged, two
-    outputs stand apart, and all rows lie in one window of 1 degC. ``DESCR`` has the details. For
-    data to develop a compensation on, see :func:`make_ofog`.
+    A historical document, kept as printed, and no benchmark, as ``DESCR`` says. For data to develop
+    a compensation on, see :func:`make_ofog`.
 
     Returns
     -------

@@ -12,7 +12,6 @@ import pandas as pd
 
 from ..inspection import MembershipDisplay
 from ._columns import RATE_UNITS, evenly_chosen, label_texts
-from ._headline import readability_of
 from ._report_options import ReportOptions, check_limit
 from .compensator import features
 from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures, signs
@@ -108,7 +107,6 @@ class Results:
         self.in_range = calibration.in_range
         self.before = np.where(self.in_range, calibration.before, np.nan)
         self.after = np.where(self.in_range, calibration.after, np.nan)
-        self.error_before = (self.before - self.rate)[self.in_range]
         self.error_after = (self.after - self.rate)[self.in_range]
         self.temperature = self.log["temperature"].to_numpy()
         self.temperature_rate = self.time = self.run = None
@@ -121,7 +119,8 @@ class Results:
         self.unit = self.options.unit
         if self.unit == "auto":
             # That in which errors are no long row of zeros.
-            self.unit = "deg/s" if rms(self.error_before) > _SMALL else "deg/h"
+            is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
+            self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 
     def shown(self, error):
@@ -169,31 +168,12 @@ class Results:
         lines = self.merit.set_index("figure")
         return [check_limit(limit, lines) for limit in self.options.limits]
 
-    @cached_property
-    def readability(self):
-        """Whether the rules can be read one by one."""
-        return readability_of(self.calibration)
-
     def pictures(self):
         """The pictures of the held-out rows that have a sense on this log."""
-        arguments = self._arguments()
-        for subject, (kind, caption) in _PICTURES.items():
-            if subject not in arguments:
-                continue
-            options = arguments[subject]
-            rows = options.pop("rows", slice(None))
-            rates = (each[rows] for each in (self.rate, self.before, self.after))
-            unit = None if kind is ScaleFactorErrorDisplay else self.unit
-            figure = _figure()
-            display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
-            yield Picture.of(subject, figure, display.tables(), caption)
-
-    def _arguments(self):
-        """What each picture is made of, where it has a sense."""
-        temperature, change = self.temperature, self.temperature_rate
+        heat, change = {"temperature": self.temperature}, self.temperature_rate
         label = "temperature [degC]"
         found = {
-            "error-by-temperature": {"position": temperature, "position_label": label},
+            "error-by-temperature": {"position": self.temperature, "position_label": label},
             "held-out-groups": {"groups": self.calibration.split.labels.astype(str)},
         }
         if self.time is not None:
@@ -201,13 +181,21 @@ class Results:
             time = features(self.log, ("time",), time_constant=1.0)["time"]
             found["error-by-time"] = {"position": time, "position_label": label}
         if np.ptp(self.rate):
-            for subject in ("scale-factor-error", "residual-surface"):
-                found[subject] = {"temperature": temperature}
+            found["scale-factor-error"] = found["residual-surface"] = heat
         if change is not None and change.min() < -_CLEARLY < _CLEARLY < change.max():
-            found["hysteresis"] = {"temperature": temperature, "temperature_rate": change}
+            found["hysteresis"] = heat | {"temperature_rate": change}
         if isinstance(self.of_allan, dict):
-            found["allan-deviation"] = dict(self.of_allan)
-        return found
+            found["allan-deviation"] = self.of_allan
+        for subject, (kind, caption) in _PICTURES.items():
+            if subject not in found:
+                continue
+            options = dict(found[subject])
+            rows = options.pop("rows", slice(None))
+            rates = (each[rows] for each in (self.rate, self.before, self.after))
+            unit = None if kind is ScaleFactorErrorDisplay else self.unit
+            figure = _figure()
+            display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
+            yield Picture.of(subject, figure, display.tables(), caption)
 
     def coverage(self):
         """The picture of the coverage; none where temperature or output is no input."""

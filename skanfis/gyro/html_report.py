@@ -16,7 +16,7 @@ from ..policies import policy_in_words
 from ._budget import budget_of, proven_bounds
 from ._columns import RATE_UNITS, SIGNALS
 from ._formulas import formula_of, law_table, on_board, rules_text
-from ._headline import ARTICLES, headline, held_out_groups
+from ._headline import ARTICLES, headline, held_out_groups, readability_of
 from ._results import Results
 from ._simpler import NOTHING, options_for
 from .displays import figures, signs
@@ -33,12 +33,11 @@ _PROOF = "Proven for every point of the box. How far the gyro is from the compen
 
 
 class Block(NamedTuple):
-    """Part of a section: "text", "warn", "soft", "heading", "table", "pictures" or "details"."""
+    """Part of a section: text, warn, soft, heading, table, pictures, or details, closed or open."""
 
     kind: str
     content: Any
     title: str = ""
-    is_open: bool = False
 
 
 def report_page(calibration, title, options=None):
@@ -190,7 +189,7 @@ def _instead(results):
     )
     if wanted := options_for(name, calibration.X.shape[1]):
         text += f" The command writes its files, C code included, with {wanted}."
-    formula = Block("details", formula_of(calibration, name), "What to compute", is_open=True)
+    formula = Block("open", formula_of(calibration, name), "What to compute")
     return "What to use instead", [Block("text", text), formula]
 
 
@@ -290,8 +289,8 @@ def _rules(results):
         text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
     blocks.append(Block("pictures", list(results.memberships())))
-    findings = results.readability.findings
-    text, steps = rules_text(calibration, results.readability), on_board(calibration.compensator)
+    found = readability_of(calibration)
+    text, steps = rules_text(calibration, found), on_board(calibration.compensator)
     n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
@@ -299,7 +298,7 @@ def _rules(results):
         Block("details", text, f"All rules as text ({n_rules}, {terms})"),
         Block("details", steps, "What to compute on board"),
         Block("heading", "Can the rules be read?"),
-        *([Block("warn", sentence) for sentence in findings] or [Block("text", fit)]),
+        *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
     ]
 
 

@@ -42,7 +42,7 @@ _ROWS_PER_TIME = 10
 _UNEVEN = 0.01  # largest deviation of the time between rows, relative
 
 
-class Figure(NamedTuple):
+class _Figure(NamedTuple):
     """A figure of merit of some columns; ``also`` is one that is given by name where there is such.
 
     With ``combine``, the function is of one run, and ``combine`` of the values of all runs.
@@ -57,18 +57,15 @@ class Figure(NamedTuple):
     fewest_runs: int = 1
 
     def of(self, rows):
-        """The function of these rows."""
         also = {self.also: rows[self.also]} if self.also in rows else {}
         return self.function(*(rows[name] for name in self.needs), **also)
 
     def by_run(self, rows):
-        """The function of each run."""
         runs = rows_by_run(rows.get("run"), rows["rate"].size, self.fewest_runs)
         parts = [{name: column[run] for name, column in rows.items()} for run in runs]
         return np.array([self.of(part) for part in parts])
 
     def value(self, rows):
-        """The figure of these rows."""
         return self.of(rows) if self.combine is None else self.combine(self.by_run(rows))
 
 
@@ -92,25 +89,25 @@ def figures_of_merit(full_scale=1.0):
         return _PPM * spread(slopes) / abs(np.mean(slopes))
 
     return [
-        Figure("residual_rms", "deg/s", rms, residual),
-        Figure("residual_peak", "deg/s", _peak, residual),
-        Figure("residual_peak_to_peak", "deg/s", np.ptp, residual),
-        Figure("reduction_factor", "", _reduction, ("rate", "before", "after")),
-        Figure(
+        _Figure("residual_rms", "deg/s", rms, residual),
+        _Figure("residual_peak", "deg/s", _peak, residual),
+        _Figure("residual_peak_to_peak", "deg/s", np.ptp, residual),
+        _Figure("reduction_factor", "", _reduction, ("rate", "before", "after")),
+        _Figure(
             "scale_factor_error", "ppm", lambda *line: _PPM * (scale_factor(*line) - 1.0), rates
         ),
-        Figure("scale_factor_nonlinearity", full, largest, rates),
-        Figure("scale_factor_nonlinearity_rms", full, root, rates),
-        Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
-        Figure("scale_factor_repeatability", "ppm", scale_factor, rates, "", relative_spread, 2),
-        Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
-        Figure("bias", "deg/h", bias, error),
-        Figure("bias_repeatability", "deg/h", bias, error, "", spread, 2),
-        Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), ramp),
-        Figure("bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), heat),
-        Figure("hysteresis", "deg/h", hysteresis, ("error", heat, ramp)),
-        Figure("bias_stability_10s", "deg/h", short, timed, "", pooled),
-        Figure("bias_stability_100s", "deg/h", long, timed, "", pooled),
+        _Figure("scale_factor_nonlinearity", full, largest, rates),
+        _Figure("scale_factor_nonlinearity_rms", full, root, rates),
+        _Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
+        _Figure("scale_factor_repeatability", "ppm", scale_factor, rates, "", relative_spread, 2),
+        _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
+        _Figure("bias", "deg/h", bias, error),
+        _Figure("bias_repeatability", "deg/h", bias, error, "", spread, 2),
+        _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), ramp),
+        _Figure("bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), heat),
+        _Figure("hysteresis", "deg/h", hysteresis, ("error", heat, ramp)),
+        _Figure("bias_stability_10s", "deg/h", short, timed, "", pooled),
+        _Figure("bias_stability_100s", "deg/h", long, timed, "", pooled),
     ]
 
 

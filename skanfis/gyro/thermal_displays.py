@@ -93,7 +93,7 @@ class ScaleFactorErrorDisplay(GyroDisplay):
                 known = band.dropna(subset=column)
                 rate, ppm = known["true rate [deg/s]"], known[column]
                 # The line is broken at rest.
-                for half, label in ((rate < 0, f"{np.mean(ends):.0f} °C"), (rate > 0, None)):
+                for half, label in ((rate < 0, f"{np.mean(ends):z.0f} °C"), (rate > 0, None)):
                     panel.plot(rate[half], ppm[half], ".-", color=color, label=label, lw=1.2, ms=4)
             title = f"{side}: largest {figures(scale_factor[column].abs().max())} ppm"
             legend = "around" if panel is axes[0] else None
@@ -324,7 +324,7 @@ class CoverageDisplay(GyroDisplay):
             panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
         empty = np.mean(cells["rows"] == 0)
         title = f"{empty:.0%} of the cells in range are empty (hatched)"
-        dress(panel, *labels, title)
+        dress(panel, labels[0], labels[1], title)
         panel.grid(False)
 
 

@@ -17,7 +17,7 @@ NOMINAL = {name: entry[0] for name, entry in _POPULATION.items()}
 STRUCTURAL = ("amplitude", "sagnac_factor", "warm_up_time", "thermal_time", "correlation_time")
 IDEAL = NOMINAL | {name: 0.0 for name in NOMINAL if name not in STRUCTURAL}
 SCHEDULE = Schedule(720, 5.0, 1, 0, "constant", (-20.0, 60.0))
-TIME = SCHEDULE.time
+TIME = 5.0 * np.arange(720)
 RATE = np.repeat(np.linspace(-120, 120, 9), 80)
 OPTICS = (0.2536, 0.98, 1.01)
 
@@ -31,7 +31,7 @@ def simulate(device, *, ambient=20.0, bias=0.0, normals=None, rate=RATE):
     """Measurement and parts of the error at a constant ambient temperature."""
     normals = np.zeros((4, TIME.size)) if normals is None else normals
     (thermal,) = history(SCHEDULE, ambient, **device)
-    return simulate_power_up(SimpleNamespace(**device), bias, TIME, rate, thermal, normals, 5.0)
+    return simulate_power_up(SimpleNamespace(**device), bias, rate, thermal, normals, 5.0)
 
 
 @pytest.fixture(name="normals")
