@@ -241,16 +241,12 @@ def _table_rates(max_rate, n_rate_levels, rates):
 
 
 def _ambient_range(given):
-    try:
-        low, high = (float(end) for end in given)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"ambient_range must be two temperatures; got {given!r}.") from error
-    if not _COLDEST <= low <= high <= _HOTTEST:
+    if np.shape(given) != (2,) or not _COLDEST <= given[0] <= given[1] <= _HOTTEST:
         raise ValueError(
-            f"ambient_range={given!r} must rise, from {_COLDEST:g} or more to {_HOTTEST:g} degC or "
-            "less."
+            f"ambient_range={given!r} must be two temperatures that rise, from {_COLDEST:g} or "
+            f"more to {_HOTTEST:g} degC or less."
         )
-    return low, high
+    return tuple(map(float, given))
 
 
 def _tolerances(nominal):
