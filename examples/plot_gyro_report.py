@@ -73,16 +73,15 @@ by_temperature = ErrorDisplay.from_predictions(
 
 figure = plt.figure(figsize=(11, 4.4), layout="constrained")
 left, right = figure.subfigures(1, 2)
-scale_factor = ScaleFactorErrorDisplay.from_predictions(
+ScaleFactorErrorDisplay.from_predictions(
     *rates, temperature=log["temperature"], ax=left.subplots(2, sharex=True)
 )
-hysteresis = HysteresisDisplay.from_predictions(
+HysteresisDisplay.from_predictions(
     *rates,
     temperature=log["temperature"],
     temperature_rate=60.0 * log["dT/dt"],
     ax=right.subplots(2, sharex=True),
 )
-print(f"largest gap: {hysteresis.gap_before_:.3g} °/h before, {hysteresis.gap_after_:.3g} after")
 
 # %%
 # Hysteresis is a matter of bias, and shows best in a gyro at rest, where no rate disturbs it.
@@ -96,11 +95,11 @@ inputs = at_rest[["time", "temperature", "dT/dt"]]
 bias_model = ANFISRegressor([2, 2, 1], out_of_bounds="clip")
 bias_model = bias_model.fit(inputs[old], at_rest["error"][old])
 new = at_rest[~old]
-loop = HysteresisDisplay.from_estimator(
-    bias_model,
-    new,
+HysteresisDisplay.from_predictions(
     new["rate"],
-    temperature="temperature",
+    new["output"],
+    new["output"] - bias_model.predict(new[inputs.columns]),
+    temperature=new["temperature"],
     temperature_rate=60.0 * new["dT/dt"],
 )
 
@@ -117,6 +116,6 @@ groups = GroupResidualDisplay.from_predictions(*rates, groups=log["run"])
 #
 # The last picture is of the model itself, trained on all runs: outside the dashed line it flags.
 
-coverage = CoverageDisplay.from_estimator(model.fit(X, log["error"]), X, units={"dT/dt": "degC/s"})
+coverage = CoverageDisplay.from_estimator(model.fit(X, log["error"]), X)
 
 plt.show()

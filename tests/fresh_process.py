@@ -80,8 +80,7 @@ def pyplot_of_pictures():
 
     from skanfis.gyro import ErrorDisplay
 
-    display = ErrorDisplay.computed([0, 1], [0, 1], [0, 1], position=[0, 1])
-    display.plot(display.panels(Figure))
+    ErrorDisplay.from_predictions([0, 1], [0, 1], [0, 1], position=[0, 1], ax=Figure())
     return [name for name in sys.modules if name == "matplotlib.pyplot"]
 
 

@@ -32,10 +32,7 @@ from skanfis.gyro import (
     OpenLoopArcsineRegressor,
     ResidualRegressor,
     ThermalRate,
-    allan_coefficients,
     allan_deviation,
-    bias,
-    bias_stability,
     export_c_physics,
     group_by_rate_level,
     gyro_report,
@@ -107,11 +104,9 @@ compensator = GyroCompensator(composed, ("output", "temperature"), predicts="rat
 compensator.write_json("compensator.json")
 applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read_log("a.csv"))
 report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
-offset: float = bias(log["error"])
-curve = allan_deviation(log["error"], 1.0)
-walk: float | None = allan_coefficients(curve["time"], curve["deviation"]).angle_random_walk
+curve: pd.DataFrame = allan_deviation(log["error"], 1.0)
 dwells: np.ndarray = log["rate"].to_numpy()
-picture: ErrorDisplay = ErrorDisplay.from_estimator(composed, log, log["rate"])
+picture: ErrorDisplay = ErrorDisplay.from_predictions(dwells, dwells, dwells, position=dwells)
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
 wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]
 
@@ -132,7 +127,6 @@ ResponseSurfaceDisplay.from_estimator(model, frame, features=("x0", "x1"), held=
 sure = ConformalRegressor(model, cv=3).fit(frame, y, groups=[0, 1] * 60)
 lower, upper = sure.predict_interval(frame, coverage=0.95)
 model.partial_fit(frame, y, forgetting=0.99)
-stability: float = bias_stability(log["error"], log["time"], averaging_time=10.0, run=log["run"])
 export_text(model, precision="many")  # type: ignore[arg-type]
 export_c(model, min_coverage="most")  # type: ignore[arg-type]
 model.coverage(None)  # type: ignore[arg-type]

@@ -1,7 +1,6 @@
 """Data sets: gyros, real (one printed table) and simulated, and the benchmarks of Jang 1993."""
 
-from ._jang import make_jang_sinc, make_jang_three_input, make_mackey_glass
 from ._ofog import make_ofog
-from ._ofog_table import load_ofog
+from ._published import load_ofog, make_jang_sinc, make_jang_three_input, make_mackey_glass
 
 __all__ = ["load_ofog", "make_jang_sinc", "make_jang_three_input", "make_mackey_glass", "make_ofog"]

@@ -20,7 +20,6 @@ _NOT_NEGATIVE = Interval(Real, 0, None, closed="left")
 _POSITIVE = Interval(Real, 0, None, closed="neither")
 _PART = Interval(Real, 0, 1, closed="both")
 _AT_LEAST_ONE = Interval(Integral, 1, None, closed="left")
-_AT_LEAST_TWO = Interval(Integral, 2, None, closed="left")
 
 
 def _within(limit):
@@ -55,71 +54,25 @@ _POPULATION = {
     "thermometer_noise": (0.0, 0.2, 0.0, _NOT_NEGATIVE),
 }
 # What the factor on the noise multiplies.
-_RANDOM = (
+_RANDOM = [
     "bias_repeatability",
     "angle_random_walk",
     "bias_instability",
     "rate_random_walk",
     "quantisation",
     "thermometer_noise",
-)
-_CONDITIONS = {
-    "duration": 3600.0,
-    "sampling_interval": 10.0,
-    "max_rate": 100.0,
-    "n_rate_levels": None,
-    "rates": None,
-    "dwell_time": 120.0,
-    "ambient_range": (-20.0, 50.0),
-}
-# Coefficients and conditions that differ from those above.
-_PRESETS: dict[str, tuple[dict, dict]] = {
-    "open_loop": ({}, {}),
-    # A cubic of x^2 / 6 with x = K Omega leaves 0.151 x^2 / 6 RMS of full scale about its best
-    # line: 1000 ppm at 375 deg/s.
-    "linearised": (
-        {
-            "sagnac_factor": 0.0304,
-            "sagnac_temperature": -45.0,
-            "amplitude_temperature": -5.0,
-            "warm_up_scale_factor": 100.0,
-        },
-        {"max_rate": 375.0},
-    ),
-    # Table 1 of the founding paper: at 38.69 deg/s some 39.99 deg/s are indicated, although the
-    # sine takes 0.5 % away; a start that is over within 20 s; rows scatter by 0.005 deg/s.
-    "paper": (
-        {
-            "scale_factor": 36_950.0,
-            "warm_up": -1440.0,
-            "warm_up_time": 5.0,
-            "self_heating": 0.5,
-            "thermal_time": 300.0,
-            "angle_random_walk": 1.3,
-            "thermometer_noise": 0.25,
-        },
-        {
-            "duration": 380.0,
-            "sampling_interval": 20.0,
-            "rates": (38.69,),
-            "ambient_range": (20.4, 20.8),
-        },
-    ),
-}
+]
 _CONSTRAINTS = {
-    "preset": [StrOptions(set(_PRESETS))],
     "profile": [StrOptions({"constant", "soaks", "ramps"})],
     "n_devices": [_AT_LEAST_ONE],
     "n_runs": [_AT_LEAST_ONE],
     "n_power_ups": [_AT_LEAST_ONE],
     "off_time": [_NOT_NEGATIVE],
-    "duration": [_POSITIVE, None],
-    "sampling_interval": [_POSITIVE, None],
+    "duration": [_POSITIVE],
+    "sampling_interval": [_POSITIVE],
     "max_rate": [_POSITIVE, None],
-    "n_rate_levels": [_AT_LEAST_TWO, None],
-    "rate_order": [StrOptions({"random", "sweep"})],
-    "dwell_time": [_POSITIVE, None],
-    "n_soaks": [_AT_LEAST_TWO],
+    "n_rate_levels": [Interval(Integral, 2, None, closed="left"), None],
+    "dwell_time": [_POSITIVE],
     "max_residual_heat": [_PART],
     "noise": [_NOT_NEGATIVE],
     "device_spread": [_PART],
@@ -131,21 +84,18 @@ _COLDEST, _HOTTEST = -60.0, 100.0  # degC
 
 def make_ofog(
     *,
-    preset: str = "open_loop",
     profile: str = "constant",
     n_devices: int = 3,
     n_runs: int = 8,
     n_power_ups: int = 1,
     off_time: float = 600.0,
-    duration: float | None = None,
-    sampling_interval: float | None = None,
+    duration: float = 3600.0,
+    sampling_interval: float = 10.0,
     max_rate: float | None = None,
     n_rate_levels: int | None = None,
     rates: ArrayLike | None = None,
-    rate_order: str = "random",
-    dwell_time: float | None = None,
-    ambient_range: Any = None,
-    n_soaks: int = 5,
+    dwell_time: float = 120.0,
+    ambient_range: Any = (-20.0, 50.0),
     max_residual_heat: float = 0.5,
     noise: float = 1.0,
     device_spread: float = 1.0,
@@ -155,57 +105,39 @@ def make_ofog(
     """Simulate thermal runs of open-loop fiber-optic gyros on a rate table (regression).
 
     Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the
-    table steps through rates of both signs. The table has the error that a compensation must learn,
-    and every part of it. A compensator on board knows the columns time, temperature and output (or
-    counts), and no others. Hold out whole runs (``run``) or devices (``device``), never single
-    rows: neighbours are nearly equal. Formulas, coefficients and presets: :doc:`/gyro_simulator`.
+    table steps through rates of both signs. A compensator on board knows the columns time,
+    temperature and output (or counts), and no others. Hold out whole runs (``run``) or devices
+    (``device``), never single rows: neighbours are nearly equal. :doc:`/gyro_simulator` has the
+    formulas and coefficients.
 
     Parameters
     ----------
-    preset : {"open_loop", "linearised", "paper"}, default="open_loop"
-        Gyro and conditions to start from: an open loop without correction; the same with 1000 ppm
-        of nonlinearity and -50 ppm/degC left; 19 rows at 38.69 deg/s as in :func:`load_ofog`.
     profile : {"constant", "soaks", "ramps"}, default="constant"
-        Chamber during a run: one temperature, ``n_soaks`` of them in turn, or a ramp up and down,
+        Chamber during a run: one temperature, five of them up and down, or a ramp up and down,
         which takes ``duration``.
-    n_devices : int, default=3
-        Number of gyros.
-    n_runs : int, default=8
-        Runs per device. Each begins in another of as many equal parts of the ambient range.
-    n_power_ups : int, default=1
-        Power-ups in each run, ``off_time`` apart.
-    off_time : float, default=600
-        Time without power between two power-ups [s], rounded to ``sampling_interval``.
-    duration : float, default=None
-        Length of each power-up [s]. Default: 3600; "paper" 380.
-    sampling_interval : float, default=None
-        Time between rows [s]; a row is the mean over the interval. Default: 10; "paper" 20.
-    max_rate : float, default=None
-        Largest rate of the table [deg/s], at which the Sagnac phase of every device must be below
-        pi/2 (some 340 deg/s for "open_loop"). Default: 100; "linearised" 375.
-    n_rate_levels : int, default=None
-        Number of equally spaced rates from ``-max_rate`` to ``max_rate``, which all runs share.
-        Default: every dwell has a rate of its own.
+    n_devices, n_runs : int, default=3, 8
+        Gyros, and runs of each, which begin in as many equal parts of the ambient range.
+    n_power_ups, off_time : int, float, default=1, 600.0
+        Power-ups in each run, and the time without power between two of them [s].
+    duration, sampling_interval : float, default=3600.0, 10.0
+        Length of each power-up, and time between rows [s]; a row is the mean over the interval.
+    max_rate, n_rate_levels : float, int, default=None
+        Largest rate of the table [deg/s], 100 by default, at which the Sagnac phase of every device
+        must be below pi/2; and the number of equally spaced rates, which all runs share. By default
+        every dwell has a rate of its own.
     rates : array-like of shape (n_rates,), default=None
-        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest. "paper": 38.69.
-    rate_order : {"random", "sweep"}, default="random"
-        Each rate once, at random, before any comes again; or up and down.
-    dwell_time : float, default=None
-        Time at each rate [s], rounded to ``sampling_interval``. Default: 120.
-    ambient_range : tuple of two floats, default=None
-        Temperatures of the chamber [degC], within -60 and 100. Default: -20 and 50; "paper" 20.4
-        and 20.8.
-    n_soaks : int, default=5
-        Number of temperatures of the profile "soaks".
+        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest.
+    dwell_time : float, default=120.0
+        Time at each rate [s], rounded to ``sampling_interval``.
+    ambient_range : tuple of two floats, default=(-20.0, 50.0)
+        Temperatures of the chamber [degC], within -60 and 100.
     max_residual_heat : float, default=0.5
         A run starts with a part of the self-heating, up to this one, in the coil; 0: cold starts.
-    noise : float, default=1.0
-        Factor on all that is random within a device.
-    device_spread : float, default=1.0
-        Factor in [0, 1] on the tolerances of the population.
+    noise, device_spread : float, default=1.0
+        Factors on all that is random within a device, and, in [0, 1], on the tolerances of the
+        population.
     coefficients : dict of str to float, default=None
-        Nominal values in place of the preset's, by their names in :doc:`/gyro_simulator`. Zero
-        turns an effect off.
+        Nominal values by their names in :doc:`/gyro_simulator`. Zero turns an effect off.
     random_state : int, RandomState instance or None, default=None
         Seed. Changing ``noise``, ``coefficients`` or ``device_spread`` leaves all that is drawn as
         it was, up to its size.
@@ -213,24 +145,16 @@ def make_ofog(
     Returns
     -------
     data : DataFrame of shape (n_devices * n_runs * n_power_ups * n_samples, 26)
-        Runs one after another, in time's order. The measurement: time since power-on [s];
-        temperature of the gyro's thermometer [degC] and its rate without noise,
-        temperature_rate [degC/s]; ambient [degC]; true rate [deg/s]; counts; output, the indicated
-        rate; error, output - rate; noise, which no compensation can foresee, at the input [deg/s];
-        run, power_up and device. Then the parts of the error [deg/s]: nonlinearity, scale_factor,
-        wavelength, amplitude, warm_up_scale_factor, bias, bias_temperature, warm_up,
-        bias_temperature_rate, bias_repeatability, bias_instability, rate_random_walk,
-        angle_random_walk and quantisation.
+        Runs in turn: time since power-on [s]; temperature of the gyro's thermometer [degC] and its
+        rate without noise [degC/s]; ambient [degC]; true rate [deg/s]; counts; output, the
+        indicated rate; error, output - rate; noise, which no compensation can foresee, at the
+        input; run, power_up and device; then the parts of the error [deg/s], which sum to it.
 
     Raises
     ------
     ValueError
         If a parameter is of the wrong type or out of its range, or ``rates`` is given together with
         ``max_rate`` or ``n_rate_levels``.
-
-    See Also
-    --------
-    load_ofog : The founding paper's Table 1, as printed.
 
     Examples
     --------
@@ -244,45 +168,49 @@ def make_ofog(
     """
     given = locals()
     validate_parameter_constraints(_CONSTRAINTS, given, "make_ofog")
-    nominal = _nominal_device(preset, coefficients)
-    conditions = _conditions(preset, {name: given[name] for name in _CONDITIONS})
-    interval = conditions.sampling_interval
+    for name in ("duration", "dwell_time"):
+        if given[name] < sampling_interval:
+            raise ValueError(
+                f"{name}={given[name]} must be at least the sampling_interval, "
+                f"{sampling_interval} s."
+            )
+    nominal = _nominal_device(coefficients)
     schedule = Schedule(
         # 0.3 / 0.1 is 2.9999999999999996, and three samples are meant.
-        n_samples=int(conditions.duration / interval * (1.0 + 1e-12)),
-        sampling_interval=interval,
+        n_samples=int(duration / sampling_interval * (1.0 + 1e-12)),
+        sampling_interval=sampling_interval,
         n_power_ups=n_power_ups,
-        n_off=round(off_time / interval),
+        n_off=round(off_time / sampling_interval),
         profile=profile,
-        ambient_range=conditions.ambient_range,
-        n_soaks=n_soaks,
+        ambient_range=_ambient_range(ambient_range),
     )
-    _check_phase(nominal, device_spread, conditions)
+    largest, levels = _table_rates(max_rate, n_rate_levels, rates)
+    _check_phase(nominal, device_spread, schedule.ambient_range, largest)
     generator: np.random.RandomState = check_random_state(random_state)
     devices = _draw_devices(nominal, n_devices, device_spread, noise, generator)
     # All runs before the first row: the noise of one must not move the temperature of the next.
     runs = list(_draw_runs(devices, n_runs, schedule, max_residual_heat, generator))
-    power_ups: list[dict] = []
+    n_held = round(dwell_time / sampling_interval)
+    n_dwells = -(-schedule.n_samples // n_held)
+    power_ups: list[pd.DataFrame] = []
     for run, (device, start, biases) in enumerate(runs):
         thermal_history = temperatures(devices[device], schedule, *start)
         for thermal, bias in zip(thermal_history, biases, strict=True):
-            rate = _draw_rates(schedule.n_samples, conditions, rate_order, generator)
+            dwells = _draw_rates(n_dwells, largest, levels, generator)
+            rate = np.repeat(dwells, n_held)[: schedule.n_samples]
             normals = generator.standard_normal((4, rate.size))
             measurement, parts = simulate_power_up(
-                devices[device], bias, schedule.time, rate, thermal, normals, interval
+                devices[device], bias, rate, thermal, normals, sampling_interval
             )
             labels = {"run": run, "power_up": len(power_ups), "device": device}
-            columns = {name: np.full(rate.size, label) for name, label in labels.items()}
-            power_ups.append(measurement | columns | parts)
-    # Each piece goes as soon as it is joined, so that the table is in memory once.
-    names = list(power_ups[0])
-    data = {name: np.concatenate([each.pop(name) for each in power_ups]) for name in names}
+            power_ups.append(pd.DataFrame(measurement | labels | parts))
+    data = pd.concat(power_ups, ignore_index=True)
     data["counts"] = nominal["amplitude"] * np.deg2rad(nominal["sagnac_factor"]) * data["output"]
-    return pd.DataFrame(data, copy=False)
+    return data
 
 
-def _nominal_device(preset, coefficients):
-    """Coefficients of the preset's gyro but for those given, checked."""
+def _nominal_device(coefficients):
+    """Coefficients of the population but for those given, checked."""
     given = {} if coefficients is None else dict(coefficients)
     unknown = [name for name in given if name not in _POPULATION]
     if unknown:
@@ -292,48 +220,33 @@ def _nominal_device(preset, coefficients):
     constraints = {name: [entry[-1]] for name, entry in _POPULATION.items()}
     validate_parameter_constraints(constraints, given, "make_ofog's coefficients")
     nominal = {name: entry[0] for name, entry in _POPULATION.items()}
-    return nominal | _PRESETS[preset][0] | {name: float(value) for name, value in given.items()}
+    return nominal | {name: float(value) for name, value in given.items()}
 
 
-def _conditions(preset, given):
-    """The preset's conditions but for those given, checked; ``levels`` are the table's rates."""
-    given = {name: value for name, value in given.items() if value is not None}
-    levels = sorted({"max_rate", "n_rate_levels"} & set(given))
-    if levels and "rates" in given:
-        raise ValueError(f"rates is given together with {levels}; it takes their place.")
-    if levels:
-        given["rates"] = None
-    found = SimpleNamespace(**_CONDITIONS | _PRESETS[preset][1] | given)
-    for name in ("duration", "dwell_time"):
-        if getattr(found, name) < found.sampling_interval:
-            raise ValueError(
-                f"{name}={getattr(found, name)} must be at least the sampling_interval, "
-                f"{found.sampling_interval} s."
-            )
-    found.ambient_range = _ambient_range(found.ambient_range)
-    found.levels = None
-    if found.rates is not None:
-        rates = np.asarray(found.rates, dtype=float)
-        if rates.ndim != 1 or not rates.size or not np.isfinite(rates).all():
-            raise ValueError(f"rates must be a list of finite rates in deg/s; got {found.rates!r}.")
-        found.levels = np.unique(rates)
-        found.max_rate = float(np.abs(rates).max())
-    elif found.n_rate_levels is not None:
-        found.levels = np.linspace(-found.max_rate, found.max_rate, found.n_rate_levels)
-    return found
+def _table_rates(max_rate, n_rate_levels, rates):
+    """Largest rate of the table, and its levels; None where every dwell has its own."""
+    if rates is None:
+        largest = 100.0 if max_rate is None else max_rate
+        if n_rate_levels is None:
+            return largest, None
+        return largest, np.linspace(-largest, largest, n_rate_levels)
+    options = {"max_rate": max_rate, "n_rate_levels": n_rate_levels}
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise ValueError(f"rates is given together with {given}; it takes their place.")
+    found = np.asarray(rates, dtype=float)
+    if found.ndim != 1 or not found.size or not np.isfinite(found).all():
+        raise ValueError(f"rates must be a list of finite rates in deg/s; got {rates!r}.")
+    return float(np.abs(found).max()), np.unique(found)
 
 
 def _ambient_range(given):
-    try:
-        low, high = (float(end) for end in given)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"ambient_range must be two temperatures; got {given!r}.") from error
-    if not _COLDEST <= low <= high <= _HOTTEST:
+    if np.shape(given) != (2,) or not _COLDEST <= given[0] <= given[1] <= _HOTTEST:
         raise ValueError(
-            f"ambient_range={given!r} must rise, from {_COLDEST:g} or more to {_HOTTEST:g} degC or "
-            "less."
+            f"ambient_range={given!r} must be two temperatures that rise, from {_COLDEST:g} or "
+            f"more to {_HOTTEST:g} degC or less."
         )
-    return low, high
+    return tuple(map(float, given))
 
 
 def _tolerances(nominal):
@@ -344,27 +257,21 @@ def _tolerances(nominal):
     }
 
 
-def _check_phase(nominal, spread, conditions):
-    """Refuse rates at which some device of the population would leave the sine's rising branch.
-
-    Beyond a Sagnac phase of pi / 2 two rates give one output, and no compensation can tell them.
-    """
+def _check_phase(nominal, spread, ambient_range, largest):
+    """Refuse rates of a Sagnac phase of pi / 2: beyond it, two rates give one output."""
     tolerances = _tolerances(nominal)
     factor, by_temperature, self_heating = (
         abs(nominal[name]) + spread * tolerances[name]
         for name in ("sagnac_factor", "sagnac_temperature", "self_heating")
     )
-    coldest, hottest = conditions.ambient_range
-    difference = max(
-        REFERENCE_TEMPERATURE - coldest, hottest + self_heating - REFERENCE_TEMPERATURE
-    )
+    cold, warm = (end - REFERENCE_TEMPERATURE for end in ambient_range)
+    difference = max(-cold, warm + self_heating)
     limit = 90.0 / (factor * (1.0 + 1e-6 * by_temperature * difference))
-    if conditions.max_rate >= limit:
-        name = "max_rate" if conditions.rates is None else "largest of abs(rates)"
+    if largest >= limit:
         raise ValueError(
-            f"{name} == {conditions.max_rate}, must be < {limit:.4g} deg/s: from there on the "
-            "Sagnac phase reaches pi / 2 in some device of this population, and the arcsine is "
-            "not defined."
+            f"The largest rate is {largest} and must be < {limit:.4g} deg/s: from there on the "
+            "Sagnac phase reaches pi / 2 in some device of this population, and the arcsine is not "
+            "defined."
         )
 
 
@@ -372,13 +279,10 @@ def _draw_devices(nominal, n_devices, spread, noise, random_state):
     """Devices whose coefficients are uniform within ``spread`` times their tolerance."""
     tolerances = np.array(list(_tolerances(nominal).values()))
     draws = random_state.uniform(-spread, spread, size=(n_devices, tolerances.size))
-    devices = []
-    for offsets in draws * tolerances:
-        pairs = zip(_POPULATION, offsets.tolist(), strict=True)
-        device = {name: nominal[name] + offset for name, offset in pairs}
-        device |= {name: noise * device[name] for name in _RANDOM}
-        devices.append(SimpleNamespace(**device))
-    return devices
+    offsets = draws * tolerances
+    devices = pd.DataFrame(offsets + np.array(list(nominal.values())), columns=list(nominal))
+    devices[_RANDOM] *= noise
+    return [SimpleNamespace(**device) for device in devices.to_dict("records")]
 
 
 def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
@@ -395,31 +299,19 @@ def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
         heats = random_state.uniform(0.0, max_residual_heat, size=n_runs)
         normals = random_state.standard_normal((n_runs, schedule.n_power_ups))
         starts = zip(ambients, rising, heats, strict=True)
-        yield from (
-            (number, start, device.bias_repeatability * each)
-            for start, each in zip(starts, normals, strict=True)
-        )
+        for start, each in zip(starts, normals, strict=True):
+            yield number, start, device.bias_repeatability * each
 
 
-def _draw_rates(n_samples, conditions, order, random_state):
-    """True rate of each sample of a power-up: each level comes once before any comes again.
+def _draw_rates(n_dwells, largest, levels, random_state):
+    """True rate of each dwell of a power-up: each level comes once before any comes again.
 
     Without levels there is one rate in each of as many equal parts of the range as there are
     dwells.
     """
-    levels = conditions.levels
-    n_held = round(conditions.dwell_time / conditions.sampling_interval)
-    n_dwells = -(-n_samples // n_held)
     if levels is None:
         parts = np.arange(n_dwells) + random_state.uniform(size=n_dwells)
-        rates = conditions.max_rate * (2.0 * parts / n_dwells - 1.0)
-        if order == "sweep":
-            rates = np.concatenate([rates[::2], rates[1::2][::-1]])
-        else:
-            rates = random_state.permutation(rates)
-    elif order == "sweep":
-        rates = np.resize(np.concatenate([levels, levels[-2:0:-1]]), n_dwells)
-    else:
-        n_passes = -(-n_dwells // levels.size)
-        rates = np.concatenate([random_state.permutation(levels) for _ in range(n_passes)])
-    return np.repeat(rates[:n_dwells], n_held)[:n_samples]
+        return random_state.permutation(largest * (2.0 * parts / n_dwells - 1.0))
+    n_passes = -(-n_dwells // levels.size)
+    passes = [random_state.permutation(levels) for _ in range(n_passes)]
+    return np.concatenate(passes)[:n_dwells]

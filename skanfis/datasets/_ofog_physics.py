@@ -10,24 +10,18 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.signal import lfilter
 
-__all__ = [
-    "RANDOM_BIASES",
-    "REFERENCE_TEMPERATURE",
-    "Schedule",
-    "simulate_power_up",
-    "temperatures",
-]
+__all__ = ["REFERENCE_TEMPERATURE", "Schedule", "simulate_power_up", "temperatures"]
 
 REFERENCE_TEMPERATURE = 25.0  # degC, where the factory calibrates the scale factor
 # Biases that nobody can foresee, the one drawn at power-on included.
-RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
+_RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
 
 _PER_HOUR = 1.0 / 3600.0  # deg/h in deg/s, and an arc second in deg
 _PPM = 1e-6
-# The largest Allan deviation of a Gauss-Markov process in its standard deviations, and the flat one
-# of flicker noise in its coefficient (IEEE 952, annex on Allan variance).
-_ALLAN_MAXIMUM_OF_GAUSS_MARKOV = 0.437 * np.sqrt(2.0)
-_ALLAN_FLOOR_OF_FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)
+_N_SOAKS = 5
+# The flat Allan deviation of flicker noise in its coefficient, over the largest of a Gauss-Markov
+# process in its standard deviations (IEEE 952, annex on Allan variance).
+_GAUSS_MARKOV = np.sqrt(2.0 * np.log(2.0) / np.pi) / (0.437 * np.sqrt(2.0))
 
 
 @dataclass(frozen=True)
@@ -40,12 +34,6 @@ class Schedule:
     n_off: int  # samples between two power-ups, without power
     profile: str
     ambient_range: tuple[float, float]  # degC
-    n_soaks: int
-
-    @property
-    def time(self):
-        """Time since power-on [s]."""
-        return self.sampling_interval * np.arange(self.n_samples)
 
     def ambient(self, first, n_samples, start, rising):
         """Temperature of the chamber [degC] at samples of the run's clock, from ``first`` on."""
@@ -60,8 +48,7 @@ class Schedule:
         clock = self.sampling_interval * (first + np.arange(n_samples))
         triangle = 1.0 - np.abs(2.0 * ((phase + clock / period) % 1.0) - 1.0)
         if self.profile == "soaks":
-            n_steps = self.n_soaks - 1
-            triangle = np.rint(n_steps * triangle) / n_steps
+            triangle = np.rint((_N_SOAKS - 1) * triangle) / (_N_SOAKS - 1)
         return low + span * triangle
 
 
@@ -81,11 +68,10 @@ def temperatures(device, schedule, start, rising, residual_heat):
         off = schedule.ambient(first + n_on, schedule.n_off + 1, start, rising)
         warm = on + device.self_heating
         coil = first_order_lag(warm, coil_start, device.thermal_time, interval)
-        thermometer = first_order_lag(coil, thermometer_start, device.thermometer_lag, interval)
+        lag = device.thermometer_lag
+        thermometer = first_order_lag(coil, thermometer_start, lag, interval)
         coil_rate = (warm - coil) / device.thermal_time
-        thermometer_rate = coil_rate
-        if device.thermometer_lag:
-            thermometer_rate = (coil - thermometer) / device.thermometer_lag
+        thermometer_rate = (coil - thermometer) / lag if lag else coil_rate
         yield SimpleNamespace(
             ambient=on[:-1],
             coil=coil[:-1],
@@ -94,18 +80,17 @@ def temperatures(device, schedule, start, rising, residual_heat):
             thermometer_rate=thermometer_rate[:-1],
         )
         coil = first_order_lag(off, coil[-1], device.thermal_time, interval)
-        last = thermometer[-1]
-        thermometer_start = first_order_lag(coil, last, device.thermometer_lag, interval)[-1]
+        thermometer_start = first_order_lag(coil, thermometer[-1], lag, interval)[-1]
         coil_start = coil[-1]
 
 
-def simulate_power_up(device, turn_on_bias, time, rate, thermal, normals, sampling_interval):
+def simulate_power_up(device, turn_on_bias, rate, thermal, normals, sampling_interval):
     """Columns of the measurement and of the parts of its error, for one power-up.
 
     ``thermal`` is of :func:`temperatures`; ``normals`` are four rows of standard normal numbers,
     for bias instability, rate random walk, angle random walk and thermometer.
     """
-    h = sampling_interval
+    h, time = sampling_interval, sampling_interval * np.arange(rate.size)
     warm = thermal.coil - REFERENCE_TEMPERATURE
     settling = np.exp(-time / device.warm_up_time)
     relative = 1.0 + _PPM * device.sagnac_temperature * warm  # K(T) / K0
@@ -156,8 +141,9 @@ def simulate_power_up(device, turn_on_bias, time, rate, thermal, normals, sampli
         "counts": output,
         "output": output,
         "error": output - rate,
-        "noise": sum(biases[name] for name in RANDOM_BIASES)
-        + rate_by_output(rate + bias, *optics) * (white + parts["quantisation"]),
+        "noise": sum(biases[name] for name in _RANDOM_BIASES)
+        # A unit of noise of the output is worth 1 over the response's slope at the input.
+        + (1.0 / bias_gain(rate + bias, 0.0, *optics)) * (white + parts["quantisation"]),
     }
     return measurement, parts
 
@@ -178,12 +164,6 @@ def bias_gain(rate, bias, sagnac_factor, relative_factor, amplitude):
     half_phase = 0.5 * factor * np.deg2rad(bias)
     phase = factor * np.deg2rad(rate) + half_phase
     return amplitude * relative_factor * np.cos(phase) * np.sinc(half_phase / np.pi)
-
-
-def rate_by_output(rate, sagnac_factor, relative_factor, amplitude):
-    """What a unit of noise of the output is worth at the input: 1 over the response's slope."""
-    factor = sagnac_factor * relative_factor
-    return 1.0 / (amplitude * relative_factor * np.cos(factor * np.deg2rad(rate)))
 
 
 def first_order_lag(values, start, time_constant, sampling_interval):
@@ -217,8 +197,7 @@ def quantised(rate, coefficient, sampling_interval):
 
 def bias_instability(standard_normal, coefficient, correlation_time, sampling_interval):
     """Stationary Gauss-Markov noise [deg/s], whose Allan deviation peaks at 0.664 B, B in deg/h."""
-    ratio = _ALLAN_FLOOR_OF_FLICKER / _ALLAN_MAXIMUM_OF_GAUSS_MARKOV
-    deviation = ratio * coefficient * _PER_HOUR
+    deviation = _GAUSS_MARKOV * coefficient * _PER_HOUR
     interval = sampling_interval / correlation_time
     innovations = np.sqrt(-np.expm1(-2.0 * interval)) * standard_normal
     innovations[0] = standard_normal[0]

@@ -2,31 +2,22 @@
 
 from ._checks import check_log
 from ._split import group_by_rate_level
-from .allan import allan_coefficients, allan_deviation
 from .c_code import export_c_physics
 from .compensator import GyroCompensator
 from .compose import ResidualRegressor
-from .displays import (
-    AllanDisplay,
+from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay
+from .errors import LogError
+from .features import ThermalRate
+from .log import read_log
+from .metrics import allan_deviation
+from .physics import OpenLoopArcsineRegressor
+from .report import gyro_report
+from .thermal_displays import (
     CoverageDisplay,
-    ErrorDisplay,
-    GroupResidualDisplay,
     HysteresisDisplay,
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
-from .errors import LogError
-from .features import ThermalRate
-from .log import read_log
-from .metrics import (
-    bias,
-    bias_stability,
-    hysteresis,
-    input_error,
-    scale_factor,
-)
-from .physics import OpenLoopArcsineRegressor
-from .report import gyro_report
 
 __all__ = [
     "AllanDisplay",
@@ -41,16 +32,10 @@ __all__ = [
     "ResidualSurfaceDisplay",
     "ScaleFactorErrorDisplay",
     "ThermalRate",
-    "allan_coefficients",
     "allan_deviation",
-    "bias",
-    "bias_stability",
     "check_log",
     "export_c_physics",
     "group_by_rate_level",
     "gyro_report",
-    "hysteresis",
-    "input_error",
     "read_log",
-    "scale_factor",
 ]

@@ -24,7 +24,7 @@ from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NOTHING, options_for
-from .displays._base import figures
+from .displays import figures
 from .metrics import rms
 
 __all__ = [

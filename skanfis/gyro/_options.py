@@ -14,12 +14,11 @@ from .. import __version__
 from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
-from ._figures_of_merit import figures_of_merit
 from ._guess import Request, checked_request
 from ._split import KINDS
-from .allan import ALLAN_FIGURES
 from .compensator import INPUTS
 from .errors import UsageError, shortened
+from .metrics import ALLAN_FIGURES, figures_of_merit
 
 __all__ = [
     "PROGRAM",

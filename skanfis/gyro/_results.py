@@ -1,26 +1,104 @@
-"""What the sections and pictures of a calibration's report have in common."""
+"""What the report shows of a calibration: errors, figures of merit, limits, and pictures."""
 
+import base64
+import io
+import re
 from functools import cached_property
+from importlib.util import find_spec
+from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from ._columns import RATE_UNITS, label_texts
-from ._headline import readability_of
+from ..inspection import MembershipDisplay
+from ._columns import RATE_UNITS, evenly_chosen, label_texts
 from ._options import ReportOptions, check_limit
-from .allan import rows_for_allan
 from .compensator import features
-from .displays._base import figures, signs
-from .metrics import rms
+from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures, signs
+from .metrics import rms, rows_for_allan
 from .report import gyro_report
+from .thermal_displays import (
+    CoverageDisplay,
+    HysteresisDisplay,
+    ResidualSurfaceDisplay,
+    ScaleFactorErrorDisplay,
+)
 
-__all__ = ["Results"]
+__all__ = ["Picture", "Results"]
 
 _PER_MINUTE = 60.0
 _SMALL = 0.05  # deg/s
+_CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls
+_DOTS_PER_INCH = 160  # sharp in print
+_FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
+_MOST_ROWS_SHOWN = 20_000  # rows beyond cover one another
+# Display and caption by name of the files; of a caption the first sentence is read out to those who
+# cannot see the picture.
+_PICTURES = {
+    "error-by-time": (ErrorDisplay, "Error against time, before and after."),
+    "error-by-temperature": (ErrorDisplay, "Error against temperature, before and after."),
+    "scale-factor-error": (
+        ScaleFactorErrorDisplay,
+        "Scale-factor error against rate, in three bands of temperature.",
+    ),
+    "hysteresis": (
+        HysteresisDisplay,
+        "Bias against temperature, while warming and while cooling. What depends on the rate is "
+        "taken off, other than in the table. Temperature alone cannot close a loop.",
+    ),
+    "residual-surface": (
+        ResidualSurfaceDisplay,
+        "Mean residual and number of rows over temperature and rate.",
+    ),
+    "held-out-groups": (GroupResidualDisplay, "RMS error of every held-out group."),
+    "allan-deviation": (
+        AllanDisplay,
+        "Allan deviation of the error, over the runs that are in range from end to end.",
+    ),
+}
+_COVERAGE = (
+    "Coverage over temperature and output; other inputs at their medians. Hatched cells hold no "
+    "row: what is said there is a guess from their neighbours. Rows outside the dashed line are "
+    "flagged, and within it those beyond the dotted line, where there is one."
+)
+
+
+class Picture(NamedTuple):
+    """What a page shows: a PNG image, what those who cannot see it are told, CSV files; in base64.
+
+    ``is_tall`` tells how the picture stands on paper.
+    """
+
+    image: str
+    alt: str
+    caption: str
+    files: dict[str, str]
+    is_tall: bool
+
+    @classmethod
+    def of(cls, subject, figure, tables, caption):
+        """The figure painted, and its tables as files."""
+        file = io.BytesIO()
+        # Software and date would make two reports on the same log differ.
+        figure.savefig(file, format="png", dpi=_DOTS_PER_INCH, metadata={"Software": None})
+        files = {}
+        for name, table in tables.items():
+            # What a spreadsheet would take for a formula has an apostrophe in front.
+            texts = {
+                column: [_FORMULA.sub(r"'\g<0>", str(value)) for value in table[column]]
+                for column in table.select_dtypes(exclude="number")
+            }
+            table = table.assign(**texts)
+            text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
+            ending = f"-{name}" if len(tables) > 1 else ""
+            files[f"{subject}{ending}.csv"] = _base64(text.encode("utf-8"))
+        width, height = figure.get_size_inches()
+        alt = caption.partition(".")[0]
+        return cls(_base64(file.getvalue()), alt, caption, files, height > width)
 
 
 class Results:
-    """What several parts of the report need; rates are NaN where a row was out of range."""
+    """What the sections of the report need; rates are NaN where a row was out of range."""
 
     def __init__(self, calibration, options=None):
         self.calibration = calibration
@@ -29,27 +107,25 @@ class Results:
         self.in_range = calibration.in_range
         self.before = np.where(self.in_range, calibration.before, np.nan)
         self.after = np.where(self.in_range, calibration.after, np.nan)
-        self.error_before = (self.before - self.rate)[self.in_range]
         self.error_after = (self.after - self.rate)[self.in_range]
         self.temperature = self.log["temperature"].to_numpy()
-        self.temperature_rate = self.time = self.since_power_on = self.run = None
+        self.temperature_rate = self.time = self.run = None
         if "temperature_rate" in calibration.X:
             self.temperature_rate = _PER_MINUTE * calibration.X["temperature_rate"].to_numpy()
         if "time" in self.log:
             self.time = self.log["time"].to_numpy()
-            times = features(self.log, ("time",), time_constant=1.0)
-            self.since_power_on = times["time"].to_numpy()
         if "run" in self.log:
             self.run = label_texts(self.log["run"])
         self.unit = self.options.unit
         if self.unit == "auto":
             # That in which errors are no long row of zeros.
-            self.unit = "deg/s" if rms(self.error_before) > _SMALL else "deg/h"
+            is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
+            self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 
     def shown(self, error):
         """An error [deg/s] in the unit for errors, without it; a dash where it is not known."""
-        return figures(RATE_UNITS[self.unit] * error) if np.isfinite(error) else "–"
+        return figures(RATE_UNITS[self.unit] * error)
 
     @cached_property
     def merit(self):
@@ -73,9 +149,7 @@ class Results:
     @cached_property
     def of_allan(self):
         """Arguments of an AllanDisplay, or why there is none."""
-        try:
-            import allantools  # noqa: F401
-        except ImportError:
+        if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:
             return "the log has no time"
@@ -94,7 +168,75 @@ class Results:
         lines = self.merit.set_index("figure")
         return [check_limit(limit, lines) for limit in self.options.limits]
 
-    @cached_property
-    def readability(self):
-        """Whether the rules can be read one by one."""
-        return readability_of(self.calibration)
+    def pictures(self):
+        """The pictures of the held-out rows that have a sense on this log."""
+        heat, change = {"temperature": self.temperature}, self.temperature_rate
+        label = "temperature [degC]"
+        found = {
+            "error-by-temperature": {"position": self.temperature, "position_label": label},
+            "held-out-groups": {"groups": self.calibration.split.labels.astype(str)},
+        }
+        if self.time is not None:
+            label = "time since power-on [s]"
+            time = features(self.log, ("time",), time_constant=1.0)["time"]
+            found["error-by-time"] = {"position": time, "position_label": label}
+        if np.ptp(self.rate):
+            found["scale-factor-error"] = found["residual-surface"] = heat
+        if change is not None and change.min() < -_CLEARLY < _CLEARLY < change.max():
+            found["hysteresis"] = heat | {"temperature_rate": change}
+        if isinstance(self.of_allan, dict):
+            found["allan-deviation"] = self.of_allan
+        for subject, (kind, caption) in _PICTURES.items():
+            if subject not in found:
+                continue
+            options = dict(found[subject])
+            rows = options.pop("rows", slice(None))
+            rates = (each[rows] for each in (self.rate, self.before, self.after))
+            unit = None if kind is ScaleFactorErrorDisplay else self.unit
+            figure = _figure()
+            display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
+            yield Picture.of(subject, figure, display.tables(), caption)
+
+    def coverage(self):
+        """The picture of the coverage; none where temperature or output is no input."""
+        calibration = self.calibration
+        if not {"temperature", "output"} <= set(calibration.X):
+            return
+        figure = _figure()
+        display = CoverageDisplay.from_estimator(
+            calibration.compensator.estimator,
+            calibration.X,
+            min_coverage=calibration.compensator.min_coverage,
+            output_unit=calibration.recipe.output_unit,
+            ax=figure,
+        )
+        yield Picture.of("coverage", figure, display.tables(), _COVERAGE)
+
+    def memberships(self):
+        """The picture of the membership functions; none where no input has terms."""
+        rules, X = self.calibration.rules, self.calibration.X
+        n_inputs = len({term["input"] for term in rules[-1].memberships_})
+        if not n_inputs:
+            return
+        figure = _figure(figsize=(6.2, 0.6 + 1.9 * n_inputs))
+        axes = list(figure.subplots(n_inputs, squeeze=False).ravel())
+        shown = X.iloc[evenly_chosen(len(X), _MOST_ROWS_SHOWN)]
+        display = MembershipDisplay.from_estimator(rules, shown, ax=axes)
+        parts = []
+        for each in display.inputs:
+            for term, before, after in zip(each.term_names, each.before, each.after, strict=True):
+                truths = {"value": each.grid, "truth before": before, "truth after": after}
+                parts.append(pd.DataFrame({"input": each.input_name, "term": term} | truths))
+        caption = "Membership functions before training (dashed) and after, over the data."
+        yield Picture.of("fuzzy-terms", figure, {"terms": pd.concat(parts)}, caption)
+
+
+def _figure(**options):
+    """A figure that is not pyplot's, which would look for a screen."""
+    from matplotlib.figure import Figure
+
+    return Figure(layout="constrained", **options)
+
+
+def _base64(data):
+    return base64.b64encode(data).decode("ascii")

@@ -15,11 +15,10 @@ from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
 from ._formulas import formula_of, law_table, on_board, rules_text
-from ._headline import ARTICLES, budget_of, headline, held_out_groups, proven_bounds
-from ._pictures import PICTURES, draw, draw_coverage, draw_memberships
+from ._headline import ARTICLES, budget_of, headline, held_out_groups, proven_bounds, readability_of
 from ._results import Results
 from ._simpler import NOTHING, options_for
-from .displays._base import figures, signs
+from .displays import figures, signs
 from .metrics import rms
 
 __all__ = ["check_installed", "report_page"]
@@ -33,12 +32,11 @@ _PROOF = "Proven for every point of the box. How far the gyro is from the compen
 
 
 class Block(NamedTuple):
-    """Part of a section: "text", "warn", "soft", "heading", "table", "pictures" or "details"."""
+    """Part of a section: text, warn, soft, heading, table, pictures, or details, closed or open."""
 
     kind: str
     content: Any
     title: str = ""
-    is_open: bool = False
 
 
 def report_page(calibration, title, options=None):
@@ -59,7 +57,9 @@ def report_page(calibration, title, options=None):
         reasons=map(signs, _reasons(results)),
         cautions=[f"Warning: {sentence}" for sentence in cautions],
         sections=[section for make in sections if (section := make(results))],
-        footer=f"Made by {_programs()}. Figures of merit in the terms of IEEE Std 952.",
+        footer=f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
+        f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}. "
+        "Figures of merit in the terms of IEEE Std 952.",
     )
 
 
@@ -111,9 +111,10 @@ def _reasons(results):
 def _identity(results):
     """What is needed to find this calibration again, and to repeat it."""
     options = results.options
-    names = "device, serial number", "operator", "made"
-    entries = [each or "not given" for each in (options.serial, options.operator, options.made)]
-    blocks = [_table(["what", "entry"], zip(names, entries, strict=True))]
+    entries = {"device, serial number": options.serial, "operator": options.operator}
+    entries |= {"made": options.made}
+    lines = [(name, entry or "not given") for name, entry in entries.items()]
+    blocks = [_table(["what", "entry"], lines)]
     if options.files:
         blocks.append(_table(["file of the log", "bytes", "SHA-256"], options.files))
     text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
@@ -187,28 +188,27 @@ def _instead(results):
     )
     if wanted := options_for(name, calibration.X.shape[1]):
         text += f" The command writes its files, C code included, with {wanted}."
-    formula = Block("details", formula_of(calibration, name), "What to compute", is_open=True)
+    formula = Block("open", formula_of(calibration, name), "What to compute")
     return "What to use instead", [Block("text", text), formula]
 
 
 def _merit(results):
     """The figures of merit of all rows in range, and the limits."""
-    table = results.merit[~results.merit["figure"].str.startswith("rows")]
-    lines = []
+    table, lines = results.merit, []
     for _, line in table[table[["before", "after"]].notna().any(axis=1)].iterrows():
         cells = []
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
-            cells += [_shown(value), _interval(low, high)]
+            cells += [figures(value), _interval(low, high)]
         lines.append((_words(line["figure"]), *cells, signs(line["unit"])))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit"]
-    resampled = results.merit.attrs["resampled"]["all"]
+    resampled = results.merit.attrs["resampled"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
     for note, part in table[table["note"] != ""].groupby("note", sort=False):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
         checks = [
-            (_words(limit.figure), signs(limit.text), _shown(value), signs(limit.unit), *told)
+            (_words(limit.figure), signs(limit.text), figures(value), signs(limit.unit), *told)
             for limit, value, *told in results.checks
         ]
         caption = "After compensation by the fuzzy rules, on the held-out rows in range"
@@ -219,8 +219,7 @@ def _merit(results):
 
 
 def _pictures(results):
-    found = [picture for plan in PICTURES if (picture := draw(plan, results)) is not None]
-    blocks = [Block("pictures", found)]
+    blocks = [Block("pictures", list(results.pictures()))]
     if isinstance(results.of_allan, str):
         blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
     return "Pictures", blocks
@@ -240,9 +239,8 @@ def _use(results):
         "that --c writes flags the same rows with the same numbers."
     )
     ends = calibration.X.agg(["min", "max"]).T
-    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy())]
-    if (picture := draw_coverage(calibration)) is not None:
-        blocks.append(Block("pictures", [picture]))
+    pictures = Block("pictures", list(results.coverage()))
+    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy()), pictures]
     return "Where it may be used", blocks
 
 
@@ -276,7 +274,8 @@ def _sure(results):
         Block("soft", _BUDGET),
         Block("heading", "What is proven"),
         _table(["over the box below", "result"], proven),
-        _box(calibration, names, _rounded(certain.found.box)),
+        # What rounding leaves of zero, where a box is in the units before a scaler, is zero.
+        _box(calibration, names, np.round(certain.found.box, 9) + 0.0),
         Block("soft", _PROOF),
     ]
 
@@ -288,10 +287,9 @@ def _rules(results):
         law = law_table(calibration.compensator.estimator.base_, calibration.recipe)
         text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
-    if (picture := draw_memberships(calibration)) is not None:
-        blocks.append(Block("pictures", [picture]))
-    findings = results.readability.findings
-    text, steps = rules_text(calibration, results.readability), on_board(calibration.compensator)
+    blocks.append(Block("pictures", list(results.memberships())))
+    found = readability_of(calibration)
+    text, steps = rules_text(calibration, found), on_board(calibration.compensator)
     n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
@@ -299,7 +297,7 @@ def _rules(results):
         Block("details", text, f"All rules as text ({n_rules}, {terms})"),
         Block("details", steps, "What to compute on board"),
         Block("heading", "Can the rules be read?"),
-        *([Block("warn", sentence) for sentence in findings] or [Block("text", fit)]),
+        *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
     ]
 
 
@@ -338,15 +336,6 @@ def _interval(low, high, shown=figures):
     return f"[{shown(low)}, {shown(high)}]" if np.isfinite([low, high]).all() else ""
 
 
-def _shown(value):
-    return figures(value) if np.isfinite(value) else "–"
-
-
-def _rounded(values):
-    """What rounding leaves of zero, where a box is in the units before a scaler, is zero."""
-    return np.round(values, 9) + 0.0
-
-
 def _words(name):
     return name.replace("_", " ")
 
@@ -358,11 +347,3 @@ def _unit_of(calibration, name):
 def _terms_text(terms):
     """Numbers of fuzzy terms in words."""
     return f"terms {' × '.join(map(str, terms))}" if terms else "structure left to ANFISRegressor"
-
-
-def _programs():
-    """The programs that figures depend on, with their versions."""
-    return (
-        f"skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy {np.__version__}, "
-        f"SciPy {scipy.__version__} and Python {platform.python_version()}"
-    )

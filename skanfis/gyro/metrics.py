@@ -1,181 +1,292 @@
-"""Figures of merit in the terms of IEEE 952, as plain functions of columns of a log.
+"""Figures of merit in the terms of IEEE 952, as one table of functions of columns of a log.
 
-Every argument has one value per row: rates in deg/s, temperatures in degC, times in s. Bias figures
-take the *error* at the input (:func:`input_error`) and give deg/h. Where a figure does not exist
-these functions raise ValueError with the reason; they never return NaN.
+Every column has one value per row: rates in deg/s, temperatures in degC, times in s. The error at
+the input is the output over its scale factor, less the true rate; biases are of it, in deg/h. Where
+a figure does not exist these functions raise ValueError with the reason; they never return NaN.
+
+N, B and K are read off the Allan deviation [deg/h] of tau [h]: N sqrt(1 / tau) where its slope is
+-1/2, B sqrt(2 ln 2 / pi) at its minimum, and K sqrt(tau / 3) where its slope is +1/2.
 """
 
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike
 
 from ._columns import PER_HOUR, check_column, check_labels
 
-__all__ = ["bias", "bias_stability", "hysteresis", "input_error", "rms", "scale_factor"]
+__all__ = ["allan_deviation", "figures_of_merit", "hysteresis", "rms", "scale_factor"]
 
+_PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
 _HYSTERESIS_BINS, _ROWS_PER_MEAN = 20, 5
+# A nonlinearity is looked for in means over such parts of the range of rates.
+_RATE_BINS = 101
+# The largest value of a resample says nothing of the largest to come.
+LARGEST_VALUES = ("residual_peak", "residual_peak_to_peak")
+ALLAN_FIGURES = {
+    "angle_random_walk": "deg/sqrt(h)",
+    "bias_instability": "deg/h",
+    "allan_minimum": "deg/h",
+    "rate_random_walk": "deg/h/sqrt(h)",
+}
+_FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
+_POINTS_PER_SLOPE = 3  # two points have no check
+# Neighbouring processes differ by a half in slope: a third of that tells them apart.
+_SLOPE_TOLERANCE = 0.15
+# A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
+_ROWS_PER_TIME = 10
+_UNEVEN = 0.01  # largest deviation of the time between rows, relative
 
 
-def scale_factor(rate: ArrayLike, output: ArrayLike) -> float:
-    """Slope of the least-squares line of the output against the true rate.
+class _Figure(NamedTuple):
+    """A figure of merit of some columns; ``also`` is one that is given by name where there is such.
 
-    Parameters
-    ----------
-    rate, output : array-like of shape (n_rows,)
-        True rate [deg/s], at least two different ones; output in any unit.
-
-    Returns
-    -------
-    scale_factor : float
-        In units of the output per deg/s.
-
-    Raises
-    ------
-    ValueError
-        If the rate never changes.
-
-    Examples
-    --------
-    >>> from skanfis.gyro import scale_factor
-    >>> scale_factor([-10.0, 0.0, 10.0], [-199.0, 1.0, 201.0])
-    20.0
+    With ``combine``, the function is of one run, and ``combine`` of the values of all runs.
     """
-    rate = check_column(rate, "rate")
-    return line(rate, check_column(output, "output", rate.size))[0]
+
+    name: str
+    unit: str
+    function: Callable
+    needs: tuple[str, ...]
+    also: str = ""
+    combine: Callable | None = None
+    fewest_runs: int = 1
+
+    def of(self, rows):
+        also = {self.also: rows[self.also]} if self.also in rows else {}
+        return self.function(*(rows[name] for name in self.needs), **also)
+
+    def by_run(self, rows):
+        runs = rows_by_run(rows.get("run"), rows["rate"].size, self.fewest_runs)
+        parts = [{name: column[run] for name, column in rows.items()} for run in runs]
+        return np.array([self.of(part) for part in parts])
+
+    def value(self, rows):
+        return self.of(rows) if self.combine is None else self.combine(self.by_run(rows))
 
 
-def input_error(rate: ArrayLike, output: ArrayLike) -> np.ndarray:
-    """Error in units of the input: the output over its scale factor, less the true rate.
+def figures_of_merit(full_scale=1.0):
+    """All figures but those of Allan, in the order of the report."""
+    rates, error, residual = ("rate", "output"), ("error",), ("residual",)
+    heat, ramp = "temperature", "temperature_rate"
+    largest, root = (partial(_nonlinearity, full_scale=full_scale, size=s) for s in (_peak, rms))
+    full = "ppm of full scale"
+    slope, slope_in_ramp = (partial(_bias_sensitivity, name=name) for name in (heat, ramp))
+    short, long = (partial(_squares_of_means, over=seconds) for seconds in (10.0, 100.0))
+    timed, pooled = ("error", "time"), _pooled_deviation
 
-    Parameters
-    ----------
-    rate, output : array-like of shape (n_rows,)
-        True rate [deg/s]; output in any unit where the rate changes, in deg/s where it does not.
+    def bias(error):
+        return PER_HOUR * error.mean()
 
-    Returns
-    -------
-    error : ndarray of shape (n_rows,)
-        [deg/s]
+    def spread(values):
+        return np.std(values, ddof=1)
 
-    Examples
-    --------
-    >>> from skanfis.gyro import input_error
-    >>> input_error([-10.0, 0.0, 10.0], [-19.0, 1.0, 21.0])
-    array([0.5, 0.5, 0.5])
+    def relative_spread(slopes):
+        return _PPM * spread(slopes) / abs(np.mean(slopes))
+
+    return [
+        _Figure("residual_rms", "deg/s", rms, residual),
+        _Figure("residual_peak", "deg/s", _peak, residual),
+        _Figure("residual_peak_to_peak", "deg/s", np.ptp, residual),
+        _Figure("reduction_factor", "", _reduction, ("rate", "before", "after")),
+        _Figure(
+            "scale_factor_error", "ppm", lambda *line: _PPM * (scale_factor(*line) - 1.0), rates
+        ),
+        _Figure("scale_factor_nonlinearity", full, largest, rates),
+        _Figure("scale_factor_nonlinearity_rms", full, root, rates),
+        _Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
+        _Figure("scale_factor_repeatability", "ppm", scale_factor, rates, "", relative_spread, 2),
+        _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
+        _Figure("bias", "deg/h", bias, error),
+        _Figure("bias_repeatability", "deg/h", bias, error, "", spread, 2),
+        _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), ramp),
+        _Figure("bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), heat),
+        _Figure("hysteresis", "deg/h", hysteresis, ("error", heat, ramp)),
+        _Figure("bias_stability_10s", "deg/h", short, timed, "", pooled),
+        _Figure("bias_stability_100s", "deg/h", long, timed, "", pooled),
+    ]
+
+
+def table_of(columns, labels=(), gaps=()):
+    """Columns of equal length as a table, those that are None left out.
+
+    All but ``labels`` must be numbers, and finite; those in ``gaps`` may be NaN.
     """
-    rate = check_column(rate, "rate")
-    output = check_column(output, "output", rate.size)
-    return output / (1.0 if np.ptp(rate) == 0 else line(rate, output)[0]) - rate
+    found: dict[str, np.ndarray] = {}
+    n_rows = None
+    for name, values in columns.items():
+        if values is None:
+            continue
+        if name in labels:
+            found[name] = check_labels(values, name, n_rows)
+        elif name in gaps:
+            numbers = np.asarray(values, dtype=object)
+            is_gap = pd.isna(numbers)
+            filled = check_column(np.where(is_gap, 0.0, numbers), name, n_rows)
+            found[name] = np.where(is_gap, np.nan, filled)
+        else:
+            found[name] = check_column(values, name, n_rows)
+        n_rows = found[name].size
+    return pd.DataFrame(found)
 
 
-def bias(error: ArrayLike) -> float:
-    """Mean error.
-
-    Parameters
-    ----------
-    error : array-like of shape (n_rows,)
-        Error at the input [deg/s].
-
-    Returns
-    -------
-    bias : float
-        [deg/h]
-
-    Examples
-    --------
-    >>> from skanfis.gyro import bias
-    >>> bias([0.001, 0.003])
-    7.2
-    """
-    return float(PER_HOUR * check_column(error, "error").mean())
+def rows_by_run(run, n_rows, at_least=1):
+    """Positions of the rows of each run, in order of appearance."""
+    if run is None:
+        return [np.arange(n_rows)]
+    place, labels = pd.factorize(check_labels(run, "run", n_rows), use_na_sentinel=False)
+    if len(labels) < at_least:
+        raise ValueError(f"There is {len(labels)} run; at least {at_least} are needed.")
+    return np.split(np.argsort(place, kind="stable"), np.cumsum(np.bincount(place))[:-1])
 
 
-def bias_stability(
-    error: ArrayLike, time: ArrayLike, *, averaging_time: float = 10.0, run: ArrayLike | None = None
-) -> float:
-    """Standard deviation of means over 10 s, or another time, within the runs (GJB 2426).
-
-    Parameters
-    ----------
-    error, time : array-like of shape (n_rows,)
-        Error at the input [deg/s]; time [s], increasing within each run.
-    averaging_time : float, default=10.0
-        Length of the means, positive [s].
-    run : array-like of shape (n_rows,), default=None
-        Labels of the runs, whose own means are taken off first; None is one run.
-
-    Returns
-    -------
-    stability : float
-        [deg/h]
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis.gyro import bias_stability
-    >>> error = np.random.default_rng(0).normal(scale=0.01, size=10_000)  # deg/s
-    >>> bool(abs(bias_stability(error, np.arange(10_000) * 0.1) - 3.6) < 0.4)  # 100 rows each
-    True
-    """
-    error = check_column(error, "error")
-    time = check_column(time, "time", error.size)
-    runs = rows_by_run(run, error.size)
-    return pooled_deviation([squares_of_means(error[r], time[r], averaging_time) for r in runs])
+def rms(values) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
-def hysteresis(error: ArrayLike, temperature: ArrayLike, temperature_rate: ArrayLike) -> float:
-    """Largest gap between the mean errors while warming and while cooling, at equal temperature.
+def scale_factor(rate, output) -> float:
+    """Slope of the least-squares line of the output against the true rate."""
+    return _line(np.asarray(rate), np.asarray(output))[0]
 
-    Parameters
-    ----------
-    error, temperature : array-like of shape (n_rows,)
-        Error at the input [deg/s]; temperature [degC].
-    temperature_rate : array-like of shape (n_rows,)
-        Its sign tells warming from cooling; rows of zero are left out.
 
-    Returns
-    -------
-    hysteresis : float
-        [deg/h]
+def input_error(rate, output):
+    """Error in units of the input [deg/s]; the scale factor of a rate that never changes is 1."""
+    return output / (1.0 if np.ptp(rate) == 0 else scale_factor(rate, output)) - rate
 
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis.gyro import hysteresis
-    >>> temperature = np.concatenate([np.linspace(0, 50, 500), np.linspace(50, 0, 500)])
-    >>> direction = np.repeat([1.0, -1.0], 500)
-    >>> hysteresis(0.001 * direction, temperature, direction)
-    7.2
-    """
-    error = check_column(error, "error")
-    temperature = check_column(temperature, "temperature", error.size)
-    direction = np.sign(check_column(temperature_rate, "temperature_rate", error.size))
-    sides = [direction > 0, direction < 0]
+
+def hysteresis(error, temperature, temperature_rate) -> float:
+    """Largest gap between mean errors while warming and while cooling, at equal temperature."""
+    sides = [temperature_rate > 0, temperature_rate < 0]
     if not all(side.any() for side in sides):
         raise ValueError("No hysteresis: the temperature does not both rise and fall.")
     low = max(temperature[side].min() for side in sides)
     high = max(low, min(temperature[side].max() for side in sides))
     edges = np.linspace(low, high, _HYSTERESIS_BINS + 1)
-    counts, sums = (
-        np.array([np.histogram(temperature[side], edges, weights=w[side])[0] for side in sides])
-        for w in (np.ones_like(error), error)
-    )
-    met = (counts >= _ROWS_PER_MEAN).all(axis=0)
-    if not met.any():
+    shared = (temperature >= low) & (temperature <= high) & (temperature_rate != 0)
+    keys = [np.digitize(temperature[shared], edges[1:-1]), sides[0][shared]]
+    means = pd.Series(error[shared]).groupby(keys).agg(["mean", "size"])
+    gaps = means["mean"].where(means["size"] >= _ROWS_PER_MEAN).unstack().diff(axis=1)
+    if gaps.isna().all(axis=None):
         raise ValueError(
             "No hysteresis: warming and cooling share no temperature at which both have "
             f"{_ROWS_PER_MEAN} rows."
         )
-    warming, cooling = sums[:, met] / counts[:, met]
-    return float(PER_HOUR * np.abs(warming - cooling).max())
+    return float(PER_HOUR * gaps.abs().max(axis=None))
 
 
-def rms(values: ArrayLike) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
+def allan_deviation(
+    error: ArrayLike, sampling_interval: float, *, run: ArrayLike | None = None
+) -> pd.DataFrame:
+    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
+
+    Parameters
+    ----------
+    error : array-like of shape (n_rows,)
+        Error at the input, evenly sampled within each run [deg/s].
+    sampling_interval : float
+        Time between rows, positive [s].
+    run : array-like of shape (n_rows,), default=None
+        Labels of the runs, whose variances are averaged; None is one run.
+
+    Returns
+    -------
+    curve : DataFrame of shape (n_times, 4)
+        averaging_time [s]; deviation [deg/h]; its standard error [deg/h]; n, the differences.
+
+    Raises
+    ------
+    ImportError
+        If allantools is not installed.
+    ValueError
+        If ``sampling_interval`` is not positive, or no run has ten rows.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skanfis.gyro import allan_deviation
+    >>> white = np.random.default_rng(0).normal(scale=1 / 3600, size=4096)  # deg/s
+    >>> curve = allan_deviation(white, 1.0)  # doctest: +SKIP
+    >>> curve["deviation"].iloc[0].round(1)  # doctest: +SKIP
+    1.0
+    """
+    try:
+        from allantools import oadev
+    except ImportError as reason:
+        raise ImportError(
+            "The Allan deviation needs allantools: pip install allantools."
+        ) from reason
+    error = check_column(error, "error")
+    if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
+        raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
+    parts = []
+    for rows in rows_by_run(run, error.size):
+        if rows.size < _ROWS_PER_TIME:
+            continue
+        times, deviations, _, counts = oadev(
+            PER_HOUR * error[rows], rate=1.0 / sampling_interval, data_type="freq", taus="octave"
+        )
+        multiple = np.round(times / sampling_interval)
+        part = pd.DataFrame({"multiple": multiple, "sum": counts * deviations**2, "n": counts})
+        parts.append(part[multiple * _ROWS_PER_TIME <= rows.size])
+    if not parts:
+        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
+    sums = pd.concat(parts).groupby("multiple", as_index=False).sum()
+    curve = pd.DataFrame({"averaging_time": sums["multiple"] * sampling_interval})
+    curve["deviation"] = np.sqrt(sums["sum"] / sums["n"])
+    curve["error"] = curve["deviation"] / np.sqrt(sums["n"])
+    return curve.assign(n=sums["n"].astype(int))
 
 
-def line(rate, output):
+def allan_figures(tau, deviation):
+    """Of each figure its value, NaN where the curve [s, deg/h] has none, and why it has none.
+
+    A slope is found where a line through three neighbouring points has it within 0.15; the lowest
+    such line counts, before the minimum for N and after it for K. A minimum at an end is none.
+    """
+    if tau.size < _POINTS_PER_SLOPE:
+        raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")
+    if deviation.min() <= 0:
+        raise ValueError(f"deviation must be positive; its smallest value is {deviation.min():g}.")
+    lowest = int(np.argmin(deviation))
+    minimum, no_minimum = deviation[lowest], ""
+    if lowest in (0, tau.size - 1):
+        side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
+        minimum = np.nan
+        no_minimum = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
+    walk, no_walk = _level(tau[: lowest + 1], deviation[: lowest + 1], -0.5)
+    drift, no_drift = _level(tau[lowest:], deviation[lowest:], 0.5)
+    return {
+        # sigma sqrt(tau) is N where the slope is -1/2: 1 deg/h at 1 s is 1/60 deg/sqrt(h).
+        "angle_random_walk": (walk / 60.0, no_walk),
+        "bias_instability": (minimum / _FLICKER, no_minimum),
+        "allan_minimum": (minimum, no_minimum),
+        # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
+        "rate_random_walk": (drift * np.sqrt(3.0) * 60.0, no_drift),
+    }
+
+
+def rows_for_allan(time, run, answered):
+    """Rows of the runs that were answered from end to end, and the time between them [s].
+
+    ValueError says why there is no Allan deviation.
+    """
+    runs = [rows for rows in rows_by_run(run, time.size) if answered[rows].all()]
+    if not runs:
+        raise ValueError("no run is in range from end to end")
+    if max(map(len, runs)) < _ROWS_PER_TIME:
+        raise ValueError(f"no run in range has {_ROWS_PER_TIME} rows")
+    steps = np.concatenate([np.diff(time[rows]) for rows in runs])
+    if np.abs(steps - np.median(steps)).max() > _UNEVEN * np.median(steps):
+        raise ValueError("the rows are not evenly spaced in time")
+    return np.sort(np.concatenate(runs)), float(np.median(steps))
+
+
+def _line(rate, output):
     """Slope and intercept of the least-squares line."""
     mean, middle = rate.mean(), output.mean()
     if rate.min() == rate.max():
@@ -185,41 +296,107 @@ def line(rate, output):
     return slope, middle - slope * mean
 
 
-def rows_by_run(run, n_rows, at_least=1):
-    """Positions of the rows of each run, in order of appearance."""
-    if run is None:
-        return [np.arange(n_rows)]
-    labels = check_labels(run, "run", n_rows)
-    _, first, place = np.unique(labels, return_index=True, return_inverse=True)
-    if first.size < at_least:
-        raise ValueError(f"There is {first.size} run; at least {at_least} are needed.")
-    rows = np.split(np.argsort(place, kind="stable"), np.cumsum(np.bincount(place))[:-1])
-    return [rows[i] for i in np.argsort(first)]
+def _peak(values):
+    return np.abs(values).max()
 
 
-def squares_of_means(error, time, averaging_time):
+def _reduction(rate, before, after):
+    left = rms(after - rate)
+    if left == 0:
+        raise ValueError("after is zero everywhere: a factor without bound.")
+    return rms(before - rate) / left
+
+
+def _nonlinearity(rate, output, full_scale, size):
+    """Of the means over bins of the rate's range: that of single rows would be their noise."""
+    low, width = rate.min(), np.ptp(rate) / _RATE_BINS
+    if width > 0:
+        place = np.minimum(((rate - low) / width).astype(int), _RATE_BINS - 1)
+        counts, *sums = (np.bincount(place, weights) for weights in (None, rate, output))
+        rate, output = (each[counts > 0] / counts[counts > 0] for each in sums)
+    slope, intercept = _line(rate, output)
+    return _PPM * size(output - slope * rate - intercept) / (abs(slope) * full_scale)
+
+
+def _asymmetry(rate, output):
+    slopes = []
+    for sign, side in (("positive", rate >= 0), ("negative", rate <= 0)):
+        if side.sum() < 2 or np.ptp(rate[side]) == 0:
+            raise ValueError(f"No asymmetry: there are not two different {sign} rates.")
+        slopes.append(scale_factor(rate[side], output[side]))
+    return _PPM * (slopes[0] - slopes[1]) / np.mean(slopes)
+
+
+def _sensitivity(rate, output, temperature):
+    """S_T / S of output = (S + S_T dT) rate + c + c_T dT."""
+    dt = _centred(temperature)
+    without = "rate and temperature do not change independently of each other"
+    slope, by_temperature, *_ = _least_squares([rate, rate * dt, dt], output, without)
+    return _PPM * by_temperature / slope
+
+
+def _bias_sensitivity(error, column, name, **other):
+    """Slope of the error in a column, fitted together with that in another."""
+    without = f"{name} never changes"
+    if other:
+        without = "temperature and temperature_rate do not change independently of each other"
+    design = [_centred(values) for values in (column, *other.values())]
+    return PER_HOUR * _least_squares(design, error, without)[0]
+
+
+def _centred(values):
+    # Not values - mean where they are all equal: that leaves rounding errors, not zero.
+    return values - (values[0] if np.ptp(values) == 0 else values.mean())
+
+
+def _least_squares(design, target, without):
+    """Coefficients of the columns in ``design``, beside a constant."""
+    columns = np.column_stack([*design, np.ones_like(target)])
+    size = np.sqrt(np.mean(columns**2, axis=0))
+    rank = 0
+    if (size > 0).all():
+        solution, _, rank, _ = np.linalg.lstsq(columns / size, target, rcond=1e-10)
+    if rank < columns.shape[1]:
+        raise ValueError(f"No sensitivity: {without}.")
+    return solution / size
+
+
+def _squares_of_means(error, time, over):
     """Sum of squares of one run's means over whole averaging times, and degrees of freedom."""
-    if not averaging_time > 0:
-        raise ValueError(f"averaging_time={averaging_time} must be positive.")
     steps = np.diff(time)
     if (steps <= 0).any():
         raise ValueError("time must increase within each run.")
-    if time.size > 1 and np.median(steps) > averaging_time * (1.0 + 1e-9):
+    if time.size > 1 and np.median(steps) > over * (1.0 + 1e-9):
         raise ValueError(
             f"No bias stability: rows are {np.median(steps):g} s apart, more than "
-            f"averaging_time={averaging_time:g} s."
+            f"averaging_time={over:g} s."
         )
     # A time on an edge belongs to the interval that starts there, rounding errors or not.
-    place = np.floor((time - time[0]) / averaging_time + 1e-9).astype(int)
+    place = np.floor((time - time[0]) / over + 1e-9).astype(int)
     _, place, counts = np.unique(place, return_inverse=True, return_counts=True)
     full = counts >= 0.5 * counts.max()  # a time less than half full has no mean
     means = np.bincount(place, error)[full] / counts[full]
     return np.sum((means - means.mean()) ** 2), means.size - 1
 
 
-def pooled_deviation(squares):
-    """Standard deviation within the runs [deg/h], of the sums of squares of each."""
+def _pooled_deviation(squares):
+    """Standard deviation within the runs [deg/h] (GJB 2426), of the sums of squares of each."""
     sum_of_squares, degrees_of_freedom = np.sum(squares, axis=0)
     if degrees_of_freedom == 0:
         raise ValueError("No bias stability: no run is as long as two averaging times.")
     return float(PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
+
+
+def _level(tau, deviation, slope):
+    """Level of the lowest line of this slope along the curve; NaN and why where it has none."""
+    x, y = np.log(tau), np.log(deviation)
+    levels = []
+    for start in range(x.size - _POINTS_PER_SLOPE + 1):
+        window = slice(start, start + _POINTS_PER_SLOPE)
+        if abs(np.polyfit(x[window], y[window], 1)[0] - slope) <= _SLOPE_TOLERANCE:
+            levels.append(np.mean(y[window] - slope * x[window]))
+    return (
+        (np.exp(min(levels)), "")
+        if levels
+        else (np.nan, f"no slope of {'+' if slope > 0 else '-'}1/2")
+    )

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.datasets import load_ofog, make_ofog
+from skanfis.datasets import make_ofog
 from skanfis.datasets._ofog import _POPULATION
 
 PARTS = [
@@ -39,45 +39,14 @@ def test_parts_add_up_to_the_error(data):
     assert_allclose(data[PARTS].sum(axis=1), data["error"], atol=1e-12)
 
 
-def test_sizes_of_the_parts_are_those_of_a_tactical_gyro(data):
-    largest = data[PARTS].abs().max()
-    # sin(phi) / phi at 100 deg/s: 3.2 % of 100 deg/s, the Sagnac factor being known to 2 %.
-    assert_allclose(largest["nonlinearity"], 3.23, rtol=0.05)
-    # 370 and 40 ppm/degC over some 25 to 45 degC from the reference
-    assert 0.8 < largest["wavelength"] < 2.0
-    assert 0.08 < largest["amplitude"] < 0.4
-    assert 0.01 < largest["warm_up_scale_factor"] < 0.03
-    assert largest["scale_factor"] < 500e-6 * 100
-    in_degrees_per_hour = 3600 * largest
-    for name, low, high in [
-        ("bias", 1, 15),
-        ("bias_temperature", 10, 80),
-        ("warm_up", 20, 45),
-        ("bias_temperature_rate", 1, 10),
-        ("bias_repeatability", 1, 4),
-        ("bias_instability", 0.5, 5),
-        ("rate_random_walk", 0.2, 2),
-        ("angle_random_walk", 1, 10),
-        ("quantisation", 0.05, 0.3),
-    ]:
-        assert low < in_degrees_per_hour[name] < high
-
-
-def test_rates_are_the_levels_asked_for_in_every_run():
+def test_rates_are_the_levels_asked_for_in_every_run_or_of_one_dwell_alone(data):
     few = make_ofog(n_rate_levels=11, random_state=0)
     for _, run in few.groupby("run"):
         assert_allclose(np.unique(run["rate"]), np.linspace(-100, 100, 11), atol=1e-12)
     given = make_ofog(rates=[30.0, 0.0, -2.5], random_state=0)
     assert_array_equal(np.unique(given["rate"]), [-2.5, 0.0, 30.0])
-    assert set(make_ofog(rates=[0], random_state=0)["rate"]) == {0.0}
-
-
-def test_by_default_no_two_runs_share_a_rate(data):
-    runs_per_rate = data.groupby("rate")["run"].nunique()
-    assert set(runs_per_rate) == {1}
-    for _, run in data.groupby("run"):
-        assert run["rate"].min() < -90
-        assert run["rate"].max() > 90
+    assert set(data.groupby("rate")["run"].nunique()) == {1}
+    assert (data["rate"].groupby(data["run"]).agg(np.ptp) > 180.0).all()
 
 
 def test_counts_obey_the_sine_of_the_gyro_measured():
@@ -116,8 +85,10 @@ def test_power_ups_are_numbered_without_repeats_and_begin_at_time_zero():
 
 
 def test_linearised_gyro_leaves_1000_ppm():
+    # About its best line a cubic of x^2 / 6 leaves 0.151 x^2 / 6 RMS of full scale, x = K Omega.
     data = make_ofog(
-        preset="linearised",
+        coefficients={"sagnac_factor": 0.0304, "sagnac_temperature": -45.0},
+        max_rate=375.0,
         n_devices=1,
         n_runs=1,
         duration=72_000.0,
@@ -129,19 +100,6 @@ def test_linearised_gyro_leaves_1000_ppm():
     best_line = np.polynomial.Polynomial.fit(data["rate"], data["nonlinearity"], 1)
     left = data["nonlinearity"] - best_line(data["rate"])
     assert_allclose(np.sqrt(np.mean(left**2)) / 375.0, 1000e-6, rtol=0.02)
-
-
-def test_conditions_of_the_paper_give_a_table_like_its_own():
-    paper = make_ofog(preset="paper", n_devices=1, device_spread=0.0, random_state=0)
-    printed = load_ofog().data
-    assert set(paper.groupby("run").size()) == {len(printed)}
-    assert_array_equal(paper.loc[paper["run"] == 0, "time"], printed["time"])
-    assert_allclose(paper["rate"].mean(), printed["rate"].mean(), atol=0.3)
-    assert_allclose(paper["temperature"].mean(), printed["temperature"].mean(), atol=0.2)
-    assert_allclose(paper["temperature"].std(), printed["temperature"].std(), rtol=0.3)
-    warm, output = paper["time"] > 0, load_ofog().target
-    assert_allclose(paper["output"][warm].mean(), np.median(output), atol=0.01)
-    assert_allclose(paper["output"][~warm].mean(), output[0], atol=0.02)
 
 
 def test_same_seed_same_table_another_seed_another():
@@ -171,76 +129,12 @@ def test_seed_fixes_the_experiment_whatever_the_noise_and_the_devices():
     assert not nominal["warm_up"].any()
 
 
-@pytest.mark.theory
-def test_angle_random_walk_of_a_mean_falls_with_the_root_of_time():
-    # The mean over a time t has the deviation N / sqrt(t).
-    noise = make_ofog(
-        n_devices=1,
-        n_runs=1,
-        duration=4e6,
-        sampling_interval=10.0,
-        device_spread=0.0,
-        coefficients={"angle_random_walk": 0.1},
-        random_state=0,
-    )["angle_random_walk"].to_numpy()
-    for hours, tolerance in ((1 / 360, 0.01), (0.1, 0.03), (1.0, 0.1)):
-        means = noise[: noise.size // 360 * 360].reshape(-1, round(hours * 360)).mean(axis=1)
-        assert_allclose(3600 * means.std(), 0.1 / np.sqrt(hours), rtol=tolerance)
-
-
-def _residual_of_a_smooth_law(temperature, error):
-    """What no single-valued smooth function of the temperature explains [deg/s]."""
-    law = np.polynomial.Chebyshev.fit(temperature, error, 6)
-    return np.sqrt(np.mean((error - law(temperature)) ** 2))
-
-
-def _one_rate_of_a_quiet_device(**coefficients):
-    """A gyro without noise, whose error depends on the coil's temperature alone."""
-    without_others = {"warm_up": 0.0, "warm_up_scale_factor": 0.0, "bias_temperature_rate": 0.0}
-    return make_ofog(
-        n_devices=1,
-        n_runs=12,
-        sampling_interval=5.0,
-        rates=[100.0],
-        device_spread=0.0,
-        noise=0.0,
-        coefficients=without_others | coefficients,
-        random_state=1,
-    )
-
-
-def test_lag_makes_the_error_many_valued_in_the_indicated_temperature():
-    in_step = _one_rate_of_a_quiet_device(thermometer_lag=0.0)
-    lagging = _one_rate_of_a_quiet_device()
-    assert _residual_of_a_smooth_law(in_step["temperature"], in_step["error"]) < 1e-9
-    assert _residual_of_a_smooth_law(lagging["temperature"], lagging["error"]) > 0.01
-
-
-def test_rate_of_temperature_makes_it_single_valued_again():
-    lagging = _one_rate_of_a_quiet_device()
-    coil = lagging["temperature"] + 180.0 * lagging["temperature_rate"]
-    many_valued = _residual_of_a_smooth_law(lagging["temperature"], lagging["error"])
-    assert _residual_of_a_smooth_law(coil, lagging["error"]) < 1e-6 * many_valued
-
-
-def test_effects_of_time_make_it_many_valued_even_without_a_lag():
-    # At 25 degC, in runs that pass it early, late, cooling or warming.
-    warming_up = _one_rate_of_a_quiet_device(thermometer_lag=0.0, warm_up_scale_factor=200.0)
-    shupe = _one_rate_of_a_quiet_device(thermometer_lag=0.0, bias_temperature_rate=20.0)
-    for data in (warming_up, shupe):
-        assert _residual_of_a_smooth_law(data["temperature"], data["error"]) > 5e-4
-
-
 def test_documentation_lists_every_coefficient_with_its_nominal_value():
     page = Path(__file__).parents[2] / "docs" / "gyro_simulator.rst"
     rows = [line.split() for line in page.read_text(encoding="utf-8").splitlines()]
     listed = {row[0]: row[1] for row in reversed(rows) if len(row) > 3}
     for name, (nominal, *_) in _POPULATION.items():
         assert float(listed[name]) == nominal
-
-
-def devices_of(data, name):
-    return data.groupby("device")[name].first()
 
 
 def test_devices_fill_their_tolerances_and_not_more():
@@ -281,15 +175,6 @@ def test_every_rate_is_held_once_before_any_comes_again():
     assert not np.array_equal(order, np.sort(order))
 
 
-def test_rates_in_a_sweep_go_up_and_down_again():
-    order = dwells_of(duration=36.0, rates=[-10.0, 0.0, 10.0], rate_order="sweep")
-    assert_array_equal(order, [-10, 0, 10, 0, -10, 0, 10, 0, -10])
-    steps = np.diff(dwells_of(duration=400.0, rate_order="sweep"))
-    assert (steps[:49] > 0).all()
-    assert (steps[50:] < 0).all()
-    assert set(dwells_of(duration=40.0, rates=[38.69], rate_order="sweep")) == {38.69}
-
-
 def test_phase_is_refused_exactly_where_a_device_reaches_a_quarter_turn():
     small = {"n_devices": 1, "n_runs": 1, "duration": 10.0}
     nominal = {"device_spread": 0.0, "coefficients": {"sagnac_temperature": 0.0}}
@@ -306,44 +191,51 @@ def test_sampling_keeps_to_the_durations_asked_for():
         n_devices=1, n_runs=1, duration=0.3, sampling_interval=0.1, dwell_time=0.1, random_state=0
     )
     assert_allclose(data["time"], [0.0, 0.1, 0.2])
-    data = make_ofog(n_devices=1, n_runs=1, duration=100.0, sampling_interval=30.0, random_state=0)
-    assert_allclose(data["time"], [0.0, 30.0, 60.0])
+
+
+@pytest.mark.theory
+def test_rate_of_temperature_undoes_the_lag_of_the_thermometer():
+    """Without noise the error is a smooth law of the coil's temperature, not of the indicated."""
+    still = dict.fromkeys(("warm_up", "warm_up_scale_factor", "bias_temperature_rate"), 0.0)
+    data = make_ofog(
+        n_devices=1,
+        n_runs=12,
+        sampling_interval=5.0,
+        rates=[100.0],
+        device_spread=0.0,
+        noise=0.0,
+        coefficients=still,
+        random_state=1,
+    )
+    coil = data["temperature"] + 180.0 * data["temperature_rate"]
+    left = []
+    for temperature in (data["temperature"], coil):
+        law = np.polynomial.Chebyshev.fit(temperature, data["error"], 6)
+        left.append(np.sqrt(np.mean((data["error"] - law(temperature)) ** 2)))
+    assert left[0] > 0.01
+    assert left[1] < 1e-9
 
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
         ({"n_devices": 0}, r"'n_devices' .* int in the range \[1, inf\). Got 0"),
-        ({"n_devices": 2.0}, "'n_devices' .* must be an int"),
         ({"duration": 5.0}, r"duration=5.0 must be at least the sampling_interval, 10.0 s"),
-        ({"duration": float("inf")}, "'duration' .* Got inf"),
-        ({"sampling_interval": 0.0}, "'sampling_interval' .* Got 0.0"),
         ({"max_rate": 350.0}, "arcsine is not defined"),
-        ({"max_rate": -1.0}, "'max_rate' .* Got -1.0"),
         ({"n_rate_levels": 1}, "'n_rate_levels' .* Got 1"),
         ({"dwell_time": 1.0}, "dwell_time=1.0 must be at least"),
-        ({"ambient_range": 20.0}, "ambient_range must be two temperatures"),
-        ({"ambient_range": (30.0, 20.0)}, r"ambient_range=\(30.0, 20.0\) must rise"),
+        ({"ambient_range": 20.0}, "ambient_range=20.0 must be two temperatures"),
+        ({"ambient_range": (30.0, 20.0)}, r"=\(30.0, 20.0\) must be two temperatures that rise"),
         ({"ambient_range": (-200.0, 20.0)}, "from -60 or more to 100 degC"),
         ({"max_residual_heat": 1.1}, r"in the range \[0.*, 1.*\]. Got 1.1"),
         ({"noise": float("nan")}, "'noise' .* Got nan"),
-        ({"device_spread": "all"}, "'device_spread' .* must be a float"),
         ({"coefficients": {"gain": 1}}, r"unknown names \['gain'\]; known are .*'warm_up'"),
         ({"coefficients": {"warm_up": "1"}}, "'warm_up' parameter of make_ofog's coefficients"),
-        ({"coefficients": {"warm_up": float("inf")}}, "Got inf"),
-        ({"coefficients": {"warm_up_time": 0.0}}, r"range \(0.*, inf\). Got 0.0"),
         ({"coefficients": {"sagnac_temperature": -3000}}, "Got -3000"),
-        ({"coefficients": [("warm_up", 1.0)]}, "'coefficients' parameter of make_ofog"),
         ({"random_state": "seed"}, "cannot be used to seed"),
-        ({"preset": "mems"}, "'preset' .* must be a str among"),
         ({"profile": "oven"}, "'profile' .* must be a str among"),
-        ({"rate_order": "up"}, "'rate_order' .* must be a str among"),
-        ({"off_time": -1.0}, "'off_time' .* Got -1.0"),
-        ({"n_soaks": 1}, "'n_soaks' .* Got 1"),
-        ({"rates": []}, "rates must be a list of finite rates"),
-        ({"rates": 5.0}, "rates must be a list of finite rates"),
         ({"rates": [0.0, float("nan")]}, "rates must be a list of finite rates"),
-        ({"rates": [-400.0]}, r"largest of abs\(rates\) == 400.0, must be < 341"),
+        ({"rates": [-400.0]}, "largest rate is 400.0 and must be < 341"),
         ({"rates": [0.0], "max_rate": 5.0}, r"together with \['max_rate'\]"),
     ],
 )

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from skanfis.datasets import _ofog_physics as physics
@@ -17,8 +16,8 @@ NOMINAL = {name: entry[0] for name, entry in _POPULATION.items()}
 # Those that are no size of an effect stay: an interferometer without them is none.
 STRUCTURAL = ("amplitude", "sagnac_factor", "warm_up_time", "thermal_time", "correlation_time")
 IDEAL = NOMINAL | {name: 0.0 for name in NOMINAL if name not in STRUCTURAL}
-SCHEDULE = Schedule(720, 5.0, 1, 0, "constant", (-20.0, 60.0), 5)
-TIME = SCHEDULE.time
+SCHEDULE = Schedule(720, 5.0, 1, 0, "constant", (-20.0, 60.0))
+TIME = 5.0 * np.arange(720)
 RATE = np.repeat(np.linspace(-120, 120, 9), 80)
 OPTICS = (0.2536, 0.98, 1.01)
 
@@ -28,11 +27,11 @@ def history(schedule=SCHEDULE, start=10.0, rising=True, heat=0.0, **coefficients
     return list(temperatures(device, schedule, start, rising, heat))
 
 
-def simulate(device, *, ambient=20.0, heat=0.0, bias=0.0, normals=None, rate=RATE):
+def simulate(device, *, ambient=20.0, bias=0.0, normals=None, rate=RATE):
     """Measurement and parts of the error at a constant ambient temperature."""
     normals = np.zeros((4, TIME.size)) if normals is None else normals
-    (thermal,) = history(SCHEDULE, ambient, True, heat, **device)
-    return simulate_power_up(SimpleNamespace(**device), bias, TIME, rate, thermal, normals, 5.0)
+    (thermal,) = history(SCHEDULE, ambient, **device)
+    return simulate_power_up(SimpleNamespace(**device), bias, rate, thermal, normals, 5.0)
 
 
 @pytest.fixture(name="normals")
@@ -76,8 +75,6 @@ def test_chamber_ramps_and_soaks():
     assert_allclose(soaks, [-20, 0, 20, 40, 60])
     # The ends are met once on the way up and down, the others twice.
     assert_allclose(n_samples, [90, 180, 180, 180, 90], atol=2)
-    one = replace(schedule, ambient_range=(21.0, 21.0))
-    assert_array_equal(one.ambient(0, 720, 21.0, True), 21.0)
 
 
 def test_later_power_ups_begin_as_warm_as_the_off_time_leaves_the_gyro():
@@ -89,14 +86,7 @@ def test_later_power_ups_begin_as_warm_as_the_off_time_leaves_the_gyro():
         # The thermometer lags: it is still warmer when the coil has cooled.
         assert (thermal.thermometer[0] > thermal.coil[0]) == (heat > 0)
         heat = (15.0 - (15.0 - heat) * on) * off
-    (whole,) = history(replace(SCHEDULE, n_samples=1440))
-    halves = history(replace(SCHEDULE, n_power_ups=2))
-    for name in ("coil", "thermometer"):
-        parts = np.concatenate([getattr(half, name) for half in halves])
-        assert_allclose(parts, getattr(whole, name), rtol=1e-12)
-
-
-def test_the_chamber_goes_on_while_the_gyro_is_off():
+    # The chamber goes on while the gyro is off.
     schedule = replace(SCHEDULE, profile="ramps", n_power_ups=2, n_off=120)
     first, second = history(schedule)
     assert second.ambient[0] == schedule.ambient(840, 1, 10.0, True)[0] != first.ambient[0]
@@ -116,11 +106,8 @@ def test_ideal_gyro_obeys_the_arcsine_law():
         ({"scale_factor": 500.0}, "scale_factor"),
         ({"sagnac_temperature": -370.0}, "wavelength"),
         ({"amplitude_temperature": -40.0}, "amplitude"),
-        ({"amplitude_curvature": -0.5}, "amplitude"),
         ({"warm_up_scale_factor": 200.0}, "warm_up_scale_factor"),
-        ({"bias": 10.0}, "bias"),
         ({"bias_temperature": 0.5}, "bias_temperature"),
-        ({"bias_temperature_curvature": 0.01}, "bias_temperature"),
         ({"warm_up": 30.0}, "warm_up"),
         ({"bias_temperature_rate": 5.0, "self_heating": 10.0}, "bias_temperature_rate"),
         ({"bias_instability": 0.5}, "bias_instability"),
@@ -134,13 +121,6 @@ def test_each_coefficient_acts_in_its_own_part_alone(coefficient, part, normals)
     acting = {name for name, values in parts.items() if np.abs(values).max() > 1e-12}
     assert acting == {"nonlinearity", part}
     assert_allclose(measured["error"] - parts["nonlinearity"], parts[part], rtol=1e-9, atol=1e-12)
-
-
-def test_parts_add_up_to_the_error_even_where_effects_are_large(normals):
-    # A bias of 10 deg/s makes the sine's curvature felt within the bias itself.
-    device = NOMINAL | {"bias": 36_000.0, "warm_up": -20_000.0, "scale_factor": 5e4}
-    measured, parts = simulate(device, ambient=60.0, heat=0.3, bias=3.0, normals=normals)
-    assert_allclose(sum(parts.values()), measured["error"], atol=1e-12)
 
 
 def test_coefficients_have_the_units_of_data_sheets():
@@ -181,15 +161,8 @@ def test_noise_is_what_a_perfect_compensation_leaves(normals):
     compensated = np.rad2deg(phase / factor) - bias / 3600
     noise = np.sqrt(np.mean(measured["noise"] ** 2))
     assert_allclose(compensated - RATE, measured["noise"], atol=1e-5 * noise)
+    assert_allclose(sum(parts.values()), measured["error"], atol=1e-12)
     assert noise > np.sqrt(np.mean(parts["angle_random_walk"] ** 2))
-
-
-def test_thermometer_is_as_noisy_as_asked_for_and_its_rate_is_not(normals):
-    quiet, _ = simulate(NOMINAL, normals=normals)
-    noisy, _ = simulate(NOMINAL | {"thermometer_noise": 0.2}, normals=normals)
-    assert_allclose(noisy["temperature"] - quiet["temperature"], 0.2 * normals[3], atol=1e-12)
-    for name in ("temperature_rate", "output"):
-        assert_array_equal(noisy[name], quiet[name])
 
 
 @pytest.mark.parametrize("bias", [0.0, 1e-12, 0.01, -30.0])
@@ -200,7 +173,6 @@ def test_bias_gain_is_the_secant_of_the_response(bias):
     assert_allclose(gain * bias, ends[1] - ends[0], atol=1e-13)
     if bias == 0.0:
         assert_allclose(gain, 0.98 * 1.01 * np.cos(0.2536 * 0.98 * np.deg2rad(rate)), rtol=1e-13)
-        assert_allclose(physics.rate_by_output(rate, *OPTICS), 1 / gain, rtol=1e-13)
 
 
 def test_lag_is_exact_whatever_the_interval():
@@ -208,17 +180,9 @@ def test_lag_is_exact_whatever_the_interval():
         time = interval * np.arange(50)
         lagged = physics.first_order_lag(np.full(50, 20.0), 5.0, 300.0, interval)
         assert_allclose(lagged, 20 - 15 * np.exp(-time / 300), rtol=1e-12)
-    time = np.arange(0.0, 2000.0)
-    solution = solve_ivp(
-        lambda t, y: (np.sin(t / 200) - y) / 150,
-        (0, 1999),
-        [0.3],
-        t_eval=time,
-        rtol=1e-9,
-        atol=1e-10,
-    )
-    lagged = physics.first_order_lag(np.sin(time / 200), 0.3, 150.0, 1.0)
-    assert_allclose(lagged, solution.y[0], atol=1e-5)
+        # Behind a ramp u = t it stays by tau, whatever the start.
+        lagged = physics.first_order_lag(time, 5.0, 300.0, interval)
+        assert_allclose(lagged, time - 300.0 + 305.0 * np.exp(-time / 300), atol=1e-9 * time[-1])
     assert_allclose(physics.first_order_lag(time, 9.0, 0.0, 1.0), time)
 
 
@@ -242,10 +206,6 @@ def test_allan_deviation_of_the_bias_instability_peaks_at_its_flicker_floor():
     n_mean = round(50 * peak.x)
     means = noise[: noise.size // n_mean * n_mean].reshape(-1, n_mean).mean(axis=1)
     assert_allclose(np.sqrt(0.5 * np.mean(np.diff(means) ** 2)), 0.664 * 2.0, rtol=0.05)
-    normals = np.random.RandomState(1).standard_normal((4000, 21))
-    noise = np.array([physics.bias_instability(row, 1.0, 100.0, 10.0) for row in normals])
-    assert_allclose(noise.std(axis=0), noise.std(), rtol=0.06)
-    assert_allclose(np.corrcoef(noise[:, 0], noise[:, 10])[0, 1], np.exp(-1), atol=0.05)
 
 
 def test_allan_deviation_of_the_rate_random_walk_grows_with_the_root_of_time(rng):

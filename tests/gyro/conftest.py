@@ -23,7 +23,7 @@ def coarse_report():
     """Pictures of few points, intervals of few resamples: both are looked at elsewhere."""
     every = _results.gyro_report
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skanfis.gyro._pictures._DOTS_PER_INCH", 30)
+        patch.setattr("skanfis.gyro._results._DOTS_PER_INCH", 30)
         patch.setattr(_results, "gyro_report", lambda *a, **o: every(*a, **{"n_resamples": 20} | o))
         yield
 

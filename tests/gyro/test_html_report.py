@@ -15,14 +15,13 @@ pytest.importorskip("jinja2")
 
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import _pictures
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._formulas import formula_of, rules_text
 from skanfis.gyro._headline import budget_of, proven_bounds
 from skanfis.gyro._options import ReportOptions, parse_limit
-from skanfis.gyro._results import Results
+from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
-from skanfis.gyro.displays._base import figures
+from skanfis.gyro.displays import figures
 from skanfis.gyro.html_report import check_installed, report_page
 from skanfis.inspection import readability
 
@@ -222,7 +221,7 @@ def test_a_file_runs_nothing_in_a_spreadsheet():
     from matplotlib.figure import Figure
 
     tables = {"groups": pd.DataFrame({"group": ["=HYPERLINK(1)", "-5"], "error": [1.0, 2.0]})}
-    picture = _pictures._picture("subject", Figure(), tables, "Caption.")
+    picture = Picture.of("subject", Figure(), tables, "Caption.")
     lines = base64.b64decode(picture.files["subject.csv"]).decode().splitlines()
     assert lines == ["group,error", "'=HYPERLINK(1),1", "-5,2"]
 

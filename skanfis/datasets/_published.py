@@ -1,0 +1,212 @@
+"""Data of papers: the benchmarks of Jang 1993 by their formulas, and Table 1 of Sun et al. 2009."""
+
+import numpy as np
+import pandas as pd
+from sklearn.utils import Bunch
+
+from .._sklearn import StrOptions, validate_parameter_constraints
+
+__all__ = ["load_ofog", "make_jang_sinc", "make_jang_three_input", "make_mackey_glass"]
+
+_SUBSET = {"subset": [StrOptions({"train", "check", "all"})]}
+
+# Columns: time [s], temperature [degC], rate [deg/s], output [deg/s].
+_TABLE = (
+    (0, 20.55, 38.6839, 39.5906),
+    (20, 21.03, 37.6859, 39.9941),
+    (40, 20.56, 38.6894, 39.9914),
+    (60, 20.96, 38.6858, 39.9903),
+    (80, 21.22, 39.6885, 39.9928),
+    (100, 20.99, 39.6773, 39.9900),
+    (120, 20.65, 38.6969, 39.9812),
+    (140, 20.54, 37.6788, 39.9906),
+    (160, 20.47, 39.6916, 40.0014),
+    (180, 21.01, 38.6919, 39.9826),
+    (200, 21.32, 37.6808, 39.9964),
+    (220, 21.06, 38.6837, 39.8965),
+    (240, 20.93, 39.6786, 39.9924),
+    (260, 20.82, 38.6911, 39.9890),
+    (280, 20.64, 38.6887, 39.7843),
+    (300, 20.74, 38.6931, 39.9880),
+    (320, 20.98, 38.6858, 39.8967),
+    (340, 20.82, 38.6901, 39.9930),
+    (360, 20.59, 38.6930, 39.9820),
+)
+
+_DESCRIPTION = """\
+Open-loop fiber-optic gyro: time since power-on [s], temperature [degC], rate and output [deg/s].
+
+Source: Y. Liu, Y. Sun, Y. Lu, D. Li, L. Li, Y. Pan, "Study of ANFIS Modeling Algorithm for
+Eliminating the Fiber Optic Gyro Nonlinear Error", Chinese Journal of Lasers 36 (Supplement 2),
+2009, 27-29, doi:10.3788/CJL200936s2.0027, Table 1. The values are kept exactly as printed.
+
+Do not judge a model by its fit to this table:
+
+* The text speaks of 20 rows; 19 are printed.
+* The rate column is damaged: its fractional parts agree (standard deviation 0.005 deg/s), while
+  the digit before the point jumps between 7, 8 and 9, and the output stays at 39.99 deg/s.
+* The outputs 39.5906 (at 0 s) and 39.7843 (at 280 s) stand apart from all others.
+* All temperatures lie between 20.47 and 21.32 degC: one window of 1 degC.
+* The paper trains 36 rules, that is 108 linear parameters, on these rows, and tests only on
+  0 to 120 s of the same rows. No row is left to test a model on.
+"""
+
+
+def load_ofog() -> Bunch:
+    """Load Table 1 of the founding paper: 19 rows of an open-loop fiber-optic gyro (regression).
+
+    A historical document, kept as printed, and no benchmark, as ``DESCR`` says. For data to develop
+    a compensation on, see :func:`make_ofog`.
+
+    Returns
+    -------
+    table : :class:`~sklearn.utils.Bunch`
+        With DataFrames ``data`` (19, 3): time since power-on [s], temperature [degC], angular rate
+        [deg/s]; ``target`` (19,): output of the gyro [deg/s]; ``frame``, both together; and
+        ``DESCR``.
+
+    Examples
+    --------
+    >>> from skanfis.datasets import load_ofog
+    >>> load_ofog().data.shape
+    (19, 3)
+    """
+    frame = pd.DataFrame(_TABLE, columns=["time", "temperature", "rate", "output"], dtype=float)
+    data, target = frame.drop(columns="output"), frame["output"]
+    return Bunch(data=data, target=target, frame=frame, DESCR=_DESCRIPTION)
+
+
+def make_jang_sinc(*, midpoints: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Make Jang's first problem: y = sin(x1) / x1 * sin(x2) / x2 on a grid over [-10, 10]^2.
+
+    Parameters
+    ----------
+    midpoints : bool, default=False
+        Give the centres of the grid's cells in place of its corners.
+
+    Returns
+    -------
+    X : ndarray of shape (121, 2), or (100, 2) for the midpoints
+        The second input changes fastest.
+    y : ndarray of shape (121,) or (100,)
+
+    References
+    ----------
+    J.-S. R. Jang, "ANFIS: Adaptive-Network-Based Fuzzy Inference System", IEEE Transactions on
+    Systems, Man, and Cybernetics 23(3), 1993, 665-685, example 1.
+
+    Examples
+    --------
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> X, y = make_jang_sinc()
+    >>> X.shape, float(y.max())
+    ((121, 2), 1.0)
+    """
+    axis = np.linspace(-10.0, 10.0, 11)
+    if midpoints:
+        axis = 0.5 * (axis[1:] + axis[:-1])
+    X = _grid(axis, 2)
+    # numpy's sinc(u) is sin(pi u) / (pi u).
+    return X, np.sinc(X / np.pi).prod(axis=1)
+
+
+def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
+    """Make Jang's second problem: y = (1 + x1^0.5 + x2^-1 + x3^-1.5)^2.
+
+    It is example 2 of the paper that :func:`make_jang_sinc` names. Jang's figure of merit is the
+    mean of 100 abs(y - prediction) / abs(y).
+
+    Parameters
+    ----------
+    subset : {"train", "check", "all"}, default="train"
+        The 216 training points (1, 2, ..., 6 in each input), the 125 checking points
+        (1.5, 2.5, ..., 5.5 in each), or both, in this order.
+
+    Returns
+    -------
+    X : ndarray of shape (216, 3), (125, 3) or (341, 3)
+        The third input changes fastest.
+    y : ndarray of shape (216,), (125,) or (341,)
+
+    Raises
+    ------
+    ValueError
+        If ``subset`` is unknown.
+
+    Examples
+    --------
+    >>> from skanfis.datasets import make_jang_three_input
+    >>> X, y = make_jang_three_input()
+    >>> X.shape, float(y[0])
+    ((216, 3), 16.0)
+    """
+    validate_parameter_constraints(_SUBSET, {"subset": subset}, "make_jang_three_input")
+    train, check = _grid(np.arange(1.0, 7.0), 3), _grid(np.arange(1.5, 6.0), 3)
+    X = {"train": train, "check": check, "all": np.vstack([train, check])}[subset]
+    return X, (1.0 + X[:, 0] ** 0.5 + 1.0 / X[:, 1] + X[:, 2] ** -1.5) ** 2
+
+
+def make_mackey_glass(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
+    """Make Jang's fourth problem: predict the chaotic Mackey-Glass series (Science 197, 1977).
+
+    The series solves dx/dt = 0.2 x(t - 17) / (1 + x(t - 17)^10) - 0.1 x(t) with x(0) = 1.2, and
+    zero before. From its values at t - 18, t - 12, t - 6 and t, the value at t + 6 is to be
+    predicted, for t = 118, ..., 1117.
+
+    Parameters
+    ----------
+    subset : {"train", "check", "all"}, default="train"
+        The first 500 rows, the last 500, or all 1000.
+
+    Returns
+    -------
+    X : ndarray of shape (500, 4) or (1000, 4)
+        x(t - 18), x(t - 12), x(t - 6), x(t), in time's order.
+    y : ndarray of shape (500,) or (1000,)
+        x(t + 6).
+
+    Raises
+    ------
+    ValueError
+        If ``subset`` is unknown.
+
+    Examples
+    --------
+    >>> from skanfis.datasets import make_mackey_glass
+    >>> X, y = make_mackey_glass()
+    >>> X.shape, round(float(y[0]), 4)
+    ((500, 4), 1.0243)
+    """
+    validate_parameter_constraints(_SUBSET, {"subset": subset}, "make_mackey_glass")
+    t = np.arange(118, 1118)
+    series = _mackey_glass_series(t[-1] + 6)
+    rows = {"train": slice(None, 500), "check": slice(500, None), "all": slice(None)}[subset]
+    X = np.column_stack([series[t - lag] for lag in (18, 12, 6, 0)])
+    return X[rows], series[t + 6][rows]
+
+
+def _mackey_glass_series(last_time, steps_per_unit=10):
+    """x(0), x(1), ..., x(last_time) by Runge and Kutta's method of order 4.
+
+    In the middle of a step the delayed value is a mean. Published errors are of 10 steps per unit:
+    chaos magnifies the error of the step that reads across the jump at t = 0.
+    """
+    step = 1.0 / steps_per_unit
+    x = [0.0] * (17 * steps_per_unit) + [1.2]  # from t = -17 on
+    for i in range(last_time * steps_per_unit):
+        now, delayed, delayed_next = x[-1], x[i], x[i + 1]
+        gain, gain_middle, gain_next = (
+            0.2 * value / (1.0 + value**10)
+            for value in (delayed, 0.5 * (delayed + delayed_next), delayed_next)
+        )
+        slope_1 = gain - 0.1 * now
+        slope_2 = gain_middle - 0.1 * (now + 0.5 * step * slope_1)
+        slope_3 = gain_middle - 0.1 * (now + 0.5 * step * slope_2)
+        slope_4 = gain_next - 0.1 * (now + step * slope_3)
+        x.append(now + step / 6.0 * (slope_1 + 2.0 * slope_2 + 2.0 * slope_3 + slope_4))
+    return np.array(x[17 * steps_per_unit :: steps_per_unit])
+
+
+def _grid(axis, n_inputs):
+    """All combinations of the values of one axis, the last input changing fastest."""
+    return np.stack(np.meshgrid(*[axis] * n_inputs, indexing="ij"), axis=-1).reshape(-1, n_inputs)

@@ -1,0 +1,361 @@
+"""Pictures of a compensation, after scikit-learn's Displays: they store tables and draw them."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from ..inspection.labels import as_label
+from ._columns import PER_HOUR, RATE_UNITS, evenly_chosen
+from .metrics import allan_deviation, allan_figures, rms, table_of
+
+__all__ = ["AllanDisplay", "ErrorDisplay", "GroupResidualDisplay"]
+
+# Colours that the colour-blind can tell apart.
+SIDES = {"before": "#d55e00", "after": "#0072b2"}
+_SIGNS = {"degC": "°C", "deg/": "°/", "sqrt(h)": "√h"}
+TWO_ROWS = {"nrows": 2, "sharex": True}
+# Bands about two dots wide in the picture; points beyond cover one another.
+_N_BANDS, _N_POINTS = 300, 3_000
+# The worst groups: more lines cannot be read.
+_MOST_GROUPS = 30
+_CAUTION = """\
+Smoothing is not compensation: a filter lowers the left of a curve and hides
+as much of the motion. What a compensation takes away lies on the right, at
+long averaging times."""
+
+
+class GyroDisplay:
+    """A picture drawn from tables; ``figure_``, ``axes_`` and ``ax_``, the first, once drawn.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+    """
+
+    # Options with a value per row; those of _PER_ROW must be given.
+    _PER_ROW: ClassVar[tuple[str, ...]] = ()
+    _OPTIONAL: ClassVar[tuple[str, ...]] = ()
+    # The first is that of from_predictions unless another is given.
+    _UNITS: ClassVar[tuple[str, ...]] = ("deg/s", "deg/h")
+    _PANELS: ClassVar[dict[str, Any]] = {}
+    _SIZE: ClassVar[tuple[float, float]] = (6.2, 4.4)
+
+    # Tables of what is drawn, from the errors of all rows in the unit, and options.
+    _computed: ClassVar[Callable[..., dict[str, pd.DataFrame]]]
+    _draw: Callable[..., None]
+
+    def __init__(self, tables: dict[str, pd.DataFrame]) -> None:
+        self._tables = tables
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """What is drawn.
+
+        Returns
+        -------
+        tables : dict of str to DataFrame
+            Columns carry their units.
+        """
+        return self._tables
+
+    def plot(self, ax: Any = None) -> Self:
+        """Draw.
+
+        Parameters
+        ----------
+        ax : matplotlib Figure, axes or array of axes, default=None
+            Where to draw: an empty figure, or axes, one for each panel. None makes a figure.
+
+        Returns
+        -------
+        display
+            Itself.
+        """
+        if ax is None:
+            from matplotlib import pyplot
+
+            ax = pyplot.figure(layout="constrained")
+        if hasattr(ax, "set_size_inches"):
+            ax.set_size_inches(self._size())
+            ax = ax.subplots(**self._PANELS)
+        self.axes_ = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
+        n_axes = self._PANELS.get("nrows", 1) * self._PANELS.get("ncols", 1)
+        if self.axes_.size != n_axes:
+            raise ValueError(f"ax has {self.axes_.size} axes; this picture needs {n_axes}.")
+        self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
+        self._draw(self.axes_, *self._tables.values())
+        return self
+
+    @classmethod
+    def from_predictions(
+        cls,
+        rate: ArrayLike,
+        before: ArrayLike,
+        after: ArrayLike,
+        *,
+        unit: str | None = None,
+        ax: Any = None,
+        **options: Any,
+    ) -> Self:
+        """Compute from rates, and draw.
+
+        Parameters
+        ----------
+        rate, before, after : array-like of shape (n_rows,)
+            True, indicated and compensated rate [deg/s]. NaN: the compensator refused the row.
+        unit : {"deg/s", "deg/h"}, default=None
+            Unit of the errors; None is that which is usual in this picture.
+        ax : matplotlib Figure, axes or array of axes, default=None
+            Where to draw, as for :meth:`plot`.
+        **options
+            What the class describes.
+
+        Returns
+        -------
+        display
+            The display, drawn.
+        """
+        unit = cls._UNITS[0] if unit is None else unit
+        if unit not in cls._UNITS:
+            raise ValueError(f"unit={unit!r} must be one of {', '.join(cls._UNITS)}.")
+        for name in cls._PER_ROW:
+            if name not in options:
+                raise TypeError(f"{cls.__name__} needs {name}, with one value per row.")
+        columns = {"rate": rate, "before": before, "after": after}
+        columns |= {name: options.pop(name, None) for name in (*cls._PER_ROW, *cls._OPTIONAL)}
+        rows = table_of(columns, labels=("run", "groups"), gaps=SIDES)
+        for side in SIDES:
+            if rows[side].isna().all():
+                raise ValueError(f"{side} is NaN in all rows: there is nothing to draw.")
+            rows[side] = RATE_UNITS.get(unit, 1.0) * (rows[side] - rows["rate"])
+        return cls(cls._computed(rows, unit, **options)).plot(ax)
+
+    @property
+    def _unit(self):
+        """That of the errors, which stand in the last column."""
+        *_, table = self._tables.values()
+        return table.columns[-1].rpartition("[")[2].rstrip("]")
+
+    def _size(self):
+        return self._SIZE
+
+
+class ErrorDisplay(GyroDisplay):
+    """The rate error before and after compensation, against time or temperature.
+
+    A band reaches from the smallest to the largest error of all rows; points are some of the rows.
+
+    ``from_predictions`` takes ``position``, a time or temperature per row, and ``position_label``.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import ErrorDisplay
+    >>> before, after = [0.3, -0.3, 0.3], [0.1, -0.1, 0.1]
+    >>> display = ErrorDisplay.from_predictions([0, 0, 0], before, after, position=[0, 1, 2])
+    >>> display.tables()["whole"]["RMS error [deg/s]"].round(3).tolist()
+    [0.3, 0.1]
+    """
+
+    _PER_ROW = ("position",)
+    _PANELS: ClassVar = TWO_ROWS
+
+    @classmethod
+    def _computed(cls, rows, unit, position_label="time [s]"):
+        errors = rows[[*SIDES]]
+        bins, edges = bins_of(rows["position"], _N_BANDS)
+        ends = errors.groupby(bins).agg(["min", "max"]).reindex(range(_N_BANDS))
+        ends.columns = [
+            f"{end} error {side} [{unit}]" for side in errors for end in ("smallest", "largest")
+        ]
+        places = {f"{position_label}, from": edges[:-1], f"{position_label}, to": edges[1:]}
+        points = rows.loc[evenly_chosen(len(rows), _N_POINTS), ["position", *SIDES]]
+        points.columns = [position_label, *(f"error {side} [{unit}]" for side in errors)]
+        whole = {
+            "errors": errors.columns,
+            f"RMS error [{unit}]": [rms(errors[side].dropna()) for side in errors],
+            f"peak [{unit}]": errors.abs().max().to_numpy(),
+        }
+        return {
+            "points": points.reset_index(drop=True),
+            "bands": pd.DataFrame(places).join(ends),
+            "whole": pd.DataFrame(whole),
+        }
+
+    def _draw(self, axes, points, bands, whole):
+        # Every band is a step, and the last one ends.
+        steps = pd.concat([bands, bands.tail(1)]).to_numpy(copy=True)
+        steps[-1, 0] = steps[-1, 1]
+        for place, (panel, (side, color)) in enumerate(zip(axes, SIDES.items(), strict=True)):
+            low, high = steps[:, 2 + 2 * place : 4 + 2 * place].T
+            style = {"step": "post", "color": color, "alpha": 0.22, "linewidth": 0}
+            panel.fill_between(steps[:, 0], low, high, **style)
+            style = {"color": color, "markersize": 2.5, "alpha": 0.6, "mew": 0}
+            panel.plot(points.iloc[:, 0], points.iloc[:, 1 + place], ".", **style)
+            size, peak = map(figures, whole.iloc[place, 1:])
+            title = f"{side}: RMS {size}, peak {peak} {self._unit}"
+            dress(panel, ylabel=f"error [{self._unit}]", title=title)
+        axes[-1].set_xlabel(signs(points.columns[0]))
+
+
+class GroupResidualDisplay(GyroDisplay):
+    """RMS error of every held-out group, before and after, the worst 30 from the top down.
+
+    ``from_predictions`` takes ``groups``, the label of each row's held-out group.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import GroupResidualDisplay
+    >>> options = {"groups": ["cold", "hot"]}
+    >>> display = GroupResidualDisplay.from_predictions([0, 0], [1, 2], [0.3, 0.1], **options)
+    >>> display.tables()["groups"]["group"].tolist()
+    ['hot', 'cold']
+    """
+
+    _PER_ROW = ("groups",)
+
+    @classmethod
+    def _computed(cls, rows, unit):
+        squares = rows[[*SIDES]].pow(2).groupby(rows["groups"]).mean()
+        # Groups without an answer last, at the top: nothing is worse.
+        table = np.sqrt(squares).sort_values("after", kind="stable").reset_index()
+        table.columns = ["group", f"RMS error before [{unit}]", f"RMS error after [{unit}]"]
+        return {"groups": table}
+
+    def _size(self):
+        return 6.2, 1.4 + 0.2 * min(len(self._tables["groups"]), _MOST_GROUPS)
+
+    def _draw(self, axes, groups):
+        (panel,), shown = axes, groups.iloc[-_MOST_GROUPS:]
+        errors, lines = shown.iloc[:, 1:].to_numpy(), np.arange(len(shown))
+        panel.hlines(lines, errors[:, 1], errors[:, 0], color="0.8", linewidth=2, zorder=1)
+        for (side, color), error in zip(SIDES.items(), errors.T, strict=True):
+            panel.plot(error, lines, "o", color=color, label=side, markersize=5)
+        panel.set_xscale("log")
+        panel.margins(x=0.2)
+        mark_decades(panel.xaxis, *panel.get_xlim())
+        panel.set_yticks(lines, [as_label(group) for group in shown["group"]])
+        panel.set_ylim(-0.7, len(shown) - 0.3)
+        extent = f"worst {len(shown)} of {len(groups)}" if len(shown) < len(groups) else len(shown)
+        middle, worst = figures(groups.iloc[:, 2].median()), figures(shown.iloc[:, 2].max())
+        title = f"{extent} groups: after, {middle} in the median, {worst} in the worst"
+        dress(panel, f"RMS error [{self._unit}]", "held-out group", title, legend="")
+
+
+class AllanDisplay(GyroDisplay):
+    """Allan deviation of the error against averaging time, before and after compensation.
+
+    The legend has N and B where the curve has them, the title a caution against smoothing.
+    ``from_predictions`` takes ``sampling_interval`` [s] and ``run``, labels of the runs or None.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import AllanDisplay
+    >>> rates, options = ([0] * 20, [1, 2] * 10, [1, 1.1] * 10), {"sampling_interval": 1.0}
+    >>> display = AllanDisplay.from_predictions(*rates, **options)  # doctest: +SKIP
+    """
+
+    _OPTIONAL = ("run",)
+    _UNITS = ("deg/h", "deg/s")
+
+    @classmethod
+    def _computed(cls, rows, unit, sampling_interval):
+        parts = []
+        for side in SIDES:
+            # This takes deg/s and gives deg/h: 3600 times the unit of what it is given.
+            curve = allan_deviation(rows[side], sampling_interval, run=rows.get("run"))
+            columns = {
+                "curve": side,
+                "averaging time [s]": curve["averaging_time"],
+                f"Allan deviation [{unit}]": curve["deviation"] / PER_HOUR,
+                f"error [{unit}]": curve["error"] / PER_HOUR,
+            }
+            parts.append(pd.DataFrame(columns))
+        return {"allan": pd.concat(parts, ignore_index=True)}
+
+    def _draw(self, axes, allan):
+        (panel,) = axes
+        for side, color in SIDES.items():
+            time, deviation, error = allan[allan["curve"] == side].iloc[:, 1:].to_numpy().T
+            low = np.maximum(deviation - error, 0.1 * deviation)
+            panel.fill_between(time, low, deviation + error, color=color, alpha=0.18, linewidth=0)
+            label = side + self._coefficients(time, deviation)
+            panel.loglog(time, deviation, "o-", color=color, label=label, ms=3, lw=1.4)
+        dress(panel, "averaging time [s]", f"Allan deviation [{self._unit}]")
+        mark_decades(panel.xaxis, *panel.get_xlim())
+        mark_decades(panel.yaxis, *panel.get_ylim())
+        panel.legend(frameon=False)
+        panel.set_title(_CAUTION, loc="left", fontsize="small")
+
+    def _coefficients(self, time, deviation):
+        """What is read off a curve, in words."""
+        factor = RATE_UNITS[self._unit] / RATE_UNITS["deg/h"]
+        try:
+            (walk, _), (instability, _), *_ = allan_figures(time, deviation / factor).values()
+        except ValueError:
+            return ""  # too few points, or no noise at all
+        text = "" if np.isnan(walk) else f", N = {figures(walk)} °/√h"
+        if np.isfinite(instability):
+            text += f", B = {figures(factor * instability)} {signs(self._unit)}"
+        return text
+
+
+def bins_of(values, n_bins):
+    """The bin of each value, and the edges of equal bins over the values."""
+    low, high = values.min(), values.max()
+    edges = np.linspace(low, high if high > low else low + 1.0, n_bins + 1)
+    return pd.cut(values, edges, labels=False, include_lowest=True), edges
+
+
+def dress(axes, xlabel="", ylabel="", title="", legend=None):
+    """Labels, a light grid, no box; ``legend`` is the title of one beside the panel."""
+    axes.grid(True, color="0.9", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set(xlabel=signs(xlabel), ylabel=signs(ylabel))
+    axes.set_title(signs(title), loc="left", fontsize="medium")
+    if legend is not None:
+        axes.legend(title=legend, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+
+
+def signs(text):
+    """Units with the signs that are usual in print."""
+    for name, sign in _SIGNS.items():
+        text = text.replace(name, sign)
+    return text
+
+
+def figures(value):
+    """A number with three digits that count, without an exponent where it can be; NaN is a dash."""
+    if value == 0 or not np.isfinite(value):
+        return "–" if np.isnan(value) else f"{value:g}"
+    decimals = max(2 - int(np.floor(np.log10(abs(value)))), 0)
+    return f"{value:,.{decimals}f}" if decimals < 8 else f"{value:.2e}"
+
+
+def mark_decades(axis, low, high):
+    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    decades = np.log10(high / low)
+    digits = (1, 2, 3, 5) if decades < 1.0 else (1, 3) if decades < 3.0 else (1,)
+    axis.set_major_locator(LogLocator(subs=digits, numticks=8))
+    axis.set_major_formatter("{x:,g}")
+    axis.set_minor_formatter(NullFormatter())

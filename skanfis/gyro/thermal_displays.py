@@ -1,0 +1,358 @@
+"""Pictures over temperature: scale factor, hysteresis, where error is left, what is covered."""
+
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pandas as pd
+
+from ._columns import ask, check_column, evenly_chosen
+from .displays import SIDES, TWO_ROWS, GyroDisplay, bins_of, dress, figures, mark_decades, signs
+
+__all__ = [
+    "CoverageDisplay",
+    "HysteresisDisplay",
+    "ResidualSurfaceDisplay",
+    "ScaleFactorErrorDisplay",
+]
+
+# Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
+_N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
+# Enough to show a loop, and few enough that every bin has rows; fewer rows have no mean.
+_N_TEMPERATURES, _FEWEST_ROWS = 25, 3
+_SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
+_BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
+# Odd ones: what an error of the scale factor adds changes its sign with the rate.
+_POWERS = (1, 3, 5, 7)
+# Of maps: cells and points on each axis, and dots for rows, which beyond so many cover one another.
+_N_CELLS, _N_POINTS, _MOST_DOTS = 24, 96, 2_000
+# How far a map of the coverage goes beyond the data, as a part of their range.
+_MARGIN = 0.15
+# Of the sizes that a colour scale covers, so that one outlier does not flatten it.
+_NEARLY_ALL = 0.995
+_NO_DATA = "#e9e9e6"
+_COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some, full
+
+
+class ScaleFactorErrorDisplay(GyroDisplay):
+    """Scale-factor error against rate in three bands of temperature, before and after.
+
+    It is what the bias, read off the band's least-squares line, leaves of the error, over the rate.
+    Rates below 5 % of the largest are left out.
+
+    ``from_predictions`` takes ``temperature`` [degC].
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import ScaleFactorErrorDisplay
+    >>> rates, options = ([-100, 100], [-100.1, 100.1], [-100, 100]), {"temperature": [25, 25]}
+    >>> display = ScaleFactorErrorDisplay.from_predictions(*rates, **options)
+    >>> display.tables()["scale-factor"].iloc[:, -2:].round().max().tolist()
+    [1000.0, 0.0]
+    """
+
+    _PER_ROW = ("temperature",)
+    _UNITS = ("ppm",)
+    _PANELS: ClassVar = TWO_ROWS
+
+    @classmethod
+    def _computed(cls, rows, unit):
+        if np.ptp(rows["rate"]) == 0:
+            raise ValueError(f"rate is {rows['rate'][0]:g} in all rows: there is no scale factor.")
+        bands, edges = bins_of(rows["temperature"], _N_BANDS)
+        ends = (edges[bands + k] for k in (0, 1))
+        keys = [*map(pd.Series, ends), bins_of(rows["rate"], _N_RATES)[0]]
+        far = rows["rate"].abs() >= _SMALLEST_SHARE * rows["rate"].abs().max()
+        means = {"true rate [deg/s]": rows["rate"][far].groupby(keys).mean()}
+        for side in SIDES:
+            known = rows[["rate", side]].dropna()
+            # What the least-squares line of each band leaves at rest.
+            biases = {
+                band: np.polyfit(part["rate"], part[side], 1)[1] if np.ptp(part["rate"]) else 0.0
+                for band, part in known.groupby(bands)
+            }
+            known[side] -= bands.map(biases)
+            parts = known[far[known.index]].groupby(keys).mean()
+            means[f"scale-factor error {side} [ppm]"] = 1e6 * parts[side] / parts["rate"]
+        names = ["temperature, from [degC]", "temperature, to [degC]", "bin"]
+        table = pd.DataFrame(means).reset_index(names=names).drop(columns="bin")
+        return {"scale-factor": table}
+
+    def _draw(self, axes, scale_factor):
+        import matplotlib
+
+        bands = scale_factor.groupby(list(scale_factor.columns[:2]))
+        colors = matplotlib.colormaps["plasma"](np.linspace(0.05, 0.75, bands.ngroups))
+        for panel, side in zip(axes, SIDES, strict=True):
+            column = f"scale-factor error {side} [ppm]"
+            for (ends, band), color in zip(bands, colors, strict=True):
+                known = band.dropna(subset=column)
+                rate, ppm = known["true rate [deg/s]"], known[column]
+                # The line is broken at rest.
+                for half, label in ((rate < 0, f"{np.mean(ends):z.0f} °C"), (rate > 0, None)):
+                    panel.plot(rate[half], ppm[half], ".-", color=color, label=label, lw=1.2, ms=4)
+            title = f"{side}: largest {figures(scale_factor[column].abs().max())} ppm"
+            legend = "around" if panel is axes[0] else None
+            dress(panel, ylabel="scale-factor error [ppm]", title=title, legend=legend)
+        axes[-1].set_xlabel(signs("true rate [deg/s]"))
+
+
+class HysteresisDisplay(GyroDisplay):
+    """Bias against temperature while it rises and while it falls, before and after compensation.
+
+    What the error owes to the rate (an odd polynomial, linear in temperature) is taken off.
+
+    ``from_predictions`` takes ``temperature`` [degC] and ``temperature_rate`` [degC/min]; rows of
+    less than 0.05 degC/min belong to neither branch.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import HysteresisDisplay
+    >>> options = {"temperature": range(60), "temperature_rate": [1, 1, 1, -1, -1, -1] * 10}
+    >>> rates = [0] * 60, [0.01, 0.01, 0.01, 0, 0, 0] * 10, [0] * 60
+    >>> display = HysteresisDisplay.from_predictions(*rates, **options)
+    >>> round(display.tables()["bias"]["bias before, warming [deg/h]"].max())
+    36
+    """
+
+    _PER_ROW = ("temperature", "temperature_rate")
+    _UNITS = ("deg/h", "deg/s")
+    _PANELS: ClassVar = TWO_ROWS
+
+    @classmethod
+    def _computed(cls, rows, unit):
+        bins, edges = bins_of(rows["temperature"], _N_TEMPERATURES)
+        branch = np.where(rows["temperature_rate"] > 0, *_BRANCHES)
+        rows = rows.assign(bin=bins, branch=branch)
+        moving = rows[rows["temperature_rate"].abs() >= _SLOWEST]
+        table = pd.DataFrame({"temperature [degC]": 0.5 * (edges[:-1] + edges[1:])})
+        for side in SIDES:
+            biases = _bias_of_branches(moving.dropna(subset=side), side)
+            for name in _BRANCHES:
+                table[f"bias {side}, {name} [{unit}]"] = biases[name]
+        return {"bias": table}
+
+    def _draw(self, axes, bias):
+        temperature = bias["temperature [degC]"]
+        for place, (panel, side) in enumerate(zip(axes, SIDES, strict=True)):
+            branches = bias.iloc[:, 1 + 2 * place : 3 + 2 * place].to_numpy().T
+            panel.fill_between(temperature, *branches, color="0.9", linewidth=0)
+            for values, (name, (form, color)) in zip(branches, _BRANCHES.items(), strict=True):
+                panel.plot(temperature, values, form, color=color, label=name, ms=4)
+            gaps = pd.Series(np.abs(branches[0] - branches[1]))
+            found = f"largest gap {figures(gaps.max())} {self._unit}"
+            title = f"{side}: {found if gaps.notna().any() else 'branches never meet'}"
+            legend = "" if panel is axes[0] else None
+            dress(panel, ylabel=f"bias [{self._unit}]", title=title, legend=legend)
+        axes[-1].set_xlabel("temperature [°C]")
+
+
+def _bias_of_branches(rows, side):
+    """Mean error at rest by bin and branch, fitted together with the polynomial (Frisch, Waugh)."""
+    ratio = rows["rate"] / (rows["rate"].abs().max() or 1.0)
+    deviation = rows["temperature"] - rows["temperature"].mean()
+    powers = {k: ratio**k for k in _POWERS} | {-k: ratio**k * deviation for k in _POWERS}
+    powers, keys = pd.DataFrame(powers), [rows["branch"], rows["bin"]]
+    design = powers - powers.groupby(keys).transform("mean")
+    left = rows[side] - rows[side].groupby(keys).transform("mean")
+    coefficients = np.linalg.lstsq(design, left, rcond=None)[0]
+    found = (rows[side] - powers @ coefficients).groupby(keys).agg(["mean", "size"])
+    means = found["mean"].where(found["size"] >= _FEWEST_ROWS).unstack("branch")
+    return means.reindex(index=range(_N_TEMPERATURES), columns=list(_BRANCHES))
+
+
+class ResidualSurfaceDisplay(GyroDisplay):
+    """Mean error after compensation over temperature and rate, beside the number of rows.
+
+    ``from_predictions`` takes ``temperature`` [degC].
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+
+    Examples
+    --------
+    >>> from skanfis.gyro import ResidualSurfaceDisplay
+    >>> rates = [-50, 50, 50], [-50, 50, 50], [-50, 50.25, 50.75]
+    >>> display = ResidualSurfaceDisplay.from_predictions(*rates, temperature=[10, 30, 30])
+    >>> display.tables()["cells"].iloc[-1, -2:].tolist()  # rows, and their mean error
+    [2.0, 0.5]
+    """
+
+    _PER_ROW = ("temperature",)
+    _SIZE = (7.0, 3.3)
+    _PANELS: ClassVar = {"ncols": 2, "sharey": True}
+
+    @classmethod
+    def _computed(cls, rows, unit):
+        columns = {"temperature [degC]": rows["temperature"], "true rate [deg/s]": rows["rate"]}
+        cells, numbers = _cells(columns)
+        found = rows["after"].groupby(numbers).agg(["count", "mean"]).reindex(cells.index)
+        cells["rows"] = found["count"].fillna(0).astype(int)
+        cells[f"mean error after [{unit}]"] = found["mean"]
+        return {"cells": cells}
+
+    def _draw(self, axes, cells):
+        from matplotlib.colors import LogNorm
+
+        residual, counts = cells.iloc[:, -1], cells["rows"]
+        limit = residual.abs().quantile(_NEARLY_ALL) or 1.0
+        mesh = _draw_cells(axes[0], cells, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
+        label = signs(cells.columns[-1])
+        self.figure_.colorbar(mesh, ax=axes[0], extend="both").set_label(label)
+        # A scale needs two ends, even where all cells have as many rows.
+        norm = LogNorm(vmin=1, vmax=max(counts.max(), 2))
+        mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
+        bar = self.figure_.colorbar(mesh, ax=axes[1], label="rows in the cell")
+        mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
+        title = f"residual: largest {figures(residual.abs().max())} {self._unit}"
+        dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
+        empty = np.mean(counts == 0)
+        dress(axes[1], "temperature [degC]", title=f"data: {empty:.0%} of the cells empty")
+
+
+class CoverageDisplay(GyroDisplay):
+    """Where the calibration data cover what a compensator may be asked, by temperature and output.
+
+    Cells without a row are hatched; in the others the colour is the coverage, from 0 to 1. Outside
+    the dashed line rows are flagged, and within it where the coverage is below ``min_coverage``,
+    beyond the dotted line. Colour and lines hold all other inputs at one value.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        As :meth:`tables` gives them.
+    min_coverage : float, default=0.1
+        Rows that are covered less are flagged.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.gyro import CoverageDisplay
+    >>> X = pd.DataFrame({"temperature": [10.0, 20.0, 30.0] * 9, "output": range(27)})
+    >>> model = ANFISRegressor(1).fit(X, X["output"])
+    >>> len(CoverageDisplay.from_estimator(model, X).tables()["points"])
+    9216
+    """
+
+    _SIZE = (6.2, 4.0)
+
+    def __init__(self, tables: dict[str, pd.DataFrame], *, min_coverage: float = 0.1) -> None:
+        super().__init__(tables)
+        self.min_coverage = min_coverage
+
+    @classmethod
+    def from_estimator(
+        cls,
+        estimator: Any,
+        X: Any,
+        *,
+        output_unit: str = "deg/s",
+        min_coverage: float = 0.1,
+        ax: Any = None,
+    ) -> Self:
+        """Compute from a fitted estimator, and draw.
+
+        Parameters
+        ----------
+        estimator : estimator
+            Fitted, with methods ``coverage`` and ``in_bounds``, or a Pipeline that ends in such.
+        X : DataFrame of shape (n_rows, n_inputs)
+            Rows to draw, with columns temperature and output; other inputs are at their medians.
+        output_unit : str, default="deg/s"
+            Unit of the column output.
+        min_coverage : float, default=0.1
+            Rows that are covered less are flagged.
+        ax : matplotlib Figure or axes, default=None
+            Where to draw, as for :meth:`plot`.
+
+        Returns
+        -------
+        display : CoverageDisplay
+        """
+        labels = {"temperature": "temperature [degC]", "output": f"output [{output_unit}]"}
+        for name in labels:
+            if name not in X:
+                raise ValueError(f"{name!r} is no column of X, which has {', '.join(X)}.")
+        rows = pd.DataFrame({label: check_column(X[name], name) for name, label in labels.items()})
+        steps = np.linspace(-_MARGIN, 1.0 + _MARGIN, _N_POINTS)
+        axes = (rows[label].min() + steps * np.ptp(rows[label]) for label in rows)
+        places = dict(zip(labels, (each.ravel() for each in np.meshgrid(*axes)), strict=True))
+        grid = pd.DataFrame(X.median().to_dict() | places)[list(X)]
+        cells, numbers = _cells(dict(rows))
+        cells["rows"] = np.bincount(numbers, minlength=len(cells))
+        points = grid[list(labels)].rename(columns=labels)
+        points["coverage"] = ask(estimator, "coverage", grid)
+        points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
+        numbers = _cell_numbers({label: points[label] for label in rows}, _edges(cells))
+        points["in a cell with data"] = numbers.map(cells["rows"] > 0).eq(True).astype(int)
+        rows = rows.iloc[evenly_chosen(len(rows), _MOST_DOTS)].reset_index(drop=True)
+        tables = {"points": points, "rows": rows, "cells": cells}
+        return cls(tables, min_coverage=min_coverage).plot(ax)
+
+    def _draw(self, axes, points, rows, cells):
+        from matplotlib.colors import LinearSegmentedColormap
+
+        (panel,), labels = axes, points.columns[:2]
+        x, y = (points[label].unique() for label in labels)
+        coverage, inside, has_rows = points.iloc[:, 2:].to_numpy().T.reshape(3, y.size, x.size)
+        panel.set_facecolor(_NO_DATA)
+        panel.patch.set(hatch="////", edgecolor="0.75", linewidth=0)
+        colors = LinearSegmentedColormap.from_list("coverage", _COLORS)
+        style = {"cmap": colors, "vmin": 0, "vmax": 1, "rasterized": True}
+        mesh = panel.pcolormesh(x, y, np.where(has_rows, coverage, np.nan), **style)
+        self.figure_.colorbar(mesh, ax=panel, label="coverage where there are data")
+        panel.plot(*rows.to_numpy().T, ".", color="0.15", ms=1.5, alpha=0.35, mew=0)
+        left, bottom = x[inside.any(axis=0)], y[inside.any(axis=1)]
+        if left.size and bottom.size:
+            corners = left[[0, -1, -1, 0, 0]], bottom[[0, 0, -1, -1, 0]]
+            panel.plot(*corners, "--", color="0.15", linewidth=1.2)
+        flagged = np.where(inside, coverage, np.nan)
+        if np.nanmin(flagged, initial=np.inf) < self.min_coverage:
+            style = {"colors": "0.15", "linestyles": ":", "linewidths": 1.2}
+            panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
+        empty = np.mean(cells["rows"] == 0)
+        title = f"{empty:.0%} of the cells in range are empty (hatched)"
+        dress(panel, labels[0], labels[1], title)
+        panel.grid(False)
+
+
+def _cells(columns):
+    """Ends of all cells over two columns, a line for each, and the number of that of every row."""
+    lines, places = np.divmod(np.arange(_N_CELLS**2), _N_CELLS)
+    edges = [bins_of(values, _N_CELLS)[1] for values in columns.values()]
+    ends: dict[str, np.ndarray] = {}
+    for label, place, each in zip(columns, (places, lines), edges, strict=True):
+        ends |= {f"{label}, from": each[place], f"{label}, to": each[place + 1]}
+    return pd.DataFrame(ends), _cell_numbers(columns, edges).astype(int)
+
+
+def _cell_numbers(columns, edges):
+    """Number of the cell of every row; NaN beyond all."""
+    place, line = (
+        pd.Series(pd.cut(values, each, labels=False, include_lowest=True))
+        for values, each in zip(columns.values(), edges, strict=True)
+    )
+    return line * _N_CELLS + place
+
+
+def _edges(cells):
+    """Edges of the cells in both directions."""
+    return [np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2)]
+
+
+def _draw_cells(axes, cells, values, **options):
+    axes.set_facecolor(_NO_DATA)
+    image = values.to_numpy().reshape(_N_CELLS, _N_CELLS)
+    return axes.pcolormesh(*_edges(cells), image, rasterized=True, **options)
