@@ -56,7 +56,7 @@ def no_report(monkeypatch, few_rivals):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """A report of words and tables."""
-    monkeypatch.setattr("skanfis.gyro.html_report.PICTURES", ())
+    monkeypatch.setattr("skanfis.gyro._results._PICTURES", {})
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def calibrated(tmp_path_factory, log, given_weights, coarse_report):
     path = write_log(folder / "raw.csv", raw, raw.columns)
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skanfis.gyro.html_report.PICTURES", ())
+        patch.setattr("skanfis.gyro._results._PICTURES", {})
         assert main([*arguments, "--c", "c99", "--saturate"]) == 0
     return folder
 
