@@ -11,13 +11,11 @@ interval is a little too narrow.
 
 import warnings
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from ..options import LinearExtrapolation
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
 from ._models import Choice, fit_model, some_rows
@@ -51,7 +49,6 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    max_extrapolation: float | Literal["auto"] = LinearExtrapolation().max_extrapolation
     min_coverage: float = 0.1
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
 
@@ -143,13 +140,11 @@ class Calibration:
         """Rows that were in the bounds of a model new to them, and have its answer."""
         return self.inside & np.isfinite(self.after)
 
-    @property
-    def cautions(self):
-        """Sentences that say why the compensator should not be used as it is; rates in deg/s."""
-        return self.cautions_in("deg/s")
+    def cautions(self, unit="deg/s", per_unit=1.0):
+        """Sentences that say why the compensator should not be used as it is.
 
-    def cautions_in(self, unit, per_unit=1.0):
-        """The same, with errors in another unit, of which ``per_unit`` are 1 deg/s."""
+        Errors are in a unit of which ``per_unit`` are 1 deg/s.
+        """
         found = []
         for rows, where in ((self.inside, "in range"), (~self.inside, "out of range")):
             answered = rows & np.isfinite(self.after)
@@ -213,10 +208,8 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    if choice.tried:
-        terms = "no grid" if choice.terms is None else f"terms {','.join(map(str, choice.terms))}"
-        error = dict(choice.tried).get(choice.terms, np.nan)
-        tell(f"{terms}: held-out RMS {error:.4g} deg/s")
+    if choice.terms is not None:
+        tell(f"terms {','.join(map(str, choice.terms))}")
     if recipe.physics:
         tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
     compensator = GyroCompensator(

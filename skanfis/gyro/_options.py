@@ -265,12 +265,11 @@ def check_limit(limit, lines):
 
 
 class ReportOptions(NamedTuple):
-    """All may be missing. ``files`` have a name, a size [bytes] and the SHA-256 of their bytes."""
+    """All may be missing: the command line as typed; of files name, size [bytes] and SHA-256."""
 
     made: str = ""
     serial: str = ""
     operator: str = ""
     files: tuple[tuple[str, int, str], ...] = ()
-    options: tuple[tuple[str, str], ...] = ()
+    typed: str = ""
     limits: tuple[Limit, ...] = ()
-    unit: str = "auto"

@@ -116,11 +116,9 @@ class Results:
             self.time = self.log["time"].to_numpy()
         if "run" in self.log:
             self.run = label_texts(self.log["run"])
-        self.unit = self.options.unit
-        if self.unit == "auto":
-            # That in which errors are no long row of zeros.
-            is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
-            self.unit = "deg/s" if is_large else "deg/h"
+        # That in which errors are no long row of zeros.
+        is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
+        self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 
     def shown(self, error):

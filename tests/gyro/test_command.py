@@ -381,10 +381,6 @@ def test_a_thermal_cycle_at_rest(tmp_path, capsys):
     log = pd.DataFrame({"time": [0.0, 1e4], "temperature": 10.0, "output": 0.31})
     # Neither warming nor cooling: between the two.
     assert compensator.apply(log)["rate_compensated"].abs().max() < 0.02
-    [line] = [line.split() for line in said.splitlines() if line.startswith("hysteresis")]
-    # Twice the lag of 0.05 deg/s. After a turn, the low-pass takes its time to tell of it.
-    assert float(line[1]) == pytest.approx(2 * 0.05 * 3600, rel=0.1)
-    assert float(line[-2]) < 0.4 * float(line[1])
 
 
 @pytest.mark.usefixtures("no_report")
