@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
+from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
 from ._models import Choice, fit_model, some_rows
@@ -40,7 +41,7 @@ _ROUNDING = 1e-9
 class Recipe:
     """What a calibration is asked to do.
 
-    ``terms`` is "search", "auto" (left to ANFISRegressor) or numbers, one per input.
+    ``terms`` is "search" or numbers, one per input.
     """
 
     inputs: tuple[str, ...]
@@ -49,7 +50,6 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    min_coverage: float = 0.1
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
 
 
@@ -207,6 +207,8 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     tell(f"fitting to {rows.size:,} rows")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        # Of rows that trial fits have not seen; the final one is asked of none.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
     if choice.terms is not None:
         tell(f"terms {','.join(map(str, choice.terms))}")
@@ -219,7 +221,6 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         scale_factor=factor,
         output_unit=recipe.output_unit,
         time_constant=_TIME_CONSTANT,
-        min_coverage=recipe.min_coverage,
     )
     after = compensator.compensate(before, predicted)
     # The same rows for all: those that the model answered in range.

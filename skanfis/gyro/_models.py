@@ -59,7 +59,7 @@ def fit_model(X, target, groups, recipe):
 
 def _make_rules(recipe, terms):
     """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
-    structure: dict[str, Any] = {"partition": "grid" if recipe.terms == "search" else "auto"}
+    structure: dict[str, Any] = {"partition": "grid"}
     if isinstance(terms, tuple):
         structure = {"n_mfs": list(terms)}
     return make_pipeline(

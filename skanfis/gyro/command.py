@@ -168,7 +168,6 @@ def _recipe(options, reading, at_rest):
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
-        min_coverage=options.min_coverage,
         box=tuple(options.box),
     )
 
@@ -204,7 +203,7 @@ def _write(calibration, options, files, folder):
             compensator.estimator,
             folder / "compensator",
             std=options.c,
-            min_coverage=compensator.min_coverage or None,
+            min_coverage=compensator.min_coverage,
             saturate=proven_bounds(calibration).found if options.saturate else None,
         )
 

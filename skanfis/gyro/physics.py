@@ -17,9 +17,11 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
+from .._sklearn import check_sample_weight
+from .._validation import positive_weights
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ..policies import OUT_OF_BOUNDS, SILENT
-from ._columns import check_weights, column_position
+from ._columns import column_position
 
 __all__ = [
     "DEGREES",
@@ -170,7 +172,9 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         """
         check_parameters(self)
         inputs, rate = validate_data(self, X, y, dtype=float, y_numeric=True)
-        weights = check_weights(sample_weight, len(rate))
+        weights = check_sample_weight(sample_weight, inputs, dtype=float)
+        positive_weights(weights, len(rate), least=1)
+        weights = weights / weights.mean()
         columns = self._find_columns()
         counts = weights > 0
         used = inputs[counts][:, columns]
