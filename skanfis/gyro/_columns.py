@@ -9,8 +9,6 @@ from numbers import Real
 import numpy as np
 from sklearn.pipeline import Pipeline
 
-from .._validation import position_of
-
 __all__ = [
     "CANONICAL",
     "PER_HOUR",
@@ -159,13 +157,14 @@ def _check_shape(column, name, n_rows):
 
 def column_position(names, role, given) -> int:
     """Position of a column given by position or name; ``names`` are those of X, or positions."""
-    position = None if isinstance(given, bool) else position_of(given, names)
-    if position is None:
+    places = range(-len(names), len(names))
+    is_place = isinstance(given, int | np.integer) and not isinstance(given, bool)
+    if given not in (places if is_place else [name for name in names if isinstance(name, str)]):
         named = f": {names}" if any(isinstance(name, str) for name in names) else ""
         raise ValueError(
             f"{role}={given!r} is no column of X, which has {len(names)} feature(s){named}."
         )
-    return position
+    return int(given) % len(names) if is_place else names.index(given)
 
 
 def evenly_chosen(n_rows, most) -> np.ndarray:

@@ -17,11 +17,9 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
-from .._sklearn import check_sample_weight
-from .._validation import positive_weights
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ..policies import OUT_OF_BOUNDS, SILENT
-from ._columns import column_position
+from ._columns import check_column, column_position
 
 __all__ = [
     "DEGREES",
@@ -172,8 +170,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         """
         check_parameters(self)
         inputs, rate = validate_data(self, X, y, dtype=float, y_numeric=True)
-        weights = check_sample_weight(sample_weight, inputs, dtype=float)
-        positive_weights(weights, len(rate), least=1)
+        given = np.ones(len(rate)) if sample_weight is None else sample_weight
+        weights = check_column(given, "sample_weight", len(rate))
+        if weights.min() < 0 or weights.max() == 0:
+            raise ValueError("sample_weight must be zero or positive, and positive somewhere.")
         weights = weights / weights.mean()
         columns = self._find_columns()
         counts = weights > 0
