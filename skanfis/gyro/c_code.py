@@ -251,12 +251,8 @@ class _Composition:
 
 def _law_source(dialect, whole, silent):
     """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
-    law, number, inputs, places = (
-        whole.law,
-        dialect.number,
-        whole.law.columns_,
-        whole.rules.positions,
-    )
+    law, number = whole.law, dialect.number
+    inputs, places = law.columns_, whole.rules.positions
     tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.polynomials}
     parts = ["/* Of the law: where it was fitted, powers of the temperature, columns of x. */\n"]
     parts += [f"{dialect.table(key, values)}\n" for key, values in tables.items()]

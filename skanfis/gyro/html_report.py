@@ -16,6 +16,7 @@ from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
 from ._formulas import formula_of, law_text, on_board, rules_text
 from ._headline import ARTICLES, budget_of, headline, held_out_groups, proven_bounds, readability_of
+from ._options import ReportOptions
 from ._results import Results
 from ._simpler import NOTHING, options_for
 from .displays import figures, signs
@@ -41,7 +42,7 @@ class Block(NamedTuple):
 
 def report_page(calibration, title, options=None):
     """The report of a calibration, as the text of an HTML file; ``options`` a ReportOptions."""
-    results = Results(calibration, options)
+    results = Results(calibration, options or ReportOptions())
     recipe, verdict = calibration.recipe, calibration.verdict
     what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
     target = "rate" if recipe.physics else "rate error"

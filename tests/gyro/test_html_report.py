@@ -72,7 +72,7 @@ TITLE = "<gyro> & co.csv"
 @pytest.fixture(scope="module")
 def options(calibration):
     """All in it is text from outside; the limits lie on both sides of what was found."""
-    merit = Results(calibration).merit.set_index("figure")
+    merit = Results(calibration, ReportOptions()).merit.set_index("figure")
     value = merit.loc["residual_rms", "after"]
     typed = [f"residual_rms={factor * value:.9f}deg/s" for factor in (1.001, 0.999)]
     return ReportOptions(
@@ -119,7 +119,7 @@ def test_needs_nothing_from_elsewhere(page):
 
 
 def test_says_how_sure(calibration, page):
-    results, budget = Results(calibration), budget_of(calibration)
+    results, budget = Results(calibration, ReportOptions()), budget_of(calibration)
     text = " ".join(" ".join(Outline(page).text).split())
     told = text[text.rindex("How sure") : text.rindex("Can the rules be read?")]
     for value in (budget.noise, budget.scatter, budget.scatter_high, budget.model, budget.combined):
