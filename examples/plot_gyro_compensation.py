@@ -37,7 +37,8 @@ from skanfis.inspection import MembershipDisplay, export_text
 # indicates. The true rate is never an input: on a vehicle nobody knows it. What is learnt is the
 # error, indicated minus true rate.
 
-log = make_ofog(n_devices=1, n_runs=12, sampling_interval=20.0, n_rate_levels=401, random_state=0)
+rates = np.linspace(-100.0, 100.0, 401)
+log = make_ofog(n_devices=1, n_runs=12, sampling_interval=20.0, rates=rates, random_state=0)
 X = log[["time", "temperature", "output"]]
 error = log["output"] - log["rate"]
 run = log["run"]

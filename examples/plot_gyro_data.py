@@ -117,7 +117,7 @@ panel.legend()
 table = make_ofog(
     n_devices=1,
     n_runs=12,
-    n_rate_levels=57,
+    rates=np.linspace(-100.0, 100.0, 57),
     dwell_time=60.0,
     sampling_interval=60.0,
     max_residual_heat=0.0,

@@ -95,7 +95,7 @@ score: float = DaskANFISRegressor(n_mfs=3).fit(X, y).score(X, y)
 
 # A gyro.
 log = make_ofog(n_devices=1, n_runs=4, random_state=0)
-groups: np.ndarray = group_by_rate_level(log["rate"], n_groups=4)
+groups: np.ndarray = group_by_rate_level(log["rate"])
 rates: np.ndarray = ThermalRate(60.0, time="time", run="run").fit_transform(log)
 law = OpenLoopArcsineRegressor("output", "temperature", bias_degree=2)
 composed = ResidualRegressor(law, ANFISRegressor(n_mfs=2)).fit(log, log["rate"])

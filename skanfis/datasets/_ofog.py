@@ -71,7 +71,6 @@ _CONSTRAINTS = {
     "duration": [_POSITIVE],
     "sampling_interval": [_POSITIVE],
     "max_rate": [_POSITIVE, None],
-    "n_rate_levels": [Interval(Integral, 2, None, closed="left"), None],
     "dwell_time": [_POSITIVE],
     "max_residual_heat": [_PART],
     "noise": [_NOT_NEGATIVE],
@@ -92,7 +91,6 @@ def make_ofog(
     duration: float = 3600.0,
     sampling_interval: float = 10.0,
     max_rate: float | None = None,
-    n_rate_levels: int | None = None,
     rates: ArrayLike | None = None,
     dwell_time: float = 120.0,
     ambient_range: Any = (-20.0, 50.0),
@@ -121,12 +119,11 @@ def make_ofog(
         Power-ups in each run, and the time without power between two of them [s].
     duration, sampling_interval : float, default=3600.0, 10.0
         Length of each power-up, and time between rows [s]; a row is the mean over the interval.
-    max_rate, n_rate_levels : float, int, default=None
+    max_rate : float, default=None
         Largest rate of the table [deg/s], 100 by default, at which the Sagnac phase of every device
-        must be below pi/2; and the number of equally spaced rates, which all runs share. By default
-        every dwell has a rate of its own.
+        must be below pi/2. Every dwell has a rate of its own.
     rates : array-like of shape (n_rates,), default=None
-        The rates of the table [deg/s] in place of both; ``[0]`` is a gyro at rest.
+        The rates of the table [deg/s], which all runs share; ``[0]`` is a gyro at rest.
     dwell_time : float, default=120.0
         Time at each rate [s], rounded to ``sampling_interval``.
     ambient_range : tuple of two floats, default=(-20.0, 50.0)
@@ -154,7 +151,7 @@ def make_ofog(
     ------
     ValueError
         If a parameter is of the wrong type or out of its range, or ``rates`` is given together with
-        ``max_rate`` or ``n_rate_levels``.
+        ``max_rate``.
 
     Examples
     --------
@@ -184,7 +181,7 @@ def make_ofog(
         profile=profile,
         ambient_range=_ambient_range(ambient_range),
     )
-    largest, levels = _table_rates(max_rate, n_rate_levels, rates)
+    largest, levels = _table_rates(max_rate, rates)
     _check_phase(nominal, device_spread, schedule.ambient_range, largest)
     generator: np.random.RandomState = check_random_state(random_state)
     devices = _draw_devices(nominal, n_devices, device_spread, noise, generator)
@@ -223,17 +220,12 @@ def _nominal_device(coefficients):
     return nominal | {name: float(value) for name, value in given.items()}
 
 
-def _table_rates(max_rate, n_rate_levels, rates):
+def _table_rates(max_rate, rates):
     """Largest rate of the table, and its levels; None where every dwell has its own."""
     if rates is None:
-        largest = 100.0 if max_rate is None else max_rate
-        if n_rate_levels is None:
-            return largest, None
-        return largest, np.linspace(-largest, largest, n_rate_levels)
-    options = {"max_rate": max_rate, "n_rate_levels": n_rate_levels}
-    given = [name for name, value in options.items() if value is not None]
-    if given:
-        raise ValueError(f"rates is given together with {given}; it takes their place.")
+        return (100.0 if max_rate is None else max_rate), None
+    if max_rate is not None:
+        raise ValueError("rates is given together with max_rate; it takes its place.")
     found = np.asarray(rates, dtype=float)
     if found.ndim != 1 or not found.size or not np.isfinite(found).all():
         raise ValueError(f"rates must be a list of finite rates in deg/s; got {rates!r}.")

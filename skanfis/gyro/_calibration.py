@@ -11,13 +11,12 @@ interval is a little too narrow.
 
 import warnings
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student
 
-from ..options import LinearExtrapolation
+from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
 from ._models import Choice, fit_model, some_rows
@@ -42,7 +41,7 @@ _ROUNDING = 1e-9
 class Recipe:
     """What a calibration is asked to do.
 
-    ``terms`` is "search", "auto" (left to ANFISRegressor) or numbers, one per input.
+    ``terms`` is "search" or numbers, one per input.
     """
 
     inputs: tuple[str, ...]
@@ -51,8 +50,6 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    max_extrapolation: float | Literal["auto"] = LinearExtrapolation().max_extrapolation
-    min_coverage: float = 0.1
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
 
 
@@ -143,13 +140,11 @@ class Calibration:
         """Rows that were in the bounds of a model new to them, and have its answer."""
         return self.inside & np.isfinite(self.after)
 
-    @property
-    def cautions(self):
-        """Sentences that say why the compensator should not be used as it is; rates in deg/s."""
-        return self.cautions_in("deg/s")
+    def cautions(self, unit="deg/s", per_unit=1.0):
+        """Sentences that say why the compensator should not be used as it is.
 
-    def cautions_in(self, unit, per_unit=1.0):
-        """The same, with errors in another unit, of which ``per_unit`` are 1 deg/s."""
+        Errors are in a unit of which ``per_unit`` are 1 deg/s.
+        """
         found = []
         for rows, where in ((self.inside, "in range"), (~self.inside, "out of range")):
             answered = rows & np.isfinite(self.after)
@@ -212,11 +207,11 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     tell(f"fitting to {rows.size:,} rows")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        # Of rows that trial fits have not seen; the final one is asked of none.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    if choice.tried:
-        terms = "no grid" if choice.terms is None else f"terms {','.join(map(str, choice.terms))}"
-        error = dict(choice.tried).get(choice.terms, np.nan)
-        tell(f"{terms}: held-out RMS {error:.4g} deg/s")
+    if choice.terms is not None:
+        tell(f"terms {','.join(map(str, choice.terms))}")
     if recipe.physics:
         tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
     compensator = GyroCompensator(
@@ -226,7 +221,6 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         scale_factor=factor,
         output_unit=recipe.output_unit,
         time_constant=_TIME_CONSTANT,
-        min_coverage=recipe.min_coverage,
     )
     after = compensator.compensate(before, predicted)
     # The same rows for all: those that the model answered in range.

@@ -18,7 +18,6 @@ __all__ = [
     "check_column",
     "check_labels",
     "check_number",
-    "check_weights",
     "column_position",
     "convert",
     "declared_units",
@@ -147,22 +146,6 @@ def check_labels(values, name, n_rows) -> np.ndarray:
     return labels
 
 
-def check_weights(sample_weight, n_rows) -> np.ndarray:
-    """Return weights of mean 1, shape (n_rows,): ones where ``sample_weight`` is None."""
-    if sample_weight is None:
-        return np.ones(n_rows)
-    sample_weight = np.asarray(sample_weight)
-    if sample_weight.ndim == 0:
-        sample_weight = np.full(n_rows, sample_weight)
-    weights = check_column(sample_weight, "sample_weight", n_rows)
-    if weights.min() < 0 or weights.max() == 0:
-        raise ValueError(
-            "sample_weight must be zero or positive, and positive somewhere; found values from "
-            f"{weights.min():g} to {weights.max():g}."
-        )
-    return weights / weights.mean()
-
-
 def _check_shape(column, name, n_rows):
     if column.ndim != 1:
         raise ValueError(f"{name} must have one dimension; its shape is {column.shape}.")
@@ -174,17 +157,14 @@ def _check_shape(column, name, n_rows):
 
 def column_position(names, role, given) -> int:
     """Position of a column given by position or name; ``names`` are those of X, or positions."""
-    if isinstance(given, str):
-        if given not in names:
-            has_names = any(isinstance(name, str) for name in names)
-            found = f"its columns are {names}" if has_names else "it has no column names"
-            raise ValueError(f"X has no column {role}={given!r}: {found}.")
-        return names.index(given)
-    if not isinstance(given, int | np.integer) or isinstance(given, bool):
-        raise ValueError(f"{role}={given!r} must be the position or the name of a column.")
-    if not -len(names) <= given < len(names):
-        raise ValueError(f"{role}={given} is no column of X, which has {len(names)} feature(s).")
-    return int(given) % len(names)
+    places = range(-len(names), len(names))
+    is_place = isinstance(given, int | np.integer) and not isinstance(given, bool)
+    if given not in (places if is_place else [name for name in names if isinstance(name, str)]):
+        named = f": {names}" if any(isinstance(name, str) for name in names) else ""
+        raise ValueError(
+            f"{role}={given!r} is no column of X, which has {len(names)} feature(s){named}."
+        )
+    return int(given) % len(names) if is_place else names.index(given)
 
 
 def evenly_chosen(n_rows, most) -> np.ndarray:

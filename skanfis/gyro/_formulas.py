@@ -6,7 +6,7 @@ from ._headline import readability_of
 from ._simpler import LAW_AND_LINE
 from .physics import past_phase
 
-__all__ = ["formula_of", "law_table", "law_text", "on_board", "rules_text"]
+__all__ = ["formula_of", "law_text", "on_board", "rules_text"]
 
 
 def formula_of(calibration, name):
@@ -15,9 +15,9 @@ def formula_of(calibration, name):
     recipe = calibration.recipe
     if name == LAW_AND_LINE:
         line = _polynomial("line", simple.model.residual_, recipe.inputs)
-        return f"{law_table(simple.model.base_, recipe)}\n\nTo this rate is added the line:\n{line}"
+        return f"{law_text(simple.model.base_, recipe)}\n\nTo this rate is added the line:\n{line}"
     if simple.predicts == "rate":
-        return law_table(simple.model, recipe)
+        return law_text(simple.model, recipe)
     rate = f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n"
     if name == "constant":
         return f"{rate}error = {float(simple.model.constant_.item()):.9g}"
@@ -66,20 +66,6 @@ def _in_powers(coefficients):
 def _term(value, factor=""):
     """What is to be added, with its sign; nothing for zero."""
     return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
-
-
-def law_table(law, recipe):
-    """The arcsine law as a formula and by its coefficients."""
-    lines = [
-        law_text(law, recipe),
-        f"at {law.reference_temperature_:.6g} °C; powers of the difference, lowest first",
-    ]
-    for name in ("amplitude_", "sagnac_factor_", "bias_"):
-        values = ", ".join(f"{value:.8g}" for value in getattr(law, name))
-        lines.append(f"{name.rstrip('_').replace('_', ' ')}: {values}")
-    if law.temperature_rate is not None:
-        lines.append(f"lag of the thermometer: {law.thermometer_lag_:.6g} s")
-    return "\n".join(lines)
 
 
 def on_board(compensator):

@@ -140,14 +140,13 @@ def readability_of(calibration):
 
 
 class Budget(NamedTuple):
-    """Standard deviations [deg/s], NaN where unknown; ends of a 95 % interval; groups in range."""
+    """Standard deviations [deg/s], NaN where unknown; ends of a 95 % interval."""
 
     noise: float
     scatter: float
     scatter_low: float
     scatter_high: float
     model: float
-    n_groups: int
 
     @property
     def combined(self):
@@ -173,7 +172,7 @@ def budget_of(calibration):
         beyond = np.maximum(deviation**2 - rules.noise_std_**2, 0.0)
         model = float(np.sqrt(np.mean(beyond)))
     scatter, low, high = scatter_between(errors, groups[in_range])
-    return Budget(noise, scatter, low, high, model, np.unique(groups[in_range]).size)
+    return Budget(noise, scatter, low, high, model)
 
 
 def noise_within(residual, groups, noise_of_fit=None):

@@ -12,7 +12,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from .. import ANFISRegressor
-from ..options import LinearExtrapolation
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
@@ -33,14 +32,10 @@ _N_FOLDS, _ROWS_FOR_DEGREE = 5, 6_000
 
 @dataclass(frozen=True)
 class Choice:
-    """Degree of the law in temperature, terms of each input or None for rules of other kinds.
-
-    ``tried`` is all that was compared, (terms, RMS [deg/s] on the groups held out).
-    """
+    """Degree of the law in temperature, terms of each input or None for rules of other kinds."""
 
     degree: int
     terms: tuple[int, ...] | None
-    tried: tuple = ()
 
 
 def fit_model(X, target, groups, recipe):
@@ -52,7 +47,7 @@ def fit_model(X, target, groups, recipe):
         if recipe.physics:
             left = target - make_law(recipe.inputs, degree, "linear").fit(X, target).predict(X)
         rules.fit(X, left, anfisregressor__groups=groups)
-        choice = Choice(degree, *_terms_of(rules[-1], left.std()))
+        choice = Choice(degree, _terms_of(rules[-1]))
     elif not recipe.physics:
         rules.fit(X, target)
     if not recipe.physics:
@@ -64,25 +59,19 @@ def fit_model(X, target, groups, recipe):
 
 def _make_rules(recipe, terms):
     """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
-    outside = recipe.outside
-    if outside == "linear":
-        outside = LinearExtrapolation(recipe.max_extrapolation)
-    structure: dict[str, Any] = {"partition": "grid" if recipe.terms == "search" else "auto"}
+    structure: dict[str, Any] = {"partition": "grid"}
     if isinstance(terms, tuple):
         structure = {"n_mfs": list(terms)}
-    return make_pipeline(StandardScaler(), ANFISRegressor(**structure, out_of_bounds=outside))
+    return make_pipeline(
+        StandardScaler(), ANFISRegressor(**structure, out_of_bounds=recipe.outside)
+    )
 
 
-def _terms_of(anfis, unit):
-    """Terms of the rules taken, None unless they are a grid, and all tried with their errors."""
+def _terms_of(anfis):
+    """Numbers of terms of a grid of rules; None of other rules."""
     counts = Counter(term["input"] for term in anfis.memberships_)
     terms = tuple(max(counts[name], 1) for name in anfis.model_.input_names)
-    tried = [
-        (tuple(line["n_mfs"]), unit * line["held_out_error"])
-        for line in anfis.structures_
-        if line["n_mfs"] is not None and "held_out_error" in line
-    ]
-    return terms if prod(terms) == anfis.n_rules_ else None, tuple(tried)
+    return terms if prod(terms) == anfis.n_rules_ else None
 
 
 def _law_degree(X, target, groups, recipe):

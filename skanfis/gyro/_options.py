@@ -73,10 +73,6 @@ def make_parser():
     )
     several = {"nargs": "+", "action": "extend", "default": []}
     units = "; ".join(f"{part}: {', '.join(units_of(part))}" for part in QUANTITIES)
-    factor = _number(
-        lambda k: 1e-30 <= abs(k) <= 1e30, "a number from 1e-30 to 1e30, or such a negative one"
-    )
-    share = _number(lambda s: 0 <= s <= 1, "a number from 0 to 1")
     parser.add_argument("--version", action="version", version=f"skanfis {__version__}")
 
     def add(name, told, **settings):
@@ -90,12 +86,12 @@ def make_parser():
     told = f"by default those in the names, or s, degC and deg/s. {units}"
     add("--units", told, metavar="PART=UNIT", **several)
     told = "of a raw signal at rest, which does not tell it: counts per deg/s"
-    add("--scale-factor", told, type=factor)
+    add("--scale-factor", told, type=_scale_factor)
     group = parser.add_argument_group("the model")
     told = "all that the log has; time, since power-on, with three runs or more"
     add("--inputs", told, nargs="+", choices=INPUTS)
     told = "fuzzy terms per input, such as 2,1,3; 'search' (default) grows them on held-out groups"
-    add("--terms", f"{told}, 'auto' leaves them to ANFISRegressor", type=_terms, default="search")
+    add("--terms", told, type=_terms, default="search")
     told = "fit the arcsine law of open-loop fiber-optic gyros first; rules learn what it leaves"
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
@@ -104,8 +100,6 @@ def make_parser():
         "(clip), go on along the tangent for a while (linear, default), or give no rate (nan)"
     )
     add("--outside", told, choices=("clip", "linear", "nan"), default=Recipe.outside)
-    told = f"rows that the data cover less are flagged ({Recipe.min_coverage:g})"
-    add("--min-coverage", told, type=share, default=Recipe.min_coverage)
     told = "where the report proves how large the compensation can be"
     add("--box", told, type=parse_box, metavar="INPUT=LOW:HIGH", **several)
     add("--groups", "what to hold out", choices=KINDS, default="auto")
@@ -153,30 +147,27 @@ def check_once(option, names):
             raise UsageError(f"{option}: {name} is given twice.")
 
 
-def _number(is_valid, what):
-    """A type of option: a number for which ``is_valid`` holds."""
-
-    def parse(text):
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not is_valid(value):
-            raise ArgumentTypeError(f"{shortened(text)} must be {what}")
-        return value
-
-    return parse
+def _scale_factor(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 1e-30 <= abs(value) <= 1e30:
+        raise ArgumentTypeError(
+            f"{shortened(text)} must be a number from 1e-30 to 1e30, or such a negative one"
+        )
+    return value
 
 
 def _terms(text):
-    if text in ("search", "auto"):
+    if text == "search":
         return text
     try:
         numbers = tuple(int(part) for part in text.split(","))
     except ValueError:
         numbers = ()
     if not numbers or min(numbers) < 1:
-        raise ArgumentTypeError(f"{shortened(text)} must be search, auto, or numbers such as 2,3,3")
+        raise ArgumentTypeError(f"{shortened(text)} must be search, or numbers such as 2,3,3")
     n_rules = math.prod(numbers)
     if n_rules > _MOST_RULES:
         made = f"{n_rules:,}" if n_rules < 10**15 else "too many"
@@ -265,12 +256,11 @@ def check_limit(limit, lines):
 
 
 class ReportOptions(NamedTuple):
-    """All may be missing. ``files`` have a name, a size [bytes] and the SHA-256 of their bytes."""
+    """All may be missing: the command line as typed; of files name, size [bytes] and SHA-256."""
 
     made: str = ""
     serial: str = ""
     operator: str = ""
     files: tuple[tuple[str, int, str], ...] = ()
-    options: tuple[tuple[str, str], ...] = ()
+    typed: str = ""
     limits: tuple[Limit, ...] = ()
-    unit: str = "auto"

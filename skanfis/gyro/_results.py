@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..inspection import MembershipDisplay
 from ._columns import RATE_UNITS, evenly_chosen, label_texts
-from ._options import ReportOptions, check_limit
+from ._options import check_limit
 from .compensator import features
 from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures, signs
 from .metrics import rms, rows_for_allan
@@ -100,9 +100,9 @@ class Picture(NamedTuple):
 class Results:
     """What the sections of the report need; rates are NaN where a row was out of range."""
 
-    def __init__(self, calibration, options=None):
+    def __init__(self, calibration, options):
         self.calibration = calibration
-        self.options = ReportOptions() if options is None else options
+        self.options = options
         self.log, self.rate = calibration.log, calibration.rate
         self.in_range = calibration.in_range
         self.before = np.where(self.in_range, calibration.before, np.nan)
@@ -116,11 +116,9 @@ class Results:
             self.time = self.log["time"].to_numpy()
         if "run" in self.log:
             self.run = label_texts(self.log["run"])
-        self.unit = self.options.unit
-        if self.unit == "auto":
-            # That in which errors are no long row of zeros.
-            is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
-            self.unit = "deg/s" if is_large else "deg/h"
+        # That in which errors are no long row of zeros.
+        is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
+        self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 
     def shown(self, error):

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.model_selection import GroupKFold
-from sklearn.utils import check_scalar
 
 from ._columns import check_column, check_number, label_texts
 from .errors import LogError
@@ -69,7 +68,6 @@ _WORDS = {
 def group_by_rate_level(
     rate: ArrayLike,
     *,
-    n_groups: int | None = None,
     signed: bool = False,
     tolerance: float | None = None,
 ) -> np.ndarray:
@@ -81,9 +79,6 @@ def group_by_rate_level(
     ----------
     rate : array-like of shape (n_samples,)
         True rate, in any unit.
-    n_groups : int, default=None
-        Number of groups, at least 2: levels are dealt out to them by turns, so that each has levels
-        from the whole range. Default: a group for each level.
     signed : bool, default=False
         Whether a rate and its opposite are two levels.
     tolerance : float, default=None
@@ -93,13 +88,13 @@ def group_by_rate_level(
     Returns
     -------
     groups : ndarray of int of shape (n_samples,)
-        Number of the group of each row, from 0; of the level without ``n_groups``.
+        Number of the level of each row, the lowest 0. Modulo 5 they are five groups, each with
+        levels from the whole range.
 
     Raises
     ------
     ValueError
-        If the rate changes continuously, so that it has no levels, if it has fewer than
-        ``n_groups``, or if values are missing.
+        If the rate changes continuously, so that it has no levels, or if values are missing.
 
     Examples
     --------
@@ -108,8 +103,6 @@ def group_by_rate_level(
     >>> rate = [-20.0, -10, 0, 10, 20, -20, -10, 0, 10, 20]
     >>> group_by_rate_level(rate).tolist()
     [2, 1, 0, 1, 2, 2, 1, 0, 1, 2]
-    >>> group_by_rate_level(rate, n_groups=2).tolist()
-    [0, 1, 0, 1, 0, 0, 1, 0, 1, 0]
     >>> LeaveOneGroupOut().get_n_splits(groups=group_by_rate_level(rate, signed=True))
     5
     """
@@ -121,12 +114,7 @@ def group_by_rate_level(
             f"{rate.max():g}. If a table went from level to level, leave out the rows in between, "
             "or give tolerance. If not, no level can be memorised: hold out runs or devices."
         )
-    if n_groups is None:
-        return labels
-    n_groups, n_levels = check_scalar(n_groups, "n_groups", int, min_val=2), labels.max() + 1
-    if n_levels < n_groups:
-        raise ValueError(f"n_groups={n_groups}: the rate has no more than {n_levels} levels.")
-    return labels % n_groups
+    return labels
 
 
 def _level_numbers(rate, tolerance):

@@ -12,7 +12,6 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
@@ -224,15 +223,8 @@ class _Composition:
         positions = np.searchsorted(columns, rules.positions)
         self.rules = replace(rules, model=part.model, positions=positions)
         self.reference = self.rounded(law.reference_temperature_)
-        # Coefficients about the reference as it is rounded.
-        shift = Polynomial([float(self.reference) - law.reference_temperature_, 1.0])
-        self.polynomials = {}
-        for key in ("amplitude", "sagnac", "bias"):
-            given = getattr(law, "sagnac_factor_" if key == "sagnac" else f"{key}_")
-            moved = np.zeros(given.size)
-            found = Polynomial(given)(shift).coef
-            moved[: found.size] = found
-            self.polynomials[key] = self.rounded(moved)
+        given = {"amplitude": law.amplitude_, "sagnac": law.sagnac_factor_, "bias": law.bias_}
+        self.polynomials = {key: self.rounded(values) for key, values in given.items()}
 
     def rounded(self, values):
         values = np.asarray(values, dtype=float)
@@ -259,12 +251,8 @@ class _Composition:
 
 def _law_source(dialect, whole, silent):
     """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
-    law, number, inputs, places = (
-        whole.law,
-        dialect.number,
-        whole.law.columns_,
-        whole.rules.positions,
-    )
+    law, number = whole.law, dialect.number
+    inputs, places = law.columns_, whole.rules.positions
     tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.polynomials}
     parts = ["/* Of the law: where it was fitted, powers of the temperature, columns of x. */\n"]
     parts += [f"{dialect.table(key, values)}\n" for key, values in tables.items()]

@@ -30,7 +30,6 @@ from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
 from .log import LogFile, RunFinder, digests_of, find_logs, read
-from .metrics import hysteresis
 
 __all__ = ["main"]
 
@@ -81,7 +80,7 @@ def _calibrate(options, tell):
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
-    tell("done, but see the warnings" if calibration.cautions else "done")
+    tell("done, but see the warnings" if calibration.cautions() else "done")
 
 
 def _where_from_and_to(options):
@@ -169,7 +168,6 @@ def _recipe(options, reading, at_rest):
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
-        min_coverage=options.min_coverage,
         box=tuple(options.box),
     )
 
@@ -191,7 +189,7 @@ def _write(calibration, options, files, folder):
         serial=options.serial,
         operator=options.operator,
         files=files,
-        options=(("options", options.typed),),
+        typed=options.typed,
         limits=tuple(options.limits),
     )
     page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
@@ -205,7 +203,7 @@ def _write(calibration, options, files, folder):
             compensator.estimator,
             folder / "compensator",
             std=options.c,
-            min_coverage=compensator.min_coverage or None,
+            min_coverage=compensator.min_coverage,
             saturate=proven_bounds(calibration).found if options.saturate else None,
         )
 
@@ -213,30 +211,12 @@ def _write(calibration, options, files, folder):
 def _summary(calibration, folder, notes):
     lines = errors_and_verdict(calibration)
     lines += [
-        *_hysteresis_line(calibration),
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
         *(f"note           {note}" for note in notes),
-        *(f"WARNING        {sentence}" for sentence in calibration.cautions),
+        *(f"WARNING        {sentence}" for sentence in calibration.cautions()),
     ]
     return lines
-
-
-def _hysteresis_line(calibration):
-    """The gap between warming and cooling of a gyro at rest; none where there is no such gap."""
-    if np.ptp(calibration.rate) or "temperature_rate" not in calibration.X:
-        return []
-    rows = calibration.in_range
-    temperature = calibration.log["temperature"].to_numpy()[rows]
-    warming = 60.0 * calibration.X["temperature_rate"].to_numpy()[rows]
-    errors = [(rates - calibration.rate)[rows] for rates in (calibration.before, calibration.after)]
-    try:
-        before, after = (hysteresis(error, temperature, warming) for error in errors)
-    except ValueError:
-        return []  # never warmed and cooled at one temperature
-    return [
-        f"hysteresis     {before:.4g} deg/h between warming and cooling before, {after:.4g} after"
-    ]
 
 
 def _apply(options, tell):

@@ -14,8 +14,9 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
-from ._formulas import formula_of, law_table, on_board, rules_text
+from ._formulas import formula_of, law_text, on_board, rules_text
 from ._headline import ARTICLES, budget_of, headline, held_out_groups, proven_bounds, readability_of
+from ._options import ReportOptions
 from ._results import Results
 from ._simpler import NOTHING, options_for
 from .displays import figures, signs
@@ -41,12 +42,12 @@ class Block(NamedTuple):
 
 def report_page(calibration, title, options=None):
     """The report of a calibration, as the text of an HTML file; ``options`` a ReportOptions."""
-    results = Results(calibration, options)
+    results = Results(calibration, options or ReportOptions())
     recipe, verdict = calibration.recipe, calibration.verdict
     what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
     target = "rate" if recipe.physics else "rate error"
     inputs = ", ".join(map(_words, recipe.inputs))
-    cautions = calibration.cautions_in(results.symbol, RATE_UNITS[results.unit])
+    cautions = calibration.cautions(results.symbol, RATE_UNITS[results.unit])
     sections = [_identity, _check, _instead, _merit, _pictures, _use, _sure, _rules, _log]
     kept = verdict.model_is_worth_it and all(check.result == "pass" for check in results.checks)
     return _template().render(
@@ -119,9 +120,8 @@ def _identity(results):
         blocks.append(_table(["file of the log", "bytes", "SHA-256"], options.files))
     text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
     blocks.append(Block("soft", text))
-    if options.options:
-        text = "\n".join(f"{name}: {value}" for name, value in options.options)
-        blocks.append(Block("details", text, "Options of the command"))
+    if options.typed:
+        blocks.append(Block("details", options.typed, "Options of the command"))
     return "This calibration", blocks
 
 
@@ -284,7 +284,7 @@ def _rules(results):
     """The rules in pictures and as text, and whether they can be read one by one."""
     calibration, blocks = results.calibration, []
     if calibration.recipe.physics:
-        law = law_table(calibration.compensator.estimator.base_, calibration.recipe)
+        law = law_text(calibration.compensator.estimator.base_, calibration.recipe)
         text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
     blocks.append(Block("pictures", list(results.memberships())))

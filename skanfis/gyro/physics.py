@@ -19,7 +19,7 @@ from sklearn.utils.validation import check_is_fitted, check_scalar, validate_dat
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ..policies import OUT_OF_BOUNDS, SILENT
-from ._columns import check_weights, column_position
+from ._columns import check_column, column_position
 
 __all__ = [
     "DEGREES",
@@ -170,7 +170,11 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         """
         check_parameters(self)
         inputs, rate = validate_data(self, X, y, dtype=float, y_numeric=True)
-        weights = check_weights(sample_weight, len(rate))
+        given = np.ones(len(rate)) if sample_weight is None else sample_weight
+        weights = check_column(given, "sample_weight", len(rate))
+        if weights.min() < 0 or weights.max() == 0:
+            raise ValueError("sample_weight must be zero or positive, and positive somewhere.")
+        weights = weights / weights.mean()
         columns = self._find_columns()
         counts = weights > 0
         used = inputs[counts][:, columns]

@@ -40,7 +40,7 @@ def test_parts_add_up_to_the_error(data):
 
 
 def test_rates_are_the_levels_asked_for_in_every_run_or_of_one_dwell_alone(data):
-    few = make_ofog(n_rate_levels=11, random_state=0)
+    few = make_ofog(rates=np.linspace(-100, 100, 11), random_state=0)
     for _, run in few.groupby("run"):
         assert_allclose(np.unique(run["rate"]), np.linspace(-100, 100, 11), atol=1e-12)
     given = make_ofog(rates=[30.0, 0.0, -2.5], random_state=0)
@@ -166,7 +166,7 @@ def dwells_of(**options):
 
 def test_every_rate_is_held_once_before_any_comes_again():
     levels = np.linspace(-100, 100, 5)
-    order = dwells_of(duration=51.0, n_rate_levels=5)
+    order = dwells_of(duration=51.0, rates=levels)
     assert_array_equal(np.sort(order[:10].reshape(2, 5), axis=1), [levels, levels])
     assert not np.array_equal(order[:5], order[5:10])
     # Without levels they fill the range and never come again.
@@ -222,7 +222,6 @@ def test_rate_of_temperature_undoes_the_lag_of_the_thermometer():
         ({"n_devices": 0}, r"'n_devices' .* int in the range \[1, inf\). Got 0"),
         ({"duration": 5.0}, r"duration=5.0 must be at least the sampling_interval, 10.0 s"),
         ({"max_rate": 350.0}, "arcsine is not defined"),
-        ({"n_rate_levels": 1}, "'n_rate_levels' .* Got 1"),
         ({"dwell_time": 1.0}, "dwell_time=1.0 must be at least"),
         ({"ambient_range": 20.0}, "ambient_range=20.0 must be two temperatures"),
         ({"ambient_range": (30.0, 20.0)}, r"=\(30.0, 20.0\) must be two temperatures that rise"),
@@ -236,7 +235,7 @@ def test_rate_of_temperature_undoes_the_lag_of_the_thermometer():
         ({"profile": "oven"}, "'profile' .* must be a str among"),
         ({"rates": [0.0, float("nan")]}, "rates must be a list of finite rates"),
         ({"rates": [-400.0]}, "largest rate is 400.0 and must be < 341"),
-        ({"rates": [0.0], "max_rate": 5.0}, r"together with \['max_rate'\]"),
+        ({"rates": [0.0], "max_rate": 5.0}, "together with max_rate"),
     ],
 )
 def test_refuses_parameters_without_meaning(parameters, message):

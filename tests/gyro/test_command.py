@@ -216,13 +216,12 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--columns", "time=a", "time=b"], "time is given twice"),
         (["--units", "time=year"], "time has no unit 'year'"),
         (["--saturate"], "--saturate is of the model in C: give --c"),
-        (["--terms", "2,x"], "must be search, auto, or numbers"),
+        (["--terms", "2,x"], "must be search, or numbers"),
         (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
-        (["--min-coverage", "2"], "must be a number from 0 to 1"),
         (["--physics", "--inputs", "temperature"], "needs the output"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
         (["--terms", "99999999,1,1,1"], "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
-        (["--terms", "9" * 9000], "must be search, auto, or numbers"),
+        (["--terms", "9" * 9000], "must be search, or numbers"),
         (["--inputs", "time", "time"], "--inputs: time is given twice"),
         (["--scale-factor", "131"], "is for a raw signal at rest"),
         (["--box", "humidity=0:1"], "--box: 'humidity' is no input; these are time, temperature"),
@@ -381,10 +380,6 @@ def test_a_thermal_cycle_at_rest(tmp_path, capsys):
     log = pd.DataFrame({"time": [0.0, 1e4], "temperature": 10.0, "output": 0.31})
     # Neither warming nor cooling: between the two.
     assert compensator.apply(log)["rate_compensated"].abs().max() < 0.02
-    [line] = [line.split() for line in said.splitlines() if line.startswith("hysteresis")]
-    # Twice the lag of 0.05 deg/s. After a turn, the low-pass takes its time to tell of it.
-    assert float(line[1]) == pytest.approx(2 * 0.05 * 3600, rel=0.1)
-    assert float(line[-2]) < 0.4 * float(line[1])
 
 
 @pytest.mark.usefixtures("no_report")

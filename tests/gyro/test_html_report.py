@@ -72,14 +72,14 @@ TITLE = "<gyro> & co.csv"
 @pytest.fixture(scope="module")
 def options(calibration):
     """All in it is text from outside; the limits lie on both sides of what was found."""
-    merit = Results(calibration).merit.set_index("figure")
+    merit = Results(calibration, ReportOptions()).merit.set_index("figure")
     value = merit.loc["residual_rms", "after"]
     typed = [f"residual_rms={factor * value:.9f}deg/s" for factor in (1.001, 0.999)]
     return ReportOptions(
         serial=SCRIPT,
         operator=SCRIPT,
         files=((SCRIPT, 12, "0" * 64),),
-        options=(("logs", SCRIPT),),
+        typed=SCRIPT,
         limits=tuple(map(parse_limit, [*typed, "bias_instability=1deg/h"])),
     )
 
@@ -119,7 +119,7 @@ def test_needs_nothing_from_elsewhere(page):
 
 
 def test_says_how_sure(calibration, page):
-    results, budget = Results(calibration), budget_of(calibration)
+    results, budget = Results(calibration, ReportOptions()), budget_of(calibration)
     text = " ".join(" ".join(Outline(page).text).split())
     told = text[text.rindex("How sure") : text.rindex("Can the rules be read?")]
     for value in (budget.noise, budget.scatter, budget.scatter_high, budget.model, budget.combined):
@@ -138,7 +138,7 @@ def test_physics_shows_its_law(few_rivals, no_drawing):
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
     assert f"along its tangent, for each input up to {found.max_extrapolation:g} of its" in text
-    assert f"lag of the thermometer: {law.thermometer_lag_:.6g} s" in text
+    assert f"{law.thermometer_lag_:.8g} s * temperature_rate [degC/s]" in text
     # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.
     assert 100.0 < law.thermometer_lag_ < 260.0
     estimator = calibration.compensator.estimator
@@ -183,9 +183,10 @@ def test_the_verdict_comes_first(page, calibration):
     assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What to use instead") :]
 
 
-def test_one_unit_throughout(page, calibration, no_drawing):
+def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
     """Of errors; rates, and the formula of what to use instead, are in deg/s."""
-    hourly = report_page(calibration, TITLE, ReportOptions(unit="deg/h"))
+    monkeypatch.setattr("skanfis.gyro._results._SMALL", np.inf)
+    hourly = report_page(calibration, TITLE)
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
         text = " ".join(Outline(text).text)

@@ -172,12 +172,12 @@ class TestBeyondTheSine:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"output": 2}, r"output=2 is no column of X, which has 2 feature"),
-        ({"temperature": "T"}, r"X has no column temperature='T': it has no column names"),
+        ({"output": 2}, "output=2 is no column of X, which has 2 feature"),
+        ({"temperature": "T"}, "temperature='T' is no column of X, which has 2 feature"),
         ({"temperature": 0}, "Two of output=0, temperature=0 are one column"),
         ({"temperature_rate": 1}, "Two of .* temperature_rate=1 are one column"),
         ({"temperature": None, "temperature_rate": 1}, "of no use with temperature=None"),
-        ({"output": True}, "output=True must be the position or the name"),
+        ({"output": True}, "output=True is no column of X"),
         ({"bias_degree": 6}, "bias_degree == 6"),
         ({"max_phase": 1.6}, "max_phase == 1.6"),
         ({"out_of_bounds": "hold"}, "out_of_bounds='hold' must be one of clip, linear, nan, raise"),

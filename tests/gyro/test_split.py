@@ -14,6 +14,7 @@ from skanfis.gyro._split import choose_split, cut_legs, find_legs
 GRID = np.linspace(-100.8, 100.8, 57)  # steps of 3.6 deg/s
 UNEVEN = np.array([-100.0, -30, -10, -3, -1, -0.3, 0, 0.3, 1, 3, 10, 30, 100])
 FINE = np.linspace(-100, 100, 401)
+LEVELS = np.linspace(-100, 100, 9)
 
 
 def levels_of(rate, **options):
@@ -75,18 +76,9 @@ def test_a_rate_that_changes_continuously_has_no_levels(rate):
         group_by_rate_level(rate)
 
 
-def test_levels_are_dealt_out_by_turns():
+def test_a_rate_and_its_opposite_are_one_level():
     rate = np.tile(GRID, 3)
-    groups = group_by_rate_level(rate, n_groups=5)
-    assert_array_equal(groups, np.rint(np.abs(rate) / 3.6).astype(int) % 5)
-    # Every group reaches over the whole range.
-    reach = pd.Series(np.abs(rate)).groupby(groups).agg(["min", "max"])
-    assert reach["min"].max() < 20
-    assert reach["max"].min() > 85
-    with pytest.raises(ValueError, match=r"n_groups=30: the rate has no more than 29 levels"):
-        group_by_rate_level(rate, n_groups=30)
-    with pytest.raises(ValueError, match="n_groups == 1, must be >= 2"):
-        group_by_rate_level(rate, n_groups=1)
+    assert_array_equal(group_by_rate_level(rate), np.rint(np.abs(rate) / 3.6).astype(int))
 
 
 def log_of(**options):
@@ -106,9 +98,9 @@ def every_row_once(split, n_rows):
         ({"n_devices": 1, "n_runs": 4}, "run"),
         ({"n_devices": 3, "n_runs": 2}, "device"),
         ({"n_devices": 2, "n_runs": 2}, "run"),
-        ({"n_devices": 1, "n_runs": 4, "n_rate_levels": 9}, "run+level"),
-        ({"n_devices": 3, "n_runs": 1, "n_rate_levels": 9}, "device+level"),
-        ({"n_devices": 1, "n_runs": 2, "n_rate_levels": 9}, "level"),
+        ({"n_devices": 1, "n_runs": 4, "rates": LEVELS}, "run+level"),
+        ({"n_devices": 3, "n_runs": 1, "rates": LEVELS}, "device+level"),
+        ({"n_devices": 1, "n_runs": 2, "rates": LEVELS}, "level"),
     ],
 )
 def test_choice(options, kind):
@@ -119,7 +111,7 @@ def test_choice(options, kind):
 
 
 def test_a_choice_never_leaks():
-    log = log_of(n_devices=1, n_runs=4, n_rate_levels=9)
+    log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
     for train, test in choose_split(log).folds:
         # Levels of one size and two signs are held out together.
         assert not np.isin(log["rate"].abs()[test], log["rate"].abs()[train]).any()
@@ -127,12 +119,12 @@ def test_a_choice_never_leaks():
 
 
 def test_levels_do_not_matter_to_a_compensator_that_does_not_see_the_output():
-    log = log_of(n_devices=1, n_runs=4, n_rate_levels=9)
+    log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
     assert choose_split(log, uses_output=False).kind == "run"
 
 
 def test_asked_for():
-    log = log_of(n_devices=1, n_runs=4, n_rate_levels=9)
+    log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
     split = choose_split(log, "run")
     assert len(split.folds) == 4
     assert "whole runs held out (4 runs, 4 folds; as asked for)" in split.sentence

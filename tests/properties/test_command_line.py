@@ -25,7 +25,6 @@ _VALUES = {
     "--groups": ["auto", "run", "device", "level", "run+level", "leg", "piece", "week"],
     "--outside": ["clip", "linear", "nan", "error"],
     "--c": ["c99", "c89", "c23"],
-    "--min-coverage": _NUMBERS,
     "--scale-factor": _NUMBERS,
 }
 _FLAGS = ["--physics", "--force"]
