@@ -7,8 +7,6 @@ from functools import lru_cache
 from joblib import Parallel, delayed, effective_n_jobs
 from threadpoolctl import ThreadpoolController
 
-__all__ = ["map_in_threads", "one_blas_thread"]
-
 
 @lru_cache(maxsize=1)
 def _thread_pools() -> ThreadpoolController:

@@ -11,21 +11,6 @@ from sklearn import get_config
 
 from .blocks import LARGE_BLOCK_ROWS, row_blocks
 
-__all__ = [
-    "bearable_weights",
-    "check_choice",
-    "check_count",
-    "check_finite",
-    "check_not_negative",
-    "feature_indices",
-    "group_numbers",
-    "named_refusals",
-    "position_of",
-    "positive_weights",
-    "refuse_lazy",
-    "warn_user",
-]
-
 # Exponent of two up to which weights are taken as they are: products of two, and sums of as many
 # rows as there can be, stay within 2^1023.
 _FAR = 400

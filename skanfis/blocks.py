@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["BLOCK_BYTES", "BLOCK_ROWS", "LARGE_BLOCK_ROWS", "fitting_rows", "row_blocks"]
-
 # Rows that NumPy works on at once: 32 kB a column, so that some columns stay in the second-level
 # cache, and a call costs little beside its work.
 BLOCK_ROWS = 4096

@@ -24,8 +24,6 @@ import numpy as np
 
 from ..membership import Membership
 
-__all__ = ["Antecedent", "TermGroup", "softmax_in_place"]
-
 
 @dataclass(frozen=True, eq=False)
 class TermGroup:

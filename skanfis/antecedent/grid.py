@@ -9,8 +9,6 @@ import numpy as np
 
 from .base import Antecedent, TermGroup, softmax_in_place
 
-__all__ = ["GridAntecedent"]
-
 
 def _grid_rule_terms(counts):
     """The terms of every rule of a full grid, shape (n_rules, n_inputs with terms)."""

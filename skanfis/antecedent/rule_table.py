@@ -7,8 +7,6 @@ import numpy as np
 
 from .base import Antecedent, softmax_in_place
 
-__all__ = ["RuleTableAntecedent"]
-
 
 @dataclass(frozen=True, eq=False)
 class RuleTableAntecedent(Antecedent):

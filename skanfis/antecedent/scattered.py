@@ -6,8 +6,6 @@ import numpy as np
 
 from .base import Antecedent, TermGroup, softmax_in_place
 
-__all__ = ["ScatteredAntecedent"]
-
 
 @dataclass(frozen=True, eq=False)
 class ScatteredAntecedent(Antecedent):

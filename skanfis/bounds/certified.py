@@ -14,8 +14,6 @@ from .enclosure import Enclosure, reach_of
 from .search import largest
 from .terms import is_known
 
-__all__ = ["Bounds", "bounds", "cuts_of", "gradient_bounds", "monotonicity", "spread_points"]
-
 # Rows that are looked at first: all corners, of so few inputs, and some between.
 _CORNERS = 6
 _POINTS = 512

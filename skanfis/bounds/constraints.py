@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Constraints", "FixedPoint", "OutputLimits"]
-
 
 @dataclass(frozen=True)
 class OutputLimits:

@@ -33,8 +33,6 @@ from .terms import (
     term_ranges,
 )
 
-__all__ = ["Enclosure", "reach_of"]
-
 
 def reach_of(model):
     """How far predictions change beyond the range of each input, (n_inputs,)."""

@@ -21,8 +21,6 @@ from .inequalities import HeldPoints, InfeasibleError
 from .search import largest
 from .terms import is_known
 
-__all__ = ["constrained"]
-
 # Margins, in standard deviations of the target (and of the input): the first, and the last tried.
 _FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.03, 3.0
 # A bound on time: what is not proven by then is said not to be. One proof takes a second.

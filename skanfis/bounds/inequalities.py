@@ -20,8 +20,6 @@ from ..model import TSKModel
 from ..policies import SILENT
 from .constraints import Constraints
 
-__all__ = ["HeldPoints", "InfeasibleError", "nearest"]
-
 # The step of a slope, in standard deviations of the input.
 _STEP = 1e-5
 # A minimum below this is zero; rows are of length one.

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Found", "largest"]
-
 # Boxes that are split at once; where there are fewer than the latter, they are split on, unseen.
 _BATCH, _FEWEST = 1024, 64
 

@@ -30,8 +30,6 @@ from ..membership import (
 )
 from ..membership.profiles import LinearProfile
 
-__all__ = ["Shares", "TermRanges", "is_known", "ranges"]
-
 EPS = float(np.finfo(float).eps)
 # Roundings of a membership, a share, a rule's output or its slope, in EPS, with room to spare: of
 # a dozen operations one after another, beside those of sums, which are counted.

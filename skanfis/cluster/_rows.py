@@ -15,8 +15,6 @@ from .._sklearn import check_sample_weight, fit_context
 from .._validation import check_finite, check_not_negative
 from ..blocks import row_blocks
 
-__all__ = ["Clusterer", "check_rows", "distance_blocks", "nearest"]
-
 # Distances in a block: a few arrays of this size stay in the cache.
 _BLOCK_SIZE = 32_768
 

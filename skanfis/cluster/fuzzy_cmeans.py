@@ -25,8 +25,6 @@ from sklearn.utils.validation import check_is_fitted
 from .._sklearn import Interval, StrOptions
 from ._rows import Clusterer, check_rows, distance_blocks
 
-__all__ = ["FuzzyCMeans"]
-
 # Centres that differ by less than this part of their cluster's own spread are one.
 _SAME = 0.01
 

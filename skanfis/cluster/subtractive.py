@@ -10,8 +10,6 @@ from scipy.spatial.distance import cdist
 from .._sklearn import Interval
 from ._rows import Clusterer, distance_blocks, nearest
 
-__all__ = ["SubtractiveClustering"]
-
 # Potentials this near, relative to the first centre's, differ by rounding: the first of them wins.
 _TIE = 1e-9
 

@@ -14,8 +14,6 @@ from ..learning.sampling import is_many
 from ..regressor import ANFISRegressor
 from .rows import ClusterData, Partitions, add_each, computed, is_collection, reduce_partitions
 
-__all__ = ["DaskANFISRegressor"]
-
 
 class DaskANFISRegressor(ANFISRegressor):
     r"""ANFISRegressor for dask arrays and DataFrames, trained on the cluster where they live.

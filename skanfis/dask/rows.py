@@ -15,8 +15,6 @@ from ..learning.data import Scale, StandardisedData, check_scales, column_statis
 from ..naming import default_output_names
 from ..training.chunks import joined_scales
 
-__all__ = ["ClusterData", "Partitions", "computed", "is_collection", "reduce_partitions"]
-
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
 # Weights within which squares are finite.

@@ -13,8 +13,6 @@ from sklearn.utils import check_random_state
 from .._sklearn import Interval, StrOptions, validate_parameter_constraints
 from ._ofog_physics import REFERENCE_TEMPERATURE, Schedule, simulate_power_up, temperatures
 
-__all__ = ["make_ofog"]
-
 _ANY = Interval(Real, None, None, closed="neither")
 _NOT_NEGATIVE = Interval(Real, 0, None, closed="left")
 _POSITIVE = Interval(Real, 0, None, closed="neither")

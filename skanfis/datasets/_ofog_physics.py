@@ -10,8 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.signal import lfilter
 
-__all__ = ["REFERENCE_TEMPERATURE", "Schedule", "simulate_power_up", "temperatures"]
-
 REFERENCE_TEMPERATURE = 25.0  # degC, where the factory calibrates the scale factor
 # Biases that nobody can foresee, the one drawn at power-on included.
 _RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")

@@ -6,8 +6,6 @@ from sklearn.utils import Bunch
 
 from .._sklearn import StrOptions, validate_parameter_constraints
 
-__all__ = ["load_ofog", "make_jang_sinc", "make_jang_three_input", "make_mackey_glass"]
-
 _SUBSET = {"subset": [StrOptions({"train", "check", "all"})]}
 
 # Columns: time [s], temperature [degC], rate [deg/s], output [deg/s].

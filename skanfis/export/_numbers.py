@@ -13,8 +13,6 @@ import numpy as np
 
 from ..membership import MEMBERSHIPS, Membership
 
-__all__ = ["FLOOR", "SMALLEST_LOG_SQUARE", "Numbers", "TermTable", "rounded_within"]
-
 # As in ``membership.profiles`` and ``membership.bell``.
 FLOOR = 1e-10
 SMALLEST_LOG_SQUARE = np.log(1e-300)

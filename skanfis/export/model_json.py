@@ -17,8 +17,6 @@ from .folding import fold
 from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
 
-__all__ = ["export_json", "read_json", "write_json"]
-
 # A model of 27 rules takes 10 kB: there is room for thousands, and none to fill the memory.
 _MOST_BYTES = 2**24
 

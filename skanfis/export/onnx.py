@@ -13,8 +13,6 @@ from ..membership import MEMBERSHIPS
 from ..options import policy_of
 from ._numbers import FLOOR, SMALLEST_LOG_SQUARE, Numbers
 
-__all__ = ["register_onnx_converter"]
-
 # Softmax along one axis and ReduceSum with axes as an input are of this version.
 _OLDEST_OPSET = 13
 

@@ -26,8 +26,6 @@ from .compensator import GyroCompensator, features
 from .errors import LogError
 from .metrics import rms, scale_factor
 
-__all__ = ["Calibration", "Recipe", "Verdict", "calibrate", "judge"]
-
 _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
 _MOST_FIT_ROWS = 100_000
 # Of a verdict: the name of the model in it, and what a gain must be above to be worth having.

@@ -10,17 +10,6 @@ from scipy.spatial import cKDTree
 from ._columns import CANONICAL, SIGNALS, convert, declared_units, units_of
 from .errors import LogError
 
-__all__ = [
-    "LABELS",
-    "PARTS",
-    "QUANTITIES",
-    "RowChecks",
-    "check_at_rest",
-    "check_log",
-    "check_values",
-    "find_glitches",
-]
-
 QUANTITIES = ("time", "temperature", "output", "rate")
 LABELS = ("run", "device")
 PARTS = (*QUANTITIES, *LABELS)

@@ -9,26 +9,6 @@ from numbers import Real
 import numpy as np
 from sklearn.pipeline import Pipeline
 
-__all__ = [
-    "CANONICAL",
-    "PER_HOUR",
-    "RATE_UNITS",
-    "SIGNALS",
-    "ask",
-    "check_column",
-    "check_labels",
-    "check_number",
-    "column_position",
-    "convert",
-    "declared_units",
-    "evenly_chosen",
-    "in_rate_unit",
-    "label_texts",
-    "rate_unit_of",
-    "unit_in",
-    "units_of",
-]
-
 # Of each unit: its factor to the canonical one, and spellings in lower case, without blanks.
 _TABLE = {
     "time": {

@@ -6,8 +6,6 @@ from ._headline import readability_of
 from ._simpler import LAW_AND_LINE
 from .physics import past_phase
 
-__all__ = ["formula_of", "law_text", "on_board", "rules_text"]
-
 
 def formula_of(calibration, name):
     """The formula of a simpler compensation, as lines of text."""

@@ -12,8 +12,6 @@ from ._columns import CANONICAL, declared_units, unit_in
 from ._source import Clock, as_numbers
 from .errors import LogError
 
-__all__ = ["Request", "checked_request", "settle"]
-
 _SAMPLE_ROWS = 5_000
 _RATE = "rate omega angular velocity speed"
 _OUTPUT = (

@@ -27,20 +27,6 @@ from ._simpler import LAW_AND_LINE, NOTHING, options_for
 from .displays import figures
 from .metrics import rms
 
-__all__ = [
-    "ARTICLES",
-    "Budget",
-    "Proven",
-    "budget_of",
-    "errors_and_verdict",
-    "headline",
-    "held_out_groups",
-    "noise_within",
-    "proven_bounds",
-    "readability_of",
-    "scatter_between",
-]
-
 ARTICLES = {
     NOTHING: "no compensation",
     "constant": "a constant",

@@ -15,15 +15,6 @@ from .. import ANFISRegressor
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
-__all__ = [
-    "Choice",
-    "fit_model",
-    "make_law",
-    "make_law_and_line",
-    "make_polynomial",
-    "some_rows",
-]
-
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
 _ROUNDS = 3
 # As in scikit-learn's cross-validation, and enough rows to tell two degrees apart.

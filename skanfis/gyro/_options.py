@@ -20,19 +20,6 @@ from .compensator import INPUTS
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
 
-__all__ = [
-    "PROGRAM",
-    "Check",
-    "Limit",
-    "ReportOptions",
-    "check_limit",
-    "check_once",
-    "make_parser",
-    "parse_box",
-    "parse_limit",
-    "request_of",
-]
-
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
 _FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")

@@ -24,8 +24,6 @@ from .thermal_displays import (
     ScaleFactorErrorDisplay,
 )
 
-__all__ = ["Picture", "Results"]
-
 _PER_MINUTE = 60.0
 _SMALL = 0.05  # deg/s
 _CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls

@@ -12,8 +12,6 @@ from sklearn.exceptions import ConvergenceWarning
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ._models import make_law, make_law_and_line, make_polynomial
 
-__all__ = ["LAW_AND_LINE", "NOTHING", "Simpler", "options_for", "simpler_compensations"]
-
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"
 # Options by which the command writes the files of one: a single rule is a straight line.

@@ -11,8 +11,6 @@ import pandas as pd
 
 from .errors import LogError
 
-__all__ = ["NO_VALUE", "Clock", "as_numbers", "open_source"]
-
 # What loggers write where there is no value, beside what pandas knows.
 NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 

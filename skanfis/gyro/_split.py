@@ -14,13 +14,6 @@ from sklearn.model_selection import GroupKFold
 from ._columns import check_column, check_number, label_texts
 from .errors import LogError
 
-__all__ = [
-    "KINDS",
-    "Split",
-    "choose_split",
-    "group_by_rate_level",
-]
-
 # Relative to the largest rate: rates closer than that are one to any table.
 _SMALLEST_TOLERANCE = 1e-4
 # Gaps between levels are at least so many times those within a level.

@@ -39,8 +39,6 @@ from ..policies import SILENT
 from .compose import law_and_rules
 from .physics import past_phase
 
-__all__ = ["export_c_physics"]
-
 _SUFFIX = "_r"
 
 _POLYNOMIAL = """

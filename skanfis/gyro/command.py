@@ -31,8 +31,6 @@ from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
 from .log import LogFile, RunFinder, digests_of, find_logs, read
 
-__all__ = ["main"]
-
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 

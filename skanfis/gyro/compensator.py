@@ -20,8 +20,6 @@ from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
 from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
 
-__all__ = ["INPUTS", "GyroCompensator", "features"]
-
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1

@@ -20,8 +20,6 @@ from ..export import fold_with_rows, found_by_search
 from ._columns import ask
 from .physics import OpenLoopArcsineRegressor, check_parameters
 
-__all__ = ["FrozenRules", "ResidualRegressor", "joined", "law_and_rules"]
-
 
 class ResidualRegressor(RegressorMixin, BaseEstimator):
     """A base regressor, and another that learns what it leaves: the prediction is their sum.

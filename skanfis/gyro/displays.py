@@ -11,8 +11,6 @@ from ..inspection.labels import as_label
 from ._columns import PER_HOUR, RATE_UNITS, evenly_chosen
 from .metrics import allan_deviation, allan_figures, rms, table_of
 
-__all__ = ["AllanDisplay", "ErrorDisplay", "GroupResidualDisplay"]
-
 # Colours that the colour-blind can tell apart.
 SIDES = {"before": "#d55e00", "after": "#0072b2"}
 _SIGNS = {"degC": "°C", "deg/": "°/", "sqrt(h)": "√h"}

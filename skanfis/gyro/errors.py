@@ -1,7 +1,5 @@
 """Errors: of a log, of options, of files that exist."""
 
-__all__ = ["ExistsError", "LogError", "UsageError", "shortened"]
-
 _LONGEST_SHOWN = 60  # of a value in a message
 
 

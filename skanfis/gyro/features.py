@@ -19,8 +19,6 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._columns import check_column, check_number, column_position
 
-__all__ = ["ThermalRate"]
-
 
 class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     r"""Rate of change of the temperature, causally low-passed; see :doc:`/gyro_data`.

@@ -22,8 +22,6 @@ from ._simpler import NOTHING, options_for
 from .displays import figures, signs
 from .metrics import rms
 
-__all__ = ["check_installed", "report_page"]
-
 _UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
 _BUDGET = (
     "Combined and RMS error are two ways to one figure: where the error is clearly larger, the "

@@ -22,8 +22,6 @@ from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
 from .errors import LogError, shortened
 
-__all__ = ["LogFile", "Reading", "RunFinder", "digests_of", "find_logs", "read", "read_log"]
-
 _ROWS = 200_000  # of a piece, which is all that is held beside the log itself
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s

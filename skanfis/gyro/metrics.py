@@ -18,8 +18,6 @@ from numpy.typing import ArrayLike
 
 from ._columns import PER_HOUR, check_column, check_labels
 
-__all__ = ["allan_deviation", "figures_of_merit", "hysteresis", "rms", "scale_factor"]
-
 _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
 _HYSTERESIS_BINS, _ROWS_PER_MEAN = 20, 5

@@ -21,15 +21,6 @@ from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ..policies import OUT_OF_BOUNDS, SILENT
 from ._columns import check_column, column_position
 
-__all__ = [
-    "DEGREES",
-    "HIGHEST_DEGREE",
-    "ROLES",
-    "OpenLoopArcsineRegressor",
-    "check_parameters",
-    "past_phase",
-]
-
 HIGHEST_DEGREE = 5
 DEGREES = ("amplitude_degree", "sagnac_degree", "bias_degree")
 ROLES = ("output", "temperature", "temperature_rate")

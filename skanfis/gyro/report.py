@@ -8,8 +8,6 @@ from sklearn.utils import check_random_state
 from . import metrics
 from ._columns import RATE_UNITS, in_rate_unit
 
-__all__ = ["gyro_report"]
-
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
 _N_BLOCKS = 30

@@ -8,13 +8,6 @@ import pandas as pd
 from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, TWO_ROWS, GyroDisplay, bins_of, dress, figures, mark_decades, signs
 
-__all__ = [
-    "CoverageDisplay",
-    "HysteresisDisplay",
-    "ResidualSurfaceDisplay",
-    "ScaleFactorErrorDisplay",
-]
-
 # Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
 _N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
 # Enough to show a loop, and few enough that every bin has rows; fewer rows have no mean.

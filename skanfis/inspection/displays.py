@@ -13,8 +13,6 @@ from ..export import fold, fold_with_rows
 from .labels import as_label
 from .rules import has_training_data
 
-__all__ = ["MembershipDisplay", "ResponseSurfaceDisplay"]
-
 # Points of a membership along its input, and bins of the data behind it.
 _N_POINTS, _BINS = 201, 30
 # The brightest end of a colour map is hard to see on white.

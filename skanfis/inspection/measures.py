@@ -16,8 +16,6 @@ import numpy as np
 from ..blocks import LARGE_BLOCK_ROWS, fitting_rows, row_blocks
 from ..learning.data import column_statistics
 
-__all__ = ["Measures", "RuleSums", "crossings", "distinct_terms", "measure"]
-
 # Strengths that differ by rounding errors only are equal.
 _EQUALLY_STRONG = 1.0 - 1e-9
 # A target that varies by rounding errors only, as the predictions of a constant do, is constant.

@@ -17,8 +17,6 @@ from ..model import TSKModel
 from .measures import Measures, crossings, distinct_terms, measure
 from .rules import premise_texts, rules_frame, writable
 
-__all__ = ["Readability", "readability", "readability_of_rows"]
-
 # A sentence names so many terms or pairs, and counts the others.
 _MOST_NAMED = 5
 

@@ -13,8 +13,6 @@ from ..exceptions import ReadabilityWarning
 from ..export import fold, fold_with_rows, last_step
 from ..model import TSKModel
 
-__all__ = ["explain", "memberships_table", "rules_table"]
-
 
 def rules_frame(model, reference):
     """A row per rule: ("if", input), ("data", "weight" or "rows"), ("then output", coefficient).

@@ -22,8 +22,6 @@ from .rules import (
     writable,
 )
 
-__all__ = ["export_text", "range_text", "rows_text", "rules_html"]
-
 # More than these give back no other double.
 _MOST_DIGITS = 17
 

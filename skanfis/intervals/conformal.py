@@ -16,8 +16,6 @@ from .._sklearn import HasMethods, Interval, StrOptions, fit_context
 from ..regressor import ANFISRegressor
 from . import _scores
 
-__all__ = ["ConformalRegressor"]
-
 
 class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     r"""Prediction intervals that cover, around any regressor.

@@ -24,8 +24,6 @@ from ..posterior import MOST_PARAMETERS, Posterior, parameter_units
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-__all__ = ["posterior_of"]
-
 # Where rows leave no freedom, the noise is that of so many.
 _LEAST_FREEDOM = 1.0
 

@@ -12,8 +12,6 @@ import numpy as np
 
 from ..blocks import BLOCK_ROWS, row_blocks
 
-__all__ = ["Scale", "StandardisedData", "check_scales", "column_statistics", "fingerprint"]
-
 # Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
 # whatever the number of workers.
 _BLOCKS_PER_CHUNK = 16

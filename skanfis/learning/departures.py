@@ -26,8 +26,6 @@ from scipy import linalg
 
 from ..antecedent import Antecedent
 
-__all__ = ["Departures"]
-
 # Beyond pairs nobody tells one interaction from another.
 _MOST_INPUTS = 2
 

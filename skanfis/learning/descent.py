@@ -34,8 +34,6 @@ from .._sklearn import Interval, StrOptions
 from .objective import Evaluation, JointGradient
 from .solver import Solver, SolverResult, lse
 
-__all__ = ["GradientDescent", "Hybrid", "NaturalPremise", "StepSize"]
-
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
 _GROWTH, _SHRINKAGE = 1.1, 0.9

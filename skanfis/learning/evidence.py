@@ -52,18 +52,6 @@ from ..consequent import NormalFactor
 from .objective import NormalEquations
 from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 
-__all__ = [
-    "FREE",
-    "PRIOR_DISPLACEMENT",
-    "ROWS_EACH",
-    "Laplace",
-    "extrapolated",
-    "is_settled",
-    "laplace",
-    "least_weights",
-    "reestimated",
-]
-
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
 # Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.

@@ -12,8 +12,6 @@ from ..support import RuleSupport
 from .data import StandardisedData, fingerprint
 from .gram import pair_index, pairs
 
-__all__ = ["FIRES", "RuleFiring", "inverse_factor", "rule_support"]
-
 # Standard deviation added to every standardised input: rows on a line or a surface (two
 # thermometers on one gyro) keep some thickness, and the distance stays finite off it.
 _THICKNESS = 0.1

@@ -23,8 +23,6 @@ from math import prod
 import numpy as np
 from scipy.linalg import blas
 
-__all__ = ["DesignMoments", "pair_index", "pairs"]
-
 # Columns up to which the places of moments are kept, 4 MB each; of more, they are soon worked out
 # beside a pass, and would hold memory after the fit.
 _MOST_KEPT = 1024

@@ -50,8 +50,6 @@ from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
-__all__ = ["Evaluation", "JointGradient", "Linearisation", "NormalEquations", "SeparableProblem"]
-
 _TINY = float(np.finfo(float).tiny)
 # A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
 _SMALLEST_FREEDOM = 1e-6

@@ -20,8 +20,6 @@ import numpy as np
 
 from ..membership import GREATEST_CROSSING, LEAST_TRUTH
 
-__all__ = ["LOG_FACTOR", "LOG_FLATTER", "OrderedTerms", "Term", "terms_of"]
-
 # Neighbouring gaps differ at most by this factor, the outer ones by the second from the next.
 _LOG_RATIO, _LOG_OUTER = np.log(2.2), np.log(1.45)
 # A ratio of gaps changes by so much, as a logarithm, per displacement: a term between two others

@@ -14,8 +14,6 @@ from ..antecedent import Antecedent
 from ..consequent import basis, rule_outputs
 from .gram import DesignMoments
 
-__all__ = ["Design", "FirstPass", "JointPass", "SecondPass", "own_parameters"]
-
 _TINY = np.finfo(float).tiny
 
 

@@ -42,15 +42,6 @@ from ..antecedent import Antecedent
 from ..consequent import LocalBasis, NormalFactor
 from .departures import Departures
 
-__all__ = [
-    "GREATEST_ALONE",
-    "WEIGHTS",
-    "CommonLine",
-    "Penalty",
-    "disagreement_matrix",
-    "mean_and_parts",
-]
-
 # In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
 # explains three quarters of the variance; beyond, the rule says too little of the model.
 GREATEST_ALONE = 0.5

@@ -18,8 +18,6 @@ import numpy as np
 from ..antecedent import Antecedent
 from .ordered_terms import LOG_FACTOR, LOG_FLATTER, OrderedTerms, terms_of
 
-__all__ = ["Premise"]
-
 # Displacements this near to an edge of the box are on it.
 _ON_EDGE = 1e-9
 

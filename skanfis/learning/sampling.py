@@ -18,8 +18,6 @@ import numpy as np
 from ..blocks import BLOCK_ROWS, row_blocks
 from .data import StandardisedData, fingerprint
 
-__all__ = ["MANY_ROWS", "SAMPLE_ROWS", "is_many", "with_sample"]
-
 # Beyond so many rows the premises are found on a sample of so many of them. At the minimum of a
 # sample of m rows, q parameters cost a part q / m of the error's square: for 18 of them and 20,000
 # rows a thousandth, before all rows have their say.

@@ -32,8 +32,6 @@ import numpy as np
 from .._sklearn import Interval, StrOptions
 from .solver import Solver, SolverResult
 
-__all__ = ["VariableProjection", "trust_region_step", "varpro"]
-
 # Displacements are in spacings and logarithms: steps beyond about a third of a spacing skip from
 # one arrangement of the terms to another, and the bad minima are met that way.
 _FIRST_RADIUS = 0.3

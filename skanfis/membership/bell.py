@@ -4,8 +4,6 @@ import numpy as np
 
 from .base import Membership, Parameter
 
-__all__ = ["Bell"]
-
 # Below this, (x - c)^2 / a^2 counts as zero: its logarithm stays finite, mu is exactly one.
 _SMALLEST_SQUARE = 1e-300
 # b of a bell at the start of training, as in Jang's examples.

@@ -18,8 +18,6 @@ import numpy as np
 from .base import Membership, Parameter
 from .profiles import GaussianProfile, LinearProfile, SplineProfile
 
-__all__ = ["PiShaped", "SShaped", "Trapezoidal", "Triangular", "TwoSidedGaussian", "ZShaped"]
-
 # The plateau at the start of training, as part of the spacing of terms.
 _FIRST_PLATEAU = 0.25
 

@@ -4,8 +4,6 @@ import numpy as np
 
 from .base import Membership, Parameter
 
-__all__ = ["Gaussian"]
-
 
 class Gaussian(Membership):
     r"""mu(x) = exp(-(x - c)^2 / (2 sigma^2)), with theta = (c, log sigma)."""

@@ -21,8 +21,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-__all__ = ["GaussianProfile", "LinearProfile", "SplineProfile"]
-
 # Part of a Gaussian that is mixed in, so that no logarithm is infinite beyond the foot.
 _FLOOR = 1e-10
 

@@ -16,8 +16,6 @@ import numpy as np
 
 from .base import Membership, Parameter
 
-__all__ = ["SigmoidDifference", "SigmoidProduct"]
-
 
 def _log_sigmoid(u):
     # A quarter of the time of -logaddexp(0, -u).

@@ -13,8 +13,6 @@ from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
 from .tuning import Tuned
 
-__all__ = ["MOST_RULES", "Candidate", "RuleBases", "term_scores"]
-
 # More nobody reads.
 MOST_RULES = 36
 _IN_WORDS = {

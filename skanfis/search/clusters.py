@@ -13,8 +13,6 @@ from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAnteceden
 from ..learning.data import StandardisedData
 from .sample import representative_rows
 
-__all__ = ["clustered_antecedent"]
-
 # Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
 _SMALLEST_WIDTH = 0.1
 

@@ -17,8 +17,6 @@ from ..antecedent import GridAntecedent
 from ..learning.data import StandardisedData
 from .sample import representative_rows, weighted_quantile
 
-__all__ = ["OVERLAP", "Spacing", "grid_antecedent"]
-
 # Neighbouring terms cross at this membership at the start. From the customary 0.5, Jang's sinc gets
 # stuck; elsewhere it makes little difference (benchmarks/start.py).
 OVERLAP = 0.6

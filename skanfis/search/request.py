@@ -23,8 +23,6 @@ from .size import check_clusters_fit, check_grid_fits, term_counts
 from .start import Start, imported_antecedent, tuned_start
 from .tuning import scaled
 
-__all__ = ["StructureRequest", "report_constant"]
-
 _MIB = 2**20
 
 

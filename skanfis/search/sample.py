@@ -11,15 +11,6 @@ import numpy as np
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import Scale, StandardisedData, fingerprint
 
-__all__ = [
-    "effective_weight",
-    "n_distinct_inputs",
-    "representative_rows",
-    "search_sample",
-    "unit_scale",
-    "weighted_quantile",
-]
-
 # More rows than this tell a clustering nothing new.
 _MOST_ROWS = 20_000
 

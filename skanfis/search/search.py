@@ -23,8 +23,6 @@ from .start import Start
 from .trials import Trials
 from .tuning import scaled, settled, with_rules_that_hold
 
-__all__ = ["SEARCHED", "StructureSearch"]
-
 # The partitions whose size the data decide on.
 SEARCHED = ("auto", "grid", "subtractive", "fcm")
 

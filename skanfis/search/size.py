@@ -5,8 +5,6 @@ from numbers import Integral
 
 import numpy as np
 
-__all__ = ["check_clusters_fit", "check_grid_fits", "term_counts"]
-
 # Of one term, whatever its family: what a limit on memory reckons with.
 _MOST_PREMISE_PARAMETERS = 4
 # Square matrices over all consequent parameters that exist at one time: the Gram matrix, its

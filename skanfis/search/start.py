@@ -31,8 +31,6 @@ from .tuning import (
     with_rules_that_hold,
 )
 
-__all__ = ["Start", "check_inputs", "imported_antecedent", "tuned_start"]
-
 # The weights of rules that are given are found on at most so many representative rows.
 _MOST_ROWS = 1000
 # What terms without bounds must leave of the expected squared error.

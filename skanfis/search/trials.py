@@ -29,8 +29,6 @@ from .grid import Spacing
 from .sample import effective_weight, search_sample, unit_scale
 from .tuning import FIRST_PENALTY, FIRST_STEPS, Tuned, tune
 
-__all__ = ["Trials", "held_out_loss"]
-
 # Candidates are compared on at most so many representative rows. Rows of one group are alike, and
 # every candidate is trained once for each part that is left out.
 _MOST_ROWS, _MOST_ROWS_IN_GROUPS = 2000, 1000

@@ -29,20 +29,6 @@ from ..learning.penalty import GREATEST_ALONE, Penalty
 from ..learning.premise import Premise
 from ..learning.varpro import varpro
 
-__all__ = [
-    "ARRIVING",
-    "FIRST_PENALTY",
-    "FIRST_STEPS",
-    "MOST_COLUMNS",
-    "MOST_TURNS",
-    "Tuned",
-    "scaled",
-    "settled",
-    "tune",
-    "tune_unbounded",
-    "with_rules_that_hold",
-]
-
 # In the middle of what data of every kind ask for; from there the first steps find their way.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they

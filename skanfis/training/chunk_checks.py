@@ -8,19 +8,6 @@ import numpy as np
 
 from ..model import TSKModel
 
-__all__ = [
-    "can_learn_from_chunks",
-    "check_begin",
-    "check_distance",
-    "check_forgetting",
-    "check_outputs",
-    "check_same_premises",
-    "check_settings",
-    "faded_weights",
-    "named_premises",
-    "structure_settings",
-]
-
 # What the premises and the columns of the design depend on.
 _STRUCTURE = ("n_mfs", "mf", "order", "premise_features", "consequent_features")
 # Sums of squares of weights, and of standardised rows, stay finite within these.

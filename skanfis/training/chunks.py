@@ -28,8 +28,6 @@ from .chunk_checks import check_distance
 from .freezing import in_user_units
 from .pruning import RuleStatistics, redundant_rules
 
-__all__ = ["RowSums", "Solved", "fitted_weights", "joined_scales", "solve"]
-
 # The weights of the penalty that are found where premises stay.
 _FREE = ("agreement", "alpha", "slope")
 # What adds up over rows, each with its weight.

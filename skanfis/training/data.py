@@ -12,8 +12,6 @@ from ..learning.premise import Premise
 from ..model import TSKModel
 from ..search import Start
 
-__all__ = ["Fitted", "SolverRun", "ValidatedData"]
-
 
 @dataclass(frozen=True, eq=False)
 class ValidatedData:

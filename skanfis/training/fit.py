@@ -40,8 +40,6 @@ from .robust import (
 )
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
 
-__all__ = ["fit_rules"]
-
 # Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
 # what is left to do is done on all rows.
 _THOROUGH = 0.1

@@ -34,8 +34,6 @@ from ..search import (
 from .data import Fitted, ValidatedData
 from .pruning import redundant_rules, rule_statistics
 
-__all__ = ["ModelBuilder", "as_given", "extrapolation_distance", "in_user_units"]
-
 _DISTANCES = (MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST)
 # Less of the squared error is more than chance: with a half in place of a quarter, one fit in
 # twenty is 4 % worse on rows beyond the range, with a quarter none.

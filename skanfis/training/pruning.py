@@ -19,13 +19,6 @@ from ..learning.firing import RuleFiring
 from ..model import TSKModel
 from ..support import RuleSupport
 
-__all__ = [
-    "RuleStatistics",
-    "model_without_rules",
-    "redundant_rules",
-    "rule_statistics",
-]
-
 # A strength that is nowhere above this: what the rule says moves no prediction by more than a
 # hundredth of its difference from the others.
 _NEVER = 0.01

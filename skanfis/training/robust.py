@@ -29,8 +29,6 @@ from sklearn.linear_model import HuberRegressor
 from ..blocks import BLOCK_ROWS
 from ..learning.data import column_statistics
 
-__all__ = ["huber_weights", "reweighted", "robust_start", "without_outliers"]
-
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
 # Rows that the linear model sees: the median of so many residuals is good to a hundredth.

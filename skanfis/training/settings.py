@@ -8,8 +8,6 @@ from ..membership import membership_families
 from ..model import TSKModel
 from ..search import StructureRequest, check_inputs
 
-__all__ = ["given_weights", "solver_of", "structure_request"]
-
 
 def solver_of(estimator) -> Solver:
     """The solver, by its word or as it is given."""

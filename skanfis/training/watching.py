@@ -11,8 +11,6 @@ from ..blocks import BLOCK_ROWS
 from ..learning.data import StandardisedData, fingerprint
 from ..search import held_out_loss
 
-__all__ = ["Callbacks", "Printer", "ValidationLoss", "hold_out", "watch_all"]
-
 
 def watch_all(*watchers):
     """Several watchers as one: every one sees every iteration, any one can end the run."""

@@ -10,18 +10,6 @@ import numpy as np
 from ..._validation import check_choice
 from .._numbers import FLOOR, SMALLEST_LOG_SQUARE, rounded_within
 
-__all__ = [
-    "LONGEST_NAME",
-    "Dialect",
-    "check_arguments",
-    "comment",
-    "index_type",
-    "kept_lines",
-    "literals",
-    "read_limits",
-    "write_files",
-]
-
 _DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
 _STANDARDS = ("c99", "c89")
 # C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.

@@ -11,9 +11,6 @@ from functools import reduce
 
 from ...membership import MEMBERSHIPS
 
-__all__ = ["BODIES", "COSTS", "HELPERS"]
-
-
 # A flank with a foot: a function of s, which is zero at the foot and one at the shoulder, over a
 # floor. @ is its name, and it has a mu and a slope between the two.
 _FLANK = {

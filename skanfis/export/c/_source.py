@@ -15,8 +15,6 @@ from . import _templates as templates
 from ._dialect import index_type, kept_lines
 from ._families import BODIES, COSTS, HELPERS
 
-__all__ = ["CCost", "Source"]
-
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
 _MOST_LOOPS = 12
 # What there is nearly everywhere.

@@ -3,15 +3,6 @@
 The words before a "|" say when a line is there: see ``Source.facts`` in ``_source``.
 """
 
-__all__ = [
-    "ADD_CHANGE",
-    "ADD_RULE",
-    "ADD_SUPPORT",
-    "FINITE_INPUT",
-    "FUNCTIONS",
-    "rejection",
-]
-
 _REJECT_UNTOUCHED = """
 /* No outputs: y stays as it is. */
 #define $NAME_REJECT(y, status) ((status) | $NAME_NO_OUTPUT)

@@ -13,8 +13,6 @@ import numpy as np
 from ...membership import MEMBERSHIPS
 from ..limits import LARGEST_NUMBER, SMALLEST_NUMBER, shown
 
-__all__ = ["function_of", "theta_of"]
-
 # A plateau that is a point, of a family that always has one, as part of the shorter flank.
 _POINT = 1e-12
 

@@ -18,8 +18,6 @@ from ...model import TSKModel
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
 
-__all__ = ["distinct", "parse_fis", "read_fis"]
-
 # What is larger is refused before it is read.
 _MOST_BYTES = 2**22
 
