@@ -180,25 +180,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         tell(f"warning: {sentence}")
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
-    predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    folds, choices = [], []
-    for number, (train, test) in enumerate(split.folds, 1):
-        tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
-        rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
-        folds.append((rows, test))
-        with warnings.catch_warnings():
-            # The final fit warns of the same.
-            warnings.simplefilter("ignore")
-            model, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-            predicted[test] = model.predict(X.iloc[test])
-            inside[test] = ask(model, "in_bounds", X.iloc[test])
-        choices.append(choice)
-    if not (inside & np.isfinite(predicted)).any():
-        raise LogError(
-            f"the compensator could not be checked: every row lies outside the range of the rows "
-            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
-            "overlap in temperature, rate and time."
-        )
+    predicted, inside, folds, choices = _held_out(X, target, groups, split, recipe, tell, rng)
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows))
@@ -243,6 +225,30 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
     )
+
+
+def _held_out(X, target, groups, split, recipe, tell, rng):
+    """Predictions of every row by a model new to it, which are in range, folds, and choices."""
+    predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
+    folds, choices = [], []
+    for number, (train, test) in enumerate(split.folds, 1):
+        tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
+        rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
+        folds.append((rows, test))
+        with warnings.catch_warnings():
+            # The final fit warns of the same.
+            warnings.simplefilter("ignore")
+            model, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
+            predicted[test] = model.predict(X.iloc[test])
+            inside[test] = ask(model, "in_bounds", X.iloc[test])
+        choices.append(choice)
+    if not (inside & np.isfinite(predicted)).any():
+        raise LogError(
+            f"the compensator could not be checked: every row lies outside the range of the rows "
+            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
+            "overlap in temperature, rate and time."
+        )
+    return predicted, inside, folds, choices
 
 
 def judge(errors, groups):

@@ -118,11 +118,8 @@ class RowSums:
             for j, x in enumerate(raw[own]):
                 distance = np.sqrt(strengths) * np.abs(x - centers[:, j, None])
                 extent[:, j] = np.maximum(extent[:, j], distance.max(axis=1))
-            numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-            marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
-            distinct = _distinct(np.vstack([distinct, marks[:, None]]), _ROWS_EACH * len(slope))
-            distinct_inputs = _distinct(
-                np.vstack([distinct_inputs, np.column_stack([best, numbers])]), 1 + n_inputs
+            distinct, distinct_inputs = _with_prints(
+                base, raw, rows.y[part].T, best, distinct, distinct_inputs, len(slope)
             )
             rule, row = np.nonzero(strengths >= FIRES * top)
             every = basis(Z)
@@ -230,6 +227,16 @@ class RowSums:
         return RuleSupport(share, center, factor, radius * known).change_units(
             scale.offset, scale.scale
         )
+
+
+def _with_prints(base, raw, y, best, distinct, distinct_inputs, n_columns):
+    """Fingerprints of distinct rows, and of distinct inputs by rule, with those of a block."""
+    numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
+    marks = fingerprint(np.vstack([numbers, y]))
+    return (
+        _distinct(np.vstack([distinct, marks[:, None]]), _ROWS_EACH * n_columns),
+        _distinct(np.vstack([distinct_inputs, np.column_stack([best, numbers])]), 1 + len(raw)),
+    )
 
 
 def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) -> Scale:
