@@ -79,7 +79,7 @@ class StructureSearch:
         trials, best = self.trials, self.choose(partition)
         tuned, n_sample = trials.tuned(best), trials.n_sample
         premise = Premise.of(tuned.problem.antecedent, *trials.sample.inputs.box)
-        tuned = with_rules_that_hold(tuned, premise, trials.free, n_sample)
+        tuned = with_rules_that_hold(tuned, premise, trials.free, n_sample, trials.n_all)
         return Start(
             tuned.problem.antecedent,
             scaled(tuned.penalty, trials.free, n_sample / trials.n_all, tuned.agreement_is_raised),

@@ -86,7 +86,7 @@ def tuned_start(
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, premise, is_free = freed, unbounded, True
     if premises_move and not is_free:
-        best = with_rules_that_hold(best, premise, free, n_sample)
+        best = with_rules_that_hold(best, premise, free, n_sample, effective_weight(rows))
     return Start(
         antecedent,
         scaled(best.penalty, free, n_sample / effective_weight(rows), best.agreement_is_raised),

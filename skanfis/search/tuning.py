@@ -52,7 +52,7 @@ _RISE = 0.5
 _NO_WEIGHT, _UNBOUNDED_ITERATIONS = 1e-12, 25
 # How far the strongest rule alone may be off, in deviations of the target, and what factor of the
 # expected squared error that is worth: what can be had for nothing, and what must be had.
-_HOLDS_WELL, _NEXT_TO_NOTHING = 0.3, 1.02
+_HOLDS_WELL, _NEXT_TO_NOTHING = 0.3, 0.02
 _HOLDS, _WORTH = 0.9 * GREATEST_ALONE, 1.2
 # Agreement rises by a power of how far the rule is off, within these factors; beyond the last
 # weight, all rules are one line.
@@ -251,19 +251,23 @@ def _improved(
     return posterior
 
 
-def with_rules_that_hold(tuned: Tuned, premise: Premise, free, n_rows: float) -> Tuned:
+def with_rules_that_hold(
+    tuned: Tuned, premise: Premise, free, n_rows: float, n_all: float
+) -> Tuned:
     """The same with more agreement, while the strongest rule does not hold alone.
 
     A rule that is off by more than a person may take for the model is worth a fifth of the expected
-    squared error; one that is off by less is made to hold for next to nothing.
+    squared error; one that is off by less is made to hold for next to nothing: at most half of what
+    it costs anyway to find the parameters on the ``n_all`` rows of the fit, k / n of the noise.
     """
     if "agreement" not in free or not tuned.displacement.size:
         return tuned
     others = [key for key in free if key != "agreement"]
+    little = 1.0 + min(0.5 * tuned.posterior.n_effective / n_all, _NEXT_TO_NOTHING)
     best = tuned
     while best.penalty.agreement < _MOST_AGREEMENT:
         alone = best.problem.strongest_alone(best.evaluation)
-        limit, worth = (_HOLDS, _WORTH) if alone > _HOLDS else (_HOLDS_WELL, _NEXT_TO_NOTHING)
+        limit, worth = (_HOLDS, _WORTH) if alone > _HOLDS else (_HOLDS_WELL, little)
         if alone <= limit:
             break
         raised = min(max((alone / limit) ** _POWER, _LEAST_RAISE), _LARGEST_RAISE)

@@ -61,7 +61,7 @@ def test_agreement_rises_until_rules_hold_or_the_price_is_too_high(
     limit *= apart.problem.strongest_alone(apart.evaluation)
     monkeypatch.setattr(tuning, "_HOLDS", limit)
     monkeypatch.setattr(tuning, "_HOLDS_WELL", np.inf)
-    found = tuning.with_rules_that_hold(apart, two_rules[1], FREE, 100.0)
+    found = tuning.with_rules_that_hold(apart, two_rules[1], FREE, 100.0, 100.0)
     assert found.agreement_is_raised is agreement_is_raised
     if not agreement_is_raised:
         assert found.problem.strongest_alone(found.evaluation) > limit
@@ -71,4 +71,4 @@ def test_agreement_rises_until_rules_hold_or_the_price_is_too_high(
     # The other weights are those that the evidence found.
     assert found.penalty == replace(apart.penalty, agreement=found.penalty.agreement)
     # What is given is not changed.
-    assert tuning.with_rules_that_hold(apart, two_rules[1], FREE[1:], 100.0) is apart
+    assert tuning.with_rules_that_hold(apart, two_rules[1], FREE[1:], 100.0, 100.0) is apart
