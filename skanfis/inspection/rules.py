@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_choice, check_count
 from ..exceptions import ReadabilityWarning
-from ..export import fold, fold_with_rows, last_step
+from ..export import fold, fold_with_rows
+from ..export.folding import last_step
 from ..model import TSKModel
 
 

@@ -1,7 +1,5 @@
 """The status word of generated C, and of Python that flags rows as it does."""
 
-__all__ = ["STATUS", "status_lines"]
-
 STATUS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
 
 _MEANING = {
