@@ -24,7 +24,6 @@ from .terms import (
     ROUNDINGS,
     Shares,
     enclosed,
-    factors,
     largest_mean,
     product,
     size,
@@ -62,14 +61,14 @@ class Enclosure:
 
     def __init__(self, model: TSKModel, output: int, sign: float):
         self.model, self.output, self.sign = model, output, sign
-        self.factors = factors(model.antecedent)
+        self.factors = model.antecedent.factor_terms()
         self.counts = model.antecedent.share_counts if self.factors else (1,)
         self.axes = tuple(range(len(self.counts)))
         coefficients = sign * model.coefficients[:, :, output]
         self.height = coefficients[:, :1]
         self.slopes = np.zeros((model.n_rules, model.n_inputs))
         self.slopes[:, : coefficients.shape[1] - 1] = coefficients[:, 1:]
-        self.place = {j: place for place, one in enumerate(self.factors) for j in one.terms}
+        self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach = reach_of(model)
         answers = model.out_of_bounds in ("clip", "linear")
         answering = model if answers else model.with_out_of_bounds("clip")

@@ -213,22 +213,14 @@ def _bell_curve(theta, lo, hi):
     return np.minimum.reduce(corners), np.maximum.reduce(corners)
 
 
-@dataclass(frozen=True, eq=False)
-class Factor:
-    """Shares that sum to one: by input, positions of the terms (n_shares, n) whose log mu add up.
+def _along(factor, by_term):
+    """Along each input, sums over each share's terms, (n_shares, n_boxes)."""
+    return {j: by_term[places].sum(axis=1) for j, places in factor.items()}
 
-    The number of all terms stands for none.
-    """
 
-    terms: dict[int, np.ndarray]
-
-    def total(self, by_term):
-        """Sums over each share's terms, (n_shares, n_boxes); ``by_term`` ends in a row of zeros."""
-        return sum(by_term[places].sum(axis=1) for places in self.terms.values())
-
-    def along(self, by_term):
-        """The same along each input: dict of (n_shares, n_boxes)."""
-        return {j: by_term[places].sum(axis=1) for j, places in self.terms.items()}
+def _total(factor, by_term):
+    """The same over all inputs."""
+    return sum(_along(factor, by_term).values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,11 +235,6 @@ class Shares:
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
 
 
-def factors(antecedent: Antecedent):
-    """The factors of a rule base, in the order of its rules."""
-    return [Factor(terms) for terms in antecedent.factor_terms()]
-
-
 def term_ranges(antecedent: Antecedent, low, high):
     """Ranges of all terms over boxes (n_inputs, n_boxes), with a row of zeros at the end."""
     parts = [ranges(group, low, high) for group in antecedent.groups]
@@ -255,20 +242,23 @@ def term_ranges(antecedent: Antecedent, low, high):
     return TermRanges(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def enclosed(factor: Factor, terms: TermRanges, log_mu):
-    """The :class:`Shares` of a factor, from the ranges of its terms; ``log_mu`` at the middles."""
-    middle = factor.total(log_mu)
+def enclosed(factor: dict, terms: TermRanges, log_mu):
+    """The :class:`Shares` of a factor, from the ranges of its terms; ``log_mu`` at the middles.
+
+    A factor has, by input, the terms (n_shares, n) whose log mu add up; the last place is none.
+    """
+    middle = _total(factor, log_mu)
     middle = np.exp(middle - middle.max(axis=0))
     middle /= middle.sum(axis=0)
-    least, most = _by_range(factor.total(terms.low), factor.total(terms.high))
-    error = factor.total(terms.error)
+    least, most = _by_range(_total(factor, terms.low), _total(factor, terms.high))
+    error = _total(factor, terms.error)
     # The mean error of all counts for each: the sum of the softmax.
     common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
     error = error + common + EPS * (ROUNDINGS + least.shape[0])
-    curve_low, curve_high = factor.along(terms.curve_low), factor.along(terms.curve_high)
+    curve_low, curve_high = _along(factor, terms.curve_low), _along(factor, terms.curve_high)
     curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
     shares = Shares(middle, least, most, error, {}, curvature)
-    slopes = factor.along(terms.slope_low), factor.along(terms.slope_high)
+    slopes = _along(factor, terms.slope_low), _along(factor, terms.slope_high)
     return replace(shares, departure=_departures(shares, *slopes))
 
 
