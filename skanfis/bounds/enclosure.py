@@ -159,7 +159,8 @@ class Enclosure:
         terms = term_ranges(model.antecedent, near, far)
         log_mu = model.antecedent.log_memberships(middle)
         log_mu = np.concatenate([log_mu, np.zeros((1, low.shape[1]))])
-        shares = [enclosed(factor, terms, log_mu) for factor in self.factors]
+        given = terms, term_ranges(model.antecedent, middle, middle), log_mu, half
+        shares = [enclosed(factor, *given) for factor in self.factors]
         centre = self.height + self.slopes @ (middle - model.reference[:, None])
         radius = np.abs(self.slopes) @ half
         value = self._shaped(centre - radius), self._shaped(centre + radius)

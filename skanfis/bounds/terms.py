@@ -242,8 +242,8 @@ def term_ranges(antecedent: Antecedent, low, high):
     return TermRanges(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def enclosed(factor: dict, terms: TermRanges, log_mu):
-    """The :class:`Shares` of a factor, from the ranges of its terms; ``log_mu`` at the middles.
+def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, log_mu, half):
+    """The :class:`Shares` of a factor, from the ranges of its terms over boxes and at the middles.
 
     A factor has, by input, the terms (n_shares, n) whose log mu add up; the last place is none.
     """
@@ -259,7 +259,16 @@ def enclosed(factor: dict, terms: TermRanges, log_mu):
     curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
     shares = Shares(middle, least, most, error, {}, curvature)
     slopes = _along(factor, terms.slope_low), _along(factor, terms.slope_high)
-    return replace(shares, departure=_departures(shares, *slopes))
+    departure = _departures(shares, *slopes)
+    slopes = _along(factor, at_middle.slope_low), _along(factor, at_middle.slope_high)
+    away = np.exp(4.0 * error)
+    there = _departures(replace(shares, low=middle / away, high=middle * away), *slopes)
+    for _ in range(2):
+        departure = _by_mean_value(departure, there, shares, half)
+        away = np.exp(sum(size(ends) * half[j] for j, ends in departure.items()) + 4.0 * error)
+        least, most = np.fmax(least, middle / away), np.fmin(most, middle * away)
+        shares = replace(shares, low=least, high=most, departure=departure)
+    return shares
 
 
 def _by_range(low, high):
@@ -287,6 +296,25 @@ def _departures(shares, slopes_low, slopes_high):
         total = (shares.high * size((low, high))).sum(axis=0)
         common = common + EPS * (ROUNDINGS + low.shape[0]) * total
         found[j] = low - mean_high - slack - common, high - mean_low + slack + common
+    return found
+
+
+def _by_mean_value(departure, at_middle, shares, half):
+    """Ranges of D, narrower by d D_j / dx_i = [i = j] (c_j - E c_j) - E D_i D_j."""
+    found = {}
+    for j, ends in departure.items():
+        change = 0.0
+        for i, others in departure.items():
+            both = square(ends) if i == j else product(ends, others)
+            curve = shares.curvature[j] if i == j else (0.0, 0.0)
+            least = smallest_mean(both[0] + curve[0], [shares])
+            most = largest_mean(both[1] + curve[1], [shares])
+            slack = EPS * (ROUNDINGS + len(ends[0])) * (size(both) + size(curve)).max(axis=0)
+            rate = size((curve[0] - most, curve[1] - least)) + 2.0 * slack
+            change = change + half[i] * rate
+        low, high = widened(at_middle[j][0] - change, at_middle[j][1] + change)
+        # Where the curvature is not known neither is a change: NaN.
+        found[j] = np.fmax(ends[0], low), np.fmin(ends[1], high)
     return found
 
 
