@@ -1,18 +1,11 @@
-r"""What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
+"""What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
 
-With E the mean over rules by their strengths, b_rj and a_rj the slopes of consequent f_r and of
-rule r's log-strength, c_rj its curvature, D_rj = a_rj - E a_j and phi whatever all rules share,
-
-    g = E f ,    d g / dx_j = E [ b_j + D_j (f - phi) ] ,
-    d^2 g / dx_i dx_j = E [ D_i b_j + D_j b_i + (D_i D_j + [i = j] c_j) (f - g) ] .
-
-Out of range, with c the nearest point in it and h the way followed beyond, the prediction is
-P = g(c) + sum_j h_j dg/dx_j(c). On a box c and h are intervals. P lies below its mean above, and
-below P(p) + sum_j max (dP/dx_j) (x_j - p_j). What rounding may add is added to each bound.
+E is the mean over rules by their strengths, b and f are slopes and values of the consequents, D the
+departures of the slopes of log-strengths from their mean, c their curvature, phi whatever all rules
+share; h is the way that is followed out of range. What rounding may add is added to each bound.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import prod
 
 import numpy as np
@@ -104,12 +97,8 @@ class Enclosure:
             gain = (up - down) * (high - low)
         return self.hold(bound), points, self.hold(attained), gain
 
-    def slope_by(self, j):
-        """What bounds dP/dx_j on boxes, with returns as of :meth:`values`."""
-        return partial(self.slope, j=j)
-
     def slope(self, low, high, j):
-        """Bounds of dP/dx_j; what is attained is so at a point, in the limit where it jumps."""
+        """As :meth:`values` of dP/dx_j; what is attained is so in the limit where it jumps."""
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
             natural = self._slopes(parts, low, high, [j])[1][0]

@@ -260,15 +260,11 @@ def _encoded(label, encoder, columns):
 
 def _chosen(chosen, transformer):
     """Positions of the columns that a ColumnTransformer's entry takes."""
-    places = pd.Series(range(transformer.n_features_in_))
-    if isinstance(chosen, UserList):
-        # The columns of a remainder, before scikit-learn 1.7: to look at one issues a warning.
-        chosen = chosen.data
-    ends = [chosen.start, chosen.stop] if isinstance(chosen, slice) else np.atleast_1d(chosen)
-    if not any(isinstance(one, str) for one in ends):
-        return places.iloc[chosen if isinstance(chosen, slice) else list(ends)]
-    places.index = transformer.feature_names_in_
-    return places.loc[chosen if isinstance(chosen, slice) else list(ends)]
+    columns = getattr(transformer, "feature_names_in_", range(transformer.n_features_in_))
+    places = pd.DataFrame([range(len(columns))], columns=columns)
+    # A list of a class of its own: a remainder, before scikit-learn 1.7.
+    chosen = chosen.data if isinstance(chosen, UserList) else chosen
+    return np.ravel(safe_indexing(places, chosen, axis=1))
 
 
 def _offsets_and_scales(label, scaler):

@@ -115,9 +115,9 @@ def writable(model):
 
 def rename(model, feature_names, output_names):
     """The model with other names of inputs and outputs, where given."""
-    given = {"feature_names": feature_names, "output_names": output_names}
-    for kind, (parameter, names) in zip(
-        ("input_names", "output_names"), given.items(), strict=True
+    for kind, parameter, names in (
+        ("input_names", "feature_names", feature_names),
+        ("output_names", "output_names", output_names),
     ):
         if names is not None:
             count = len(getattr(model, kind))
