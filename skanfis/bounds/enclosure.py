@@ -177,7 +177,10 @@ class Enclosure:
             moved += 2.0 * strength * error * size(self._centred(parts, place))
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
-            slopes[j] += part * (strength * size(ends)).sum(axis=self.axes) * largest
+            # Of a rule that speaks alone D is zero, and yet its own slope has been rounded.
+            steepness = self._placed(parts.shares[self.place[j]].steepness[j], self.place[j])
+            steepness = np.maximum(steepness, size(ends))
+            slopes[j] += part * (strength * steepness).sum(axis=self.axes) * largest
             slopes[j] += 2.0 * (size(ends) * moved).sum(axis=self.axes)
         ahead = size(parts.way)
         beyond = np.where(ahead > 0.0, ahead * slopes, 0.0).sum(axis=0)

@@ -231,6 +231,7 @@ class Shares:
     low: np.ndarray
     high: np.ndarray
     error: np.ndarray  # of the logarithm of a share as it is computed, at most
+    steepness: dict[int, np.ndarray]  # size of d l / dx_j
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
 
@@ -257,8 +258,9 @@ def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, log_mu, hal
     error = error + common + EPS * (ROUNDINGS + least.shape[0])
     curve_low, curve_high = _along(factor, terms.curve_low), _along(factor, terms.curve_high)
     curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
-    shares = Shares(middle, least, most, error, {}, curvature)
     slopes = _along(factor, terms.slope_low), _along(factor, terms.slope_high)
+    steepness = {j: size((low, slopes[1][j])) for j, low in slopes[0].items()}
+    shares = Shares(middle, least, most, error, steepness, {}, curvature)
     departure = _departures(shares, *slopes)
     slopes = _along(factor, at_middle.slope_low), _along(factor, at_middle.slope_high)
     away = np.exp(4.0 * error)
