@@ -20,8 +20,6 @@ from skanfis.export import (
     export_c,
     fold,
     fold_with_rows,
-    found_by_search,
-    last_step,
     read_json,
     write_json,
 )
@@ -73,7 +71,7 @@ wrong: str = model.predict(X)  # type: ignore[assignment]
 search = GridSearchCV(make_pipeline(StandardScaler(), ANFISRegressor()), {}).fit(X, y)
 folded = fold(search)
 outputs: np.ndarray = folded.predict(X)
-n_rules: int = fold_with_rows(found_by_search(search), X)[0].n_rules + last_step(search).n_rules_
+n_rules: int = fold_with_rows(search, X)[0].n_rules
 tables: pd.DataFrame = rules_table(model)
 told: pd.DataFrame = explain(model, X[:1])
 code: CCode = export_c(model, name="sinc", dtype="float", std="c89", saturate=bounds(model))

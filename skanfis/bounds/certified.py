@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -179,7 +180,7 @@ def gradient_bounds(
     low, high = held_box(box, model, _BEYOND)
 
     def sides_of(k, X):
-        slopes = [Enclosure(model, k, sign).slope_by(j) for sign in (-1.0, 1.0)]
+        slopes = [partial(Enclosure(model, k, sign).slope, j=j) for sign in (-1.0, 1.0)]
         sides = [(slope, slope(X.T, X.T)[2]) for slope in slopes]
         return max(float(np.abs(values).max()) for _, values in sides), sides
 
@@ -224,7 +225,7 @@ def monotonicity(
     signs = np.zeros(model.n_outputs, dtype=int)
     for k in range(model.n_outputs):
         for sign in (1, -1):
-            slope = Enclosure(model, k, -float(sign)).slope_by(j)
+            slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
             found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
             if found.bound <= 0.0:
                 signs[k] = sign

@@ -1,18 +1,11 @@
-r"""What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
+"""What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
 
-With E the mean over rules by their strengths, b_rj and a_rj the slopes of consequent f_r and of
-rule r's log-strength, c_rj its curvature, D_rj = a_rj - E a_j and phi whatever all rules share,
-
-    g = E f ,    d g / dx_j = E [ b_j + D_j (f - phi) ] ,
-    d^2 g / dx_i dx_j = E [ D_i b_j + D_j b_i + (D_i D_j + [i = j] c_j) (f - g) ] .
-
-Out of range, with c the nearest point in it and h the way followed beyond, the prediction is
-P = g(c) + sum_j h_j dg/dx_j(c). On a box c and h are intervals. P lies below its mean above, and
-below P(p) + sum_j max (dP/dx_j) (x_j - p_j). What rounding may add is added to each bound.
+E is the mean over rules by their strengths, b and f are slopes and values of the consequents, D the
+departures of the slopes of log-strengths from their mean, c their curvature, phi whatever all rules
+share; h is the way that is followed out of range. What rounding may add is added to each bound.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import prod
 
 import numpy as np
@@ -24,7 +17,6 @@ from .terms import (
     ROUNDINGS,
     Shares,
     enclosed,
-    factors,
     largest_mean,
     product,
     size,
@@ -62,14 +54,14 @@ class Enclosure:
 
     def __init__(self, model: TSKModel, output: int, sign: float):
         self.model, self.output, self.sign = model, output, sign
-        self.factors = factors(model.antecedent)
+        self.factors = model.antecedent.factor_terms()
         self.counts = model.antecedent.share_counts if self.factors else (1,)
         self.axes = tuple(range(len(self.counts)))
         coefficients = sign * model.coefficients[:, :, output]
         self.height = coefficients[:, :1]
         self.slopes = np.zeros((model.n_rules, model.n_inputs))
         self.slopes[:, : coefficients.shape[1] - 1] = coefficients[:, 1:]
-        self.place = {j: place for place, one in enumerate(self.factors) for j in one.terms}
+        self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach = reach_of(model)
         answers = model.out_of_bounds in ("clip", "linear")
         answering = model if answers else model.with_out_of_bounds("clip")
@@ -105,12 +97,8 @@ class Enclosure:
             gain = (up - down) * (high - low)
         return self.hold(bound), points, self.hold(attained), gain
 
-    def slope_by(self, j):
-        """What bounds dP/dx_j on boxes, with returns as of :meth:`values`."""
-        return partial(self.slope, j=j)
-
     def slope(self, low, high, j):
-        """Bounds of dP/dx_j; what is attained is so at a point, in the limit where it jumps."""
+        """As :meth:`values` of dP/dx_j; what is attained is so in the limit where it jumps."""
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
             natural = self._slopes(parts, low, high, [j])[1][0]
@@ -160,7 +148,8 @@ class Enclosure:
         terms = term_ranges(model.antecedent, near, far)
         log_mu = model.antecedent.log_memberships(middle)
         log_mu = np.concatenate([log_mu, np.zeros((1, low.shape[1]))])
-        shares = [enclosed(factor, terms, log_mu) for factor in self.factors]
+        given = terms, term_ranges(model.antecedent, middle, middle), log_mu, half
+        shares = [enclosed(factor, *given) for factor in self.factors]
         centre = self.height + self.slopes @ (middle - model.reference[:, None])
         radius = np.abs(self.slopes) @ half
         value = self._shaped(centre - radius), self._shaped(centre + radius)
@@ -188,7 +177,10 @@ class Enclosure:
             moved += 2.0 * strength * error * size(self._centred(parts, place))
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
-            slopes[j] += part * (strength * size(ends)).sum(axis=self.axes) * largest
+            # Of a rule that speaks alone D is zero, and yet its own slope has been rounded.
+            steepness = self._placed(parts.shares[self.place[j]].steepness[j], self.place[j])
+            steepness = np.maximum(steepness, size(ends))
+            slopes[j] += part * (strength * steepness).sum(axis=self.axes) * largest
             slopes[j] += 2.0 * (size(ends) * moved).sum(axis=self.axes)
         ahead = size(parts.way)
         beyond = np.where(ahead > 0.0, ahead * slopes, 0.0).sum(axis=0)

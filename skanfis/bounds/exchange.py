@@ -6,6 +6,7 @@ Premises stay. The promise is of the range of the training data; docs/bounds.rst
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtri
@@ -201,7 +202,9 @@ class _Exchange:
                 worst.append(self.sample[:0])
                 continue
             enclosure = Enclosure(model, one.output, -one.sign)
-            bound_of = enclosure.values if one.input is None else enclosure.slope_by(one.input)
+            bound_of = enclosure.values
+            if one.input is not None:
+                bound_of = partial(enclosure.slope, j=one.input)
             until = -one.sign * one.limit
             seen: list[tuple] = []
 

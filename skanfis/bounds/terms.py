@@ -213,22 +213,14 @@ def _bell_curve(theta, lo, hi):
     return np.minimum.reduce(corners), np.maximum.reduce(corners)
 
 
-@dataclass(frozen=True, eq=False)
-class Factor:
-    """Shares that sum to one: by input, positions of the terms (n_shares, n) whose log mu add up.
+def _along(factor, by_term):
+    """Along each input, sums over each share's terms, (n_shares, n_boxes)."""
+    return {j: by_term[places].sum(axis=1) for j, places in factor.items()}
 
-    The number of all terms stands for none.
-    """
 
-    terms: dict[int, np.ndarray]
-
-    def total(self, by_term):
-        """Sums over each share's terms, (n_shares, n_boxes); ``by_term`` ends in a row of zeros."""
-        return sum(by_term[places].sum(axis=1) for places in self.terms.values())
-
-    def along(self, by_term):
-        """The same along each input: dict of (n_shares, n_boxes)."""
-        return {j: by_term[places].sum(axis=1) for j, places in self.terms.items()}
+def _total(factor, by_term):
+    """The same over all inputs."""
+    return sum(_along(factor, by_term).values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,13 +231,9 @@ class Shares:
     low: np.ndarray
     high: np.ndarray
     error: np.ndarray  # of the logarithm of a share as it is computed, at most
+    steepness: dict[int, np.ndarray]  # size of d l / dx_j
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
-
-
-def factors(antecedent: Antecedent):
-    """The factors of a rule base, in the order of its rules."""
-    return [Factor(terms) for terms in antecedent.factor_terms()]
 
 
 def term_ranges(antecedent: Antecedent, low, high):
@@ -255,21 +243,34 @@ def term_ranges(antecedent: Antecedent, low, high):
     return TermRanges(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def enclosed(factor: Factor, terms: TermRanges, log_mu):
-    """The :class:`Shares` of a factor, from the ranges of its terms; ``log_mu`` at the middles."""
-    middle = factor.total(log_mu)
+def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, log_mu, half):
+    """The :class:`Shares` of a factor, from the ranges of its terms over boxes and at the middles.
+
+    A factor has, by input, the terms (n_shares, n) whose log mu add up; the last place is none.
+    """
+    middle = _total(factor, log_mu)
     middle = np.exp(middle - middle.max(axis=0))
     middle /= middle.sum(axis=0)
-    least, most = _by_range(factor.total(terms.low), factor.total(terms.high))
-    error = factor.total(terms.error)
+    least, most = _by_range(_total(factor, terms.low), _total(factor, terms.high))
+    error = _total(factor, terms.error)
     # The mean error of all counts for each: the sum of the softmax.
     common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
     error = error + common + EPS * (ROUNDINGS + least.shape[0])
-    curve_low, curve_high = factor.along(terms.curve_low), factor.along(terms.curve_high)
+    curve_low, curve_high = _along(factor, terms.curve_low), _along(factor, terms.curve_high)
     curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
-    shares = Shares(middle, least, most, error, {}, curvature)
-    slopes = factor.along(terms.slope_low), factor.along(terms.slope_high)
-    return replace(shares, departure=_departures(shares, *slopes))
+    slopes = _along(factor, terms.slope_low), _along(factor, terms.slope_high)
+    steepness = {j: size((low, slopes[1][j])) for j, low in slopes[0].items()}
+    shares = Shares(middle, least, most, error, steepness, {}, curvature)
+    departure = _departures(shares, *slopes)
+    slopes = _along(factor, at_middle.slope_low), _along(factor, at_middle.slope_high)
+    away = np.exp(4.0 * error)
+    there = _departures(replace(shares, low=middle / away, high=middle * away), *slopes)
+    for _ in range(2):
+        departure = _by_mean_value(departure, there, shares, half)
+        away = np.exp(sum(size(ends) * half[j] for j, ends in departure.items()) + 4.0 * error)
+        least, most = np.fmax(least, middle / away), np.fmin(most, middle * away)
+        shares = replace(shares, low=least, high=most, departure=departure)
+    return shares
 
 
 def _by_range(low, high):
@@ -297,6 +298,25 @@ def _departures(shares, slopes_low, slopes_high):
         total = (shares.high * size((low, high))).sum(axis=0)
         common = common + EPS * (ROUNDINGS + low.shape[0]) * total
         found[j] = low - mean_high - slack - common, high - mean_low + slack + common
+    return found
+
+
+def _by_mean_value(departure, at_middle, shares, half):
+    """Ranges of D, narrower by d D_j / dx_i = [i = j] (c_j - E c_j) - E D_i D_j."""
+    found = {}
+    for j, ends in departure.items():
+        change = 0.0
+        for i, others in departure.items():
+            both = square(ends) if i == j else product(ends, others)
+            curve = shares.curvature[j] if i == j else (0.0, 0.0)
+            least = smallest_mean(both[0] + curve[0], [shares])
+            most = largest_mean(both[1] + curve[1], [shares])
+            slack = EPS * (ROUNDINGS + len(ends[0])) * (size(both) + size(curve)).max(axis=0)
+            rate = size((curve[0] - most, curve[1] - least)) + 2.0 * slack
+            change = change + half[i] * rate
+        low, high = widened(at_middle[j][0] - change, at_middle[j][1] + change)
+        # Where the curvature is not known neither is a change: NaN.
+        found[j] = np.fmax(ends[0], low), np.fmin(ends[1], high)
     return found
 
 

@@ -1,12 +1,7 @@
 r"""Fuzzy c-means by alternating optimisation.
 
-With squared distances D_ik, memberships u_ik of row sum one and weights w_i, the objective (Bezdek
-1981) is J = Σ_i w_i Σ_k u_ik^m D_ik. At fixed centres u_ik ~ D_ik^(-1/(m-1)) is best, at fixed
-memberships c_k = Σ_i w_i u_ik^m x_i / Σ_i w_i u_ik^m. Distances are taken relative to the nearest
-centre's, for as m → 1 their powers would overflow.
-
-All centres at the mean of the data are a fixed point, which attracts if m > 1 / (1 - 2 λ), λ the
-largest eigenvalue of Σ_i w_i z_i z_iᵀ / |z_i|² / Σ_i w_i with z = x - mean (Yu et al. 2004).
+Memberships at fixed centres and centres at fixed memberships are each the best (Bezdek 1981).
+Distances are taken relative to the nearest centre's, for as m → 1 their powers would overflow.
 """
 
 import warnings
@@ -70,7 +65,10 @@ def descend(points, weight, centers, m, tol, max_iter):
 
 
 def largest_exponent(points, weight):
-    """1 / (1 - 2 λ): above this m all centres coincide; inf if they need not for any."""
+    """Above this m all centres coincide at the mean, which then attracts; inf of no such m.
+
+    1 / (1 - 2 λ), λ the largest eigenvalue of Σ_i w_i x_i x_iᵀ / |x_i|² / Σ_i w_i (Yu et al. 2004).
+    """
     squares = np.einsum("ij,ij->i", points, points)
     share = np.divide(weight, squares, out=np.zeros_like(weight), where=squares > 0)
     largest = np.linalg.eigvalsh((share * points.T) @ points / weight.sum())[-1]

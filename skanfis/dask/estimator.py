@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -44,10 +44,6 @@ class DaskANFISRegressor(ANFISRegressor):
     >>> model.predict(X)
     dask.array<..., shape=(121,), dtype=float64, chunksize=(50,), chunktype=numpy.ndarray>
     """
-
-    def fit(self, X: Any, y: Any, sample_weight: Any = None, groups: Any = None) -> Self:
-        """Train the model; what is wrong with a partition is said by its number and column."""
-        return super().fit(X, y, sample_weight=sample_weight, groups=groups)
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict the target, lazily where X is a dask collection; warnings go to the workers."""

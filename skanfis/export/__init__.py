@@ -1,8 +1,9 @@
 """Carrying a trained model away: other formats, other languages."""
 
+from ..membership import MEMBERSHIPS
 from .c import CCode, CCost, export_c
 from .fis import export_fis, read_fis, write_fis
-from .folding import fold, fold_with_rows, found_by_search, last_step
+from .folding import fold, fold_with_rows
 from .model_json import export_json, read_json, write_json
 from .onnx import register_onnx_converter
 
@@ -15,8 +16,6 @@ __all__ = [
     "export_json",
     "fold",
     "fold_with_rows",
-    "found_by_search",
-    "last_step",
     "read_fis",
     "read_json",
     "register_onnx_converter",
@@ -28,6 +27,7 @@ __all__ = [
 #: loaded. ``skops.io.load(path, trusted=TRUSTED_TYPES)``; what stands beside them in a pipeline
 #: is scikit-learn's own, which skops knows.
 TRUSTED_TYPES = [
+    *(f"{family.__module__}.{family.__name__}" for family in MEMBERSHIPS.values()),
     "skanfis.antecedent.base.TermGroup",
     "skanfis.antecedent.grid.GridAntecedent",
     "skanfis.antecedent.rule_table.RuleTableAntecedent",
@@ -41,16 +41,6 @@ TRUSTED_TYPES = [
     "skanfis.gyro.features.ThermalRate",
     "skanfis.gyro.physics.OpenLoopArcsineRegressor",
     "skanfis.intervals.conformal.ConformalRegressor",
-    "skanfis.membership.bell.Bell",
-    "skanfis.membership.flanked.PiShaped",
-    "skanfis.membership.flanked.SShaped",
-    "skanfis.membership.flanked.Trapezoidal",
-    "skanfis.membership.flanked.Triangular",
-    "skanfis.membership.flanked.TwoSidedGaussian",
-    "skanfis.membership.flanked.ZShaped",
-    "skanfis.membership.gaussian.Gaussian",
-    "skanfis.membership.sigmoid.SigmoidDifference",
-    "skanfis.membership.sigmoid.SigmoidProduct",
     "skanfis.model.TSKModel",
     "skanfis.options.EarlyStopping",
     "skanfis.options.Huber",

@@ -29,12 +29,11 @@ from sklearn.preprocessing import (
 from sklearn.utils import check_array
 from sklearn.utils.validation import check_is_fitted
 
+from .._sklearn import safe_indexing
 from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
 from ..options import policy_of
-
-__all__ = ["fold", "fold_with_reader", "fold_with_rows", "found_by_search", "last_step"]
 
 
 def fold(estimator: Any) -> TSKModel:
@@ -133,51 +132,14 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
 
 
 def last_step(estimator: Any) -> Any:
-    """Return the ANFIS estimator itself at the end of pipelines, wrappers and searches.
-
-    Parameters
-    ----------
-    estimator : fitted estimator
-        As :func:`fold` takes it, but for the steps in front, which may be any.
-
-    Returns
-    -------
-    last : estimator
-        With a ``model_`` of rules; TypeError where there is none.
-
-    Examples
-    --------
-    >>> from sklearn.pipeline import make_pipeline
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import last_step
-    >>> last_step(make_pipeline(ANFISRegressor(n_mfs=2)).fit(*make_jang_sinc())).model_.n_rules
-    4
-    """
+    """The ANFIS estimator at the end of pipelines, wrappers and searches; TypeError for none."""
     label, last = _steps_of("", estimator)[0][-1]
     _model_of(label, last)
     return last
 
 
 def found_by_search(estimator: Any) -> Any:
-    """Return the estimator that a search has kept, or one that is no search as it is.
-
-    Parameters
-    ----------
-    estimator : estimator
-        A fitted search such as GridSearchCV, a search over searches, or any other.
-
-    Returns
-    -------
-    found : estimator
-
-    Examples
-    --------
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.export import found_by_search
-    >>> found_by_search(ANFISRegressor(n_mfs=2)).n_mfs
-    2
-    """
+    """The estimator that a search, or a search over searches, has kept; any other as it is."""
     while hasattr(estimator, "best_estimator_"):
         estimator = estimator.best_estimator_
     return estimator
@@ -221,11 +183,8 @@ def _as_numbers(X):
 
 def _part_of(X, columns):
     """Columns of a frame, or of anything that is an array, by their positions."""
-    if hasattr(X, "iloc"):
-        return X.iloc[:, columns]
-    if hasattr(X, "get_columns") or isinstance(X, np.ndarray):
-        return X[:, columns]
-    return np.asarray(X, dtype=object)[:, columns]
+    table = X if hasattr(X, "columns") else np.asarray(X, dtype=object)
+    return safe_indexing(table, columns, axis=1)
 
 
 def _is_passthrough(step):
@@ -301,15 +260,11 @@ def _encoded(label, encoder, columns):
 
 def _chosen(chosen, transformer):
     """Positions of the columns that a ColumnTransformer's entry takes."""
-    places = pd.Series(range(transformer.n_features_in_))
-    if isinstance(chosen, UserList):
-        # The columns of a remainder, before scikit-learn 1.7: to look at one issues a warning.
-        chosen = chosen.data
-    ends = [chosen.start, chosen.stop] if isinstance(chosen, slice) else np.atleast_1d(chosen)
-    if not any(isinstance(one, str) for one in ends):
-        return places.iloc[chosen if isinstance(chosen, slice) else list(ends)]
-    places.index = transformer.feature_names_in_
-    return places.loc[chosen if isinstance(chosen, slice) else list(ends)]
+    columns = getattr(transformer, "feature_names_in_", range(transformer.n_features_in_))
+    places = pd.DataFrame([range(len(columns))], columns=columns)
+    # A list of a class of its own: a remainder, before scikit-learn 1.7.
+    chosen = chosen.data if isinstance(chosen, UserList) else chosen
+    return np.ravel(safe_indexing(places, chosen, axis=1))
 
 
 def _offsets_and_scales(label, scaler):

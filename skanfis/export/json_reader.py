@@ -27,8 +27,6 @@ from .limits import (
     shown,
 )
 
-__all__ = ["FORMAT", "INPUT", "KINDS", "OUTPUT", "VERSION", "key_of", "model_of", "parse_json"]
-
 FORMAT = "skanfis-model"
 VERSION = 1
 KINDS: dict[type[Antecedent], str] = {

@@ -7,18 +7,6 @@ import numpy as np
 
 from ..antecedent import TermGroup
 
-__all__ = [
-    "LARGEST_NUMBER",
-    "MOST_NUMBERS",
-    "SMALLEST_NUMBER",
-    "check_size",
-    "groups_of",
-    "number",
-    "numbers",
-    "read_bytes",
-    "shown",
-]
-
 # A rule base holds rules x terms, its consequents rules x (1 + inputs) x outputs: 160 MB.
 MOST_NUMBERS = 20_000_000
 # Squares of numbers up to this size, and of their ratios, are finite.

@@ -16,25 +16,17 @@ from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
 from ..export.c import CCode
-from ..export.c.builder import (
-    FINITE_INPUT,
+from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
+from ..export.c.dialect import (
     LONGEST_NAME,
-    ROWS,
     STATUS,
-    TOLERANCE,
     Dialect,
-    RulesPart,
     check_arguments,
-    cost_lines,
-    header_of,
     index_type,
-    input_lines,
-    policy_line,
-    rejection,
-    self_test,
-    size_of_sum,
     write_files,
 )
+from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
+from ..export.c.templates import FINITE_INPUT, rejection
 from ..policies import SILENT
 from .compose import law_and_rules
 from .physics import past_phase

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from ..export import export_c
-from ..export.c.status import STATUS
+from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, RowChecks, check_at_rest, check_log

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from ..exceptions import OutOfBoundsWarning
-from ..export import export_json, found_by_search
-from ..export.c.status import STATUS
+from ..export import export_json
+from ..export.c.dialect import STATUS
+from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask

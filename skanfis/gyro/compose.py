@@ -16,7 +16,8 @@ from sklearn.utils.validation import (
 )
 
 from .. import ANFISRegressor
-from ..export import fold_with_rows, found_by_search
+from ..export import fold_with_rows
+from ..export.folding import found_by_search
 from ._columns import ask
 from .physics import OpenLoopArcsineRegressor, check_parameters
 

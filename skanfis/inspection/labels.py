@@ -2,8 +2,6 @@
 
 import unicodedata
 
-__all__ = ["as_label", "printable"]
-
 # Some scripts are not written without them.
 _JOINERS = "\u200c\u200d"
 

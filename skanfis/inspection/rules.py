@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_choice, check_count
 from ..exceptions import ReadabilityWarning
-from ..export import fold, fold_with_rows, last_step
+from ..export import fold, fold_with_rows
+from ..export.folding import last_step
 from ..model import TSKModel
 
 
@@ -114,9 +115,9 @@ def writable(model):
 
 def rename(model, feature_names, output_names):
     """The model with other names of inputs and outputs, where given."""
-    given = {"feature_names": feature_names, "output_names": output_names}
-    for kind, (parameter, names) in zip(
-        ("input_names", "output_names"), given.items(), strict=True
+    for kind, parameter, names in (
+        ("input_names", "feature_names", feature_names),
+        ("output_names", "output_names", output_names),
     ):
         if names is not None:
             count = len(getattr(model, kind))

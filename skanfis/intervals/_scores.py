@@ -31,7 +31,7 @@ _LEAST_DEVIATION = 1e-12
 # Of a row that a model has to itself.
 _SMALLEST_FREEDOM = 1e-6
 # What rounding leaves of a sum of masses.
-_ROUNDING = 1e-9
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,21 +222,11 @@ def row_masses(n_rows, sample_weight=None, groups=None):
     return share / (n_units + 1.0), n_units
 
 
-def is_enough(mass, coverage):
-    """Whether a mass is the coverage or more, up to rounding."""
-    return mass >= coverage - _ROUNDING
-
-
-def n_needed(coverage):
-    """The least number of units with K / (K + 1) >= coverage."""
-    return int(np.ceil(coverage / (1.0 - coverage) - _ROUNDING))
-
-
 def score_quantile(scores, masses, coverage):
     """The smallest score at or below which lies the mass ``coverage``; NaN counts as infinite."""
     scores = np.where(np.isnan(scores), np.inf, scores)
     order = np.argsort(scores)
-    place = np.searchsorted(np.cumsum(masses[order]), coverage - _ROUNDING)
+    place = np.searchsorted(np.cumsum(masses[order]), coverage - ROUNDING)
     return scores[order[place]] if place < scores.size else np.inf
 
 
@@ -261,12 +251,12 @@ def one_row_per_group(scores, masses, groups, coverage):
     kept = masses > 0.0
     share = np.where(kept, masses, 0.0) / np.where(kept, np.bincount(place, masses)[place], 1.0)
     present = np.unique(place[kept])
-    needed = int(np.ceil((present.size + 1) * coverage - _ROUNDING))
+    needed = int(np.ceil((present.size + 1) * coverage - ROUNDING))
     values = np.unique(scores[kept])
 
     def is_reached(q):
         below = np.bincount(place, share * (scores <= q), minlength=numbers.size)[present]
-        return _at_least(below, needed) >= 0.5 - _ROUNDING
+        return _at_least(below, needed) >= 0.5 - ROUNDING
 
     first = bisect_left(values, True, key=is_reached)
     return values[first] if first < values.size else np.inf

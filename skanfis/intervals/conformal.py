@@ -277,12 +277,13 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if by_group and confidence != "auto":
             name, level = "confidence", confidence
         total = self.n_units_ / (self.n_units_ + 1.0)
-        if not _scores.is_enough(total, level):
+        if total < level - _scores.ROUNDING:
+            needed = int(np.ceil(level / (1.0 - level) - _scores.ROUNDING))
             what = "rows" if self._groups is None else "groups"
             held_out = " held out" if self.method == "split" else ""
             more = ", or a larger calibration_fraction" if self.method == "split" else ""
             raise ValueError(
-                f"{name}={level:g} needs {_scores.n_needed(level)} {what}{held_out} or more; there "
+                f"{name}={level:g} needs {needed} {what}{held_out} or more; there "
                 f"are {self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
                 f"for less, or give more {what}{more}."
             )

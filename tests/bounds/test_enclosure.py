@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from skanfis import ANFISRegressor
 from skanfis.bounds.enclosure import Enclosure
 
 from ..export.every_model import CASES
@@ -58,3 +59,17 @@ def test_nothing_is_beyond_the_bounds(number):
         slack = 1e-9 * np.abs(mean) + 1e-12 * scale
         assert (least[far] <= mean + slack).all()
         assert (mean - slack <= steepest[far]).all()
+
+
+def test_slopes_hold_where_one_rule_speaks_alone():
+    """They are zero there, but for the rounding of that rule's own slope."""
+    rng = np.random.default_rng(0)
+    X = rng.uniform(size=(200, 2))
+    y = np.sin(6.0 * X[:, 0]) + X[:, 1] ** 2
+    model = ANFISRegressor(n_mfs=3, mf="triangular", order=0, max_iter=5).fit(X, y).model_
+    low = rng.uniform(model.minimum, model.maximum, (400, 2)).T
+    high = np.minimum(low * (1.0 + 1e-13), model.maximum[:, None])
+    for j in range(2):
+        slope = model.gradient(low.T)[:, j, 0]
+        for sign in (-1.0, 1.0):
+            assert (sign * slope <= Enclosure(model, 0, sign).slope(low, high, j)[0]).all()

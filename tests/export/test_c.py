@@ -14,8 +14,8 @@ from sklearn.preprocessing import RobustScaler
 
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
-from skanfis.export.c.builder import size_of_sum
-from skanfis.export.c.status import STATUS
+from skanfis.export.c.dialect import STATUS
+from skanfis.export.c.self_test import size_of_sum
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.model import TSKModel

@@ -9,7 +9,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
 from skanfis.export import fold, register_onnx_converter
-from skanfis.export.c.builder import size_of_sum
+from skanfis.export.c.self_test import size_of_sum
 from skanfis.options import LinearExtrapolation
 
 from ..quick import quick

@@ -19,7 +19,6 @@ from skanfis.intervals import ConformalRegressor
 from skanfis.intervals._scores import (
     group_scores,
     last_step,
-    n_needed,
     one_row_per_group,
     row_masses,
     score_quantile,
@@ -87,7 +86,6 @@ def test_units_count_and_not_the_size_of_weights():
     masses, n_units = row_masses(30, weight, groups)
     assert n_units == 4
     assert_allclose(np.bincount(groups, masses), 0.2)
-    assert [n_needed(c) for c in (0.5, 0.8, 0.9, 0.95, 0.99)] == [1, 4, 9, 19, 99]
     # The ninth of nine scores, and of eight none.
     assert score_quantile(np.arange(9.0), row_masses(9)[0], 0.9) == 8.0
     assert score_quantile(np.arange(8.0), row_masses(8)[0], 0.9) == np.inf

@@ -6,10 +6,10 @@ from typing import Any
 
 from .._numbers import Numbers
 from ..folding import fold
-from ._dialect import Dialect, check_arguments, read_limits, write_files
-from ._self_test import known_answers, self_test
 from ._source import CCost, Source
 from .builder import header
+from .dialect import Dialect, check_arguments, read_limits, write_files
+from .self_test import known_answers, self_test
 
 __all__ = ["CCode", "CCost", "export_c"]
 

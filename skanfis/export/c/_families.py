@@ -1,7 +1,7 @@
 r"""Every family of memberships in C: log mu(x) and its derivative by x.
 
 In the templates x is an input about the reference and p the constants of a term, as in
-``_numbers``; see ``_dialect`` for the other words.
+``_numbers``; see ``dialect`` for the other words.
 
 log(1 + exp(-|u|)) stands where Python has log1p, which C89 lacks: it is as exact where it counts,
 since an absolute error of log mu is a relative one of the strengths.

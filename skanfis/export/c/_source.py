@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...policies import SILENT
-from . import _templates as templates
-from ._dialect import index_type, kept_lines
+from . import templates
 from ._families import BODIES, COSTS, HELPERS
+from .dialect import index_type, kept_lines
 
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
 _MOST_LOOPS = 12

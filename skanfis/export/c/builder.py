@@ -1,6 +1,6 @@
 """The .h file, and rules as a part of a larger .c file: for code that is written around them.
 
-skanfis.gyro writes such code, in the same :class:`Dialect` and under the same status word.
+skanfis.gyro writes such code, in the same ``dialect``, with the same ``self_test``.
 """
 
 import textwrap
@@ -9,42 +9,8 @@ import numpy as np
 
 from ...policies import policy_in_words
 from .._numbers import Numbers
-from ._dialect import (
-    LONGEST_NAME,
-    Dialect,
-    check_arguments,
-    comment,
-    index_type,
-    literals,
-    read_limits,
-    write_files,
-)
-from ._self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ._source import Source
-from ._templates import FINITE_INPUT, rejection
-from .status import STATUS, status_lines
-
-__all__ = [
-    "FINITE_INPUT",
-    "LONGEST_NAME",
-    "ROWS",
-    "STATUS",
-    "TOLERANCE",
-    "Dialect",
-    "RulesPart",
-    "check_arguments",
-    "cost_lines",
-    "header",
-    "header_of",
-    "index_type",
-    "input_lines",
-    "literals",
-    "policy_line",
-    "rejection",
-    "self_test",
-    "size_of_sum",
-    "write_files",
-]
+from .dialect import STATUS, Dialect, comment, read_limits, status_lines
 
 _SILENT = {
     "raise": "there is no output: y stays as it is",

@@ -1,4 +1,4 @@
-"""The dialect of C that a file is written in: its arguments, and what may stand in it."""
+"""The dialect of C that a file is written in: arguments, numbers and status word."""
 
 import re
 from dataclasses import dataclass
@@ -20,6 +20,15 @@ _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
 # A name in a comment stays on its line.
 _LONGEST_COMMENT = 60
+# The status word, also of Python that flags rows as generated C does.
+STATUS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
+
+_MEANING = {
+    "OUT_OF_RANGE": "an input lies outside the range of the training data",
+    "NOT_FINITE": "an input is infinite or not a number",
+    "UNCOVERED": "hardly any training data lie near the inputs",
+    "NO_OUTPUT": "y holds no answer",
+}
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,14 @@ class Dialect:
         shape = "".join(f"[{n}]" for n in values.shape)
         head = self.write(f"static const {kind or self.real} $name_{name}{shape} =\n")
         return f"{head}{literals(values)};\n"
+
+
+def status_lines() -> str:
+    """Macros of a header, one for each bit; ``$NAME`` is the prefix."""
+    return "\n".join(
+        f"#define $NAME_{name} {bit}" + (f" /* {_MEANING[name]} */" if bit else "")
+        for name, bit in STATUS.items()
+    )
 
 
 def kept_lines(template, facts):

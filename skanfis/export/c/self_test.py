@@ -4,8 +4,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...policies import SILENT
-from ._dialect import literals
-from .status import STATUS
+from .dialect import STATUS, literals
 
 # Of a test: in the box, out of it and on its edges, in a table of a few kB.
 ROWS = 32
