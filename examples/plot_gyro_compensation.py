@@ -140,10 +140,9 @@ axes.legend(loc="upper right")
 # The rules
 # ---------
 #
-# To leave so little, the rules above cancel one another: none can be read alone, and whoever asks
-# for them as text is warned. Rules to be read are made to agree more. They leave more of the error,
-# but hold one by one. The three that weigh most; what may be believed of a rule:
-# :doc:`/reading_rules`.
+# How far is the strongest rule alone from what all say together? Fewer rules that have to agree
+# more come nearer, and leave more of the error. Here are the three of these that weigh most. What
+# may be believed of a rule: :doc:`/reading_rules`.
 
 readable = ANFISRegressor(n_mfs=[2, 2, 4], agreement=1e-3).fit(X[~new], error[~new])
 for name, model in {"to compute": anfis, "to read": readable}.items():

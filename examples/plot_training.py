@@ -21,10 +21,10 @@ from skanfis.options import EarlyStopping
 # -------
 #
 # Four terms on each of two inputs, from the same start, and without the penalties that the default
-# finds, so that all three minimise the same. Variable projection gets in a dozen iterations where
-# Jang's hybrid rule, with the best size of its steps, gets in five hundred. Plain gradient descent
-# on premises and consequents together gets almost nowhere: they move along a curved valley,
-# and without eliminating one of them it has to be followed step by step.
+# finds, so that all three minimise the same. Variable projection gets further in a dozen iterations
+# than Jang's hybrid rule in five hundred. Plain gradient descent on premises and consequents
+# together gets almost nowhere: they move along a curved valley, and without eliminating one of them
+# it has to be followed step by step.
 
 X, y = make_jang_sinc()
 solvers = {

@@ -205,7 +205,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             HasMethods(["predict", "strengths"]),
         ],
         "mf": [
-            StrOptions({"auto", *MEMBERSHIPS}),
+            StrOptions(set(MEMBERSHIPS)),
             Hidden(StrOptions(set(NAMES_IN_MATLAB))),  # refused with the name that they have here
             "array-like",
             type,

@@ -300,8 +300,8 @@ def find_glitches(log, error):
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
     by_run = pd.Series(temperature).groupby(runs)
-    around = pd.concat([by_run.shift(step) for step in (-2, -1, 1, 2)], axis=1)
-    around = around.T.fillna(log["temperature"].reset_index(drop=True)).T
+    around = np.column_stack([by_run.shift(step) for step in (-2, -1, 1, 2)])
+    around = np.where(np.isnan(around), temperature[:, None], around)
     found = {
         row: f"the temperature of {temperature[row]:.4g} degC"
         for row in _alone(temperature - np.median(around, axis=1), _SMOOTH * _spread(temperature))

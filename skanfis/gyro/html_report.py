@@ -140,14 +140,16 @@ def _check(results):
         )
     if calibration.is_thinned:
         texts.append(
-            f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, drawn "
-            "at random from every stretch of every run, with those at the ends of the ranges. "
-            "Figures that need every row, of bias stability and Allan's deviation, are left out."
+            f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, evenly "
+            "from each run. Figures that need every row, of bias stability and Allan's deviation, "
+            "are left out."
         )
     if calibration.fold_choices is not None:
         found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
-        several = ", ".join(f"{text} in {count} folds" for text, count in found.most_common())
-        texts.append(f"Each fold's training rows alone chose its structure: {several}.")
+        several = ", ".join(f"{text} ({count})" for text, count in found.most_common())
+        texts.append(
+            f"Each fold's training rows alone chose its structure (number of folds): {several}."
+        )
     blocks = [Block("text", text) for text in texts]
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
@@ -304,7 +306,7 @@ def _log(results):
     calibration, rows = results.calibration, results.log
     counts = {"rows": calibration.n_rows}
     if calibration.is_thinned:
-        counts["rows kept, drawn at random"] = len(rows)
+        counts["rows kept"] = len(rows)
     if calibration.n_fit_rows < len(rows):
         counts["rows fitted to, chosen at random"] = calibration.n_fit_rows
     counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}

@@ -366,8 +366,8 @@ def _squares_of_means(error, time, over):
         raise ValueError("time must increase within each run.")
     if time.size > 1 and np.median(steps) > over * (1.0 + 1e-9):
         raise ValueError(
-            f"No bias stability: rows are {np.median(steps):g} s apart, more than "
-            f"averaging_time={over:g} s."
+            f"No bias stability: rows are {np.median(steps):g} s apart, and means are over "
+            f"{over:g} s."
         )
     # A time on an edge belongs to the interval that starts there, rounding errors or not.
     place = np.floor((time - time[0]) / over + 1e-9).astype(int)
@@ -381,7 +381,7 @@ def _pooled_deviation(squares):
     """Standard deviation within the runs [deg/h] (GJB 2426), of the sums of squares of each."""
     sum_of_squares, degrees_of_freedom = np.sum(squares, axis=0)
     if degrees_of_freedom == 0:
-        raise ValueError("No bias stability: no run is as long as two averaging times.")
+        raise ValueError("No bias stability: no run is as long as two means.")
     return float(PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
 
 

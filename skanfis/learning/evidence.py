@@ -70,8 +70,8 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 _UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
 # Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
-# count leave half of the error, and planes of which all count 5 % more (tests/test_evidence.py);
-# with fewer rows than inputs noise is fitted (tests/structure/test_tuning.py).
+# count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
+# noise is fitted.
 ROWS_EACH = 2.0
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0

@@ -18,7 +18,7 @@ from ..learning.data import StandardisedData
 from .sample import representative_rows, weighted_quantile
 
 # Neighbouring terms cross at this membership at the start. From the customary 0.5, Jang's sinc gets
-# stuck; elsewhere it makes little difference (benchmarks/start.py).
+# stuck; elsewhere it makes little difference.
 OVERLAP = 0.6
 # The outermost terms stand where this part of the rows lies beyond: a stray row is none to name a
 # term after, and a term at the very edge would be half empty.

@@ -42,7 +42,7 @@ _MOST_FOLDS = 5
 # rows far apart, as those of two clusters, lies what hardly any new row comes to.
 _MOST_PLACES, _OTHERS, _SEED = 200, 20, 0
 # Three rows far off among sixty come to a twentieth, structures told by three runs alone to a tenth
-# and more; docs/mathematics.rst has what other parts give.
+# and more.
 _MOST_UNKNOWN = 0.075
 
 

@@ -139,7 +139,7 @@ def test_what_is_missing_is_said(log):
     assert few.loc["bias_repeatability", "note"] == "no interval: fewer than 5 runs"
     assert np.isfinite(few.loc["bias_repeatability", "before"])
     long = figures(report_of(log, "time", "run"))
-    assert "no run is as long as two averaging times" in long.loc["bias_stability_100s", "note"]
+    assert "no run is as long as two means" in long.loc["bias_stability_100s", "note"]
 
 
 def test_allan_deviation_is_read(rng):
