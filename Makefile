@@ -64,7 +64,7 @@ help:
 	@echo "make docs         the documentation, in docs/_build/html"
 	@echo "make first-hour   two users' first hours with the built wheel, and what they see"
 	@echo "make release URL=https://HOST/OWNER/skanfis [DRY=1]   all checks, then tag and publish"
-	@echo "make benchmarks   all benchmarks"
+	@echo "make benchmarks   the benchmarks that take minutes; --help lists the others"
 	@echo "make clean        remove environments and everything that was built"
 
 $(DEMO)/.installed: pyproject.toml
