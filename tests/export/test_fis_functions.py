@@ -141,7 +141,7 @@ def test_a_family_of_ones_own_is_refused():
         export_c(quick(n_mfs=2, mf=Own).fit(X, X[:, 0]), name="m")
 
 
-PAGE = Path(__file__).parents[2] / "docs" / "files.rst"
+PAGE = Path(__file__).parents[2] / "docs" / "memberships.rst"
 
 
 @pytest.mark.skipif(not PAGE.is_file(), reason="the documentation is not here")
@@ -149,4 +149,5 @@ def test_every_family_is_on_the_page_with_its_function():
     page = PAGE.read_text(encoding="utf-8")
     for family in MEMBERSHIPS.values():
         name, _ = function_of(family, [1.0] * len(family.parameters))
-        assert f'``"{family.name}"``\n     - ``{name}``' in page
+        assert family.name in page
+        assert f"``{name}``" in page
