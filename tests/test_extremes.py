@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
+from skanfis.inspection import export_text
 from skanfis.learning import VariableProjection
 
 
@@ -40,8 +41,8 @@ def test_weights_that_are_all_alike_are_none(weight):
         (8e305, 1.0, r"Column 'x0' of X holds numbers up to .*e\+307; .* larger unit"),
         (1.0, 1e307, r"Column 'y' of y holds numbers up to .*e\+308"),
         (1.0, 1e-308, "Column 'y' of y varies by .*e-309 only"),
-        (1e-200, 1e200, r"'y' of y varies by .*e\+199 and column 'x0' of X by .* no slope"),
-        (1e200, 1e-200, "'y' of y varies by .* no slope of one by the other"),
+        (1e-200, 1e200, r"'y' of y reaches .*, varies by .*e\+199, and column 'x0' .* no slope"),
+        (1e200, 1e-200, "'y' of y reaches .* no slope of one by the other"),
     ],
 )
 @pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"n_mfs": 2, "solver": "hybrid"}])
@@ -49,6 +50,18 @@ def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings)
     X, y = table()
     with pytest.raises(ValueError, match=message):
         ANFISRegressor(**settings).fit(X * x_scale, y * y_scale)
+
+
+def test_a_constant_target_far_from_zero_is_refused_where_its_slopes_overflow():
+    X, y = table()
+    with pytest.raises(ValueError, match=r"'y' of y reaches 3e\+99, varies by .* no slope"):
+        ANFISRegressor(n_mfs=2).fit(X * 1e-251, np.full(len(y), 3e99))
+
+
+def test_text_of_a_constant_target():
+    X, y = table()
+    text = export_text(ANFISRegressor(n_mfs=2).fit(X, np.full(len(y), 3e99)))
+    assert "Held within the limits of its training: y, 3e+99 to 3e+99." in text
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

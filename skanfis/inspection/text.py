@@ -217,7 +217,7 @@ def _legend(model, precision):
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         ends = [low, high]
         if np.isfinite(ends).all():
-            written = [place(end, precision, high - low) for end in ends]
+            written = [place(end, precision, (high - low) or abs(high) or 1.0) for end in ends]
         else:
             written = [number(end, precision) for end in ends]
         if np.isfinite(ends).any():

@@ -159,15 +159,20 @@ def check_scales(inputs, targets, input_names, output_names):
                     f"Column {name!r} of {what} varies by {spread:.3g} only; below "
                     f"{1.0 / _LARGEST:.0e} floats lose their digits. Give it in a smaller unit."
                 )
-    for j in np.flatnonzero(~inputs.is_constant):
-        for k in np.flatnonzero(~targets.is_constant):
-            slope = np.log2(targets.scale[k]) - np.log2(inputs.scale[j])
-            if abs(slope) > _LARGEST_SLOPE:
-                raise ValueError(
-                    f"Column {output_names[k]!r} of y varies by {targets.scale[k]:.3g} and column "
-                    f"{input_names[j]!r} of X by {inputs.scale[j]:.3g}: floats hold no slope of "
-                    "one by the other. Give one of them in another unit."
-                )
+    # A target far from zero is divided by the inputs too, be it constant.
+    largest = np.maximum(np.abs(targets.minimum), np.abs(targets.maximum))
+    with np.errstate(divide="ignore"):
+        largest_slopes = np.log2(largest) - np.log2(inputs.scale[:, None])
+    smallest_slopes = np.log2(targets.scale) - np.log2(inputs.scale[:, None])
+    is_beyond = largest_slopes > _LARGEST_SLOPE
+    is_beyond |= (smallest_slopes < -_LARGEST_SLOPE) & ~targets.is_constant
+    for j, k in np.argwhere(is_beyond & ~inputs.is_constant[:, None]):
+        raise ValueError(
+            f"Column {output_names[k]!r} of y reaches {largest[k]:.3g}, varies by "
+            f"{targets.scale[k]:.3g}, and column {input_names[j]!r} of X varies by "
+            f"{inputs.scale[j]:.3g}: floats hold no slope of one by the other. Give one of them in "
+            "another unit."
+        )
 
 
 @dataclass(frozen=True, eq=False)
