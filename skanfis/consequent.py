@@ -28,7 +28,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-__all__ = ["LocalBasis", "NormalFactor", "basis", "rule_masses", "rule_outputs"]
+__all__ = ["LocalBasis", "NormalFactor", "basis", "in_user_units", "rule_masses", "rule_outputs"]
 
 # A rule that fires on one spot only has no spread there; in standard deviations of the input.
 _SMALLEST_SPREAD = 0.05
@@ -53,6 +53,19 @@ def rule_outputs(coefficients, strengths, basis_rows):
     weighted = coefficients @ basis_rows
     weighted *= strengths
     return weighted, weighted.sum(axis=0)
+
+
+def in_user_units(coefficients, inputs, targets, slopes, order):
+    """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data."""
+    n_basis = 1 + slopes.size if order == 1 else 1
+    solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
+    solved[:, 0] += targets.offset
+    if order == 0:
+        return solved
+    found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
+    found[:, 0] = solved[:, 0]
+    found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
+    return found
 
 
 def rule_masses(gram, n_rules):

@@ -200,10 +200,12 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     _parameter_constraints: ClassVar[dict] = {
         "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
         "partition": [
-            StrOptions({"auto", "grid", "subtractive", "fcm"}),
+            StrOptions({"auto", "grid", "scattered"}),
             HasMethods(["fit", "fit_predict"]),
             HasMethods(["predict", "strengths"]),
         ],
+        "simplicity": [Interval(Real, 0, 1, closed="both")],
+        "max_rules": [Interval(Integral, 1, None, closed="left"), None],
         "mf": [
             StrOptions(set(MEMBERSHIPS)),
             Hidden(StrOptions(set(NAMES_IN_MATLAB))),  # refused with the name that they have here
@@ -232,6 +234,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         n_mfs: str | int | ArrayLike = "auto",
         *,
         partition: Any = "auto",
+        simplicity: float = 0.05,
+        max_rules: int | None = None,
         mf: str | type[Membership] | Sequence[str | type[Membership]] = "gaussian",
         premise_features: ArrayLike | None = None,
         consequent_features: ArrayLike | None = None,
@@ -251,6 +255,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     ) -> None:
         self.n_mfs = n_mfs
         self.partition = partition
+        self.simplicity = simplicity
+        self.max_rules = max_rules
         self.mf = mf
         self.premise_features = premise_features
         self.consequent_features = consequent_features

@@ -5,7 +5,6 @@ from .grid import Spacing, grid_antecedent
 from .request import StructureRequest, report_constant
 from .sample import effective_weight, representative_rows, weighted_quantile
 from .start import Start, check_inputs, imported_antecedent
-from .trials import held_out_loss
 
 __all__ = [
     "Spacing",
@@ -15,7 +14,6 @@ __all__ = [
     "clustered_antecedent",
     "effective_weight",
     "grid_antecedent",
-    "held_out_loss",
     "imported_antecedent",
     "report_constant",
     "representative_rows",

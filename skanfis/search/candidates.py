@@ -1,40 +1,68 @@
-"""What a search may try: structures, the rules they begin with, the inputs worth a try."""
+"""What a search may try: kinds of rule bases, each a sequence from small to large.
+
+Both kinds begin with one rule, a line. A grid grows by one term at a time, on the input where the
+error expected of new rows promises to be the smallest before any premise has moved; an input that
+asks for no terms gets none. Scattered rules stand on the clusters of k-means, half as many again
+each time.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
 from sklearn.cluster import KMeans
 
-from ..cluster import FuzzyCMeans, SubtractiveClustering
 from ..learning.data import StandardisedData
 from ..membership import Membership
 from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
 from .tuning import Tuned
 
-# More nobody reads.
-MOST_RULES = 36
-_IN_WORDS = {
-    "k-means": "{} scattered rules",
-    "fcm": "{} fuzzy clusters",
-    "subtractive": "clusters of radius {}",
-}
+KINDS = ("grid", "scattered")
+_MORE_CLUSTERS = 1.5
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A structure to be tried: terms per input, or the clusters of a clustering."""
+    """A structure to be tried: a grid of so many terms per input, or so many scattered rules."""
 
-    counts: tuple[int, ...] | None
-    size: float | None = None  # number of clusters, or the radius that they have
-    clustering: str = ""  # "k-means", "subtractive" or "fcm"
+    counts: tuple[int, ...]
+    n_clusters: int = 0  # of scattered rules
+
+    @property
+    def kind(self):
+        """ "one rule", "grid" or "scattered"."""
+        if self.n_clusters:
+            return "scattered"
+        return "one rule" if self.n_rules == 1 else "grid"
+
+    @property
+    def n_rules(self):
+        """Number of rules."""
+        return self.n_clusters or prod(self.counts)
+
+    def n_terms(self, inputs):
+        """Number of terms, of scattered rules on so many inputs."""
+        return self.n_clusters * inputs.size or sum(count for count in self.counts if count > 1)
 
     def describe(self):
         """In words."""
-        if self.counts is not None:
-            return f"grid {list(self.counts)}"
-        return _IN_WORDS[self.clustering].format(self.size)
+        if self.n_rules == 1:
+            return "one rule"
+        if self.n_clusters:
+            return f"{self.n_clusters} scattered rules"
+        return f"grid {list(self.counts)}"
+
+    def with_one_more_term(self, j):
+        """The grid with one more term on an input."""
+        counts = list(self.counts)
+        counts[j] += 1
+        return replace(self, counts=tuple(counts))
+
+    def with_more_clusters(self):
+        """Half as many scattered rules again, two at least."""
+        return replace(self, n_clusters=max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,35 +77,26 @@ class RuleBases:
         Those that may have terms.
     spacing : Spacing
         Where the terms of grids stand.
-    seed : int or RandomState
+    seed : int
         Of the clustering.
     """
 
     families: Sequence[type[Membership]]
     inputs: np.ndarray
     spacing: Spacing
-    seed: int | np.random.RandomState
+    seed: int
 
     def of(self, candidate: Candidate, rows: StandardisedData):
         """The antecedent of a candidate; clusters are sought in the rows."""
-        if candidate.counts is not None:
+        if not candidate.n_clusters:
             return grid_antecedent(self.families, candidate.counts, self.spacing)
-        clusterer = self._clusterer(candidate, rows.y.shape[1])
+        clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=self.seed)
         return clustered_antecedent(
             self.families,
             rows,
             lambda table, weight: clusterer.fit(table, sample_weight=weight).labels_,
             self.inputs,
         )
-
-    def _clusterer(self, candidate, n_outputs):
-        if candidate.clustering == "subtractive":
-            # Distances grow with the root of the columns' number.
-            radius = candidate.size * np.sqrt(0.5 * (self.inputs.size + n_outputs))
-            return SubtractiveClustering(radius=radius, max_clusters=MOST_RULES)
-        if candidate.clustering == "fcm":
-            return FuzzyCMeans(candidate.size, m="auto", random_state=self.seed)
-        return KMeans(candidate.size, n_init=1, random_state=self.seed)
 
 
 def term_scores(tuned: Tuned, inputs: np.ndarray, centers: np.ndarray):

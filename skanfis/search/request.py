@@ -15,13 +15,15 @@ from ..learning.data import StandardisedData
 from ..learning.evidence import FREE
 from ..membership import Membership
 from ..model import TSKModel
+from .candidates import KINDS
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .sample import effective_weight, n_distinct_inputs
-from .search import SEARCHED, StructureSearch
+from .search import StructureSearch
 from .size import check_clusters_fit, check_grid_fits, term_counts
 from .start import Start, imported_antecedent, tuned_start
-from .tuning import scaled
+from .trials import Plan
+from .tuning import FIRST_PENALTY, scaled
 
 _MIB = 2**20
 
@@ -47,6 +49,9 @@ class StructureRequest:
         Of clusterings that have none of their own.
     names : sequence of str
         Of the inputs.
+    simplicity : float
+        What may be given up for a model that costs less to read.
+    max_rules : int or None
     """
 
     n_mfs: Any
@@ -59,6 +64,8 @@ class StructureRequest:
     premises_move: bool
     seed: int
     names: Sequence[str]
+    simplicity: float
+    max_rules: int | None
 
     @property
     def is_searched(self):
@@ -66,22 +73,15 @@ class StructureRequest:
         return (
             isinstance(self.n_mfs, str)
             and isinstance(self.partition, str)
-            and self.partition in SEARCHED
+            and self.partition in ("auto", *KINDS)
         )
 
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
         if self.is_searched:
-            return StructureSearch(
-                rows,
-                self.families,
-                self.order,
-                self.premise_inputs,
-                self.consequent_inputs,
-                self.seed,
-                self.weights,
-            ).run(self.partition)
+            kinds = KINDS if self.partition == "auto" else (self.partition,)
+            return StructureSearch(rows, self._plan(rows), self.simplicity).run(kinds)
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
@@ -90,6 +90,20 @@ class StructureRequest:
         antecedent = self._antecedent(rows)
         self._warn_if_underdetermined(antecedent.n_rules, rows)
         return self._tuned(antecedent, rows)
+
+    def _plan(self, rows):
+        free, is_constant = [key for key in FREE if key not in self.weights], rows.inputs.is_constant
+        return Plan(
+            self.families,
+            self.order,
+            self.premise_inputs[~is_constant[self.premise_inputs]],
+            self.consequent_inputs,
+            self.seed,
+            free,
+            replace(FIRST_PENALTY, **self.weights),
+            effective_weight(rows),
+            self.max_rules,
+        )
 
     def _antecedent(self, rows):
         """The rules that were asked for."""
@@ -106,6 +120,7 @@ class StructureRequest:
             self.consequent_inputs,
             self.weights,
             self.premises_move,
+            self.simplicity,
         )
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:

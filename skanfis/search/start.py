@@ -17,6 +17,7 @@ from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..model import TSKModel
+from .choice import tolerated
 from .sample import effective_weight, search_sample
 from .tuning import (
     ARRIVING,
@@ -24,11 +25,12 @@ from .tuning import (
     FIRST_STEPS,
     MOST_COLUMNS,
     MOST_TURNS,
+    Tuned,
     scaled,
     settled,
     tune,
     tune_unbounded,
-    with_rules_that_hold,
+    with_most_agreement,
 )
 
 # The weights of rules that are given are found on at most so many representative rows.
@@ -51,6 +53,24 @@ class Start:
     term_names: tuple[str, ...] = ()  # where they are given with the rules
 
 
+def begun(tuned: Tuned, plan, left: float, candidates) -> Start:
+    """A start from a candidate's training, with the agreement that the tolerance leaves room for.
+
+    ``left`` is the factor by which the squared error may still rise.
+    """
+    problem, rows = tuned.problem, tuned.problem.rows
+    premise = Premise.of(problem.antecedent, *rows.inputs.box)
+    n_rows = tuned.posterior.n_rows
+    tuned = with_most_agreement(tuned, premise, plan.free, n_rows, left)
+    return Start(
+        problem.antecedent,
+        scaled(tuned.penalty, plan.free, n_rows / plan.n_all, tuned.agreement_is_raised),
+        settled(tuned.displacement),
+        agreement_is_raised=tuned.agreement_is_raised,
+        candidates=candidates,
+    )
+
+
 def tuned_start(
     antecedent: Antecedent,
     rows: StandardisedData,
@@ -58,6 +78,7 @@ def tuned_start(
     consequent_inputs,
     weights,
     premises_move,
+    simplicity,
 ) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows.
 
@@ -86,7 +107,10 @@ def tuned_start(
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, premise, is_free = freed, unbounded, True
     if premises_move and not is_free:
-        best = with_rules_that_hold(best, premise, free, n_sample, effective_weight(rows))
+        variance = float(np.count_nonzero(~rows.targets.is_constant))
+        error = best.expected_error
+        left = tolerated(error, variance, simplicity) / error if error > 0.0 else 1.0
+        best = with_most_agreement(best, premise, free, n_sample, left)
     return Start(
         antecedent,
         scaled(best.penalty, free, n_sample / effective_weight(rows), best.agreement_is_raised),

@@ -25,7 +25,7 @@ from ..learning.evidence import (
     reestimated,
 )
 from ..learning.objective import Evaluation, SeparableProblem
-from ..learning.penalty import GREATEST_ALONE, Penalty
+from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..learning.varpro import varpro
 
@@ -50,13 +50,8 @@ _RISE = 0.5
 # Of terms without bounds: weights next to nothing, which rounding errors need, and a first turn
 # that goes far.
 _NO_WEIGHT, _UNBOUNDED_ITERATIONS = 1e-12, 25
-# How far the strongest rule alone may be off, in deviations of the target, and what factor of the
-# expected squared error that is worth: what can be had for nothing, and what must be had.
-_HOLDS_WELL, _NEXT_TO_NOTHING = 0.3, 0.02
-_HOLDS, _WORTH = 0.9 * GREATEST_ALONE, 1.2
-# Agreement rises by a power of how far the rule is off, within these factors; beyond the last
-# weight, all rules are one line.
-_POWER, _LEAST_RAISE, _LARGEST_RAISE = 3.0, 2.0, 100.0
+# Agreement: beyond the last weight, all rules are one line; less of a rise is not worth a training.
+_MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
 _MOST_AGREEMENT = 1.0
 # Of displacements, in spacings of terms: rounding errors stay below.
 _DIGITS = 5
@@ -251,32 +246,46 @@ def _improved(
     return posterior
 
 
-def with_rules_that_hold(
-    tuned: Tuned, premise: Premise, free, n_rows: float, n_all: float
-) -> Tuned:
-    """The same with more agreement, while the strongest rule does not hold alone.
+def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, left: float) -> Tuned:
+    """The same with as much agreement as keeps the squared error within ``left`` of itself.
 
-    A rule that is off by more than a person may take for the model is worth a fifth of the expected
-    squared error; one that is off by less is made to hold for next to nothing: at most half of what
-    it costs anyway to find the parameters on the ``n_all`` rows of the fit, k / n of the noise.
+    The consequents alone tell how much that is at least; then the premises follow, which makes room
+    for more.
     """
     if "agreement" not in free or not tuned.displacement.size:
         return tuned
     others = [key for key in free if key != "agreement"]
-    little = 1.0 + min(0.5 * tuned.posterior.n_effective / n_all, _NEXT_TO_NOTHING)
-    best = tuned
-    while best.penalty.agreement < _MOST_AGREEMENT:
-        alone = best.problem.strongest_alone(best.evaluation)
-        limit, worth = (_HOLDS, _WORTH) if alone > _HOLDS else (_HOLDS_WELL, little)
-        if alone <= limit:
+    most, best = left * tuned.expected_error, tuned
+    for _ in range(_MOST_RAISES):
+        agreement = _most_agreement(best, most)
+        if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
-        raised = min(max((alone / limit) ** _POWER, _LEAST_RAISE), _LARGEST_RAISE)
-        penalty = replace(best.penalty, agreement=raised * best.penalty.agreement)
+        penalty = replace(best.penalty, agreement=agreement)
         found = _turned(best, premise, penalty, others, n_rows, _ITERATIONS, 0)
-        if not found.expected_error <= worth * tuned.expected_error:
+        if not found.expected_error <= most:
             break
         best = found
     return best if best is tuned else replace(best, agreement_is_raised=True)
+
+
+def _with_penalty(tuned: Tuned, penalty: Penalty) -> Tuned:
+    """The same with the consequents of another penalty; no pass over the rows but for its error."""
+    return replace(
+        tuned, problem=tuned.problem.with_penalty(penalty)
+    )
+
+
+def _most_agreement(tuned: Tuned, most: float) -> float:
+    """The largest agreement at which the consequents alone keep the error, by bisection."""
+    low, high = np.log(tuned.penalty.agreement), np.log(_MOST_AGREEMENT)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        penalty = replace(tuned.penalty, agreement=float(np.exp(middle)))
+        if _with_penalty(tuned, penalty).expected_error <= most:
+            low = middle
+        else:
+            high = middle
+    return float(np.exp(low))
 
 
 def settled(displacement):

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..consequent import in_user_units
 from ..learning import SolverResult
 from ..learning.data import StandardisedData
 from ..learning.firing import RuleFiring, rule_support
@@ -92,19 +93,6 @@ class ModelBuilder:
         return in_user_units(
             coefficients, inputs, targets, request.consequent_inputs, request.order
         )
-
-
-def in_user_units(coefficients, inputs, targets, slopes, order):
-    """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data."""
-    n_basis = 1 + slopes.size if order == 1 else 1
-    solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
-    solved[:, 0] += targets.offset
-    if order == 0:
-        return solved
-    found = np.zeros((len(solved), 1 + inputs.scale.size, targets.scale.size))
-    found[:, 0] = solved[:, 0]
-    found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
-    return found
 
 
 def as_given(estimator, data, model) -> Fitted:

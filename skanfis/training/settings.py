@@ -46,6 +46,8 @@ def structure_request(estimator, names):
         premises_move=solver_of(estimator).moves_premises and estimator.max_iter > 0,
         seed=0 if state is None else check_random_state(state).randint(2**31 - 1),
         names=names,
+        simplicity=float(estimator.simplicity),
+        max_rules=estimator.max_rules,
     )
 
 
