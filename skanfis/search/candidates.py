@@ -99,25 +99,41 @@ class RuleBases:
         )
 
 
-def term_scores(tuned: Tuned, inputs: np.ndarray, centers: np.ndarray):
-    """How much the residual of a linear model asks for two terms on each input, (n_inputs,).
+def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
+    """How much the residual of a model asks for so many terms on each input, (n_inputs,).
 
-    With w the share of the upper of two Gaussian terms on an input, at ``centers``, (n_inputs, 2),
-    and r the residual, the statistic is the sum over basis functions b of
-    (sum s w b r)^2 / sum s (w b)^2.
+    With nu_k the shares of ``counts`` even Gaussian terms on an input, b the functions 1 and z_i,
+    and r the residual, the statistic is the sum over k and b of
+
+        (sum s nu_k b r)^2 / sum s (nu_k b)^2 ,    nu_k less its mean,
+
+    in deviations from what noise alone would give it.
     """
     problem, rows = tuned.problem, tuned.problem.rows
-    weight, distance = rows.sample_weight, np.diff(centers, axis=1).ravel()
+    weight = rows.sample_weight
     assert weight is not None  # a search sample has them
-    # The log of the ratio of two such Gaussians has this slope.
-    slope = -8.0 * np.log(OVERLAP) / distance
-    shares = 1.0 / (1.0 + np.exp(-slope * (rows.X[:, inputs] - centers.mean(axis=1))))
-    shares -= np.average(shares, axis=0, weights=weight)
-    basis = np.column_stack([np.ones(rows.n_rows), rows.X[:, problem.consequent_inputs]])
-    scale = (basis**2).T @ (weight[:, None] * shares**2)
-    statistic = np.zeros(inputs.size)
-    for part, residual, own in problem.residuals(tuned.evaluation):
-        for one in residual:
-            along = basis[part].T @ (shares[part] * (own * one)[:, None])
-            statistic += np.sum(along**2 / np.maximum(scale, np.finfo(float).tiny), axis=0)
-    return statistic
+    found = [residual for _, residual, _ in problem.residuals(tuned.evaluation)]
+    residual = np.concatenate(found, axis=1).T
+    residual -= np.average(residual, axis=0, weights=weight)
+    variance = np.average(residual**2, axis=0, weights=weight)
+    basis = np.column_stack([np.ones(rows.n_rows), rows.X])
+    scores = np.zeros(inputs.size)
+    for k, (j, count) in enumerate(zip(inputs, counts, strict=True)):
+        shares = _shares(rows.X[:, j], spacing.centers(j, count))
+        shares -= np.average(shares, axis=0, weights=weight)
+        own = weight[:, None] * shares
+        norm = (own * shares).T @ basis**2
+        along = np.einsum("nk,no,nb->kbo", own, residual, basis, optimize=True)
+        squares = along**2 / np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
+        # One of the shares follows from the others.
+        n_free = squares.size * (1.0 - 1.0 / count)
+        scores[k] = (squares.sum() * (1.0 - 1.0 / count) - n_free) / np.sqrt(2.0 * n_free)
+    return scores
+
+
+def _shares(column, centers):
+    """Of Gaussian terms, neighbours of which cross at ``OVERLAP``, (n_rows, n_terms)."""
+    distance = np.mean(np.diff(centers)) or 1.0
+    log_truth = 4.0 * np.log(OVERLAP) * ((column[:, None] - centers) / distance) ** 2
+    shares = np.exp(log_truth - log_truth.max(axis=1, keepdims=True))
+    return shares / shares.sum(axis=1, keepdims=True)

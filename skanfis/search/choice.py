@@ -17,6 +17,8 @@ import numpy as np
 from .candidates import Candidate
 from .tuning import Tuned
 
+_ERRORS = 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class Judged:
@@ -41,9 +43,20 @@ class Judged:
     cost: int
 
 
-def best_of(judged, weight):
-    """The candidate of the smallest expected error."""
-    return min(judged, key=lambda one: one.squared_error)
+def is_better(candidate: Judged, than: Judged, weight) -> bool:
+    """Whether it leaves less of the rows that judge, by more than one standard error."""
+    gain = than.squares - candidate.squares
+    mean = np.average(gain, weights=weight)
+    error = np.sqrt(np.sum((weight * (gain - mean)) ** 2)) / np.sum(weight)
+    return bool(mean > _ERRORS * error)
+
+
+def best_of(judged, weight) -> Judged:
+    """That of the smallest error; what is larger must be better by more than chance."""
+    best, *others = sorted(judged, key=lambda one: one.cost)
+    for one in others:
+        best = one if is_better(one, best, weight) else best
+    return best
 
 
 def tolerated(least: float, variance: float, simplicity: float) -> float:

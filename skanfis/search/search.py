@@ -12,15 +12,13 @@ import numpy as np
 from ..learning.data import StandardisedData
 from ..reading_cost import reading_cost
 from .candidates import KINDS, Candidate
-from .choice import Judged, best_of, chosen, tolerated
+from .choice import Judged, best_of, chosen, is_better, tolerated
 from .judging import dealt_rows, splits
 from .start import Start, begun
 from .trials import Plan, Trials
 
 # Sizes without a gain after which a sequence ends.
-_FURTHER = 3
-# Of one training in a search: rows times the square of its parameters.
-_MOST_OPERATIONS = 4e9
+_FURTHER = 2
 
 
 class StructureSearch:
@@ -63,7 +61,7 @@ class StructureSearch:
         n_further = 0
         while n_further < _FURTHER:
             larger = self.trials.larger(kind, now.candidate)
-            if larger is None or self._operations(larger) > _MOST_OPERATIONS:
+            if larger is None:
                 return
             grown = [
                 larger if fold is self.trials else fold.larger(kind, one)
@@ -74,7 +72,7 @@ class StructureSearch:
             in_folds = grown
             now = self._judge(larger, in_folds)
             self.judged.append(now)
-            n_further = 0 if now.squared_error < best.squared_error else n_further + 1
+            n_further = 0 if is_better(now, best, self.weight) else n_further + 1
             best = now if n_further == 0 else best
 
     def _judge(self, candidate, in_folds):
@@ -87,7 +85,8 @@ class StructureSearch:
             ]
         )
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
-        error = float(np.average(squares, weights=self.weight)) * factor
+        squares *= factor
+        error = float(np.average(squares, weights=self.weight))
         return Judged(candidate, tuned, squares, error, self._cost(candidate))
 
     def _variance(self):
@@ -100,11 +99,8 @@ class StructureSearch:
 
     def _cost(self, candidate: Candidate):
         plan, n_rules = self.plan, candidate.n_rules
-        conditions = candidate.n_terms(self.trials.inputs) if candidate.n_clusters else n_rules * sum(count > 1 for count in candidate.counts)
+        conditions = candidate.n_terms(self.trials.scattered_inputs) if candidate.n_clusters else n_rules * sum(count > 1 for count in candidate.counts)
         return reading_cost([conditions], [n_rules * plan.n_basis - 1], self.trials.rows.y.shape[1])
-
-    def _operations(self, candidate):
-        return self.trials.rows_for(candidate).n_rows * self.plan.n_parameters(candidate) ** 2
 
     def _report(self, found):
         """Every candidate in words and numbers, best first."""

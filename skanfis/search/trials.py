@@ -30,10 +30,14 @@ from .tuning import FIRST_STEPS, Tuned, tune
 _ROWS_EACH, FEWEST_ROWS = 20, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 2
+# Of one training.
+_MOST_OPERATIONS = 1e9
 # Turns of weights and premises of a candidate.
 _TURNS = 2
-# More inputs than this are screened before terms are tried on them, and so many are left.
-_MOST_UNSCREENED, _SCREENED = 16, 8
+# Of the inputs of which the residual says most, so many are tried.
+_TRIED = 3
+# Deviations by which what an input's terms would explain exceeds what they would of noise.
+_SIGNIFICANT = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +77,6 @@ class Plan:
         """Coefficients of a rule."""
         return 1 + (self.consequent_inputs.size if self.order else 0)
 
-    def n_parameters(self, candidate):
-        """Of consequents and, two each, of terms."""
-        return candidate.n_rules * self.n_basis + 2 * candidate.n_terms(self.inputs)
-
 
 class Trials:
     """Trainings on one set of rows, whose order says nothing."""
@@ -84,20 +84,23 @@ class Trials:
     def __init__(self, rows: StandardisedData, plan: Plan):
         self.rows, self.plan = rows, plan
         self.spacing = Spacing(rows)
-        self.inputs = plan.inputs
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._parts: dict[int, StandardisedData] = {}
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        if self.inputs.size > _MOST_UNSCREENED:
-            # Those whose terms the line's residual asks for most.
-            centers = np.array([self.spacing.centers(j, 2) for j in self.inputs])
-            scores = term_scores(self.tuned(self.one_rule), self.inputs, centers)
-            self.inputs = np.sort(self.inputs[np.argsort(-scores, kind="stable")[:_SCREENED]])
+        self.scattered_inputs = plan.inputs
+        # Scattered rules have terms on those inputs of which the line's residual says something.
+        scores = self._scores(self.one_rule)
+        asked = scores > _SIGNIFICANT
+        self.scattered_inputs = plan.inputs[asked if asked.any() else scores == scores.max(initial=0)]
+
+    def _scores(self, candidate):
+        counts = [candidate.counts[j] + 1 for j in self.plan.inputs]
+        return term_scores(self.tuned(candidate), self.plan.inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
         """As many as its parameters need; powers of two, for few sets of rows serve them all."""
-        needed = max(_ROWS_EACH * self.plan.n_parameters(candidate), FEWEST_ROWS)
+        needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
         n_rows = min(FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS))), self.rows.n_rows)
         if n_rows not in self._parts:
             part = self.rows.part(slice(n_rows))
@@ -107,25 +110,34 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows for one."""
         if kind == "scattered":
-            grown = [candidate.with_more_clusters()] if self.inputs.size else []
-        else:
-            grown = [
-                candidate.with_one_more_term(j)
-                for j in self.inputs
-                if candidate.counts[j] < self.spacing.n_values(j)
-            ]
-        plan = self.plan
+            grown = candidate.with_more_clusters()
+            return grown if self.scattered_inputs.size and self._is_small(grown) else None
+        inputs = self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")]
         grown = [
             one
-            for one in grown
-            if plan.n_parameters(one) <= self.rows.n_rows
-            and one.n_rules <= (plan.most_rules or np.inf)
-        ]
+            for one in (candidate.with_one_more_term(j) for j in inputs if candidate.counts[j] < self.spacing.n_values(j))
+            if self._is_small(one)
+        ][:_TRIED]
         if len(grown) < 2:
             return grown[0] if grown else None
         self._begun = {one: self._train(one, 0, _STEPS_TO_PROMISE) for one in grown}
         # Of columns that are alike, rounding is not to choose.
         return min(grown, key=lambda one: float(f"{self.expected(self._begun[one]):.6g}"))
+
+    def n_parameters(self, candidate):
+        """Of consequents and, two each, of terms."""
+        n_terms = candidate.n_terms(self.scattered_inputs)
+        return candidate.n_rules * self.plan.n_basis + 2 * n_terms
+
+    def _is_small(self, candidate):
+        most = self.plan.most_rules or np.inf
+        if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows: return False
+        return self.operations(candidate) <= _MOST_OPERATIONS
+
+    def operations(self, candidate):
+        """Of a pass over its rows and of a solution, about."""
+        n_rows, n = self.rows_for(candidate).n_rows, self.n_parameters(candidate)
+        return (n_rows + 10.0 * n) * n**2
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
@@ -151,7 +163,7 @@ class Trials:
     def _train(self, candidate, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
         plan, rows = self.plan, self.rows_for(candidate)
         if begun is None:
-            bases = RuleBases(plan.families, self.inputs, self.spacing, plan.seed)
+            bases = RuleBases(plan.families, self.scattered_inputs, self.spacing, plan.seed)
             problem = SeparableProblem(
                 rows,
                 bases.of(candidate, rows),
