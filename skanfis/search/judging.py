@@ -16,7 +16,6 @@ from sklearn.model_selection import GroupKFold
 
 from ..learning.data import StandardisedData
 from .sample import search_sample
-from .trials import FEWEST_ROWS
 
 _FOLDS = 5
 # Rows that all candidates together see, to grow and to judge.
@@ -24,6 +23,8 @@ _MOST_ROWS = 20_000
 # Digits that rounding leaves alone where units change.
 _DIGITS = 9
 _SEED = 0
+# Rows of which a fifth is enough to judge.
+_ENOUGH = 2000
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -46,8 +47,6 @@ def splits(rows: StandardisedData):
     if groups is not None and np.unique(groups).size > 1:
         n_folds = min(_FOLDS, np.unique(groups).size)
         return list(GroupKFold(n_folds).split(rows.X, groups=groups))
-    every = np.arange(n_rows)
-    if n_rows >= 2 * FEWEST_ROWS:
-        return [(every[: n_rows // 2], every[n_rows // 2 :])]
-    n_folds = min(_FOLDS, n_rows)
-    return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
+    every, n_folds = np.arange(n_rows), min(_FOLDS, n_rows)
+    folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
+    return folds[:1] if n_rows >= _ENOUGH else folds

@@ -27,15 +27,15 @@ from .sample import effective_weight, unit_scale
 from .tuning import FIRST_STEPS, Tuned, tune
 
 # Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_EACH, FEWEST_ROWS = 20, 1000
+_ROWS_EACH, FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
-_STEPS_TO_PROMISE = 2
+_STEPS_TO_PROMISE = 1
 # Of one training.
 _MOST_OPERATIONS = 1e9
 # Turns of weights and premises of a candidate.
 _TURNS = 2
 # Of the inputs of which the residual says most, so many are tried.
-_TRIED = 3
+_TRIED = 8
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
@@ -120,7 +120,8 @@ class Trials:
         ][:_TRIED]
         if len(grown) < 2:
             return grown[0] if grown else None
-        self._begun = {one: self._train(one, 0, _STEPS_TO_PROMISE) for one in grown}
+        first = self.tuned(candidate).penalty
+        self._begun = {one: self._train(one, first, 0, _STEPS_TO_PROMISE) for one in grown}
         # Of columns that are alike, rounding is not to choose.
         return min(grown, key=lambda one: float(f"{self.expected(self._begun[one]):.6g}"))
 
@@ -143,7 +144,8 @@ class Trials:
         """The end of a candidate's training."""
         if candidate not in self._found:
             begun = self._begun.get(candidate)
-            self._found[candidate] = self._train(candidate, begun=begun)
+            first = self.plan.first if begun is None else begun.penalty
+            self._found[candidate] = self._train(candidate, first, begun=begun)
         return self._found[candidate]
 
     def expected(self, tuned: Tuned) -> float:
@@ -160,7 +162,8 @@ class Trials:
             1.0 + n_effective / tuned.posterior.n_rows
         )
 
-    def _train(self, candidate, turns=_TURNS, first_steps=FIRST_STEPS, begun=None):
+    def _train(self, candidate, first, turns=None, first_steps=FIRST_STEPS, begun=None):
+        turns = _TURNS if turns is None else turns
         plan, rows = self.plan, self.rows_for(candidate)
         if begun is None:
             bases = RuleBases(plan.families, self.scattered_inputs, self.spacing, plan.seed)
@@ -168,11 +171,11 @@ class Trials:
                 rows,
                 bases.of(candidate, rows),
                 plan.order,
-                plan.first,
+                first,
                 consequent_inputs=plan.consequent_inputs,
             )
         else:
-            problem, first_steps = begun.problem, first_steps - _STEPS_TO_PROMISE
+            problem, first_steps = begun.problem, _STEPS_TO_PROMISE
         premise = Premise.of(problem.antecedent, rows.inputs.minimum, rows.inputs.maximum)
         weight = effective_weight(rows)
         return tune(problem, premise, plan.free, weight, turns, first_steps, begun=begun)
