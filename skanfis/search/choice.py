@@ -15,19 +15,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from .candidates import Candidate
-from .tuning import Tuned
 
 _ERRORS = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A candidate, its training, and what it left of rows that had no part in it.
+    """A candidate, and what it left of rows that had no part in it.
 
     Parameters
     ----------
     candidate : Candidate
-    tuned : Tuned
     squares : ndarray of shape (n_judged,)
         Squared errors, summed over outputs.
     squared_error : float
@@ -37,7 +35,6 @@ class Judged:
     """
 
     candidate: Candidate
-    tuned: Tuned
     squares: np.ndarray
     squared_error: float
     cost: int

@@ -53,7 +53,7 @@ class StructureSearch:
         most = tolerated(best.squared_error, self._variance(), self.simplicity)
         found = chosen(self.judged, most)
         left = most / found.squared_error
-        return begun(found.tuned, self.plan, left, self._report(found))
+        return begun(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large."""
@@ -77,7 +77,6 @@ class StructureSearch:
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
-        tuned = self.trials.tuned(candidate)
         squares = np.concatenate(
             [
                 fold.squared_errors(fold.tuned(one), rest)
@@ -87,7 +86,7 @@ class StructureSearch:
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         squares *= factor
         error = float(np.average(squares, weights=self.weight))
-        return Judged(candidate, tuned, squares, error, self._cost(candidate))
+        return Judged(candidate, squares, error, self._cost(candidate))
 
     def _variance(self):
         """Squared error of the mean on the rows that judge."""

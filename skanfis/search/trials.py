@@ -89,6 +89,7 @@ class Trials:
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self.scattered_inputs = plan.inputs
+        self._begun[self.one_rule] = self._train(self.one_rule, plan.first)
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
@@ -96,7 +97,7 @@ class Trials:
 
     def _scores(self, candidate):
         counts = [candidate.counts[j] + 1 for j in self.plan.inputs]
-        return term_scores(self.tuned(candidate), self.plan.inputs, counts, self.spacing)
+        return term_scores(self.begun(candidate), self.plan.inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
         """As many as its parameters need; powers of two, for few sets of rows serve them all."""
@@ -110,20 +111,28 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows for one."""
         if kind == "scattered":
-            grown = candidate.with_more_clusters()
-            return grown if self.scattered_inputs.size and self._is_small(grown) else None
-        inputs = self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")]
-        grown = [
-            one
-            for one in (candidate.with_one_more_term(j) for j in inputs if candidate.counts[j] < self.spacing.n_values(j))
-            if self._is_small(one)
-        ][:_TRIED]
-        if len(grown) < 2:
-            return grown[0] if grown else None
-        first = self.tuned(candidate).penalty
-        self._begun = {one: self._train(one, first, 0, _STEPS_TO_PROMISE) for one in grown}
+            more = candidate.with_more_clusters()
+            grown = [more] if self.scattered_inputs.size and self._is_small(more) else []
+        else:
+            grown = self._grown_grids(candidate)
+        # Weights go on from those of the smaller one.
+        first = self.begun(candidate).penalty
+        promising = [(one, self._train(one, first, 0, _STEPS_TO_PROMISE)) for one in grown]
+        if not promising:
+            return None
         # Of columns that are alike, rounding is not to choose.
-        return min(grown, key=lambda one: float(f"{self.expected(self._begun[one]):.6g}"))
+        best, begun = min(promising, key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
+        self._begun[best] = begun
+        return best
+
+    def _grown_grids(self, candidate):
+        inputs = self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")]
+        larger = (
+            candidate.with_one_more_term(j)
+            for j in inputs
+            if candidate.counts[j] < self.spacing.n_values(j)
+        )
+        return [one for one in larger if self._is_small(one)][:_TRIED]
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
@@ -140,12 +149,15 @@ class Trials:
         n_rows, n = self.rows_for(candidate).n_rows, self.n_parameters(candidate)
         return (n_rows + 10.0 * n) * n**2
 
+    def begun(self, candidate: Candidate) -> Tuned:
+        """A candidate of the sequence before its premises move."""
+        return self._begun[candidate]
+
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
         if candidate not in self._found:
-            begun = self._begun.get(candidate)
-            first = self.plan.first if begun is None else begun.penalty
-            self._found[candidate] = self._train(candidate, first, begun=begun)
+            begun = self._begun[candidate]
+            self._found[candidate] = self._train(candidate, begun.penalty, begun=begun)
         return self._found[candidate]
 
     def expected(self, tuned: Tuned) -> float:
