@@ -1,23 +1,25 @@
 """How much there is to read in the rules of a model: the numerals in their sentences."""
 
+from .antecedent import Antecedent
 
-def reading_cost(conditions, slopes, n_outputs: int = 1) -> int:
+
+def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> int:
     """Numerals that a person reads in the rules' sentences.
 
-    A condition counts as one each time a rule says it, and so do a rule's own value and each of its
-    slopes, of every output. How many rows a rule stands for, its share, its error and its number
-    are not counted.
+    A named term counts as one each time a rule says it; so do, of every output, the rule's own
+    value and each of its slopes. How many rows a rule stands for, its share, its error and its
+    number are not counted.
 
     Parameters
     ----------
-    conditions : iterable of int
-        Of each rule, how many inputs its IF part names.
-    slopes : iterable of int
-        Of each rule, how many slopes its THEN part has.
-    n_outputs : int
+    antecedent : Antecedent
+    n_slopes : int
+        Of each rule.
+    n_outputs : int, default=1
 
     Returns
     -------
     int
     """
-    return sum(conditions) + n_outputs * sum(1 + own for own in slopes)
+    n_conditions = int((antecedent.rule_terms >= 0).sum())
+    return n_conditions + antecedent.n_rules * n_outputs * (1 + n_slopes)

@@ -32,7 +32,7 @@ class Candidate:
 
     @property
     def kind(self):
-        """ "one rule", "grid" or "scattered"."""
+        """One of the kinds, or "one rule"."""
         if self.n_clusters:
             return "scattered"
         return "one rule" if self.n_rules == 1 else "grid"

@@ -16,8 +16,6 @@ import numpy as np
 
 from .candidates import Candidate
 
-_ERRORS = 1.0
-
 
 @dataclass(frozen=True, eq=False)
 class Judged:
@@ -40,19 +38,39 @@ class Judged:
     cost: int
 
 
-def is_better(candidate: Judged, than: Judged, weight) -> bool:
-    """Whether it leaves less of the rows that judge, by more than one standard error."""
-    gain = than.squares - candidate.squares
-    mean = np.average(gain, weights=weight)
-    error = np.sqrt(np.sum((weight * (gain - mean)) ** 2)) / np.sum(weight)
-    return bool(mean > _ERRORS * error)
+@dataclass(frozen=True, eq=False)
+class Judges:
+    """The rows that judge: their weights, and which of them are alike, those of one group."""
+
+    weight: np.ndarray
+    group: np.ndarray
+
+    @classmethod
+    def of(cls, parts):
+        """Of the rows that each fold has left out."""
+        weight = np.concatenate([rows.sample_weight for rows in parts])
+        if any(rows.groups is None for rows in parts):
+            return cls(weight, np.arange(weight.size))
+        groups = np.concatenate([rows.groups for rows in parts])
+        return cls(weight, np.unique(groups, return_inverse=True)[1])
+
+    def mean(self, squares) -> float:
+        """Of squared errors."""
+        return float(np.average(squares, weights=self.weight))
+
+    def prefer(self, candidate: Judged, than: Judged) -> bool:
+        """Whether a larger candidate leaves less, by more than one standard error."""
+        gain = than.squares - candidate.squares
+        mean = self.mean(gain)
+        excess = np.bincount(self.group, self.weight * (gain - mean))
+        return bool(mean > np.sqrt(np.sum(excess**2)) / np.sum(self.weight))
 
 
-def best_of(judged, weight) -> Judged:
-    """That of the smallest error; what is larger must be better by more than chance."""
+def best_of(judged, judges: Judges) -> Judged:
+    """That of the smallest error; what costs more to read must be better by more than chance."""
     best, *others = sorted(judged, key=lambda one: one.cost)
     for one in others:
-        best = one if is_better(one, best, weight) else best
+        best = one if judges.prefer(one, best) else best
     return best
 
 

@@ -24,7 +24,7 @@ _MOST_ROWS = 20_000
 _DIGITS = 9
 _SEED = 0
 # Rows that are enough to judge by: of many rows, not all folds are needed.
-_ENOUGH = 400
+_ENOUGH = 200
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -39,14 +39,16 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
 
 
 def splits(rows: StandardisedData):
-    """Positions to grow on and positions to judge on, of every fold; none of a single row.
+    """Positions to grow on and positions to judge on, of every fold.
 
-    Where there is but one, what is grown for it serves as the sequence of all rows.
+    Where there is but one fold, what is grown for it serves as the sequence of all rows.
     """
     n_rows, groups = rows.n_rows, rows.groups
     if groups is not None and np.unique(groups).size > 1:
         n_folds = min(_FOLDS, np.unique(groups).size)
         return list(GroupKFold(n_folds).split(rows.X, groups=groups))
     every, n_folds = np.arange(n_rows), min(_FOLDS, n_rows)
+    if n_rows == 1:
+        return [(every, every)]
     folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
     return folds[: int(np.ceil(_FOLDS * _ENOUGH / n_rows))]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -85,14 +86,15 @@ class StructureRequest:
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
-            self._warn_if_underdetermined(antecedent.n_rules, rows)
             return replace(self._tuned(antecedent, rows), term_names=names)
-        antecedent = self._antecedent(rows)
-        self._warn_if_underdetermined(antecedent.n_rules, rows)
-        return self._tuned(antecedent, rows)
+        return self._tuned(self._antecedent(rows), rows)
 
     def _plan(self, rows):
-        free, is_constant = [key for key in FREE if key not in self.weights], rows.inputs.is_constant
+        given: dict[str, Any] = {**self.weights}
+        free, is_constant = (
+            [key for key in FREE if key not in self.weights],
+            rows.inputs.is_constant,
+        )
         return Plan(
             self.families,
             self.order,
@@ -100,7 +102,7 @@ class StructureRequest:
             self.consequent_inputs,
             self.seed,
             free,
-            replace(FIRST_PENALTY, **self.weights),
+            replace(FIRST_PENALTY, **given),
             effective_weight(rows),
             self.max_rules,
         )
@@ -113,6 +115,8 @@ class StructureRequest:
         return clustered_antecedent(self.families, rows, label, self.premise_inputs)
 
     def _tuned(self, antecedent, rows):
+        self._check_number(antecedent.n_rules)
+        self._warn_if_underdetermined(antecedent.n_rules, rows)
         return tuned_start(
             antecedent,
             rows,
@@ -140,12 +144,26 @@ class StructureRequest:
             "leave n_mfs at 'auto', or use partition='grid'."
         )
 
+    def _check_number(self, n_rules):
+        """Raise ValueError where more rules are given than may be."""
+        if self.max_rules is not None and n_rules > self.max_rules:
+            given = f"n_mfs={self.n_mfs!r}"
+            if isinstance(self.n_mfs, str):
+                given = "partition" + (
+                    "" if isinstance(self.partition, TSKModel) else f"={self.partition!r}"
+                )
+            raise ValueError(
+                f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: give "
+                "fewer, or leave max_rules at None."
+            )
+
     def _checked(self, label, rows):
         """A labeller whose clusters are counted before any rule is made of them."""
 
         def checked(table, weight):
             labels = np.asarray(label(table, weight))
             n_rules = np.unique(labels[labels >= 0]).size
+            self._check_number(n_rules)
             check_clusters_fit(
                 f"partition={self.partition!r}",
                 n_rules,
@@ -161,6 +179,7 @@ class StructureRequest:
     def _grid(self, rows):
         counts = self._grid_counts(rows)
         n_basis, n_outputs = 1 + self.consequent_inputs.size, rows.y.shape[1]
+        self._check_number(prod(counts))
         check_grid_fits(self.n_mfs, counts, n_basis, n_outputs, _memory_limit(), self.names)
         return grid_antecedent(self.families, counts, Spacing(rows))
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..learning.data import StandardisedData
 from ..reading_cost import reading_cost
 from .candidates import KINDS, Candidate
-from .choice import Judged, best_of, chosen, is_better, tolerated
+from .choice import Judged, Judges, best_of, chosen, tolerated
 from .judging import dealt_rows, splits
 from .start import Start, begun
 from .trials import Plan, Trials
@@ -40,7 +40,7 @@ class StructureSearch:
         self.folds = [Trials(sample.part(grow), plan) for grow, _ in found]
         self.rest = [sample.part(judge) for _, judge in found]
         self.trials = self.folds[0] if len(found) == 1 else Trials(sample, plan)
-        self.weight = np.concatenate([rest.sample_weight for rest in self.rest])
+        self.judges = Judges.of(self.rest)
         self.judged: list[Judged] = []
 
     def run(self, kinds: Sequence[str] = KINDS) -> Start:
@@ -49,7 +49,7 @@ class StructureSearch:
         self.judged.append(one_rule)
         for kind in kinds:
             self._grow(kind, one_rule)
-        best = best_of(self.judged, self.weight)
+        best = best_of(self.judged, self.judges)
         most = tolerated(best.squared_error, self._variance(), self.simplicity)
         found = chosen(self.judged, most)
         left = most / found.squared_error
@@ -63,16 +63,14 @@ class StructureSearch:
             larger = self.trials.larger(kind, now.candidate)
             if larger is None:
                 return
-            grown = [
-                larger if fold is self.trials else fold.larger(kind, one)
-                for fold, one in zip(self.folds, in_folds, strict=True)
-            ]
-            if any(one is None for one in grown):
-                return
-            in_folds = grown
+            for k, fold in enumerate(self.folds):
+                one = larger if fold is self.trials else fold.larger(kind, in_folds[k])
+                if one is None:
+                    return
+                in_folds[k] = one
             now = self._judge(larger, in_folds)
             self.judged.append(now)
-            n_further = 0 if is_better(now, best, self.weight) else n_further + 1
+            n_further = 0 if self.judges.prefer(now, best) else n_further + 1
             best = now if n_further == 0 else best
 
     def _judge(self, candidate, in_folds):
@@ -85,21 +83,23 @@ class StructureSearch:
         )
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         squares *= factor
-        error = float(np.average(squares, weights=self.weight))
+        error = self.judges.mean(squares)
         return Judged(candidate, squares, error, self._cost(candidate))
 
     def _variance(self):
         """Squared error of the mean on the rows that judge."""
         squares = [
-            np.sum((rest.y - np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)) ** 2, axis=1)
+            np.sum(
+                (rest.y - np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)) ** 2,
+                axis=1,
+            )
             for fold, rest in zip(self.folds, self.rest, strict=True)
         ]
-        return float(np.average(np.concatenate(squares), weights=self.weight))
+        return self.judges.mean(np.concatenate(squares))
 
     def _cost(self, candidate: Candidate):
-        plan, n_rules = self.plan, candidate.n_rules
-        conditions = candidate.n_terms(self.trials.scattered_inputs) if candidate.n_clusters else n_rules * sum(count > 1 for count in candidate.counts)
-        return reading_cost([conditions], [n_rules * plan.n_basis - 1], self.trials.rows.y.shape[1])
+        antecedent = self.trials.begun(candidate).problem.antecedent
+        return reading_cost(antecedent, self.plan.n_basis - 1, self.trials.rows.y.shape[1])
 
     def _report(self, found):
         """Every candidate in words and numbers, best first."""

@@ -17,6 +17,7 @@ from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..model import TSKModel
+from ..reading_cost import reading_cost
 from .choice import tolerated
 from .sample import effective_weight, search_sample
 from .tuning import (
@@ -117,7 +118,23 @@ def tuned_start(
         settled(best.displacement),
         is_free,
         best.agreement_is_raised,
+        [_as_given(best)],
     )
+
+
+def _as_given(tuned: Tuned):
+    """What there is to say of rules that were given."""
+    problem = tuned.problem
+    n_rules, counts = problem.antecedent.n_rules, problem.antecedent.grid_counts
+    return {
+        "structure": f"{n_rules} rules as given",
+        "kind": "scattered" if counts is None else "grid",
+        "rules": n_rules,
+        "n_mfs": None,
+        "reading_cost": reading_cost(problem.antecedent, problem.n_basis - 1, problem.n_outputs),
+        "expected_error": float(np.sqrt(tuned.expected_error)),
+        "chosen": True,
+    }
 
 
 def check_inputs(model: TSKModel, names, what):

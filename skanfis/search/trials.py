@@ -27,7 +27,7 @@ from .sample import effective_weight, unit_scale
 from .tuning import FIRST_STEPS, Tuned, tune
 
 # Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_EACH, FEWEST_ROWS = 40, 1000
+_ROWS_EACH, _FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
 # Of one training.
@@ -93,7 +93,9 @@ class Trials:
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
-        self.scattered_inputs = plan.inputs[asked if asked.any() else scores == scores.max(initial=0)]
+        self.scattered_inputs = plan.inputs[
+            asked if asked.any() else scores == scores.max(initial=0)
+        ]
 
     def _scores(self, candidate):
         counts = [candidate.counts[j] + 1 for j in self.plan.inputs]
@@ -101,8 +103,10 @@ class Trials:
 
     def rows_for(self, candidate):
         """As many as its parameters need; powers of two, for few sets of rows serve them all."""
-        needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
-        n_rows = min(FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS))), self.rows.n_rows)
+        needed = max(_ROWS_EACH * self.n_parameters(candidate), _FEWEST_ROWS)
+        n_rows = min(
+            _FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / _FEWEST_ROWS))), self.rows.n_rows
+        )
         if n_rows not in self._parts:
             part = self.rows.part(slice(n_rows))
             self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
@@ -141,7 +145,8 @@ class Trials:
 
     def _is_small(self, candidate):
         most = self.plan.most_rules or np.inf
-        if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows: return False
+        if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows:
+            return False
         return self.operations(candidate) <= _MOST_OPERATIONS
 
     def operations(self, candidate):
@@ -170,9 +175,7 @@ class Trials:
         What the parameters cost, k / n of the noise's variance, falls as the rows rise.
         """
         n_effective = tuned.posterior.n_effective
-        return (1.0 + n_effective / self.plan.n_all) / (
-            1.0 + n_effective / tuned.posterior.n_rows
-        )
+        return (1.0 + n_effective / self.plan.n_all) / (1.0 + n_effective / tuned.posterior.n_rows)
 
     def _train(self, candidate, first, turns=None, first_steps=FIRST_STEPS, begun=None):
         turns = _TURNS if turns is None else turns
@@ -193,7 +196,7 @@ class Trials:
         return tune(problem, premise, plan.free, weight, turns, first_steps, begun=begun)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData):
-        """Of every row of some that were not trained on, as predict answers, summed over outputs."""
+        """Of rows that were not trained on, as predict answers; summed over outputs."""
         seen, evaluation = tuned.problem.rows, tuned.evaluation
         n_inputs, low, high = seen.X.shape[1], seen.y.min(axis=0), seen.y.max(axis=0)
         model = TSKModel(

@@ -270,9 +270,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
 
 def _with_penalty(tuned: Tuned, penalty: Penalty) -> Tuned:
     """The same with the consequents of another penalty; no pass over the rows but for its error."""
-    return replace(
-        tuned, problem=tuned.problem.with_penalty(penalty)
-    )
+    return replace(tuned, problem=tuned.problem.with_penalty(penalty))
 
 
 def _most_agreement(tuned: Tuned, most: float) -> float:

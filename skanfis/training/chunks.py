@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..blocks import fitting_rows, row_blocks
-from ..consequent import LocalBasis, basis
+from ..consequent import LocalBasis, basis, in_user_units
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
 from ..learning.firing import FIRES, inverse_factor
@@ -25,7 +25,6 @@ from ..policies import TargetRange
 from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
 from ..support import RuleSupport
 from .chunk_checks import check_distance
-from .freezing import in_user_units
 from .pruning import RuleStatistics, redundant_rules
 
 # The weights of the penalty that are found where premises stay.
