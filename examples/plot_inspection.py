@@ -48,7 +48,7 @@ print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X))
 # The weightiest first, to three digits. Consequents are told by the distance from round numbers
 # near the mean, so that their constants are values which the rules take there.
 
-print(export_text(model, precision=3, max_rules=4, output_names=["error"]))
+print(export_text(model, precision=3, max_shown=4, output_names=["error"]))
 
 # %%
 # As a table

@@ -73,7 +73,7 @@ for name, candidate in {"ridge": ridge, "boosted trees": boosting, "ANFIS": mode
 
 X_train, X_test, y_train, y_test = train_test_split(X, y, test_size=0.2, random_state=0)
 model.fit(X_train, y_train)
-print(export_text(model, precision=3, max_rules=4, show_terms=False))
+print(export_text(model, precision=3, max_shown=4, show_terms=False))
 
 # %%
 # Which inputs bend, and where? Terms before training are dashed, the data grey.

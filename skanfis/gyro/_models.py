@@ -50,9 +50,9 @@ def fit_model(X, target, groups, recipe):
 
 def _make_rules(recipe, terms):
     """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
-    structure: dict[str, Any] = {"partition": "grid"}
+    structure: dict[str, Any] = {"partition": "grid", "simplicity": 0.0}
     if isinstance(terms, tuple):
-        structure = {"n_mfs": list(terms)}
+        structure = {"n_mfs": list(terms), "simplicity": 0.0}
     return make_pipeline(
         StandardScaler(), ANFISRegressor(**structure, out_of_bounds=recipe.outside)
     )

@@ -54,13 +54,13 @@ def premise_texts(frame):
     ]
 
 
-def weightiest(frame, max_rules):
+def weightiest(frame, max_shown):
     """The rules to show, the weightiest first."""
-    if max_rules is not None:
-        check_count("max_rules", max_rules, 1)
+    if max_shown is not None:
+        check_count("max_shown", max_shown, 1)
     # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
     weight = np.round(frame["data", "weight"].to_numpy(), 9)
-    return frame.iloc[np.argsort(-weight, kind="stable")][:max_rules]
+    return frame.iloc[np.argsort(-weight, kind="stable")][:max_shown]
 
 
 def rule_values(model, rows):

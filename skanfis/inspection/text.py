@@ -31,7 +31,7 @@ def export_text(
     *,
     precision: int = 4,
     about: str = "mean",
-    max_rules: int | None = None,
+    max_shown: int | None = None,
     show_terms: bool = True,
     feature_names: Sequence[str] | None = None,
     output_names: Sequence[str] | None = None,
@@ -49,7 +49,7 @@ def export_text(
     about : {"mean", "origin"}, default="mean"
         Consequents by the inputs' distances from a round number near their mean, ``1.2 + 0.3 *
         (temperature - 290)``, or in the textbook form, ``-85.8 + 0.3 * temperature``.
-    max_rules : int, default=None
+    max_shown : int, default=None
         Most rules to write, the weightiest first; None for all.
     show_terms : bool, default=True
         Whether to write the terms' parameters, the ranges, the policy outside them, and the noise.
@@ -97,7 +97,7 @@ def export_text(
     warn_of_findings(estimator, model)
     reference = rounded_reference(model) if about == "mean" else 0.0 * model.reference
     frame = rules_frame(model, reference)
-    chosen = weightiest(frame, max_rules)
+    chosen = weightiest(frame, max_shown)
     consequents = _consequent_texts(model, frame, reference, precision)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
     for r, premise in zip(chosen.index, premise_texts(chosen), strict=True):
@@ -115,14 +115,14 @@ def export_text(
     return "\n\n".join(parts)
 
 
-def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> str:
+def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> str:
     """Write the rules as HTML, the weightiest first.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
-    max_rules : int, default=10
+    max_shown : int, default=10
         Most rules to show; a last line says what was left out.
     precision : int, default=4
         Significant digits of the numbers, from 1 to 17.
@@ -149,7 +149,7 @@ def rules_html(estimator: Any, *, max_rules: int = 10, precision: int = 4) -> st
     model = writable(fold(estimator))
     reference = rounded_reference(model)
     frame = rules_frame(model, reference)
-    chosen = weightiest(frame, max_rules)
+    chosen = weightiest(frame, max_shown)
     consequents = _consequent_texts(model, frame, reference, precision)
     cells: dict = {}
     if has_training_data(model):

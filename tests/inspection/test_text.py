@@ -98,7 +98,7 @@ def test_every_rule_is_told_once_the_weightiest_first(model):
 
 def test_rules_that_matter_and_a_line_for_the_rest():
     weights = A_GRID.rule_weights
-    text = export_text(A_GRID, max_rules=3)
+    text = export_text(A_GRID, max_shown=3)
     strongest = np.argsort(-weights)[:3]
     assert [label for label, _, _ in rules_read(text)] == list(strongest)
     left = 100 * (1 - weights[strongest].sum())
@@ -149,7 +149,7 @@ def test_a_slope_that_moves_no_digit_is_left_out():
     [
         ({"precision": 0}, ValueError, "precision=0 must be a whole number from 1 to 17"),
         ({"about": "here"}, ValueError, "about='here' must be one of 'mean', 'origin'"),
-        ({"max_rules": 0}, ValueError, "max_rules=0 must be a whole number of 1 or more"),
+        ({"max_shown": 0}, ValueError, "max_shown=0 must be a whole number of 1 or more"),
         ({"feature_names": ["a"]}, ValueError, "must be 3 names, all different"),
         ({"feature_names": "abc"}, TypeError, "feature_names must be a sequence of str"),
         (
@@ -168,7 +168,7 @@ def test_parameters_are_checked(settings, error, message):
 def test_a_model_without_data_has_no_weights_to_tell():
     # As read from a .fis file.
     model = replace(A_GRID, rule_weights=np.full(12, 1 / 12), rule_rows=np.zeros(12))
-    text = export_text(model, max_rules=2)
+    text = export_text(model, max_shown=2)
     assert "\nRule 0:\n  IF" in text
     assert "\n10 rules left out.\n" in text
 
@@ -199,7 +199,7 @@ class Page(HTMLParser):
 
 @ALL
 def test_there_is_a_line_per_rule(model):
-    page = Page(rules_html(model, max_rules=100))
+    page = Page(rules_html(model, max_shown=100))
     assert "".join(page.texts).count("(no row)") == np.sum(model.rule_rows < 0.5)
     assert page.count("tr") == 2 + model.n_rules
     terms = model.antecedent.rule_terms
