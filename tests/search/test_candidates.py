@@ -1,15 +1,16 @@
 """Kinds of rule bases as sequences, and which input the residual of a model asks terms for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.cluster import KMeans
+from numpy.testing import assert_allclose
 
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, clustered_antecedent, grid_antecedent, tuning
+from skanfis.search import Spacing, grid_antecedent, tuning
 from skanfis.search.candidates import Candidate, RuleBases, term_scores
 from skanfis.search.sample import search_sample
 
@@ -56,19 +57,33 @@ class TestCandidate:
 
 
 def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
-    rows = sample_of(rng.normal(size=(90, 3)), rng.normal(size=90), rng.uniform(0.5, 2.0, 90))
-    asked, families = np.array([0, 2]), [Gaussian] * 3
-    bases = RuleBases(families, asked, Spacing(rows), 7)
-    found = bases.of(Candidate((1, 1, 1), 4), rows)
-    fitted = KMeans(4, n_init=1, random_state=7)
-
-    def label(table, weight):
-        assert table.shape == (90, 3)  # two inputs and the target
-        return fitted.fit(table, sample_weight=weight).labels_
-
-    expected = clustered_antecedent(families, rows, label, asked)
-    assert_array_equal(found.parameters, expected.parameters)
-    assert {int(j) for group in found.groups for j in group.inputs} == {0, 2}
+    """Of two inputs and the target; whatever the order of the columns."""
+    clump = np.repeat([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]], 30, axis=0)
+    asked = clump + rng.normal(size=(90, 2))
+    X = np.column_stack([asked[:, 0], 9.0 * rng.normal(size=90), asked[:, 1]])
+    rows = sample_of(X, clump.sum(axis=1), rng.uniform(0.5, 2.0, 90))
+    turned = replace(rows, X=rows.X[:, ::-1])
+    found = [
+        RuleBases([Gaussian] * 3, np.array([0, 2]), Spacing(own), 7).of(
+            Candidate((1, 1, 1), 3), own
+        )
+        for own in (rows, turned)
+    ]
+    labels = rows.X[:, [0, 2]] > 0.5
+    centers = []
+    for antecedent, inputs in zip(found, ([0, 2], [2, 0]), strict=True):
+        (group,) = antecedent.groups
+        own = [group.theta[0, group.inputs == j] for j in inputs]
+        centers.append(np.column_stack(own))
+    assert_allclose(centers[0], centers[1])
+    expected = [
+        np.average(
+            rows.X[:, [0, 2]], axis=0, weights=rows.sample_weight * (labels == one).all(axis=1)
+        )
+        for one in ([False, False], [True, False], [False, True])
+    ]
+    order = np.lexsort(centers[0].T), np.lexsort(np.transpose(expected))
+    assert_allclose(centers[0][order[0]], np.array(expected)[order[1]])
 
 
 class TestTermScores:
