@@ -98,7 +98,8 @@ class Trials:
         ]
 
     def _scores(self, candidate):
-        counts = [candidate.counts[j] + 1 for j in self.plan.inputs]
+        # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
+        counts = [candidate.counts[j] + 2 for j in self.plan.inputs]
         return term_scores(self.begun(candidate), self.plan.inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
