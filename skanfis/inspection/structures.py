@@ -1,4 +1,4 @@
-"""A picture of what a search compared: the error of every candidate against what it costs to read."""
+"""A picture of what a search compared: error of every candidate against what it costs to read."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ class StructureDisplay:
         ax : matplotlib Axes, default=None
             None makes a figure.
         """
-        last = estimator if isinstance(estimator, TSKModel) else last_step(estimator)
+        last: Any = estimator if isinstance(estimator, TSKModel) else last_step(estimator)
         every = getattr(last, "structures_", [])
         structures = [one for one in every if np.isfinite(one["expected_error"])]
         if not structures:
