@@ -56,15 +56,19 @@ class Candidate:
             return f"{self.n_clusters} scattered rules"
         return f"grid {list(self.counts)}"
 
-    def with_one_more_term(self, j):
-        """The grid with one more term on an input."""
+    def with_more_terms(self, inputs):
+        """The grid with one more term on each of some inputs."""
         counts = list(self.counts)
-        counts[j] += 1
+        for j in inputs:
+            counts[j] += 1
         return replace(self, counts=tuple(counts))
 
-    def with_more_clusters(self):
-        """Half as many scattered rules again, two at least."""
-        return replace(self, n_clusters=max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters))))
+    def with_more_clusters(self, n_steps):
+        """Half as many scattered rules again, two at least, so many times."""
+        number = self.n_clusters
+        for _ in range(n_steps):
+            number = max(2, int(np.ceil(_MORE_CLUSTERS * number)))
+        return replace(self, n_clusters=number)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,8 @@
 
 Every kind is a sequence from small to large (``candidates``). It is grown on all rows and, beside,
 anew without those that judge it (``judging``), all in step, while the error expected of new rows
-falls and a few sizes further: a product of two inputs needs terms on both before any helps.
+falls. Where a step gains nothing, two at once are tried: a product of two inputs needs terms on
+both before any helps.
 """
 
 from collections.abc import Sequence
@@ -17,8 +18,8 @@ from .judging import dealt_rows, splits
 from .start import Start, started
 from .trials import Plan, Trials
 
-# Sizes without a gain after which a sequence ends.
-_FURTHER = 2
+# Where one step from the best gains nothing, two at once may; then the sequence ends.
+_MOST_STEPS = 2
 
 
 class StructureSearch:
@@ -57,21 +58,20 @@ class StructureSearch:
 
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large."""
-        now, best, in_folds = one_rule, one_rule, [self.trials.one_rule] * len(self.folds)
-        n_further = 0
-        while n_further < _FURTHER:
-            larger = self.trials.larger(kind, now.candidate)
-            if larger is None:
+        best, in_folds, n_steps = one_rule, [self.trials.one_rule] * len(self.folds), 1
+        while n_steps <= _MOST_STEPS:
+            larger = self.trials.larger(kind, best.candidate, n_steps)
+            grown = [
+                larger if fold is self.trials else fold.larger(kind, one, n_steps)
+                for fold, one in zip(self.folds, in_folds, strict=True)
+            ]
+            if larger is None or None in grown:
                 return
-            for k, fold in enumerate(self.folds):
-                one = larger if fold is self.trials else fold.larger(kind, in_folds[k])
-                if one is None:
-                    return
-                in_folds[k] = one
-            now = self._judge(larger, in_folds)
+            now = self._judge(larger, grown)
             self.judged.append(now)
-            n_further = 0 if self.judges.prefer(now, best) else n_further + 1
-            best = now if n_further == 0 else best
+            n_steps += 1
+            if self.judges.prefer(now, best):
+                best, in_folds, n_steps = now, grown, 1
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""

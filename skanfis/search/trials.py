@@ -10,6 +10,7 @@ A candidate sees as many rows as its parameters need, and not more.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -113,13 +114,14 @@ class Trials:
             self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
         return self._parts[n_rows]
 
-    def larger(self, kind, candidate) -> Candidate | None:
-        """The next of a kind; None where there are not the rows for one."""
+    def larger(self, kind, candidate, n_steps) -> Candidate | None:
+        """The next of a kind, or the one so many steps on; None where there are not the rows."""
         if kind == "scattered":
-            more = candidate.with_more_clusters()
-            grown = [more] if self.scattered_inputs.size and self._is_small(more) else []
+            grown = [candidate.with_more_clusters(n_steps)] if self.scattered_inputs.size else []
         else:
-            grown = self._grown_grids(candidate)
+            tried = combinations_with_replacement(self._asking(candidate), n_steps)
+            grown = [candidate.with_more_terms(inputs) for inputs in tried]
+        grown = [one for one in grown if self._is_small(one)]
         # Weights go on from those of the smaller one.
         first = self.begun(candidate).penalty
         promising = [(one, self._train(one, first, 0, _STEPS_TO_PROMISE)) for one in grown]
@@ -130,14 +132,9 @@ class Trials:
         self._begun[best] = begun
         return best
 
-    def _grown_grids(self, candidate):
-        inputs = self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")]
-        larger = (
-            candidate.with_one_more_term(j)
-            for j in inputs
-            if candidate.counts[j] < self.spacing.n_values(j)
-        )
-        return [one for one in larger if self._is_small(one)][:_TRIED]
+    def _asking(self, candidate):
+        """The inputs of whose terms the residual says most."""
+        return self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]]
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
@@ -147,6 +144,8 @@ class Trials:
     def _is_small(self, candidate):
         most = self.plan.most_rules or np.inf
         if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows:
+            return False
+        if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
             return False
         return self.operations(candidate) <= _MOST_OPERATIONS
 
