@@ -92,10 +92,13 @@ class RuleBases:
     spacing: Spacing
     seed: int
 
-    def of(self, candidate: Candidate, rows: StandardisedData):
-        """The antecedent of a candidate; clusters are sought in the rows."""
+    def of(self, candidate: Candidate, rows: StandardisedData, smaller=None):
+        """The antecedent of a candidate.
+
+        Clusters are sought in the rows; a grid keeps the terms that a ``smaller`` one has learnt.
+        """
         if not candidate.n_clusters:
-            return grid_antecedent(self.families, candidate.counts, self.spacing)
+            return grid_antecedent(self.families, candidate.counts, self.spacing, known=smaller)
         clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=self.seed)
 
         def label(table, weight):

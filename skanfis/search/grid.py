@@ -77,15 +77,20 @@ def _levels(column, weight):
     return values, levels / max(levels[-1], np.finfo(float).tiny)
 
 
-def grid_antecedent(families, counts, spacing: Spacing, overlap=OVERLAP):
+def grid_antecedent(families, counts, spacing: Spacing, overlap=OVERLAP, known=None):
     """Terms by a :class:`Spacing`, of which neighbours cross at about membership ``overlap``.
 
     Inputs with a count of one have no terms: they take part in the consequents alone. ``families``
-    and ``counts`` have one entry per input.
+    and ``counts`` have one entry per input. Where a ``known`` rule base has as many terms on an
+    input, it has these.
     """
+    terms = {} if known is None else _terms(known)
     inputs = [j for j, count in enumerate(counts) if count > 1]
     thetas = []
     for j in inputs:
+        if j in terms and terms[j].shape[1] == counts[j]:
+            thetas.append(terms[j])
+            continue
         centers = spacing.centers(j, counts[j])
         thetas.append(families[j].start(centers, _distance(np.diff(centers)), overlap))
     return GridAntecedent.build([families[j] for j in inputs], inputs, thetas)
@@ -95,3 +100,12 @@ def _distance(gaps):
     """Of every term to its neighbours: mostly to the farther one, so that no gap is left open."""
     sides = np.append(gaps, gaps[-1]), np.append(gaps[0], gaps)
     return np.maximum(*sides) ** (1.0 - _NEARER) * np.minimum(*sides) ** _NEARER
+
+
+def _terms(antecedent):
+    """Parameters of the terms of every input that has some."""
+    return {
+        int(j): group.theta[:, group.inputs == j]
+        for group in antecedent.groups
+        for j in np.unique(group.inputs)
+    }

@@ -37,6 +37,8 @@ _MOST_OPERATIONS = 1e9
 _TURNS = 2
 # Of the inputs of which the residual says most, so many are tried.
 _TRIED = 4
+# And of these, so many trained.
+_TRAINED = 3
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
@@ -90,7 +92,7 @@ class Trials:
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self.scattered_inputs = plan.inputs
-        self._begun[self.one_rule] = self._train(self.one_rule, plan.first)
+        self._begun[self.one_rule] = self._train(self.one_rule)
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
@@ -101,7 +103,7 @@ class Trials:
     def _scores(self, candidate):
         # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
         counts = [candidate.counts[j] + 2 for j in self.plan.inputs]
-        return term_scores(self.begun(candidate), self.plan.inputs, counts, self.spacing)
+        return term_scores(self.tuned(candidate), self.plan.inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
         """As many as its parameters need; powers of two, for few sets of rows serve them all."""
@@ -123,14 +125,15 @@ class Trials:
             grown = [candidate.with_more_terms(inputs) for inputs in tried]
         grown = [one for one in grown if self._is_small(one)]
         # Weights go on from those of the smaller one.
-        first = self.begun(candidate).penalty
-        promising = [(one, self._train(one, first, 0, _STEPS_TO_PROMISE)) for one in grown]
+        smaller = self.tuned(candidate)
+        promising = [(one, self._train(one, smaller, 0, _STEPS_TO_PROMISE)) for one in grown]
         if not promising:
             return None
+        promising.sort(key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
+        leading = promising[:_TRAINED]
+        self._begun.update(leading)
         # Of columns that are alike, rounding is not to choose.
-        best, begun = min(promising, key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
-        self._begun[best] = begun
-        return best
+        return min(leading, key=lambda pair: float(f"{self.expected(self.tuned(pair[0])):.6g}"))[0]
 
     def _asking(self, candidate):
         """The inputs of whose terms the residual says most."""
@@ -162,7 +165,7 @@ class Trials:
         """The end of a candidate's training."""
         if candidate not in self._found:
             begun = self._begun[candidate]
-            self._found[candidate] = self._train(candidate, begun.penalty, begun=begun)
+            self._found[candidate] = self._train(candidate, begun=begun)
         return self._found[candidate]
 
     def expected(self, tuned: Tuned) -> float:
@@ -177,16 +180,16 @@ class Trials:
         n_effective = tuned.posterior.n_effective
         return (1.0 + n_effective / self.plan.n_all) / (1.0 + n_effective / tuned.posterior.n_rows)
 
-    def _train(self, candidate, first, turns=None, first_steps=FIRST_STEPS, begun=None):
+    def _train(self, candidate, smaller=None, turns=None, first_steps=FIRST_STEPS, begun=None):
         turns = _TURNS if turns is None else turns
         plan, rows = self.plan, self.rows_for(candidate)
         if begun is None:
             bases = RuleBases(plan.families, self.scattered_inputs, self.spacing, plan.seed)
             problem = SeparableProblem(
                 rows,
-                bases.of(candidate, rows),
+                bases.of(candidate, rows, smaller and smaller.evaluation.antecedent),
                 plan.order,
-                first,
+                smaller.penalty if smaller else plan.first,
                 consequent_inputs=plan.consequent_inputs,
             )
         else:
