@@ -159,6 +159,13 @@ def test_too_few_rows_for_anything_but_a_line(rng):
     assert_allclose(model.predict([[0.5], [2.5]]), [2.0, 6.0], rtol=1e-2)
 
 
+@pytest.mark.parametrize("n_rows", [2, 3, 40])
+def test_a_target_that_is_constant_or_exactly_a_line_is_a_rule(rng, n_rows):
+    X = inputs(rng, n_rows, 1)
+    assert_allclose(ANFISRegressor().fit(X, np.full(n_rows, 0.64)).predict(X), 0.64)
+    assert ANFISRegressor().fit(X, 2.0 * X[:, 0]).n_rules_ == 1
+
+
 @pytest.mark.floors
 def test_noise_free_data_get_next_to_no_penalty():
     X, y = make_jang_three_input()
