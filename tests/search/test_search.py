@@ -271,6 +271,17 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
 
+def test_weights_that_are_given_stay_as_they_are(rng):
+    X = inputs(rng, 100)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
+    model = ANFISRegressor(partition="grid", alpha=3e-5).fit(X, y)
+    assert (model.alpha_, model.slope_alpha_) == (3e-5, 3e-5)
+    given = {"agreement": 1e-3, "solver": VariableProjection(stiffness=0.01)}
+    model = ANFISRegressor(partition="grid", simplicity=0.5, **given).fit(X, y)
+    assert model.n_rules_ > 1
+    assert (model.agreement_, model.stiffness_) == (1e-3, 0.01)
+
+
 # ----------------------------------------------------------------------------- what is said of it
 
 
@@ -300,7 +311,7 @@ def test_expected_error_of_the_linear_model_is_that_of_its_folds(rng, n_groups):
 
 @pytest.mark.parametrize("partition", ["auto", "grid", "scattered"])
 def test_candidates_are_listed_from_the_best(rng, partition):
-    model = ANFISRegressor(partition=partition).fit(*bumps(rng))
+    model = ANFISRegressor(partition=partition).fit(*bumps(rng, 60))
     found = model.structures_
     assert [one["expected_error"] for one in found] == sorted(o["expected_error"] for o in found)
     kinds = {"grid", "scattered"} if partition == "auto" else {partition}
@@ -336,7 +347,7 @@ def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
 
 @pytest.mark.parametrize("partition", ["auto", "grid", "scattered"])
 def test_no_candidate_has_more_rules_than_max_rules(rng, partition):
-    X, y = bumps(rng)
+    X, y = bumps(rng, 60)
     free = ANFISRegressor(partition=partition, simplicity=0.0).fit(X, y)
     assert max(one["rules"] for one in free.structures_) > 3
     bound = ANFISRegressor(partition=partition, simplicity=0.0, max_rules=3).fit(X, y)
