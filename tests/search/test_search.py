@@ -347,7 +347,7 @@ def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
 
 @pytest.mark.parametrize("partition", ["auto", "grid", "scattered"])
 def test_no_candidate_has_more_rules_than_max_rules(rng, partition):
-    X, y = bumps(rng, 60)
+    X, y = bumps(rng)
     free = ANFISRegressor(partition=partition, simplicity=0.0).fit(X, y)
     assert max(one["rules"] for one in free.structures_) > 3
     bound = ANFISRegressor(partition=partition, simplicity=0.0, max_rules=3).fit(X, y)
