@@ -35,7 +35,7 @@ _MOST_OPERATIONS = 1e9
 # Turns of weights and premises of a candidate.
 _TURNS = 2
 # Of the inputs of which the residual says most, so many are tried.
-_TRIED = 8
+_TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
