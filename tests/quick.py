@@ -4,7 +4,7 @@ from sklearn.base import clone
 
 from skanfis import ANFISRegressor
 from skanfis.learning import SOLVERS
-from skanfis.search import search
+from skanfis.search import search, trials
 
 STIFFNESS = 1e-3
 
@@ -28,5 +28,5 @@ def of_given_stiffness(solver):
 
 def with_few_candidates(patch):
     """Let the search for a structure go all of its ways, but not as often."""
-    patch.setattr(search, "_RULE_NUMBERS", (2,))
-    patch.setattr(search, "_MOST_TRAINED", 1)
+    patch.setattr(search, "_FURTHER", 1)
+    patch.setattr(trials, "_TRIED", 1)

@@ -28,6 +28,7 @@ LAYERS = {
     "options": SKLEARN,
     "membership": NUMERIC,
     "antecedent": NUMERIC,
+    "reading_cost": [],
     "consequent": NUMERIC,
     "naming": NUMERIC,
     "support": NUMERIC,

@@ -8,14 +8,15 @@ import pytest
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
+from skanfis.cluster import FuzzyCMeans
 from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 
 SETTINGS = {
     # Grids, and clusters by k-means.
     "default": {},
     "grid of a given size": {"n_mfs": [2, 3, 1]},
-    "subtractive": {"partition": "subtractive"},
-    "fcm": {"partition": "fcm"},
+    "scattered": {"partition": "scattered"},
+    "fuzzy clusters": {"partition": FuzzyCMeans(3, random_state=0)},
     "clusterer": {"partition": KMeans(4, random_state=0)},
     "hybrid": {"n_mfs": 2, "solver": Hybrid(tol=1e-2), "max_iter": 5},
     "gradient": {"n_mfs": 2, "solver": GradientDescent(tol=1e-2), "max_iter": 5},

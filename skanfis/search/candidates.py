@@ -102,8 +102,10 @@ class RuleBases:
         clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=self.seed)
 
         def label(table, weight):
-            # It begins at some of the rows: the order of columns is to have no part in which.
-            order = np.lexsort(np.round(np.sort(table, axis=1), _DIGITS).T)
+            # It begins at some of the rows: the order of columns is to have no part in which, and
+            # rounding none in what is near to two centres.
+            table = np.round(table, _DIGITS)
+            order = np.lexsort(np.sort(table, axis=1).T)
             labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
             return labels[np.argsort(order)]
 
@@ -127,7 +129,8 @@ def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
     residual = np.concatenate(found, axis=1).T
     residual -= np.average(residual, axis=0, weights=weight)
     variance = np.average(residual**2, axis=0, weights=weight)
-    basis = np.column_stack([np.ones(rows.n_rows), rows.X])
+    varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
+    basis = np.column_stack([np.ones(rows.n_rows), varying])
     scores = np.zeros(inputs.size)
     for k, (j, count) in enumerate(zip(inputs, counts, strict=True)):
         shares = _shares(rows.X[:, j], spacing.centers(j, count))

@@ -53,7 +53,7 @@ class StructureSearch:
         best = best_of(self.judged, self.judges)
         most = tolerated(best.squared_error, self._variance(), self.simplicity)
         found = chosen(self.judged, most)
-        left = most / found.squared_error
+        left = most / found.squared_error if found.squared_error > 0.0 else 1.0
         return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 
     def _grow(self, kind, one_rule):

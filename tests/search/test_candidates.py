@@ -119,6 +119,10 @@ class TestTermScores:
             expected.append((total * (count - 1) / count - n_free) / np.sqrt(2 * n_free))
         every = np.arange(4)
         assert_allclose(term_scores(tuned, every, [count] * 4, spacing), expected, rtol=1e-6)
+        # A column that never changes has no part in it.
+        wide = sample_of(np.column_stack([X, np.ones(150)]), y, np.ceil(np.exp(X.sum(axis=1))))
+        found = term_scores(line_through(wide), every, [count] * 4, Spacing(wide))
+        assert_allclose(found, expected, rtol=1e-6)
 
     @pytest.mark.parametrize("count", [2, 3])
     def test_of_noise_they_are_of_mean_zero_and_deviation_one(self, rng, count):

@@ -1,5 +1,6 @@
 """Structure by itself: what the search finds, what it says of it, and that nothing else matters."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -158,6 +159,13 @@ def test_too_few_rows_for_anything_but_a_line(rng):
     assert_allclose(model.predict([[0.5], [2.5]]), [2.0, 6.0], rtol=1e-2)
 
 
+@pytest.mark.parametrize("n_rows", [2, 3, 40])
+def test_a_target_that_is_constant_or_exactly_a_line_is_a_rule(rng, n_rows):
+    X = inputs(rng, n_rows, 1)
+    assert_allclose(ANFISRegressor().fit(X, np.full(n_rows, 0.64)).predict(X), 0.64)
+    assert ANFISRegressor().fit(X, 2.0 * X[:, 0]).n_rules_ == 1
+
+
 @pytest.mark.floors
 def test_noise_free_data_get_next_to_no_penalty():
     X, y = make_jang_three_input()
@@ -263,10 +271,21 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
 
+def test_weights_that_are_given_stay_as_they_are(rng):
+    X = inputs(rng, 100)
+    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
+    model = ANFISRegressor(partition="grid", alpha=3e-5).fit(X, y)
+    assert (model.alpha_, model.slope_alpha_) == (3e-5, 3e-5)
+    given = {"agreement": 1e-3, "solver": VariableProjection(stiffness=0.01)}
+    model = ANFISRegressor(partition="grid", simplicity=0.5, **given).fit(X, y)
+    assert model.n_rules_ > 1
+    assert (model.agreement_, model.stiffness_) == (1e-3, 0.01)
+
+
 # ----------------------------------------------------------------------------- what is said of it
 
 
-def bumps(rng, n_rows=150):
+def bumps(rng, n_rows=100):
     X = inputs(rng, n_rows)
     return X, np.sin(3.0 * X[:, 0]) + X[:, 1] * X[:, 2] + 0.1 * rng.standard_normal(n_rows)
 
@@ -292,7 +311,7 @@ def test_expected_error_of_the_linear_model_is_that_of_its_folds(rng, n_groups):
 
 @pytest.mark.parametrize("partition", ["auto", "grid", "scattered"])
 def test_candidates_are_listed_from_the_best(rng, partition):
-    model = ANFISRegressor(partition=partition).fit(*bumps(rng))
+    model = ANFISRegressor(partition=partition).fit(*bumps(rng, 60))
     found = model.structures_
     assert [one["expected_error"] for one in found] == sorted(o["expected_error"] for o in found)
     kinds = {"grid", "scattered"} if partition == "auto" else {partition}
@@ -310,12 +329,12 @@ def test_candidates_are_listed_from_the_best(rng, partition):
 
 
 def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
-    X, y = bumps(rng, 400)
-    fitted = {s: ANFISRegressor(simplicity=s).fit(X, y) for s in (0.0, 0.02, 0.05, 0.2, 1.0)}
+    X, y = bumps(rng)
+    fitted = {s: ANFISRegressor(simplicity=s).fit(X, y) for s in (0.0, 0.05, 0.5)}
     told = {s: next(o for o in m.structures_ if o["chosen"]) for s, m in fitted.items()}
     costs = [one["reading_cost"] for one in told.values()]
     assert costs == sorted(costs, reverse=True)
-    assert len(set(costs)) > 2
+    assert len(set(costs)) > 1
     for s, one in told.items():
         squares = one["expected_error"] ** 2
         least = told[0.0]["expected_error"] ** 2
@@ -330,7 +349,7 @@ def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
 def test_no_candidate_has_more_rules_than_max_rules(rng, partition):
     X, y = bumps(rng)
     free = ANFISRegressor(partition=partition, simplicity=0.0).fit(X, y)
-    assert free.n_rules_ > 3
+    assert max(one["rules"] for one in free.structures_) > 3
     bound = ANFISRegressor(partition=partition, simplicity=0.0, max_rules=3).fit(X, y)
     assert 2 <= max(one["rules"] for one in bound.structures_) <= 3
     assert bound.n_rules_ <= 3
@@ -339,38 +358,47 @@ def test_no_candidate_has_more_rules_than_max_rules(rng, partition):
 # ------------------------------------------------------------------------------------ nothing else
 
 FORMS = {
-    "order of rows": lambda X, y: (X[::-1], y[::-1]),
-    "order of columns": lambda X, y: (X[:, [2, 0, 1]], y),
-    "units": lambda X, y: (X * [1e6, -1e-3, 1.0] + [0.0, 1.0, 0.0], 1e-3 * y + 4.0),
-    "a constant column": lambda X, y: (np.column_stack([X, np.full(len(X), 3.0)]), y),
-    "a column twice": lambda X, y: (X[:, [0, 1, 2, 0]], y),
+    "orders": lambda X, y: (X[::-1, [2, 0, 1]], y[::-1]),
+    "units": lambda X, y: (X * [1e6, 1e-3, 1.0] + [0.0, 1.0, 0.0], 1e-3 * y + 4.0),
+    "a constant column": lambda X, y: (np.column_stack([np.full(len(X), 3.0), X]), y),
 }
+
+
+@cache
+def plain_fit(partition):
+    X, y = bumps(np.random.default_rng(0))
+    return X, y, ANFISRegressor(partition=partition, max_rules=6).fit(X, y)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
 @pytest.mark.parametrize("partition", ["grid", "scattered"])
 @pytest.mark.parametrize("form", FORMS)
-def test_the_same_model_whatever_form_the_rows_have(rng, partition, form):
-    X, y = bumps(rng)
+def test_the_same_model_whatever_form_the_rows_have(partition, form):
+    X, y, plain = plain_fit(partition)
     X_other, y_other = FORMS[form](X, y)
-    model = ANFISRegressor(partition=partition)
-    plain, found = (clone(model).fit(*data) for data in ((X, y), (X_other, y_other)))
+    found = clone(plain).fit(X_other, y_other)
     assert [o["rules"] for o in found.structures_] == [o["rules"] for o in plain.structures_]
-    scale = y_other.std() / y.std()
-    predicted = (found.predict(X_other) - y_other.mean()) / scale + y.mean()
-    if form == "order of rows":
-        predicted = predicted[::-1]
-    # What a column says may be said by two: the slopes share it.
-    assert_allclose(predicted, plain.predict(X), atol=(0.1 if "twice" in form else 1e-5) * y.std())
+    predicted = (found.predict(X_other) - y_other.mean()) * y.std() / y_other.std() + y.mean()
+    expected = plain.predict(X)[:: -1 if form == "orders" else 1]
+    assert_allclose(predicted, expected, atol=1e-5 * y.std())
+
+
+@pytest.mark.parametrize("partition", ["grid", "scattered"])
+def test_of_columns_that_are_equal_their_order_says_nothing(partition):
+    X, y, plain = plain_fit(partition)
+    twice = X[:, [0, 0, 1, 2, 2]]
+    found = [
+        clone(plain).fit(columns, y).predict(columns) for columns in (twice, twice[:, ::-1].copy())
+    ]
+    assert_allclose(found[1], found[0], atol=1e-5 * y.std())
 
 
 @pytest.mark.parametrize("partition", ["grid", "scattered"])
 def test_a_weight_is_so_many_repeats(rng, partition):
-    X, y = bumps(rng, 100)
+    X, y, plain = plain_fit(partition)
     times = rng.integers(1, 4, 100)
-    model = ANFISRegressor(partition=partition)
-    weighted = clone(model).fit(X, y, times)
-    repeated = clone(model).fit(X.repeat(times, axis=0), y.repeat(times))
+    weighted = clone(plain).fit(X, y, times)
+    repeated = clone(plain).fit(X.repeat(times, axis=0), y.repeat(times))
     errors = [[o["expected_error"] for o in m.structures_] for m in (weighted, repeated)]
     assert_allclose(errors[1], errors[0], rtol=1e-4)
     assert_allclose(repeated.predict(X), weighted.predict(X), atol=1e-5 * y.std())
