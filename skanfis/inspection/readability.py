@@ -11,13 +11,15 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_finite, positive_weights
 from ..export.folding import fold_with_reader
-from ..learning.penalty import GREATEST_ALONE
 from ..membership import GREATEST_CROSSING, LEAST_TRUTH
 from ..model import TSKModel
 from ..reading_cost import reading_cost
 from .measures import Measures, crossings, distinct_terms, measure
 from .rules import premise_texts, rules_frame, writable
 
+# In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
+# explains three quarters of the variance; beyond, the rule says too little of the model.
+GREATEST_ALONE = 0.5
 # A sentence names so many terms or pairs, and counts the others.
 _MOST_NAMED = 5
 
