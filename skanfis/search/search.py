@@ -61,11 +61,12 @@ class StructureSearch:
         best, in_folds, n_steps = one_rule, [self.trials.one_rule] * len(self.folds), 1
         while n_steps <= _MOST_STEPS:
             larger = self.trials.larger(kind, best.candidate, n_steps)
-            grown = [
+            each = (
                 larger if fold is self.trials else fold.larger(kind, one, n_steps)
                 for fold, one in zip(self.folds, in_folds, strict=True)
-            ]
-            if larger is None or None in grown:
+            )
+            grown = [one for one in each if one is not None]
+            if larger is None or len(grown) < len(self.folds):
                 return
             now = self._judge(larger, grown)
             self.judged.append(now)

@@ -250,21 +250,22 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
     """The same with as much agreement as keeps the squared error within ``left`` of itself.
 
     The consequents alone tell how much that is at least; then the premises follow, which makes room
-    for more.
+    for more, or for less.
     """
     if "agreement" not in free or not tuned.displacement.size or left <= 1.0:
         return tuned
     others = [key for key in free if key != "agreement"]
-    most, best = left * tuned.expected_error, tuned
+    most, best, agreement = left * tuned.expected_error, tuned, 0.0
     for _ in range(_MOST_RAISES):
-        agreement = _most_agreement(best, most)
+        agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
         penalty = replace(best.penalty, agreement=agreement)
         found = _turned(best, premise, penalty, others, n_rows, _ITERATIONS, 0)
-        if not found.expected_error <= most:
-            break
-        best = found
+        if found.expected_error <= most:
+            best, agreement = found, 0.0
+        else:
+            agreement = float(np.sqrt(best.penalty.agreement * agreement))
     return best if best is tuned else replace(best, agreement_is_raised=True)
 
 
