@@ -63,7 +63,7 @@ class Candidate:
             counts[j] += 1
         return replace(self, counts=tuple(counts))
 
-    def with_more_clusters(self, n_steps):
+    def with_more_clusters(self, n_steps=1):
         """Half as many scattered rules again, two at least, so many times."""
         number = self.n_clusters
         for _ in range(n_steps):

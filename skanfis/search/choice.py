@@ -51,8 +51,9 @@ class Judges:
         weight = np.concatenate([rows.sample_weight for rows in parts])
         if any(rows.groups is None for rows in parts):
             return cls(weight, np.arange(weight.size))
-        groups = np.concatenate([rows.groups for rows in parts])
-        return cls(weight, np.unique(groups, return_inverse=True)[1])
+        groups = np.unique(np.concatenate([rows.groups for rows in parts]), return_inverse=True)[1]
+        # A single group says nothing.
+        return cls(weight, groups if groups.any() else np.arange(weight.size))
 
     def mean(self, squares) -> float:
         """Of squared errors."""

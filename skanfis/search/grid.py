@@ -92,6 +92,8 @@ def grid_antecedent(families, counts, spacing: Spacing, overlap=OVERLAP, known=N
             thetas.append(terms[j])
             continue
         centers = spacing.centers(j, counts[j])
+        if j in terms:
+            centers = _with_more(np.sort(terms[j][0]), counts[j])
         thetas.append(families[j].start(centers, _distance(np.diff(centers)), overlap))
     return GridAntecedent.build([families[j] for j in inputs], inputs, thetas)
 
@@ -109,3 +111,11 @@ def _terms(antecedent):
         for group in antecedent.groups
         for j in np.unique(group.inputs)
     }
+
+
+def _with_more(places, count):
+    """So many places: those that there are, and the middles of the widest gaps."""
+    while places.size < count:
+        widest = int(np.argmax(np.diff(places)))
+        places = np.insert(places, widest + 1, 0.5 * (places[widest] + places[widest + 1]))
+    return places

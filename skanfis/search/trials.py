@@ -116,7 +116,7 @@ class Trials:
             self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
         return self._parts[n_rows]
 
-    def larger(self, kind, candidate, n_steps) -> Candidate | None:
+    def larger(self, kind, candidate, n_steps=1) -> Candidate | None:
         """The next of a kind, or the one so many steps on; None where there are not the rows."""
         if kind == "scattered":
             grown = [candidate.with_more_clusters(n_steps)] if self.scattered_inputs.size else []

@@ -115,7 +115,7 @@ class TestSequences:
         found, errors = [trials.one_rule], []
         for _ in range(3):
             found.append(trials.larger("grid", found[-1]))
-            others = [found[-2].with_one_more_term(j) for j in range(4)]
+            others = [found[-2].with_more_terms([j]) for j in range(4)]
             errors = {
                 one.counts: trials.expected(
                     trials._train(one, trials.begun(found[-2]).penalty, 0, 1)
