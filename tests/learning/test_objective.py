@@ -285,27 +285,9 @@ def test_leverage_and_mean_squares_are_those_of_the_dense_design(monkeypatch, na
     part = slice(3, 40)
     half = case.problem.half(evaluation, part)
     assert_allclose(np.sum(half**2, axis=0), np.diag(hat)[part], rtol=1e-8)
-    Z, _, _ = case.rows.read(part)
-    anywhere = case.problem.leverage_at(evaluation, Z, case.rows.total_weight)
-    assert_allclose(anywhere, np.diag(hat)[part], rtol=1e-8)
     squares = (case.dense.y - phi @ evaluation.coefficients) ** 2
     found = case.problem.mean_squares(evaluation)
     assert_allclose(found, case.dense.weight @ squares, rtol=1e-9)
-
-
-@pytest.mark.parametrize("name", ["grid of both", "consequents in one input", "scattered"])
-def test_the_strongest_rule_alone_is_that_of_the_dense_design(name):
-    case = Case.named(name)
-    evaluation = case.problem.evaluate(case.point)
-    Z = np.stack([case.rows.read(slice(k, k + 1))[0][:, 0] for k in range(250)], axis=1)
-    strengths = evaluation.antecedent.strengths(Z)
-    strongest = np.repeat(strengths == strengths.max(axis=0), case.problem.n_basis, axis=0)
-    phi = case.dense.design(case.point)
-    share = np.repeat(strengths, case.problem.n_basis, axis=0).T
-    alone = np.where(strongest.T, phi / share, 0.0) - phi
-    squares = case.dense.weight @ (alone @ evaluation.coefficients) ** 2
-    found = case.problem.strongest_alone(evaluation)
-    assert_allclose(found, np.sqrt(squares.max() / case.dense.weight.sum()), rtol=1e-9)
 
 
 @pytest.mark.parametrize("weighted", [False, True])
