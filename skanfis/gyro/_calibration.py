@@ -117,6 +117,7 @@ class Calibration:
     warnings: list
     glitches: list
     n_rows: int
+    fold_models: list  # those that had not seen the test rows of each fold
 
     @property
     def rules(self):
@@ -180,7 +181,9 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         tell(f"warning: {sentence}")
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
-    predicted, inside, folds, choices = _held_out(X, target, groups, split, recipe, tell, rng)
+    predicted, inside, folds, choices, fold_models = _held_out(
+        X, target, groups, split, recipe, tell, rng
+    )
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows))
@@ -224,13 +227,14 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         warnings=sorted({str(warning.message) for warning in caught}),
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
+        fold_models=fold_models,
     )
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it, which are in range, folds, and choices."""
+    """Predictions of every row by a model new to it, which are in range, folds, choices, models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    folds, choices = [], []
+    folds, choices, models = [], [], []
     for number, (train, test) in enumerate(split.folds, 1):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
         rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
@@ -242,13 +246,14 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
         choices.append(choice)
+        models.append(model)
     if not (inside & np.isfinite(predicted)).any():
         raise LogError(
             f"the compensator could not be checked: every row lies outside the range of the rows "
             f"that the model had seen while its group was held out ({split.kind}). Log groups that "
             "overlap in temperature, rate and time."
         )
-    return predicted, inside, folds, choices
+    return predicted, inside, folds, choices, models
 
 
 def judge(errors, groups):

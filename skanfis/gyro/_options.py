@@ -19,6 +19,10 @@ from ._split import KINDS
 from .compensator import INPUTS
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
+from .targets.autopilots import AXES, INSTANCES
+from .targets.tables import TYPES
+from .targets.write import FILES
+from .targets.write import Request as Targets
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
@@ -103,6 +107,13 @@ def make_parser():
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
+    told = "also write a simple target, where it is good enough: C tables, parameters of autopilots"
+    add("--target", told, choices=tuple(FILES), **several)
+    add("--type", "of the numbers of tables", choices=tuple(TYPES), default="float")
+    add("--axis", "of the autopilot's gyro that this one is", choices=AXES)
+    told = "number of that gyro: 0 to 3 for PX4 (default 0), 1 to 3 for ArduPilot (default 1)"
+    add("--instance", told, type=int)
+    add("--device-id", "of that gyro in PX4, for TC_Gn_ID", type=int)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
@@ -115,6 +126,20 @@ def request_of(options, require):
         return checked_request(Request(columns, units, tuple(require), guess=True))
     except ValueError as error:
         raise UsageError(str(error)) from error
+
+
+def targets_of(options):
+    """What the options ask of simple targets; UsageError where they make no sense."""
+    names, instance = options.target, options.instance
+    check_once("--target", names)
+    pilots = [name for name in names if name in INSTANCES]
+    if pilots and options.axis is None:
+        raise UsageError(f"--target {pilots[0]} needs the axis of its gyro: --axis x, y or z.")
+    for name in pilots:
+        if instance is not None and instance not in INSTANCES[name]:
+            first, *_, last = INSTANCES[name]
+            raise UsageError(f"--instance {instance}: gyros of {name} are {first} to {last}.")
+    return Targets(tuple(names), options.type, options.axis, instance, options.device_id)
 
 
 def _pairs(texts, option):

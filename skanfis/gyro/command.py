@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..export import export_c
 from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
@@ -23,15 +22,17 @@ from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
-from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
+from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of, targets_of
 from ._split import choose_split
-from .c_code import export_c_physics
+from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
 from .log import LogFile, RunFinder, digests_of, find_logs, read
+from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
+INCOMPLETE = 5  # a target was refused; all else is written
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "report.html", "rules.txt")
@@ -47,8 +48,7 @@ def main(arguments=None):
     options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _progress(options.quiet)
     try:
-        (_apply if options.apply else _calibrate)(options, tell)
-        return DONE
+        return (_apply if options.apply else _calibrate)(options, tell)
     except UsageError as error:
         parser.error(printable(error))  # exits
     except LogError as error:
@@ -75,10 +75,16 @@ def _calibrate(options, tell):
         )
         tell("drawing the report")
         _write(calibration, options, reading.digests, written)
+        targets = list(write_targets(calibration, targets_of(options), written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
+    _say(
+        f"{'target' if is_written else 'REFUSED':14} {name}: {told}"
+        for name, told, is_written in targets
+    )
     tell("done, but see the warnings" if calibration.cautions() else "done")
+    return DONE if all(is_written for *_, is_written in targets) else INCOMPLETE
 
 
 def _where_from_and_to(options):
@@ -91,7 +97,8 @@ def _where_from_and_to(options):
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = (*_FILES, *(_C_FILES if options.c else ()))
+    names = [*_FILES, *(_C_FILES if options.c else ())]
+    names += [name for target in targets_of(options).names for name in FILES[target]]
     _refuse_existing([folder / name for name in names], options.force)
     check_installed()
     return folder, paths
@@ -196,12 +203,10 @@ def _write(calibration, options, files, folder):
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export = export_c_physics if calibration.recipe.physics else export_c
-        export(
-            compensator.estimator,
+        export_c_compensator(
+            compensator,
             folder / "compensator",
             std=options.c,
-            min_coverage=compensator.min_coverage,
             saturate=proven_bounds(calibration).found if options.saturate else None,
         )
 
@@ -249,6 +254,7 @@ def _apply(options, tell):
         tell(f"writing {target}")
     _say(_summary_of_rates(target, tallies))
     tell("done")
+    return DONE
 
 
 def _compensated(file, compensator, stem, tell):

@@ -1,0 +1,186 @@
+"""The error that a compensator takes off, with certain ranges of its values and slopes over boxes.
+
+It is a sum of rules, whose ranges are those of ``skanfis.bounds``, of polynomials and the arcsine
+law, by interval arithmetic. Intervals are pairs of arrays, with a number for every box.
+"""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+from sklearn.dummy import DummyRegressor
+from sklearn.preprocessing import PolynomialFeatures
+
+from ...bounds.enclosure import Enclosure
+from ...bounds.terms import EPS, ROUNDINGS, product, size, square
+from ...exceptions import OutOfBoundsWarning
+from ...export.folding import found_by_search
+from ..compose import FrozenRules, ResidualRegressor
+from ..physics import OpenLoopArcsineRegressor
+
+
+class ErrorModel:
+    """The indicated minus the compensated rate [deg/s], as a function of the inputs ``axes``.
+
+    ``uses`` are the inputs that it depends on. ``others`` is a row of all inputs, for those that it
+    does not; ``estimator`` that of the compensator, or of a fold.
+    """
+
+    def __init__(self, compensator, estimator, axes, others):
+        self._compensator, self._estimator = compensator, estimator
+        self._others, self._parts = np.asarray(others, dtype=float), _parts_of(estimator)
+        inputs = list(compensator.inputs)
+        self._output = inputs.index("output") if "output" in inputs else None
+        self._own = 1.0 / compensator.scale_factor if self._output is not None else 0.0
+        used = {column for part in self._parts for column in part.used}
+        used |= {self._output} if compensator.predicts == "rate" else set()
+        self.uses = [inputs[column] for column in sorted(used)]
+        self._places = [inputs.index(name) for name in axes]
+
+    def __call__(self, points):
+        """The error at points (n_points, n_axes)."""
+        X = self._spread(points.T).T
+        indicated = self._own * X[:, self._output or 0]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", OutOfBoundsWarning)
+            table = pd.DataFrame(X, columns=list(self._compensator.inputs))
+            predicted = self._estimator.predict(table)
+        return indicated - self._compensator.compensate(indicated, predicted)
+
+    def ranges(self, low, high):
+        """Range of the error over boxes (n_axes, n_boxes), and of its slopes by axis."""
+        low, high = self._spread(low), self._spread(high)
+        value, slopes = np.zeros((2, low.shape[1])), np.zeros((2, *low.shape))
+        with np.errstate(all="ignore"):
+            for part in self._parts:
+                of_value, of_slopes = part.ranges(low[part.columns], high[part.columns])
+                value += of_value
+                slopes[:, part.columns] += of_slopes
+        if self._compensator.predicts == "rate":
+            indicated = self._own * np.sort([low[self._output], high[self._output]], axis=0)
+            value, slopes = indicated - value[::-1], -slopes[::-1]
+            slopes[:, self._output] += self._own
+        # Rounding, of what has no account of its own.
+        steep, far = np.abs(slopes).max(axis=0), np.maximum(np.abs(low), np.abs(high))
+        slack = ROUNDINGS * EPS * (np.abs(value).max(axis=0) + (steep * far).sum(axis=0))
+        return value + [-slack, slack], slopes[:, self._places]
+
+    def _spread(self, values):
+        """Values of the axes (n_axes, n_boxes) as those of all inputs."""
+        full = np.repeat(self._others[:, None], values.shape[1], axis=1)
+        full[self._places] = values
+        return full
+
+
+def polynomial_ranges(powers, coefficients, low, high):
+    """Range of sum_k c_k prod_j x_j^p_kj over boxes (n_axes, n_boxes), and of its slopes.
+
+    A coefficient is one number, or one for each box.
+    """
+    slopes = []
+    for axis in range(powers.shape[1]):
+        lowered = np.maximum(powers - (np.arange(powers.shape[1]) == axis), 0)
+        steeper = (coefficients.T * powers[:, axis]).T
+        slopes.append(_polynomial_range(lowered, steeper, low, high))
+    return _polynomial_range(powers, coefficients, low, high), np.swapaxes(slopes, 0, 1)
+
+
+def _polynomial_range(powers, coefficients, low, high):
+    total = np.zeros((2, low.shape[1]))
+    for power, coefficient in zip(powers, coefficients, strict=True):
+        term = (coefficient, coefficient)
+        for exponent, *ends in zip(power, low, high, strict=True):
+            for _ in range(exponent):
+                term = product(term, ends)
+        total += np.broadcast_arrays(*term, low[0])[:2]
+    return total
+
+
+def _parts_of(estimator):
+    """What the prediction of an estimator is the sum of."""
+    found = found_by_search(estimator)
+    if isinstance(found, ResidualRegressor):
+        return [*_parts_of(found.base_), *_parts_of(found.residual_)]
+    if isinstance(found, OpenLoopArcsineRegressor):
+        return [_Law(found)]
+    if isinstance(found, DummyRegressor):
+        return [_Polynomial([[0] * found.n_features_in_], found.constant_[0], 0.0, 1.0)]
+    steps = [step for _, step in getattr(found, "steps", ())]
+    if any(isinstance(step, PolynomialFeatures) for step in steps):
+        scaler, features, line = steps
+        powers = np.vstack([0 * features.powers_[:1], features.powers_])
+        values = np.append(line.intercept_, line.coef_)
+        return [_Polynomial(powers, values, scaler.mean_, scaler.scale_)]
+    return [_Rules(FrozenRules.of(found, getattr(found, "n_features_in_", None)))]
+
+
+class _Rules:
+    def __init__(self, rules):
+        self.columns, model = list(rules.positions), rules.model
+        slopes = np.zeros((model.n_rules, model.n_inputs))
+        slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:, 0]
+        matters = {*model.antecedent.term_inputs, *np.flatnonzero(slopes.any(axis=0))}
+        self.used = [self.columns[j] for j in matters]
+        self._sides = [Enclosure(model, 0, sign) for sign in (-1.0, 1.0)]
+
+    def ranges(self, low, high):
+        values, slopes = [], []
+        for side in self._sides:
+            values.append(side.sign * side.values(low, high)[0])
+            each = [side.slope(low, high, j)[0] for j in range(len(low))]
+            slopes.append(side.sign * np.stack(each))
+        return values, slopes
+
+
+class _Polynomial:
+    """In powers of (x - mean) / scale."""
+
+    def __init__(self, powers, coefficients, mean, scale):
+        self._powers, self._coefficients = np.array(powers), np.ravel(coefficients)
+        self.columns = list(range(self._powers.shape[1]))
+        self.used = list(np.flatnonzero(self._powers.any(axis=0)))
+        self._mean, self._scale = np.reshape(mean, (-1, 1)), np.reshape(scale, (-1, 1))
+
+    def ranges(self, low, high):
+        ends = [(side - self._mean) / self._scale for side in (low, high)]
+        value, slopes = polynomial_ranges(self._powers, self._coefficients, *ends)
+        return value, slopes / self._scale
+
+
+class _Law:
+    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
+
+    def __init__(self, law):
+        self._law, self.columns = law, list(law.columns_)
+        self.used = self.columns[: 3 if law.thermometer_lag_ else 2]
+
+    def ranges(self, low, high):
+        law = self._law
+        lag = np.array([[1.0], [law.thermometer_lag_]])[: len(low) - 1]
+        warmer = product((lag, lag), (low[1:], high[1:]))
+        d = [end.sum(axis=0, keepdims=True) - law.reference_temperature_ for end in warmer]
+        of_temperature = [
+            polynomial_ranges(np.arange(each.size)[:, None], each, *d)
+            for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
+        ]
+        (a, (a_slope,)), (k, (k_slope,)), (b, (b_slope,)) = [
+            (value, np.swapaxes(slopes, 0, 1)) for value, slopes in of_temperature
+        ]
+        over_a, over_k = _inverse(a), _inverse(k)
+        sine = product((low[0] - law.offset_, high[0] - law.offset_), over_a)
+        sine = np.where(size(sine) <= np.sin(law.max_phase), sine, np.nan)
+        steep = product(product(over_a, over_k), [1 / np.sqrt(1 - s) for s in square(sine)])
+        phase = np.arcsin(sine)
+        bend = product(product(sine, a_slope), steep)
+        turn = product(phase, product(k_slope, square(over_k)))
+        by_temperature = -(np.array(bend) + turn + b_slope)[::-1]
+        slopes = [[end] for end in steep]
+        if len(lag):
+            along = product((lag, lag), by_temperature[:, None])
+            slopes = np.concatenate([slopes, along], axis=1)
+        return product(phase, over_k) - b[::-1], slopes
+
+
+def _inverse(ends):
+    """Range of 1 / x; unknown where x may be zero."""
+    return [np.where(ends[0] * ends[1] > 0.0, 1.0 / end, np.nan) for end in ends[::-1]]

@@ -1,0 +1,149 @@
+"""Files of simple targets, each with what it is worth; or why there is none."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...export.c.dialect import write_files
+from ..c_code import raw_rate_of, units_of
+from ..metrics import rms
+from .autopilots import INSTANCES, NOTES, Cubic
+from .error_model import ErrorModel
+from .piecewise import difference, spread
+from .tables import KINDS, Table
+
+FILES = {
+    **{kind: (f"{kind}.h", f"{kind}.c") for kind in KINDS},
+    "px4": ("px4.params",),
+    "ardupilot": ("ardupilot.parm",),
+}
+# A target is let through whose error on rows held out is at most so many times the model's.
+_MOST_TIMES = 1.5
+# A table grows until its difference is such a part of the model's error, while that gains enough.
+_PART, _GAIN, _FEWEST_CELLS, _MOST_CELLS = 0.1, 0.8, 4, {1: 128, 2: 32}
+_N_CALIBRATION_TEMPERATURES = 200
+_THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
+
+
+class Request(NamedTuple):
+    """Targets by name, and what the options say of them."""
+
+    names: tuple[str, ...]
+    type_name: str = "float"
+    axis: str | None = None
+    instance: int | None = None
+    device_id: int | None = None
+
+
+class Refused(Exception):
+    """Why a target is not written."""
+
+
+def write_targets(calibration, request, folder):
+    """Write what is asked for to a folder; yields names, sentences, and whether it is written."""
+    for name in request.names:
+        try:
+            yield name, _write(calibration, request, name, folder), True
+        except Refused as reason:
+            yield name, str(reason), False
+
+
+def _write(calibration, request, name, folder):
+    axes = KINDS[name][1] if name in KINDS else ("temperature",)
+    compensator, X = calibration.compensator, calibration.X
+    if missing := [axis for axis in axes if axis not in X]:
+        raise Refused(f"the model does not take the {missing[0]}: --target table has all it says.")
+    error, ends = _error_of(calibration, compensator.estimator, axes), _ends(X[list(axes)])
+    if lacking := [each for each in error.uses if each not in axes]:
+        raise Refused(
+            f"the model needs {' and '.join(lacking)}, which this target cannot say. Calibrate "
+            f"again with --inputs {' '.join(axes)}."
+        )
+    model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
+    if name in KINDS:
+        n_cells = _n_cells(error, ends, name, request.type_name, _PART * model_rms)
+
+        def make(error, ends):
+            return Table(error, ends, name, request.type_name, n_cells)
+    else:
+
+        def make(error, ends):
+            return Cubic(error, ends, name)
+
+    made = make(error, ends)
+    low, high = difference(error, made.piecewise)
+    # ArduPilot: of the difference at T less that at T_cal.
+    largest = high - low if name == "ardupilot" else max(-low, high)
+    left = _held_out_rms(calibration, axes, make, name == "ardupilot")
+    if not np.isfinite(largest):
+        raise Refused("no bound of its difference from the model could be proven.")
+    if left > _MOST_TIMES * model_rms:
+        raise Refused(
+            f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
+            f"than {_MOST_TIMES:g} times as much is not written."
+        )
+    of = "model(T) - model(T_cal), for the worst T_cal," if name == "ardupilot" else "the model"
+    worth = (
+        f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
+        f"RMS on rows held out, and the model {model_rms:.4g}"
+    )
+    _write_files(made, calibration, request, name, worth, folder)
+    return worth
+
+
+def _ends(X):
+    return np.stack([X.min(), X.max()], axis=1)
+
+
+def _error_of(calibration, estimator, axes):
+    return ErrorModel(calibration.compensator, estimator, axes, calibration.X.iloc[0])
+
+
+def _n_cells(error, ends, kind, type_name, goal):
+    """Cells of an axis that a table needs."""
+    n_cells, before = _FEWEST_CELLS, np.inf
+    points = spread(ends)
+    errors = error(points)
+    while True:
+        made = Table(error, ends, kind, type_name, n_cells).piecewise
+        largest = np.abs(errors - made(points)).max()
+        if largest <= goal or n_cells >= _MOST_CELLS[len(ends)] or largest > _GAIN * before:
+            return n_cells
+        n_cells, before = 2 * n_cells, largest
+
+
+def _held_out_rms(calibration, axes, make, is_relative):
+    """RMS error of rows in range by targets of models that are new to them [deg/s].
+
+    ``is_relative``: for the worst T_cal, where the offset at boot is what the model says there.
+    """
+    X, errors = calibration.X[list(axes)], calibration.before - calibration.rate
+    squares = np.zeros(_N_CALIBRATION_TEMPERATURES if is_relative else 1)
+    low, high = _ends(X)[0]
+    for (train, test), estimator in zip(
+        calibration.split.folds, calibration.fold_models, strict=True
+    ):
+        error = _error_of(calibration, estimator, axes)
+        made = make(error, _ends(X.iloc[train])).piecewise
+        rows = test[calibration.in_range[test]]
+        left = errors[rows] - made(X.iloc[rows].to_numpy())
+        shift = np.zeros(1)
+        if is_relative:
+            at = np.linspace(low, high, squares.size).clip(*made.ends[0])[:, None]
+            shift = made(at) - error(at)
+        squares = squares + (left**2).sum() + 2.0 * shift * left.sum() + left.size * shift**2
+    return float(np.sqrt(squares.max() / calibration.in_range.sum()))
+
+
+def _write_files(made, calibration, request, name, worth, folder):
+    about = f"In the place of compensator.json, of which {worth}."
+    if name in KINDS:
+        use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
+        notes = [f"{use} {raw_rate_of(calibration.compensator)}", about, _THERMOMETER]
+        write_files(made.code(notes, units_of(calibration.compensator)), folder / name)
+        return
+    first = INSTANCES[name][0]
+    instance = first if request.instance is None else request.instance
+    notes = [*NOTES[name], about, _THERMOMETER]
+    text = made.text(notes, request.axis, instance, request.device_id)
+    (folder / FILES[name][0]).write_text(text, encoding="ascii", newline="\n")
