@@ -109,7 +109,7 @@ def make_parser():
     add("--saturate", told, action="store_true")
     told = "also write a simple target, where it is good enough: C tables, parameters of autopilots"
     add("--target", told, choices=tuple(FILES), **several)
-    add("--type", "of the numbers of tables", choices=tuple(TYPES), default="float")
+    add("--target-type", "of the numbers of tables", choices=tuple(TYPES), default="float")
     add("--axis", "of the autopilot's gyro that this one is", choices=AXES)
     told = "number of that gyro: 0 to 3 for PX4 (default 0), 1 to 3 for ArduPilot (default 1)"
     add("--instance", told, type=int)
@@ -139,7 +139,7 @@ def targets_of(options):
         if instance is not None and instance not in INSTANCES[name]:
             first, *_, last = INSTANCES[name]
             raise UsageError(f"--instance {instance}: gyros of {name} are {first} to {last}.")
-    return Targets(tuple(names), options.type, options.axis, instance, options.device_id)
+    return Targets(tuple(names), options.target_type, options.axis, instance, options.device_id)
 
 
 def _pairs(texts, option):

@@ -84,7 +84,7 @@ def _calibrate(options, tell):
         for name, told, is_written in targets
     )
     tell("done, but see the warnings" if calibration.cautions() else "done")
-    return DONE if all(is_written for *_, is_written in targets) else INCOMPLETE
+    return DONE if all(done for *_, done in targets) else INCOMPLETE
 
 
 def _where_from_and_to(options):

@@ -70,28 +70,24 @@ class Cubic:
     def text(self, notes, axis, instance, device_id=None):
         """The parameter file of one axis ("x", "y" or "z") of a gyro; ``notes`` are comments."""
         lines = [f"# {line}" for note in notes for line in textwrap.wrap(note, 96)]
-        if self.autopilot == "px4":
-            gyro, place = f"TC_G{instance}_", AXES.index(axis)
-            found = {
-                f"{gyro}TREF": self.reference,
-                f"{gyro}TMIN": self.low,
-                f"{gyro}TMAX": self.high,
-            }
-            found |= {f"{gyro}X{k}_{place}": each for k, each in enumerate(self.coefficients)}
-            if device_id is None:
-                lines.append(
-                    f"# {gyro}ID is missing: PX4 compensates nothing without the gyro's ID."
-                )
-            # Vehicle, component, name, value, and the type: 6 is a whole number, 9 a float.
-            whole = {"TC_G_ENABLE": 1} | ({} if device_id is None else {f"{gyro}ID": device_id})
-            lines += [f"1\t1\t{name}\t{value}\t6" for name, value in whole.items()]
-            return "\n".join(
-                [*lines, *(f"1\t1\t{name}\t{_text(value)}\t9" for name, value in found.items()), ""]
-            )
-        imu = f"INS_TCAL{instance}_"
-        found = {f"{imu}ENABLE": 1, f"{imu}TMIN": self.low, f"{imu}TMAX": self.high}
-        found |= {f"{imu}GYR{k}_{axis.upper()}": self.coefficients[k] for k in (1, 2, 3)}
-        return "\n".join([*lines, *(f"{name} {_text(value)}" for name, value in found.items()), ""])
+        if self.autopilot == "ardupilot":
+            imu = f"INS_TCAL{instance}_"
+            found = {f"{imu}ENABLE": 1, f"{imu}TMIN": self.low, f"{imu}TMAX": self.high}
+            found |= {f"{imu}GYR{k}_{axis.upper()}": self.coefficients[k] for k in (1, 2, 3)}
+            lines += [f"{name} {_text(value)}" for name, value in found.items()]
+            return "\n".join([*lines, ""])
+        gyro, whole = f"TC_G{instance}_", {"TC_G_ENABLE": 1}
+        if device_id is None:
+            lines.append(f"# {gyro}ID is missing: without the gyro's ID nothing is compensated.")
+        else:
+            whole[f"{gyro}ID"] = device_id
+        found = {f"{gyro}TREF": self.reference, f"{gyro}TMIN": self.low, f"{gyro}TMAX": self.high}
+        for k, each in enumerate(self.coefficients):
+            found[f"{gyro}X{k}_{AXES.index(axis)}"] = each
+        # Vehicle, component, name, value, and the type: 6 is a whole number, 9 a float.
+        lines += [f"1\t1\t{name}\t{value}\t6" for name, value in whole.items()]
+        lines += [f"1\t1\t{name}\t{_text(value)}\t9" for name, value in found.items()]
+        return "\n".join([*lines, ""])
 
 
 def _text(value):
@@ -100,8 +96,9 @@ def _text(value):
 
 
 def _nearest_cubic(function):
-    """Coefficients of the cubic in s with the least largest difference on [-1, 1], by a linear
-    programme at points that are dense next to the ends.
+    """Coefficients of the cubic in s with the least largest difference on [-1, 1].
+
+    By a linear programme at points that are dense next to the ends.
     """
     s = np.cos(np.pi * np.arange(_N_POINTS + 1) / _N_POINTS)
     values = function(s)

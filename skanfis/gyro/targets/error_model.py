@@ -27,25 +27,25 @@ class ErrorModel:
     """
 
     def __init__(self, compensator, estimator, axes, others):
-        self._compensator, self._estimator = compensator, estimator
+        self._inputs, self._estimator = list(compensator.inputs), estimator
         self._others, self._parts = np.asarray(others, dtype=float), _parts_of(estimator)
-        inputs = list(compensator.inputs)
+        inputs = self._inputs
         self._output = inputs.index("output") if "output" in inputs else None
-        self._own = 1.0 / compensator.scale_factor if self._output is not None else 0.0
+        self._own = 1.0 / compensator.scale_factor
+        self._is_rate = compensator.predicts == "rate"
         used = {column for part in self._parts for column in part.used}
-        used |= {self._output} if compensator.predicts == "rate" else set()
+        used |= {self._output} if self._is_rate else set()
         self.uses = [inputs[column] for column in sorted(used)]
         self._places = [inputs.index(name) for name in axes]
 
     def __call__(self, points):
         """The error at points (n_points, n_axes)."""
         X = self._spread(points.T).T
-        indicated = self._own * X[:, self._output or 0]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", OutOfBoundsWarning)
-            table = pd.DataFrame(X, columns=list(self._compensator.inputs))
+            table = pd.DataFrame(X, columns=self._inputs)
             predicted = self._estimator.predict(table)
-        return indicated - self._compensator.compensate(indicated, predicted)
+        return self._own * X[:, self._output] - predicted if self._is_rate else predicted
 
     def ranges(self, low, high):
         """Range of the error over boxes (n_axes, n_boxes), and of its slopes by axis."""
@@ -56,14 +56,14 @@ class ErrorModel:
                 of_value, of_slopes = part.ranges(low[part.columns], high[part.columns])
                 value += of_value
                 slopes[:, part.columns] += of_slopes
-        if self._compensator.predicts == "rate":
-            indicated = self._own * np.sort([low[self._output], high[self._output]], axis=0)
+        if self._is_rate:
+            indicated = np.sort(self._own * np.stack([low, high])[:, self._output], axis=0)
             value, slopes = indicated - value[::-1], -slopes[::-1]
             slopes[:, self._output] += self._own
         # Rounding, of what has no account of its own.
         steep, far = np.abs(slopes).max(axis=0), np.maximum(np.abs(low), np.abs(high))
         slack = ROUNDINGS * EPS * (np.abs(value).max(axis=0) + (steep * far).sum(axis=0))
-        return value + [-slack, slack], slopes[:, self._places]
+        return np.add(value, [-slack, slack]), slopes[:, self._places]
 
     def _spread(self, values):
         """Values of the axes (n_axes, n_boxes) as those of all inputs."""

@@ -1,9 +1,10 @@
 """Tables and piecewise cubics in C, in floating or fixed point, in the place of an error."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
-from ...export.c import CCode, CCost
-from ...export.c.builder import cost_lines, header_of, input_lines
+from ...export.c.builder import header_of, input_lines
 from ...export.c.dialect import STATUS, Dialect, kept_lines, remark
 from ...export.c.self_test import ROWS, self_test
 from ...export.c.templates import FINITE_INPUT, rejection
@@ -68,16 +69,15 @@ cubic |    value = $name_values[at[0]][3];
 cubic |    for (i = 2; i >= 0; --i) {
 cubic |        value = value * part[0]$per_one + $name_values[at[0]][i];
 cubic |    }
-fixed |    if (value > $most) {
-fixed |        value = $most;
-fixed |    }
-fixed |    if (value < -$most) {
-fixed |        value = -$most;
-fixed |    }
       |    y[0] = ($real)value;
       |    return status;
       |}
 """
+
+
+def name_of(kind):
+    """What files and identifiers of a kind of table start with."""
+    return f"gyro_{kind.replace('-', '_')}"
 
 
 class Table:
@@ -89,7 +89,7 @@ class Table:
     def __init__(self, error, ends, kind, type_name, n_cells):
         self.shape, self.names = KINDS[kind]
         real, self.wide, self.bits = TYPES[type_name]
-        self.dialect = Dialect(f"gyro_{kind.replace('-', '_')}", real, "c99")
+        self.dialect = Dialect(name_of(kind), real, "c99")
         # Low, high and step as C holds them, the number of cells, and what 1 stands for.
         self.axes = [self._axis(low, high, n_cells) for low, high in ends]
         degree = 3 if self.shape == "cubic" else 1
@@ -151,64 +151,54 @@ class Table:
 
     def code(self, notes, units):
         """The C files; ``notes`` and ``units`` are as of :func:`skanfis.export.export_c`."""
-        dialect, dtype = self.dialect, self.dialect.dtype
+        dialect, bits = self.dialect, self.bits
         lows, highs, steps, counts, scales = map(np.array, zip(*self.axes, strict=True))
-        tables = {"low": lows.astype(dtype), "high": highs.astype(dtype), "values": self.values}
-        tables["step" if self.bits else "per_unit"] = (
-            steps if self.bits else (1 / steps).astype(dtype)
-        )
-        text = "".join(
-            f"{dialect.table(name, each, self.wide if name == 'step' else None)}\n"
-            for name, each in tables.items()
-        )
-        one = 2 ** (self.bits - 1) if self.bits else 0
-        facts = {self.shape, "fixed" if self.bits else "real", "table"} - (
-            {"table"} if self.shape == "cubic" else set()
-        )
+        ends = {"low": lows, "high": highs} | ({} if bits else {"per_unit": 1.0 / steps})
+        tables = [*ends.items(), ("values", self.values)]
+        parts = [dialect.table(name, each.astype(dialect.dtype)) for name, each in tables]
+        parts.append(dialect.table("last", counts - 1, "int"))
+        if bits:
+            parts.append(dialect.table("step", steps, self.wide))
+        else:
+            parts.append(dialect.write(rejection("raise", "c99")).lstrip())
+        facts = {self.shape, "fixed" if bits else "real", self.shape != "cubic" and "table"}
+        one = 2 ** (bits - 1)
         code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
-        words = {"wide": self.wide, "one": one, "per_one": f" / {one}" if one else ""}
-        code = dialect.write(code, **words, most=2 * one - 1)
-        text += f"{dialect.table('last', counts - 1, 'int')}\n"
-        text += "" if self.bits else dialect.write(rejection("raise", "c99")).lstrip() + "\n"
-        includes = f'#include "{dialect.name}.h"\n\n' + (
-            "" if self.bits else "#include <float.h>\n\n"
-        )
+        words = {"wide": self.wide, "one": one, "per_one": f" / {one}" if bits else ""}
+        parts += [
+            dialect.write(code, **words),
+            self_test(self._answers(lows, highs, scales), dialect),
+        ]
+        head = f'#include "{dialect.name}.h"\n\n' + ("" if bits else "#include <float.h>\n\n")
         n_products, d = {"line": 1, "cubic": 3, "plane": 3}[self.shape], lows.size
-        cost = CCost(
-            exponentials=0,
-            logarithms=0,
-            multiply_adds=n_products + (2 * d if self.bits else d),
-            divisions=n_products + 2 * d if self.bits else 0,
-            table_bytes=sum(each.nbytes for each in tables.values()),
-            stack_bytes=d * dtype.itemsize,
-        )
+        n_bytes = sum(each.size for _, each in tables) * dialect.dtype.itemsize
         lines = [
             *map(remark, notes),
             f"{' x '.join(map(str, counts))} cells; C99, {dialect.real}.",
-            *cost_lines(cost),
+            f"Whatever the inputs: at most {n_products + (2 * d if bits else d)} multiplications and "
+            f"{n_products + 2 * d if bits else 0} divisions. Memory: {n_bytes} bytes of tables.",
             "",
             *input_lines(self.names, lows * scales, highs * scales, units),
             "Outputs y:",
             "  [0] error [deg/s]",
             "",
-            "Beyond this range the value at its end is held.",
-            *(self._scale_lines(scales) if self.bits else ["A row that is not finite gets none."]),
+            "An input beyond its range is held at the end of it.",
         ]
-        include = "#include <stdint.h>" if self.bits else ""
-        header = header_of("A table of the error of a gyro", lines, dialect, d, 1, include)
-        source = (
-            includes + text + code + "\n" + self_test(self._answers(lows, highs, scales), dialect)
-        )
-        return CCode(dialect.name, header, source, cost)
-
-    def _scale_lines(self, scales):
-        for k, (name, scale) in enumerate(zip(self.names, scales, strict=True)):
-            yield f"Fixed point: x[{k}] is {name} / {scale:.9g}, a whole number, rounded by the caller."
-        most = 2**self.bits - 1
-        yield (
-            f"The error is y[0] * {self.unit:.9g} deg/s, a whole number from -{most} to {most} beyond "
-            f"which it saturates ({most * self.unit:.6g} deg/s). No sum or product overflows."
-        )
+        if bits:
+            for k, (name, scale) in enumerate(zip(self.names, scales, strict=True)):
+                lines.append(
+                    f"Fixed point: x[{k}] is {name} / {scale:.9g}, rounded by the caller, and held "
+                    f"between {-2 * one} and {2 * one - 1}."
+                )
+            lines.append(
+                f"The error is y[0] * {self.unit:.9g} deg/s. No sum or product overflows, and y[0] "
+                f"stays below {2 * one} in size: nothing else is saturated."
+            )
+        else:
+            lines.append("A row that is not finite gets no output.")
+        include = "#include <stdint.h>" if bits else ""
+        header = header_of("The error of a gyro", lines, dialect, d, 1, include)
+        return SimpleNamespace(name=dialect.name, header=header, source=head + "\n".join(parts))
 
     def _answers(self, lows, highs, scales):
         """Rows, some of them beyond the range, with their values, status and tolerance."""

@@ -10,10 +10,10 @@ from ..metrics import rms
 from .autopilots import INSTANCES, NOTES, Cubic
 from .error_model import ErrorModel
 from .piecewise import difference, spread
-from .tables import KINDS, Table
+from .tables import KINDS, Table, name_of
 
 FILES = {
-    **{kind: (f"{kind}.h", f"{kind}.c") for kind in KINDS},
+    **{kind: (f"{name_of(kind)}.h", f"{name_of(kind)}.c") for kind in KINDS},
     "px4": ("px4.params",),
     "ardupilot": ("ardupilot.parm",),
 }
@@ -35,7 +35,7 @@ class Request(NamedTuple):
     device_id: int | None = None
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """Why a target is not written."""
 
 
@@ -44,7 +44,7 @@ def write_targets(calibration, request, folder):
     for name in request.names:
         try:
             yield name, _write(calibration, request, name, folder), True
-        except Refused as reason:
+        except RefusedError as reason:
             yield name, str(reason), False
 
 
@@ -52,12 +52,13 @@ def _write(calibration, request, name, folder):
     axes = KINDS[name][1] if name in KINDS else ("temperature",)
     compensator, X = calibration.compensator, calibration.X
     if missing := [axis for axis in axes if axis not in X]:
-        raise Refused(f"the model does not take the {missing[0]}: --target table has all it says.")
+        raise RefusedError(f"the model does not take the {missing[0]}; --target table will do.")
     error, ends = _error_of(calibration, compensator.estimator, axes), _ends(X[list(axes)])
     if lacking := [each for each in error.uses if each not in axes]:
-        raise Refused(
+        less = ", without --physics" if compensator.predicts == "rate" and len(axes) == 1 else ""
+        raise RefusedError(
             f"the model needs {' and '.join(lacking)}, which this target cannot say. Calibrate "
-            f"again with --inputs {' '.join(axes)}."
+            f"again with --inputs {' '.join(axes)}{less}."
         )
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if name in KINDS:
@@ -76,9 +77,9 @@ def _write(calibration, request, name, folder):
     largest = high - low if name == "ardupilot" else max(-low, high)
     left = _held_out_rms(calibration, axes, make, name == "ardupilot")
     if not np.isfinite(largest):
-        raise Refused("no bound of its difference from the model could be proven.")
+        raise RefusedError("no bound of its difference from the model could be proven.")
     if left > _MOST_TIMES * model_rms:
-        raise Refused(
+        raise RefusedError(
             f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
             f"than {_MOST_TIMES:g} times as much is not written."
         )
@@ -140,7 +141,7 @@ def _write_files(made, calibration, request, name, worth, folder):
     if name in KINDS:
         use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
         notes = [f"{use} {raw_rate_of(calibration.compensator)}", about, _THERMOMETER]
-        write_files(made.code(notes, units_of(calibration.compensator)), folder / name)
+        write_files(made.code(notes, units_of(calibration.compensator)), folder / name_of(name))
         return
     first = INSTANCES[name][0]
     instance = first if request.instance is None else request.instance
