@@ -22,7 +22,6 @@ from .metrics import ALLAN_FIGURES, figures_of_merit
 from .targets.autopilots import AXES, INSTANCES
 from .targets.tables import TYPES
 from .targets.write import FILES
-from .targets.write import Request as Targets
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
@@ -128,18 +127,19 @@ def request_of(options, require):
         raise UsageError(str(error)) from error
 
 
-def targets_of(options):
-    """What the options ask of simple targets; UsageError where they make no sense."""
-    names, instance = options.target, options.instance
-    check_once("--target", names)
-    pilots = [name for name in names if name in INSTANCES]
-    if pilots and options.axis is None:
-        raise UsageError(f"--target {pilots[0]} needs the axis of its gyro: --axis x, y or z.")
-    for name in pilots:
-        if instance is not None and instance not in INSTANCES[name]:
+def check_targets(options):
+    """UsageError where what the options ask of simple targets makes no sense."""
+    check_once("--target", options.target)
+    for name in options.target:
+        if name not in INSTANCES:
+            continue
+        if options.axis is None:
+            raise UsageError(f"--target {name} needs the axis of its gyro: --axis x, y or z.")
+        if options.instance not in (None, *INSTANCES[name]):
             first, *_, last = INSTANCES[name]
-            raise UsageError(f"--instance {instance}: gyros of {name} are {first} to {last}.")
-    return Targets(tuple(names), options.target_type, options.axis, instance, options.device_id)
+            raise UsageError(
+                f"--instance {options.instance}: gyros of {name} are {first} to {last}."
+            )
 
 
 def _pairs(texts, option):

@@ -22,7 +22,7 @@ from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
-from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of, targets_of
+from ._options import PROGRAM, ReportOptions, check_once, check_targets, make_parser, request_of
 from ._split import choose_split
 from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator, features
@@ -75,7 +75,7 @@ def _calibrate(options, tell):
         )
         tell("drawing the report")
         _write(calibration, options, reading.digests, written)
-        targets = list(write_targets(calibration, targets_of(options), written))
+        targets = list(write_targets(calibration, options, written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
@@ -91,6 +91,7 @@ def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
     check_once("--box", [name for name, *_ in options.box])
+    check_targets(options)
     if options.saturate and not options.c:
         raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
@@ -98,7 +99,7 @@ def _where_from_and_to(options):
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
     names = [*_FILES, *(_C_FILES if options.c else ())]
-    names += [name for target in targets_of(options).names for name in FILES[target]]
+    names += [name for target in options.target for name in FILES[target]]
     _refuse_existing([folder / name for name in names], options.force)
     check_installed()
     return folder, paths

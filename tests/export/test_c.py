@@ -323,7 +323,9 @@ def test_no_row_takes_more_than_the_header_says(tmp_path):
         text += re.sub(r"\$(name|n|d|rows)", lambda word: str(words[word[1]]), COUNTING)  # noqa: B023
         calls += f"count_{code.name}();"
     (tmp_path / "count.cpp").write_text(f"{text}int main() {{ {calls} }}\n", encoding="ascii")
-    subprocess.run(["g++", "-std=c++11", "-O0", "count.cpp", "-o", "count"], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["g++", "-std=c++11", "-O0", "count.cpp", "-o", "count"], cwd=tmp_path, check=True
+    )
     done = run(["./count"], tmp_path).stdout
     taken = np.reshape([int(number) for number in done.split()], (-1, 5))
     assert (taken <= said).all()

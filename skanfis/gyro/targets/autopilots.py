@@ -9,6 +9,7 @@ hold the temperature, and ArduPilot also T_cal, between TMIN and TMAX.
 import textwrap
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.optimize import linprog
 
 from .piecewise import Piecewise
@@ -50,15 +51,16 @@ class Cubic:
         is_px4 = autopilot == "px4"
         self.reference = np.float32(np.round(middle, 2) if is_px4 else _ARDUPILOT_REFERENCE)
         nearest = _nearest_cubic(lambda s: error((middle + half * s)[:, None]))
-        # In powers of the distance from the reference [rad/s].
-        shifted = np.polynomial.Polynomial(nearest)(
-            np.polynomial.Polynomial([(float(self.reference) - middle) / half, 1.0 / half])
-        )
+        # In powers of the distance from the reference [deg/s].
+        s = Polynomial([(float(self.reference) - middle) / half, 1.0 / half])
+        found = np.zeros(4)
+        shifted = Polynomial(nearest)(s).coef
+        found[: shifted.size] = shifted
         scale = 1.0 if is_px4 else _ARDUPILOT_SCALE
-        self.coefficients = (np.deg2rad(shifted.coef) * scale).astype(np.float32)
+        self.coefficients = (np.deg2rad(found) * scale).astype(np.float32)
         values = np.rad2deg(self.coefficients.astype(float) / scale)
         if not is_px4:
-            values[0] = shifted.coef[0]
+            values[0] = found[0]
         edges = np.array([self.low, self.high], dtype=float)
         farthest = np.abs(edges - float(self.reference)).max()
         slack = _SLACK * (np.abs(values) * farthest ** np.arange(4)).sum()

@@ -12,7 +12,7 @@ from ...bounds.search import largest
 from .error_model import ErrorModel, polynomial_ranges
 
 # Boxes to look at for each side; how near to the largest difference is near enough, and nothing.
-_MOST_BOXES, _TOLERANCE, _NOTHING = 100_000, 0.02, 1e-9
+_MOST_BOXES, _TOLERANCE, _NOTHING = 100_000, 0.02, 1e-7
 _N_POINTS = 4096
 
 

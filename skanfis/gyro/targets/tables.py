@@ -141,8 +141,9 @@ class Table:
         sizes = np.abs(coefficients)
         steepest, most = np.tensordot(powers.sum(axis=1), sizes, 1).max(), sizes.sum(axis=0).max()
         if self.bits:
-            # The place in a cell has a bit less than a number; three products are cut off.
-            slack = 2.0 ** (1 - self.bits) * steepest + 3.0 * self.unit
+            # The input is rounded; its place in a cell has a bit less; three products are cut off.
+            place = 0.5 / min(step for _, _, step, *_ in self.axes) + 2.0 ** (1 - self.bits)
+            slack = place * steepest + 3.0 * self.unit
         else:
             n_most = max(n for *_, n, _ in self.axes)
             slack = np.finfo(self.dialect.dtype).eps * (8.0 * n_most * steepest + 24.0 * most)
@@ -175,7 +176,7 @@ class Table:
         lines = [
             *map(remark, notes),
             f"{' x '.join(map(str, counts))} cells; C99, {dialect.real}.",
-            f"Whatever the inputs: at most {n_products + (2 * d if bits else d)} multiplications and "
+            f"Whatever the inputs: at most {n_products + (2 * d if bits else d)} multiplications, "
             f"{n_products + 2 * d if bits else 0} divisions. Memory: {n_bytes} bytes of tables.",
             "",
             *input_lines(self.names, lows * scales, highs * scales, units),
@@ -187,12 +188,12 @@ class Table:
         if bits:
             for k, (name, scale) in enumerate(zip(self.names, scales, strict=True)):
                 lines.append(
-                    f"Fixed point: x[{k}] is {name} / {scale:.9g}, rounded by the caller, and held "
+                    f"Fixed point: x[{k}] is {name} / {_shown(scale)}, rounded by the caller, held "
                     f"between {-2 * one} and {2 * one - 1}."
                 )
             lines.append(
-                f"The error is y[0] * {self.unit:.9g} deg/s. No sum or product overflows, and y[0] "
-                f"stays below {2 * one} in size: nothing else is saturated."
+                f"The error is y[0] * {_shown(self.unit)} deg/s. No sum or product overflows, and "
+                f"y[0] stays below {2 * one} in size: nothing else is saturated."
             )
         else:
             lines.append("A row that is not finite gets no output.")
@@ -205,9 +206,14 @@ class Table:
         dtype, beyond = self.dialect.dtype, 0.1 * (highs - lows)
         points = spread(np.stack([lows - beyond, highs + beyond], axis=1))
         X = points[:: len(points) // ROWS][:ROWS]
+        X = np.rint(X).clip(-(2**self.bits), 2**self.bits - 1) if self.bits else X
         y, slack = self.piecewise(X * scales) / self.unit, self.piecewise.slack / self.unit
         if self.bits:
-            X = np.rint(X).clip(-(2**self.bits), 2**self.bits - 1)
-            y, slack = np.rint(self.piecewise(X * scales) / self.unit), np.ceil(slack) + 1.0
+            y, slack = np.rint(y), np.ceil(slack) + 1.0
         status = STATUS["OUT_OF_RANGE"] * ((lows > X) | (highs < X)).any(axis=1)
         return X.astype(dtype), y[:, None].astype(dtype), status, np.array([slack]).astype(dtype)
+
+
+def _shown(power):
+    """A power of two."""
+    return f"2^{int(np.log2(power))} ({power:.6g})"

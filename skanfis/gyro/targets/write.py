@@ -1,7 +1,5 @@
 """Files of simple targets, each with what it is worth; or why there is none."""
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...export.c.dialect import write_files
@@ -25,30 +23,23 @@ _N_CALIBRATION_TEMPERATURES = 200
 _THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
 
 
-class Request(NamedTuple):
-    """Targets by name, and what the options say of them."""
-
-    names: tuple[str, ...]
-    type_name: str = "float"
-    axis: str | None = None
-    instance: int | None = None
-    device_id: int | None = None
-
-
 class RefusedError(Exception):
     """Why a target is not written."""
 
 
-def write_targets(calibration, request, folder):
-    """Write what is asked for to a folder; yields names, sentences, and whether it is written."""
-    for name in request.names:
+def write_targets(calibration, options, folder):
+    """Write what the options of the command ask for; yields names, sentences, and if it was done.
+
+    Of the options it reads ``target``, ``target_type``, ``axis``, ``instance`` and ``device_id``.
+    """
+    for name in options.target:
         try:
-            yield name, _write(calibration, request, name, folder), True
+            yield name, _write(calibration, options, name, folder), True
         except RefusedError as reason:
             yield name, str(reason), False
 
 
-def _write(calibration, request, name, folder):
+def _write(calibration, options, name, folder):
     axes = KINDS[name][1] if name in KINDS else ("temperature",)
     compensator, X = calibration.compensator, calibration.X
     if missing := [axis for axis in axes if axis not in X]:
@@ -62,10 +53,10 @@ def _write(calibration, request, name, folder):
         )
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if name in KINDS:
-        n_cells = _n_cells(error, ends, name, request.type_name, _PART * model_rms)
+        n_cells = _n_cells(error, ends, name, options.target_type, _PART * model_rms)
 
         def make(error, ends):
-            return Table(error, ends, name, request.type_name, n_cells)
+            return Table(error, ends, name, options.target_type, n_cells)
     else:
 
         def make(error, ends):
@@ -88,7 +79,7 @@ def _write(calibration, request, name, folder):
         f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
-    _write_files(made, calibration, request, name, worth, folder)
+    _write_files(made, calibration.compensator, options, name, worth, folder)
     return worth
 
 
@@ -136,15 +127,14 @@ def _held_out_rms(calibration, axes, make, is_relative):
     return float(np.sqrt(squares.max() / calibration.in_range.sum()))
 
 
-def _write_files(made, calibration, request, name, worth, folder):
+def _write_files(made, compensator, options, name, worth, folder):
     about = f"In the place of compensator.json, of which {worth}."
     if name in KINDS:
         use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
-        notes = [f"{use} {raw_rate_of(calibration.compensator)}", about, _THERMOMETER]
-        write_files(made.code(notes, units_of(calibration.compensator)), folder / name_of(name))
+        notes = [f"{use} {raw_rate_of(compensator)}", about, _THERMOMETER]
+        write_files(made.code(notes, units_of(compensator)), folder / name_of(name))
         return
-    first = INSTANCES[name][0]
-    instance = first if request.instance is None else request.instance
+    instance = INSTANCES[name][0] if options.instance is None else options.instance
     notes = [*NOTES[name], about, _THERMOMETER]
-    text = made.text(notes, request.axis, instance, request.device_id)
+    text = made.text(notes, options.axis, instance, options.device_id)
     (folder / FILES[name][0]).write_text(text, encoding="ascii", newline="\n")

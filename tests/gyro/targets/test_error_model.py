@@ -5,7 +5,7 @@ import pytest
 
 from skanfis.gyro.targets.error_model import polynomial_ranges
 
-from .models import COUNTS, ENDS, error_of, planted, rows
+from .models import ENDS, error_of, planted, rows
 
 KINDS = ["rules", "polynomial", "constant", "law and line"]
 

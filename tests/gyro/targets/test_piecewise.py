@@ -3,11 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.linear_model import LinearRegression
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis.gyro import GyroCompensator
+from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.targets.error_model import ErrorModel
 from skanfis.gyro.targets.piecewise import Piecewise, difference, spread
 from skanfis.gyro.targets.tables import KINDS, Table
@@ -28,8 +26,7 @@ def line_through(function, edges, shift=0.0):
 @pytest.fixture(scope="module")
 def parabola():
     x = pd.DataFrame({"temperature": np.linspace(-20.0, 60.0, 50)})
-    model = make_pipeline(StandardScaler(), PolynomialFeatures(2, include_bias=False), LinearRegression())
-    model.fit(x, BEND * x["temperature"] ** 2)
+    model = make_polynomial(2).fit(x, BEND * x["temperature"] ** 2)
     return ErrorModel(GyroCompensator(model, ("temperature",)), model, ("temperature",), [0.0])
 
 
