@@ -48,6 +48,7 @@ examples:
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
+  5  a target was refused; all else is written
 """
 
 

@@ -150,11 +150,12 @@ def export_c_physics(
         Of an :class:`OpenLoopArcsineRegressor`, and an ANFIS or a Pipeline of scalers, selections
         of columns and an ANFIS; or a search over such. The inputs of the function are the columns
         that either part takes, in the order of X; the header names them.
-    path, name, dtype, std, min_coverage, units, notes
-        As of :func:`skanfis.export.export_c`; ``name`` has at most 14 characters. The output is
-        called "rate".
+    path, name, dtype, std, min_coverage
+        As of :func:`skanfis.export.export_c`; ``name`` has at most 14 characters.
     saturate : Bounds or array-like of shape (1, 2), default=None
         Limits between which what the rules add to the law is held. None holds nothing.
+    units, notes
+        As of :func:`skanfis.export.export_c`; the output is called "rate".
 
     Returns
     -------
@@ -339,7 +340,7 @@ def _header(whole, dialect, price, units, notes):
         f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "an arcsine, "),
         "",
-        *input_lines(whole.names, *whole.box, units),
+        *input_lines(whole.names, *whole.box, units=units),
         "Outputs y:",
         f"  [0] rate, in {units.get('rate', 'the unit of the training data')}",
         "",

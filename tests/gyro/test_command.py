@@ -170,6 +170,20 @@ def test_physics_and_policy(tmp_path, log, capsys):
     assert (hot["status"] == 1 + 8).all()
 
 
+@pytest.mark.usefixtures("no_report")
+def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
+    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
+    arguments = [path, *SMALL, "--quiet", "--output", str(out), "--axis", "x"]
+    assert main([*arguments, "--target", "rate-table", "px4", "--target-type", "q15"]) == 5
+    told = capsys.readouterr().out
+    assert "target         rate-table: it differs from the model by " in told
+    assert "REFUSED        px4: the model needs output, which this target cannot say" in told
+    found = sorted(path.name for path in out.iterdir())
+    assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
+    assert main([*arguments, "--force", "--target", "rate-table"]) == 0
+    assert main([*arguments, "--target", "px4"]) == 4
+
+
 def one_run_without_levels(log):
     rate = log["output"] + np.random.default_rng(0).normal(size=len(log))
     warming = np.linspace(0.0, 40.0, len(log))
@@ -227,6 +241,9 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--box", "humidity=0:1"], "--box: 'humidity' is no input; these are time, temperature"),
         (["--box", "time=85:-40"], "must be INPUT=LOW:HIGH, two numbers"),
         (["--box", "time=0:inf"], "must be INPUT=LOW:HIGH, two numbers"),
+        (["--target", "px4"], "--target px4 needs the axis of its gyro: --axis x, y or z"),
+        (["--target", "ardupilot", "--axis", "x", "--instance", "0"], "ardupilot are 1 to 3"),
+        (["--target", "table", "table"], "--target: table is given twice"),
         (["--limits", "bias=5"], "bias takes deg/s or deg/h; found ''"),
     ],
 )

@@ -68,7 +68,7 @@ def header(numbers, dialect, cost, min_coverage, limits, units=None, notes=()):
         "",
         *input_lines(model.input_names, numbers.low, numbers.high, units),
         "Outputs y, and what they are held within:",
-        *_ranges(model.output_names, *model.output_limits, units),
+        *_ranges(model.output_names, *model.output_limits, units=units),
     ]
     if limits is not None:
         ends = zip(model.output_names, limits, strict=True)

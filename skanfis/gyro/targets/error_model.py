@@ -174,7 +174,7 @@ class _Law:
         bend = product(product(sine, a_slope), steep)
         turn = product(phase, product(k_slope, square(over_k)))
         by_temperature = -(np.array(bend) + turn + b_slope)[::-1]
-        slopes = [[end] for end in steep]
+        slopes = np.array(steep)[:, None]
         if len(lag):
             along = product((lag, lag), by_temperature[:, None])
             slopes = np.concatenate([slopes, along], axis=1)

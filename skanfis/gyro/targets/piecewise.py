@@ -73,7 +73,8 @@ def difference(error: ErrorModel, target: Piecewise):
         top = int(np.argmax(sign * sampled))
         evaluate = partial(_upper_bounds, error, target, sign)
         start, cuts = (points[top], sign * sampled[top]), _cuts(target.edges)
-        found = largest(evaluate, *target.ends.T, tolerance, _MOST_BOXES, cuts, start)
+        low, high = target.ends.T
+        found = largest(evaluate, low, high, tolerance, _MOST_BOXES, cuts, start)
         ends.append(sign * (found.bound + target.slack))
     return ends
 
