@@ -20,7 +20,7 @@ from .compensator import INPUTS
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
 from .targets.autopilots import AXES, INSTANCES
-from .targets.tables import TYPES
+from .targets.tables import KINDS, TYPES
 from .targets.write import FILES
 
 PROGRAM = "python -m skanfis.gyro"
@@ -29,6 +29,14 @@ _FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.
 _SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
 _AT_LEAST = ("reduction_factor",)  # of this more is better
+
+# Of what is said of a target, which it is for.
+_TARGETS_OF = {
+    "target_type": tuple(KINDS),
+    "axis": tuple(INSTANCES),
+    "instance": tuple(INSTANCES),
+    "device_id": ("px4",),
+}
 
 _WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
@@ -109,7 +117,7 @@ def make_parser():
     add("--saturate", told, action="store_true")
     told = "also write a simple target, where it is good enough: C tables, parameters of autopilots"
     add("--target", told, choices=tuple(FILES), **several)
-    add("--target-type", "of the numbers of tables", choices=tuple(TYPES), default="float")
+    add("--target-type", "of the numbers of C tables (float)", choices=tuple(TYPES))
     add("--axis", "of the autopilot's gyro that this one is", choices=AXES)
     told = "number of that gyro: 0 to 3 for PX4 (default 0), 1 to 3 for ArduPilot (default 1)"
     add("--instance", told, type=int)
@@ -132,15 +140,16 @@ def check_targets(options):
     """UsageError where what the options ask of simple targets makes no sense."""
     check_once("--target", options.target)
     for name in options.target:
-        if name not in INSTANCES:
-            continue
-        if options.axis is None:
+        numbers = INSTANCES.get(name)
+        if numbers and options.axis is None:
             raise UsageError(f"--target {name} needs the axis of its gyro: --axis x, y or z.")
-        if options.instance not in (None, *INSTANCES[name]):
-            first, *_, last = INSTANCES[name]
-            raise UsageError(
-                f"--instance {options.instance}: gyros of {name} are {first} to {last}."
-            )
+        if numbers and options.instance not in (None, *numbers):
+            told = f"{numbers[0]} to {numbers[-1]}"
+            raise UsageError(f"--instance {options.instance}: gyros of {name} are {told}.")
+    for option, names in _TARGETS_OF.items():
+        if getattr(options, option) is not None and not {*names} & {*options.target}:
+            told = f"--{option.replace('_', '-')} is of --target {' or '.join(names)}."
+            raise UsageError(told)
 
 
 def _pairs(texts, option):

@@ -333,14 +333,14 @@ def _law_source(dialect, whole, silent):
 
 def _header(whole, dialect, price, units, notes):
     law, part, model = whole.law, whole.part, whole.rules.model
-    units = units or {}
+    units, (low, high) = units or {}, whole.box
     lines = [
         *map(remark, notes),
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
         f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "an arcsine, "),
         "",
-        *input_lines(whole.names, *whole.box, units=units),
+        *input_lines(whole.names, low, high, units),
         "Outputs y:",
         f"  [0] rate, in {units.get('rate', 'the unit of the training data')}",
         "",

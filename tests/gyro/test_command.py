@@ -173,15 +173,15 @@ def test_physics_and_policy(tmp_path, log, capsys):
 @pytest.mark.usefixtures("no_report")
 def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    arguments = [path, *SMALL, "--quiet", "--output", str(out), "--axis", "x"]
-    assert main([*arguments, "--target", "rate-table", "px4", "--target-type", "q15"]) == 5
+    arguments = [path, *SMALL, "--quiet", "--output", str(out), "--target", "rate-table"]
+    assert main([*arguments, "--target", "px4", "--axis", "x", "--target-type", "q15"]) == 5
     told = capsys.readouterr().out
     assert "target         rate-table: it differs from the model by " in told
     assert "REFUSED        px4: the model needs output, which this target cannot say" in told
     found = sorted(path.name for path in out.iterdir())
     assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
-    assert main([*arguments, "--force", "--target", "rate-table"]) == 0
-    assert main([*arguments, "--target", "px4"]) == 4
+    assert main([*arguments, "--force"]) == 0
+    assert main(arguments) == 4
 
 
 def one_run_without_levels(log):
@@ -244,6 +244,8 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--target", "px4"], "--target px4 needs the axis of its gyro: --axis x, y or z"),
         (["--target", "ardupilot", "--axis", "x", "--instance", "0"], "ardupilot are 1 to 3"),
         (["--target", "table", "table"], "--target: table is given twice"),
+        (["--target", "table", "--axis", "x"], "--axis is of --target px4 or ardupilot"),
+        (["--target-type", "q15"], "--target-type is of --target table or cubic or rate-table"),
         (["--limits", "bias=5"], "bias takes deg/s or deg/h; found ''"),
     ],
 )

@@ -61,6 +61,7 @@ int $name_self_test(void);
 def header(numbers, dialect, cost, min_coverage, limits, units=None, notes=()):
     """The header, whose first comment says what the model is and what it costs."""
     model = numbers.model
+    lowest, highest = model.output_limits
     lines = [
         *map(remark, notes),
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
@@ -68,7 +69,7 @@ def header(numbers, dialect, cost, min_coverage, limits, units=None, notes=()):
         "",
         *input_lines(model.input_names, numbers.low, numbers.high, units),
         "Outputs y, and what they are held within:",
-        *_ranges(model.output_names, *model.output_limits, units=units),
+        *_ranges(model.output_names, lowest, highest, units),
     ]
     if limits is not None:
         ends = zip(model.output_names, limits, strict=True)

@@ -80,7 +80,7 @@ class Cubic:
             return "\n".join([*lines, ""])
         gyro, whole = f"TC_G{instance}_", {"TC_G_ENABLE": 1}
         if device_id is None:
-            lines.append(f"# {gyro}ID is missing: without the gyro's ID nothing is compensated.")
+            lines.append(f"# 1\t1\t{gyro}ID\t?\t6: missing, and without it nothing is compensated.")
         else:
             whole[f"{gyro}ID"] = device_id
         found = {f"{gyro}TREF": self.reference, f"{gyro}TMIN": self.low, f"{gyro}TMAX": self.high}

@@ -83,110 +83,109 @@ def name_of(kind):
 class Table:
     """A table or piecewise cubic of an error in a box, with the numbers as C holds them.
 
-    ``piecewise`` is what it computes.
+    ``piecewise`` is what it computes. By axis, ``low``, ``high`` and ``step`` are numbers of C that
+    stand for so many ``scale``, and ``counts`` the cells; a value stands for so many ``unit``.
     """
 
     def __init__(self, error, ends, kind, type_name, n_cells):
         self.shape, self.names = KINDS[kind]
         real, self.wide, self.bits = TYPES[type_name]
         self.dialect = Dialect(name_of(kind), real, "c99")
-        # Low, high and step as C holds them, the number of cells, and what 1 stands for.
-        self.axes = [self._axis(low, high, n_cells) for low, high in ends]
+        self._place(ends[:, 0], ends[:, 1], n_cells)
         degree = 3 if self.shape == "cubic" else 1
+        axes = zip(self.low, self.high, self.step, self.counts, self.scale, strict=True)
         at = [
-            np.minimum(low + np.arange(degree * n + 1) * step / degree, high) * unit
-            for low, high, step, n, unit in self.axes
+            np.minimum(low + np.arange(degree * n + 1) * step / degree, high) * scale
+            for low, high, step, n, scale in axes
         ]
         points = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1)
         values = error(points.reshape(-1, len(at))).reshape(points.shape[:-1])
+        largest = np.abs(values).max()
         if degree == 3:
             places = 3 * np.arange(values.size // 3)[:, None] + np.arange(4)
             thirds = np.vander(np.arange(4) / 3.0, increasing=True)
             values = np.linalg.solve(thirds, values[places].T).T
-        largest = np.abs(values).sum(axis=1).max() if degree == 3 else np.abs(values).max()
-        self.unit = self._unit(_MARGIN * largest)
-        numbers = np.rint(values / self.unit) if self.bits else values
-        self.values = numbers.astype(self.dialect.dtype)
+            largest = np.abs(values).sum(axis=1).max()
+        self.unit = float(self._scale_of(_MARGIN * largest))
+        values = np.rint(values / self.unit) if self.bits else values
+        self.values = values.astype(self.dialect.dtype)
         self.piecewise = self._piecewise(self.values * self.unit)
 
-    def _unit(self, largest):
-        """Of a fixed-point number that may be so large: a power of two."""
-        return 2.0 ** (np.ceil(np.log2(largest or 1.0)) - self.bits) if self.bits else 1.0
-
-    def _axis(self, low, high, n_cells):
+    def _scale_of(self, largest):
+        """What 1 stands for where a number may be so large: in fixed point a power of two."""
         if not self.bits:
-            real = self.dialect.dtype.type
-            low, high = float(real(low)), float(real(high))
-            return low, high, 1.0 / float(real(n_cells / (high - low))), n_cells, 1.0
-        unit, most = self._unit(max(abs(low), abs(high))), 2**self.bits - 1
-        low, high = int(np.ceil(low / unit)), min(int(np.floor(high / unit)), most)
-        step = -((low - high) // n_cells)
-        return low, high, step, -((low - high) // step), unit
+            return np.ones_like(largest)
+        return 2.0 ** (np.ceil(np.log2(np.where(largest > 0.0, largest, 1.0))) - self.bits)
+
+    def _place(self, low, high, n_cells):
+        self.scale = self._scale_of(np.maximum(np.abs(low), np.abs(high)))
+        if self.bits:
+            self.low = np.ceil(low / self.scale).astype(np.int64)
+            self.high = np.floor(high / self.scale).astype(np.int64).clip(max=2**self.bits - 1)
+            self.step = -((self.low - self.high) // n_cells)
+            self.counts = -((self.low - self.high) // self.step)
+            return
+        self.low, self.high = (end.astype(self.dialect.dtype).astype(float) for end in (low, high))
+        per_unit = (n_cells / (self.high - self.low)).astype(self.dialect.dtype)
+        self.step, self.counts = 1.0 / per_unit.astype(float), np.full(low.size, n_cells)
 
     def _piecewise(self, values):
-        if self.shape == "cubic":
-            powers, coefficients = np.arange(4)[:, None], values.T
-        elif self.shape == "line":
-            powers, coefficients = np.arange(2)[:, None], np.stack([values[:-1], np.diff(values)])
-        else:
+        if self.shape == "plane":
             powers = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
             down, along = np.diff(values, axis=0), np.diff(values)
-            terms = values[:-1, :-1], down[:, :-1], along[:-1], np.diff(down)
-            coefficients = np.stack(terms)
-        origins = [(low + step * np.arange(n)) * unit for low, _, step, n, unit in self.axes]
-        edges = [
-            np.append(inner, high * unit)
-            for inner, (_, high, *_, unit) in zip(origins, self.axes, strict=True)
-        ]
+            coefficients = np.stack([values[:-1, :-1], down[:, :-1], along[:-1], np.diff(down)])
+        else:
+            coefficients = values.T if values.ndim > 1 else np.stack([values[:-1], np.diff(values)])
+            powers = np.arange(len(coefficients))[:, None]
+        origins, width = [], self.step * self.scale
+        for low, each, n in zip(self.low * self.scale, width, self.counts, strict=True):
+            origins.append(low + each * np.arange(n))
+        edges = [np.append(*ends) for ends in zip(origins, self.high * self.scale, strict=True)]
         sizes = np.abs(coefficients)
         steepest, most = np.tensordot(powers.sum(axis=1), sizes, 1).max(), sizes.sum(axis=0).max()
         if self.bits:
             # The input is rounded; its place in a cell has a bit less; three products are cut off.
-            place = 0.5 / min(step for _, _, step, *_ in self.axes) + 2.0 ** (1 - self.bits)
-            slack = place * steepest + 3.0 * self.unit
+            slack = (0.5 / self.step.min() + 2.0 ** (1 - self.bits)) * steepest + 3.0 * self.unit
         else:
-            n_most = max(n for *_, n, _ in self.axes)
-            slack = np.finfo(self.dialect.dtype).eps * (8.0 * n_most * steepest + 24.0 * most)
-        widths = [step * unit for _, _, step, _, unit in self.axes]
-        return Piecewise(edges, origins, widths, powers, coefficients, float(slack))
+            eps = np.finfo(self.dialect.dtype).eps
+            slack = eps * (8.0 * self.counts.max() * steepest + 24.0 * most)
+        return Piecewise(edges, origins, width, powers, coefficients, float(slack))
 
     def code(self, notes, units):
         """The C files; ``notes`` and ``units`` are as of :func:`skanfis.export.export_c`."""
-        dialect, bits = self.dialect, self.bits
-        lows, highs, steps, counts, scales = map(np.array, zip(*self.axes, strict=True))
-        ends = {"low": lows, "high": highs} | ({} if bits else {"per_unit": 1.0 / steps})
-        tables = [*ends.items(), ("values", self.values)]
-        parts = [dialect.table(name, each.astype(dialect.dtype)) for name, each in tables]
-        parts.append(dialect.table("last", counts - 1, "int"))
-        if bits:
-            parts.append(dialect.table("step", steps, self.wide))
-        else:
-            parts.append(dialect.write(rejection("raise", "c99")).lstrip())
+        dialect, bits, one = self.dialect, self.bits, 2 ** (self.bits - 1)
+        tables = {"low": self.low, "high": self.high, "values": self.values}
+        head, kinds = f'#include "{dialect.name}.h"\n', {"last": "int", "step": self.wide}
+        if not bits:
+            tables["per_unit"] = 1.0 / self.step
+            head += f"\n#include <float.h>\n\n{dialect.write(rejection('raise', 'c99')).lstrip()}"
+        n_bytes = sum(each.size for each in tables.values()) * dialect.dtype.itemsize
+        tables = {name: each.astype(dialect.dtype) for name, each in tables.items()}
+        tables |= {"last": self.counts - 1} | ({"step": self.step} if bits else {})
         facts = {self.shape, "fixed" if bits else "real", self.shape != "cubic" and "table"}
-        one = 2 ** (bits - 1)
         code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
         words = {"wide": self.wide, "one": one, "per_one": f" / {one}" if bits else ""}
-        parts += [
+        source = [
+            head,
+            *(dialect.table(name, each, kinds.get(name)) for name, each in tables.items()),
             dialect.write(code, **words),
-            self_test(self._answers(lows, highs, scales), dialect),
+            self_test(self._answers(), dialect),
         ]
-        head = f'#include "{dialect.name}.h"\n\n' + ("" if bits else "#include <float.h>\n\n")
-        n_products, d = {"line": 1, "cubic": 3, "plane": 3}[self.shape], lows.size
-        n_bytes = sum(each.size for _, each in tables) * dialect.dtype.itemsize
+        n_products, d = {"line": 1, "cubic": 3, "plane": 3}[self.shape], self.low.size
         lines = [
             *map(remark, notes),
-            f"{' x '.join(map(str, counts))} cells; C99, {dialect.real}.",
+            f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",
             f"Whatever the inputs: at most {n_products + (2 * d if bits else d)} multiplications, "
             f"{n_products + 2 * d if bits else 0} divisions. Memory: {n_bytes} bytes of tables.",
             "",
-            *input_lines(self.names, lows * scales, highs * scales, units),
+            *input_lines(self.names, self.low * self.scale, self.high * self.scale, units),
             "Outputs y:",
             "  [0] error [deg/s]",
             "",
             "An input beyond its range is held at the end of it.",
         ]
         if bits:
-            for k, (name, scale) in enumerate(zip(self.names, scales, strict=True)):
+            for k, (name, scale) in enumerate(zip(self.names, self.scale, strict=True)):
                 lines.append(
                     f"Fixed point: x[{k}] is {name} / {_shown(scale)}, rounded by the caller, held "
                     f"between {-2 * one} and {2 * one - 1}."
@@ -199,19 +198,21 @@ class Table:
             lines.append("A row that is not finite gets no output.")
         include = "#include <stdint.h>" if bits else ""
         header = header_of("The error of a gyro", lines, dialect, d, 1, include)
-        return SimpleNamespace(name=dialect.name, header=header, source=head + "\n".join(parts))
+        return SimpleNamespace(name=dialect.name, header=header, source="\n".join(source))
 
-    def _answers(self, lows, highs, scales):
+    def _answers(self):
         """Rows, some of them beyond the range, with their values, status and tolerance."""
-        dtype, beyond = self.dialect.dtype, 0.1 * (highs - lows)
-        points = spread(np.stack([lows - beyond, highs + beyond], axis=1))
+        beyond = 0.1 * (self.high - self.low)
+        points = spread(np.stack([self.low - beyond, self.high + beyond], axis=1))
         X = points[:: len(points) // ROWS][:ROWS]
         X = np.rint(X).clip(-(2**self.bits), 2**self.bits - 1) if self.bits else X
-        y, slack = self.piecewise(X * scales) / self.unit, self.piecewise.slack / self.unit
+        y, slack = self.piecewise(X * self.scale) / self.unit, self.piecewise.slack / self.unit
         if self.bits:
             y, slack = np.rint(y), np.ceil(slack) + 1.0
-        status = STATUS["OUT_OF_RANGE"] * ((lows > X) | (highs < X)).any(axis=1)
-        return X.astype(dtype), y[:, None].astype(dtype), status, np.array([slack]).astype(dtype)
+        status = STATUS["OUT_OF_RANGE"] * ((self.low > X) | (self.high < X)).any(axis=1)
+        answers = X, y[:, None], np.array([slack])
+        X, y, tolerance = (each.astype(self.dialect.dtype) for each in answers)
+        return X, y, status, tolerance
 
 
 def _shown(power):

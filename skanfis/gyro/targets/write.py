@@ -8,7 +8,7 @@ from ..metrics import rms
 from .autopilots import INSTANCES, NOTES, Cubic
 from .error_model import ErrorModel
 from .piecewise import difference, spread
-from .tables import KINDS, Table, name_of
+from .tables import KINDS, TYPES, Table, name_of
 
 FILES = {
     **{kind: (f"{name_of(kind)}.h", f"{name_of(kind)}.c") for kind in KINDS},
@@ -53,10 +53,11 @@ def _write(calibration, options, name, folder):
         )
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if name in KINDS:
-        n_cells = _n_cells(error, ends, name, options.target_type, _PART * model_rms)
+        kind = name, options.target_type or next(iter(TYPES))
+        n_cells = _n_cells(error, ends, *kind, _PART * model_rms)
 
         def make(error, ends):
-            return Table(error, ends, name, options.target_type, n_cells)
+            return Table(error, ends, *kind, n_cells)
     else:
 
         def make(error, ends):
@@ -128,7 +129,7 @@ def _held_out_rms(calibration, axes, make, is_relative):
 
 
 def _write_files(made, compensator, options, name, worth, folder):
-    about = f"In the place of compensator.json, of which {worth}."
+    about = f"In the place of the model in compensator.json: {worth}."
     if name in KINDS:
         use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
         notes = [f"{use} {raw_rate_of(compensator)}", about, _THERMOMETER]
