@@ -20,7 +20,7 @@ from .compensator import INPUTS
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
 from .targets.autopilots import AXES, INSTANCES
-from .targets.tables import KINDS, TYPES
+from .targets.tables import TABLES, TYPES
 from .targets.write import FILES
 
 PROGRAM = "python -m skanfis.gyro"
@@ -32,7 +32,7 @@ _AT_LEAST = ("reduction_factor",)  # of this more is better
 
 # Of what is said of a target, which it is for.
 _TARGETS_OF = {
-    "target_type": tuple(KINDS),
+    "target_type": tuple(TABLES),
     "axis": tuple(INSTANCES),
     "instance": tuple(INSTANCES),
     "device_id": ("px4",),

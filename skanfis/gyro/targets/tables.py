@@ -18,7 +18,7 @@ TYPES = {
     "q15": ("int_least16_t", "int_least32_t", 15),
 }
 # What it says of a cell, and of which inputs.
-KINDS = {
+TABLES = {
     "table": ("line", ("temperature",)),
     "cubic": ("cubic", ("temperature",)),
     "rate-table": ("plane", ("temperature", "output")),
@@ -88,7 +88,7 @@ class Table:
     """
 
     def __init__(self, error, ends, kind, type_name, n_cells):
-        self.shape, self.names = KINDS[kind]
+        self.shape, self.names = TABLES[kind]
         real, self.wide, self.bits = TYPES[type_name]
         self.dialect = Dialect(name_of(kind), real, "c99")
         self._place(ends[:, 0], ends[:, 1], n_cells)

@@ -8,10 +8,10 @@ from ..metrics import rms
 from .autopilots import INSTANCES, NOTES, Cubic
 from .error_model import ErrorModel
 from .piecewise import difference, spread
-from .tables import KINDS, TYPES, Table, name_of
+from .tables import TABLES, TYPES, Table, name_of
 
 FILES = {
-    **{kind: (f"{name_of(kind)}.h", f"{name_of(kind)}.c") for kind in KINDS},
+    **{kind: (f"{name_of(kind)}.h", f"{name_of(kind)}.c") for kind in TABLES},
     "px4": ("px4.params",),
     "ardupilot": ("ardupilot.parm",),
 }
@@ -40,7 +40,7 @@ def write_targets(calibration, options, folder):
 
 
 def _write(calibration, options, name, folder):
-    axes = KINDS[name][1] if name in KINDS else ("temperature",)
+    axes = TABLES[name][1] if name in TABLES else ("temperature",)
     compensator, X = calibration.compensator, calibration.X
     if missing := [axis for axis in axes if axis not in X]:
         raise RefusedError(f"the model does not take the {missing[0]}; --target table will do.")
@@ -52,7 +52,7 @@ def _write(calibration, options, name, folder):
             f"again with --inputs {' '.join(axes)}{less}."
         )
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
-    if name in KINDS:
+    if name in TABLES:
         kind = name, options.target_type or next(iter(TYPES))
         n_cells = _n_cells(error, ends, *kind, _PART * model_rms)
 
@@ -130,7 +130,7 @@ def _held_out_rms(calibration, axes, make, is_relative):
 
 def _write_files(made, compensator, options, name, worth, folder):
     about = f"In the place of the model in compensator.json: {worth}."
-    if name in KINDS:
+    if name in TABLES:
         use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
         notes = [f"{use} {raw_rate_of(compensator)}", about, _THERMOMETER]
         write_files(made.code(notes, units_of(compensator)), folder / name_of(name))

@@ -8,7 +8,7 @@ from skanfis.gyro import GyroCompensator
 from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.targets.error_model import ErrorModel
 from skanfis.gyro.targets.piecewise import Piecewise, difference, spread
-from skanfis.gyro.targets.tables import KINDS, Table
+from skanfis.gyro.targets.tables import TABLES, Table
 
 from .models import ENDS, error_of, error_over_temperature, rows
 
@@ -69,7 +69,7 @@ def test_over_the_temperature(kind, type_name):
 
 
 def test_beyond_its_ends_a_target_is_held():
-    assert {len(axes) for _, axes in KINDS.values()} == {1, 2}
+    assert {len(axes) for _, axes in TABLES.values()} == {1, 2}
     target = Table(error_over_temperature(), ENDS[:1], "cubic", "double", 5).piecewise
     ends = target(np.array([[-20.0], [60.0]]))
     np.testing.assert_array_equal(target(np.array([[-99.0], [99.0]])), ends)
