@@ -8,8 +8,6 @@ import warnings
 
 import numpy as np
 import pandas as pd
-from sklearn.dummy import DummyRegressor
-from sklearn.preprocessing import PolynomialFeatures
 
 from ...bounds.enclosure import Enclosure
 from ...bounds.terms import EPS, ROUNDINGS, product, size, square
@@ -103,14 +101,8 @@ def _parts_of(estimator):
         return [*_parts_of(found.base_), *_parts_of(found.residual_)]
     if isinstance(found, OpenLoopArcsineRegressor):
         return [_Law(found)]
-    if isinstance(found, DummyRegressor):
-        return [_Polynomial([[0] * found.n_features_in_], found.constant_[0], 0.0, 1.0)]
-    steps = [step for _, step in getattr(found, "steps", ())]
-    if any(isinstance(step, PolynomialFeatures) for step in steps):
-        scaler, features, line = steps
-        powers = np.vstack([0 * features.powers_[:1], features.powers_])
-        values = np.append(line.intercept_, line.coef_)
-        return [_Polynomial(powers, values, scaler.mean_, scaler.scale_)]
+    if hasattr(found, "powers"):
+        return [_Polynomial(found)]
     return [_Rules(FrozenRules.of(found, getattr(found, "n_features_in_", None)))]
 
 
@@ -133,18 +125,19 @@ class _Rules:
 
 
 class _Polynomial:
-    """In powers of (x - mean) / scale."""
+    """Of what has ``coefficients`` and ``powers``, of (x - ``center``) / ``scale``."""
 
-    def __init__(self, powers, coefficients, mean, scale):
-        self._powers, self._coefficients = np.array(powers), np.ravel(coefficients)
-        self.columns = list(range(self._powers.shape[1]))
-        self.used = list(np.flatnonzero(self._powers.any(axis=0)))
-        self._mean, self._scale = np.reshape(mean, (-1, 1)), np.reshape(scale, (-1, 1))
+    def __init__(self, polynomial):
+        self._polynomial = polynomial
+        self.columns = list(range(polynomial.powers.shape[1]))
+        self.used = list(np.flatnonzero(polynomial.powers.any(axis=0)))
 
     def ranges(self, low, high):
-        ends = [(side - self._mean) / self._scale for side in (low, high)]
-        value, slopes = polynomial_ranges(self._powers, self._coefficients, *ends)
-        return value, slopes / self._scale
+        own = self._polynomial
+        scale = own.scale[:, None]
+        ends = [(side - own.center[:, None]) / scale for side in (low, high)]
+        value, slopes = polynomial_ranges(own.powers, own.coefficients, *ends)
+        return value, slopes / scale
 
 
 class _Law:

@@ -4,10 +4,9 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from sklearn.dummy import DummyRegressor
 
-from skanfis.gyro import GyroCompensator
-from skanfis.gyro._models import make_law_and_line, make_polynomial
+from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
+from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.targets.error_model import ErrorModel
 
 from ...quick import quick
@@ -29,6 +28,25 @@ def planted(temperature, output):
     return 0.02 * np.tanh((temperature - 20.0) / 15.0) + 1e-3 * rate * np.sin(temperature / 25.0)
 
 
+class Polynomial:
+    """A fitted polynomial by its numbers: of powers of (x - center) / scale."""
+
+    def __init__(self, X, y, degree=3):
+        self._fitted = make_polynomial(degree).fit(X, y)
+        scaler, features, line = (step for _, step in self._fitted.steps)
+        self.center, self.scale = scaler.mean_, scaler.scale_
+        self.powers = np.vstack([0 * features.powers_[:1], features.powers_])
+        self.coefficients = np.append(line.intercept_, line.coef_)
+
+    def predict(self, X):
+        return self._fitted.predict(X)
+
+
+def law_and_line():
+    law = OpenLoopArcsineRegressor("output", "temperature", bias_degree=1, amplitude_degree=1)
+    return ResidualRegressor(law, quick([1, 1]), n_rounds=3)
+
+
 @cache
 def error_of(kind):
     """The ErrorModel of both axes, of a kind of estimator."""
@@ -37,13 +55,13 @@ def error_of(kind):
     error = planted(*points.T)
     rate = X["output"] / COUNTS - error
     make = {
-        "rules": lambda: quick([3, 4]),
-        "polynomial": lambda: make_polynomial(3),
-        "constant": DummyRegressor,
-        "law and line": lambda: make_law_and_line(INPUTS),
+        "rules": quick([3, 4]).fit,
+        "polynomial": Polynomial,
+        "constant": quick([1, 1], order=0).fit,
+        "law and line": law_and_line().fit,
     }[kind]
     is_rate = kind == "law and line"
-    estimator = make().fit(X, rate if is_rate else error)
+    estimator = make(X, rate if is_rate else error)
     predicts = "rate" if is_rate else "error"
     compensator = GyroCompensator(estimator, INPUTS, predicts, COUNTS, "counts")
     return ErrorModel(compensator, estimator, AXES, X.iloc[0])
@@ -54,7 +72,7 @@ def error_over_temperature(kind="rules"):
     """The ErrorModel of the temperature alone."""
     points = rows(800)[:, :1]
     X = pd.DataFrame(points, columns=AXES[:1])
-    estimator = {"rules": lambda: quick([4]), "polynomial": lambda: make_polynomial(3)}[kind]()
-    estimator.fit(X, planted(points[:, 0], 0.0))
+    make = {"rules": quick([4]).fit, "polynomial": Polynomial}[kind]
+    estimator = make(X, planted(points[:, 0], 0.0))
     compensator = GyroCompensator(estimator, AXES[:1])
     return ErrorModel(compensator, estimator, AXES[:1], X.iloc[0])
