@@ -42,10 +42,13 @@ class Cubic:
     [deg/s], for ArduPilot but for a constant.
     """
 
-    def __init__(self, error, ends, autopilot):
+    def __init__(self, error, autopilot):
         self.autopilot = autopilot
         # Within the range, in two digits; no wider for being rounded.
-        low, high = np.ceil(100.0 * ends[0][0]) / 100.0, np.floor(100.0 * ends[0][1]) / 100.0
+        low, high = (
+            np.ceil(100.0 * error.ends[0, 0]) / 100,
+            np.floor(100.0 * error.ends[0, 1]) / 100,
+        )
         self.low, self.high = np.float32(low), np.float32(high)
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         is_px4 = autopilot == "px4"

@@ -20,13 +20,14 @@ from ..physics import OpenLoopArcsineRegressor
 class ErrorModel:
     """The indicated minus the compensated rate [deg/s], as a function of the inputs ``axes``.
 
-    ``uses`` are the inputs that it depends on. ``others`` is a row of all inputs, for those that it
-    does not; ``estimator`` that of the compensator, or of a fold.
+    ``estimator`` is that of the compensator, or of a fold, and X what it was fitted to: its range
+    is ``ends`` (n_axes, 2). ``uses`` are the inputs that the error depends on.
     """
 
-    def __init__(self, compensator, estimator, axes, others):
+    def __init__(self, compensator, estimator, axes, X):
+        self.ends = np.stack([X[list(axes)].min(), X[list(axes)].max()], axis=1)
         self._inputs, self._estimator = list(compensator.inputs), estimator
-        self._others, self._parts = np.asarray(others, dtype=float), _parts_of(estimator)
+        self._others, self._parts = X.iloc[0].to_numpy(dtype=float), _parts_of(estimator)
         inputs = self._inputs
         self._output = inputs.index("output") if "output" in inputs else None
         self._own = 1.0 / compensator.scale_factor
@@ -37,8 +38,8 @@ class ErrorModel:
         self._places = [inputs.index(name) for name in axes]
 
     def __call__(self, points):
-        """The error at points (n_points, n_axes)."""
-        X = self._spread(points.T).T
+        """The error at points (n_points, n_axes); outside the range that at its edge."""
+        X = self._spread(np.clip(points, *self.ends.T).T).T
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", OutOfBoundsWarning)
             table = pd.DataFrame(X, columns=self._inputs)

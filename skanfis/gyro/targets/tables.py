@@ -81,17 +81,17 @@ def name_of(kind):
 
 
 class Table:
-    """A table or piecewise cubic of an error in a box, with the numbers as C holds them.
+    """A table or piecewise cubic of an ErrorModel, with the numbers as C holds them.
 
     ``piecewise`` is what it computes. By axis, ``low``, ``high`` and ``step`` are numbers of C that
     stand for so many ``scale``, and ``counts`` the cells; a value stands for so many ``unit``.
     """
 
-    def __init__(self, error, ends, kind, type_name, n_cells):
+    def __init__(self, error, kind, type_name, n_cells):
         self.shape, self.names = TABLES[kind]
         real, self.wide, self.bits = TYPES[type_name]
         self.dialect = Dialect(name_of(kind), real, "c99")
-        self._place(ends[:, 0], ends[:, 1], n_cells)
+        self._place(error.ends[:, 0], error.ends[:, 1], n_cells)
         degree = 3 if self.shape == "cubic" else 1
         axes = zip(self.low, self.high, self.step, self.counts, self.scale, strict=True)
         at = [

@@ -1,5 +1,7 @@
 """Files of simple targets, each with what it is worth; or why there is none."""
 
+from functools import partial
+
 import numpy as np
 
 from ...export.c.dialect import write_files
@@ -44,7 +46,7 @@ def _write(calibration, options, name, folder):
     compensator, X = calibration.compensator, calibration.X
     if missing := [axis for axis in axes if axis not in X]:
         raise RefusedError(f"the model does not take the {missing[0]}; --target table will do.")
-    error, ends = _error_of(calibration, compensator.estimator, axes), _ends(X[list(axes)])
+    error = ErrorModel(compensator, compensator.estimator, axes, X)
     if lacking := [each for each in error.uses if each not in axes]:
         less = ", without --physics" if compensator.predicts == "rate" and len(axes) == 1 else ""
         raise RefusedError(
@@ -53,17 +55,12 @@ def _write(calibration, options, name, folder):
         )
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if name in TABLES:
-        kind = name, options.target_type or next(iter(TYPES))
-        n_cells = _n_cells(error, ends, *kind, _PART * model_rms)
-
-        def make(error, ends):
-            return Table(error, ends, *kind, n_cells)
+        type_name = options.target_type or next(iter(TYPES))
+        n_cells = _n_cells(error, name, type_name, _PART * model_rms)
+        make = partial(Table, kind=name, type_name=type_name, n_cells=n_cells)
     else:
-
-        def make(error, ends):
-            return Cubic(error, ends, name)
-
-    made = make(error, ends)
+        make = partial(Cubic, autopilot=name)
+    made = make(error)
     low, high = difference(error, made.piecewise)
     # ArduPilot: of the difference at T less that at T_cal.
     largest = high - low if name == "ardupilot" else max(-low, high)
@@ -84,23 +81,15 @@ def _write(calibration, options, name, folder):
     return worth
 
 
-def _ends(X):
-    return np.stack([X.min(), X.max()], axis=1)
-
-
-def _error_of(calibration, estimator, axes):
-    return ErrorModel(calibration.compensator, estimator, axes, calibration.X.iloc[0])
-
-
-def _n_cells(error, ends, kind, type_name, goal):
+def _n_cells(error, kind, type_name, goal):
     """Cells of an axis that a table needs."""
     n_cells, before = _FEWEST_CELLS, np.inf
-    points = spread(ends)
+    points, most = spread(error.ends), _MOST_CELLS[len(error.ends)]
     errors = error(points)
     while True:
-        made = Table(error, ends, kind, type_name, n_cells).piecewise
+        made = Table(error, kind, type_name, n_cells).piecewise
         largest = np.abs(errors - made(points)).max()
-        if largest <= goal or n_cells >= _MOST_CELLS[len(ends)] or largest > _GAIN * before:
+        if largest <= goal or n_cells >= most or largest > _GAIN * before:
             return n_cells
         n_cells, before = 2 * n_cells, largest
 
@@ -110,22 +99,18 @@ def _held_out_rms(calibration, axes, make, is_relative):
 
     ``is_relative``: for the worst T_cal, where the offset at boot is what the model says there.
     """
-    X, errors = calibration.X[list(axes)], calibration.before - calibration.rate
-    squares = np.zeros(_N_CALIBRATION_TEMPERATURES if is_relative else 1)
-    low, high = _ends(X)[0]
-    for (train, test), estimator in zip(
-        calibration.split.folds, calibration.fold_models, strict=True
-    ):
-        error = _error_of(calibration, estimator, axes)
-        made = make(error, _ends(X.iloc[train])).piecewise
+    X, errors = calibration.X, calibration.before - calibration.rate
+    low, high = X["temperature"].min(), X["temperature"].max()
+    at, squares = np.linspace(low, high, _N_CALIBRATION_TEMPERATURES)[:, None], 0.0
+    folds = zip(calibration.split.folds, calibration.fold_models, strict=True)
+    for (train, test), estimator in folds:
+        error = ErrorModel(calibration.compensator, estimator, axes, X.iloc[train])
+        made = make(error).piecewise
         rows = test[calibration.in_range[test]]
-        left = errors[rows] - made(X.iloc[rows].to_numpy())
-        shift = np.zeros(1)
-        if is_relative:
-            at = np.linspace(low, high, squares.size).clip(*made.ends[0])[:, None]
-            shift = made(at) - error(at)
+        left = errors[rows] - made(X[list(axes)].iloc[rows].to_numpy())
+        shift = made(at) - error(at) if is_relative else np.zeros(1)
         squares = squares + (left**2).sum() + 2.0 * shift * left.sum() + left.size * shift**2
-    return float(np.sqrt(squares.max() / calibration.in_range.sum()))
+    return float(np.sqrt(np.max(squares) / calibration.in_range.sum()))
 
 
 def _write_files(made, compensator, options, name, worth, folder):

@@ -28,6 +28,12 @@ def planted(temperature, output):
     return 0.02 * np.tanh((temperature - 20.0) / 15.0) + 1e-3 * rate * np.sin(temperature / 25.0)
 
 
+def framed(X):
+    """The rows with the ends of the range among them."""
+    corners = pd.DataFrame(ENDS.T, columns=AXES)[list(X)]
+    return pd.concat([X, corners])
+
+
 class Polynomial:
     """A fitted polynomial by its numbers: of powers of (x - center) / scale."""
 
@@ -64,7 +70,7 @@ def error_of(kind):
     estimator = make(X, rate if is_rate else error)
     predicts = "rate" if is_rate else "error"
     compensator = GyroCompensator(estimator, INPUTS, predicts, COUNTS, "counts")
-    return ErrorModel(compensator, estimator, AXES, X.iloc[0])
+    return ErrorModel(compensator, estimator, AXES, framed(X))
 
 
 @cache
@@ -75,4 +81,4 @@ def error_over_temperature(kind="rules"):
     make = {"rules": quick([4]).fit, "polynomial": Polynomial}[kind]
     estimator = make(X, planted(points[:, 0], 0.0))
     compensator = GyroCompensator(estimator, AXES[:1])
-    return ErrorModel(compensator, estimator, AXES[:1], X.iloc[0])
+    return ErrorModel(compensator, estimator, AXES[:1], framed(X))

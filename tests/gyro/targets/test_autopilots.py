@@ -9,6 +9,18 @@ from skanfis.gyro.targets.piecewise import difference
 from .models import ENDS, error_over_temperature
 
 F = np.float32
+
+
+class Within:
+    """A function of the temperature as an error in a range."""
+
+    def __init__(self, function, ends):
+        self.function, self.ends = function, ends
+
+    def __call__(self, points):
+        return self.function(points)
+
+
 TEMPERATURES = np.linspace(-20.0, 60.0, 4001).astype(F)
 
 
@@ -60,7 +72,7 @@ def ardupilot_correction(found, temperature, cal_temp, imu, axis):
 @pytest.mark.parametrize("kind", ["rules", "polynomial"])
 def test_px4_is_within_the_certain_difference(kind):
     error = error_over_temperature(kind)
-    cubic = Cubic(error, ENDS[:1], "px4")
+    cubic = Cubic(error, "px4")
     found = parameters(cubic.text(["A note."], "z", 2, 3407914))
     assert {"TC_G_ENABLE": "1", "TC_G2_ID": "3407914"}.items() <= found.items()
     off = error(TEMPERATURES[:, None].astype(float)) - np.rad2deg(
@@ -80,7 +92,7 @@ def test_px4_is_within_the_certain_difference(kind):
 
 def test_ardupilot_is_within_the_certain_difference_for_any_calibration_temperature():
     error = error_over_temperature()
-    cubic = Cubic(error, ENDS[:1], "ardupilot")
+    cubic = Cubic(error, "ardupilot")
     found = parameters(cubic.text(["A note."], "y", 3))
     assert len(found) == 6
     low, high = difference(error, cubic.piecewise)
@@ -95,19 +107,17 @@ def test_ardupilot_is_within_the_certain_difference_for_any_calibration_temperat
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_the_nearest_cubic_of_a_fourth_power_by_chebyshev(autopilot):
     # The nearest cubic to x^4 on [-1, 1] is x^4 - T_4(x) / 8, and 1 / 8 away five times.
-    def fourth(points):
-        return ((points[:, 0] - 20.0) / 40.0) ** 4
-
-    cubic = Cubic(fourth, ENDS[:1], autopilot)
+    fourth = Within(lambda points: ((points[:, 0] - 20.0) / 40.0) ** 4, ENDS[:1])
+    cubic = Cubic(fourth, autopilot)
     x = np.linspace(-1.0, 1.0, 2001)
     off = fourth(20.0 + 40.0 * x[:, None]) - cubic.piecewise(20.0 + 40.0 * x[:, None])
     np.testing.assert_allclose(off, np.cos(4.0 * np.arccos(x)) / 8.0, atol=1e-4)
 
 
 def test_a_range_is_no_wider_for_two_digits_and_no_parameter_has_an_exponent():
-    ends = np.array([(-19.996, 59.994)])
+    error = Within(error_over_temperature(), np.array([(-19.996, 59.994)]))
     for autopilot in ("px4", "ardupilot"):
-        text = Cubic(error_over_temperature(), ends, autopilot).text([], "x", 1)
+        text = Cubic(error, autopilot).text([], "x", 1)
         found = parameters(text)
         name = "TC_G1_" if autopilot == "px4" else "INS_TCAL1_"
         assert (found[f"{name}TMIN"], found[f"{name}TMAX"]) == ("-19.99", "59.99")

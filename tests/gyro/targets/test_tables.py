@@ -39,7 +39,7 @@ int main(void)
 
 def made(kind, type_name, n_cells=8):
     error = error_of("rules") if kind == "rate-table" else error_over_temperature()
-    return error, Table(error, ENDS[: len(TABLES[kind][1])], kind, type_name, n_cells)
+    return error, Table(error, kind, type_name, n_cells)
 
 
 def evaluated(code, X, folder):
@@ -127,7 +127,7 @@ def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
 
 def test_a_piecewise_cubic_is_exact_of_a_cubic():
     error = error_over_temperature("polynomial")
-    table = Table(error, ENDS[:1], "cubic", "double", 3)
+    table = Table(error, "cubic", "double", 3)
     assert np.abs(difference(error, table.piecewise)).max() < 2e-7 * np.abs(
         error(np.array([[60.0]]))
     )

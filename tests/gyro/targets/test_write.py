@@ -69,20 +69,19 @@ def test_errors_on_rows_held_out_by_hand(calibration, tmp_path):
     left = {"table": np.empty(len(X)), "px4": np.empty(len(X))}
     lefts = np.empty((len(X), 50))
     for (train, test), model in zip(calibration.split.folds, calibration.fold_models, strict=True):
-        error = ErrorModel(calibration.compensator, model, ("temperature",), [0.0])
+        error = ErrorModel(calibration.compensator, model, ("temperature",), X.iloc[train])
         # Of the definition: the model's own prediction of rows that are new to it.
         np.testing.assert_allclose(
             calibration.before[test] - error(X.iloc[test].to_numpy()), after[test], atol=1e-12
         )
-        ends = X.iloc[train].agg(["min", "max"]).to_numpy().T
         for name, made in (
-            ("table", Table(error, ends, "table", "float", n_cells)),
-            ("px4", Cubic(error, ends, "px4")),
+            ("table", Table(error, "table", "float", n_cells)),
+            ("px4", Cubic(error, "px4")),
         ):
             off = calibration.before - rate - made.piecewise(X.to_numpy())
             left[name][test] = off[test]
             if name == "px4":
-                at = np.linspace(*ends[0], 50)[:, None]
+                at = np.linspace(*X.iloc[train].agg(["min", "max"])["temperature"], 50)[:, None]
                 lefts[test] = (off[:, None] + made.piecewise(at) - error(at))[test]
     rows = calibration.in_range
     for name in ("table", "px4"):
@@ -148,3 +147,11 @@ def test_what_a_target_cannot_say_is_refused_by_name(inputs, options, target, me
     assert not list(tmp_path.iterdir())
     if len(inputs) == 2:
         assert written(calibration, tmp_path, "rate-table")["rate-table"][1]
+
+
+@pytest.mark.parametrize("type_name", ["float", "q15"])
+def test_where_there_is_no_rate_outside_a_table_ends_with_the_range(type_name, tmp_path):
+    calibration = calibrated(smooth, terms=(2,), outside="nan")
+    told = written(calibration, tmp_path, "table", "cubic", target_type=type_name)
+    told |= written(calibration, tmp_path, "px4")
+    assert all(done for _, done in told.values()), told
