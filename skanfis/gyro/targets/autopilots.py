@@ -45,10 +45,8 @@ class Cubic:
     def __init__(self, error, autopilot):
         self.autopilot = autopilot
         # Within the range, in two digits; no wider for being rounded.
-        low, high = (
-            np.ceil(100.0 * error.ends[0, 0]) / 100,
-            np.floor(100.0 * error.ends[0, 1]) / 100,
-        )
+        [(low, high)] = 100.0 * error.ends
+        low, high = np.ceil(low) / 100.0, np.floor(high) / 100.0
         self.low, self.high = np.float32(low), np.float32(high)
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         is_px4 = autopilot == "px4"

@@ -1,6 +1,7 @@
 """Files of simple targets, each with what it is worth; or why there is none."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ def _write(calibration, options, name, folder):
     if name in TABLES:
         type_name = options.target_type or next(iter(TYPES))
         n_cells = _n_cells(error, name, type_name, _PART * model_rms)
-        make = partial(Table, kind=name, type_name=type_name, n_cells=n_cells)
+        make: Any = partial(Table, kind=name, type_name=type_name, n_cells=n_cells)
     else:
         make = partial(Cubic, autopilot=name)
     made = make(error)
