@@ -10,7 +10,7 @@ interval is a little too narrow.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -39,7 +39,8 @@ _ROUNDING = 1e-9
 class Recipe:
     """What a calibration is asked to do.
 
-    ``terms`` is "search" or numbers, one per input.
+    ``terms`` is "search" or numbers, one per input. ``units`` are those of the files by part, and
+    ``assumed`` has sentences on those that were neither named nor told.
     """
 
     inputs: tuple[str, ...]
@@ -49,6 +50,8 @@ class Recipe:
     physics: bool = False
     outside: str = "linear"
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
+    units: dict[str, str] = field(default_factory=dict)
+    assumed: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -201,6 +204,8 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         scale_factor=factor,
         output_unit=recipe.output_unit,
         time_constant=_TIME_CONSTANT,
+        units={part: recipe.units[part] for part in recipe.units if part in log},
+        assumed=recipe.assumed,
     )
     after = compensator.compensate(before, predicted)
     # The same rows for all: those that the model answered in range.

@@ -69,6 +69,11 @@ def convert(values, quantity, unit):
     return values * _FACTORS[quantity][unit] + _ZERO.get(unit, 0.0)
 
 
+def convert_back(values, quantity, unit):
+    """Values in a unit, from those in the canonical one."""
+    return (values - _ZERO.get(unit, 0.0)) / _FACTORS[quantity][unit]
+
+
 def declared_units(units):
     """``units`` with the usual name of each; ValueError where there is no such unit."""
     found = {}

@@ -10,9 +10,10 @@ import pandas as pd
 from ._checks import PARTS
 from ._columns import CANONICAL, declared_units, unit_in
 from ._source import Clock, as_numbers
+from ._units import assumed_text, settle_units
 from .errors import LogError
 
-_SAMPLE_ROWS = 5_000
+_SAMPLE_ROWS = 100_000
 _RATE = "rate omega angular velocity speed"
 _OUTPUT = (
     "gyro gyroscope fog output out signal raw counts count adc measured meas indicated sensor imu "
@@ -56,10 +57,6 @@ _QUANTITIES = {
     "output": ("rate", "signal"),
     "rate": ("rate",),
 }
-_COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
-# Numbers that large count from 1970, in these units.
-_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-_LARGEST_RATE = 1000  # of whole numbers, beyond which they are taken for counts
 
 _BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]\s*$|[,/]\s*([^,/\s][^,]*)$")
 # mV first: it is one word, for all its letters of two cases.
@@ -80,6 +77,7 @@ class Request:
     units: dict = field(default_factory=dict)
     require: tuple[str, ...] = ("temperature", "output", "rate")
     guess: bool = False
+    assumed: dict | None = None  # units of columns that name none; else by the values
 
 
 def checked_request(request):
@@ -94,13 +92,18 @@ def checked_request(request):
 
 @dataclass
 class Layout:
-    """Places of the parts in a file and their units there; ``others`` would do as well."""
+    """Places of the parts in a file and their units there; ``others`` would do as well.
+
+    ``assumed`` says in words which units are neither told nor in the names: name in the file and
+    sentence, by part.
+    """
 
     header: list
     places: dict
     units: dict
     notes: list = field(default_factory=list)
     others: dict = field(default_factory=dict)
+    assumed: dict = field(default_factory=dict)
 
     def name(self, part):
         """The part's name in the file."""
@@ -123,7 +126,7 @@ def settle(source, request, first=None):
         elif part in request.columns:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
     if request.guess:
-        _guess(source, request, layout, is_first=first is None)
+        _guess(source, request, layout, first)
     for part in request.require:
         if part not in layout.places:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
@@ -134,10 +137,10 @@ def settle(source, request, first=None):
     return layout
 
 
-def _guess(source, request, layout, is_first):
+def _guess(source, request, layout, first):
     """Add the parts that names and units tell, and the units."""
     # Of the first file, a column that is called rate may be the gyro's own.
-    is_told = "rate" in request.columns or not is_first
+    is_told = "rate" in request.columns or first is not None
     called_rate = None if is_told else layout.places.pop("rate", None)
     places = range(len(source.header))
     sample = next(source.pieces(places, _SAMPLE_ROWS), pd.DataFrame(columns=places, dtype=float))
@@ -155,8 +158,9 @@ def _guess(source, request, layout, is_first):
                 layout.places.setdefault(part, column.place)
     if called_rate is not None and called_rate not in layout.places.values():
         layout.places.setdefault("rate", called_rate)
-    _settle_units(columns, layout)
-    layout.notes += _sentences(layout, request)
+    of_first = request.assumed if first is None else first.units
+    _settle_units(columns, layout, of_first)
+    layout.notes += _sentences(layout)
 
 
 class _Column:
@@ -177,6 +181,7 @@ class _Column:
         axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
         self.words = set(words) - set(axes[-1:])
         numbers = as_numbers(values, decimal)
+        self.aligned = np.where(np.isfinite(numbers), numbers, np.nan)
         self.numbers = numbers[np.isfinite(numbers)]
         self.is_time = False
         if self.numbers.size <= 0.5 * len(values):
@@ -231,39 +236,41 @@ def _by_unit(part, columns, layout):
         layout.places[part] = found[0].place
 
 
-def _settle_units(columns, layout):
-    """Units that the names say, or else the values."""
-    for part in _QUANTITIES.keys() & layout.places.keys() - layout.units.keys():
+def _settle_units(columns, layout, of_first):
+    """Units that the names say; or else those of the first file, or what the values tell."""
+    values, own = {}, {}
+    for part in _QUANTITIES.keys() & layout.places.keys():
         column = columns[layout.places[part]]
-        values = column.numbers
         if column.unit and column.quantity in _QUANTITIES[part]:
-            layout.units[part] = column.unit
-        elif values.size == 0:
-            continue
-        elif part == "temperature" and values.min() > _COLDEST_IN_KELVIN:
-            layout.units[part] = "K"
-        elif part == "time" and values.min() > _EPOCHS[-1][0]:
-            layout.units[part] = next(unit for least, unit in _EPOCHS if values.min() > least)
-        elif part == "output" and max(abs(values)) > _LARGEST_RATE and not any(values % 1.0):
-            layout.units[part] = "counts"
+            own[part] = column.unit
+        if not column.is_time:
+            values[part] = column.aligned
+    layout.units = own | layout.units
+    lacking = [part for part in values if part not in layout.units and values[part].size]
+    if of_first is None:
+        found = settle_units(values, layout.units, is_all=False)
+    else:
+        found = {part: of_first.get(part, CANONICAL[part]) for part in lacking}
+    layout.units |= found
+    layout.assumed = {
+        part: (layout.name(part), assumed_text(values, part, layout.name(part), found[part]))
+        for part in PARTS
+        if part in found
+    }
 
 
-def _sentences(layout, request):
-    """What was guessed, in words; what is named as it should be is not worth a word."""
+def _sentences(layout):
+    """Which columns were taken in which units, in words, and which of these were assumed."""
     told = []
     for part in (part for part in PARTS if part in layout.places):
         name, unit = layout.name(part), layout.units.get(part, "")
         others = ", ".join(map(repr, layout.others.get(part, [])))
-        is_told = part in request.columns or name.strip().casefold() == part
-        if is_told and not others and unit in ("", CANONICAL.get(part), request.units.get(part)):
-            continue
         told.append(
             f"{part} = {name!r}"
             + (f" in {unit}" if unit else "")
             + (f" ({others} would do too)" if others else "")
         )
-    say = "columns, as guessed: {}. Say otherwise with --columns and --units"
-    return [say.format("; ".join(told))] if told else []
+    yield f"columns: {'; '.join(told)}. Say otherwise with --columns and --units"
 
 
 def _place(source, name, taken):

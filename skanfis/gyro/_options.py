@@ -108,11 +108,14 @@ def make_parser():
     return parser
 
 
-def request_of(options, require):
-    """What the options ask of a reading; UsageError where they name an unknown part or unit."""
+def request_of(options, require, assumed=None):
+    """What the options ask of a reading; UsageError where they name an unknown part or unit.
+
+    ``assumed`` are units of columns that name none; None leaves them to the values.
+    """
     columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
     try:
-        return checked_request(Request(columns, units, tuple(require), guess=True))
+        return checked_request(Request(columns, units, tuple(require), True, assumed))
     except ValueError as error:
         raise UsageError(str(error)) from error
 

@@ -103,6 +103,8 @@ def _read(options, paths, tell):
     if {"time", "temperature_rate"} & set(options.inputs or ()):
         required.append("time")
     reading = read(paths, request_of(options, required), tell=tell, most_rows=_MOST_ROWS)
+    if reading.assumed:
+        reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     for note in reading.notes:
         tell(f"note: {note}")
     numbers = {"row": reading.n_rows}
@@ -167,6 +169,8 @@ def _recipe(options, reading, at_rest):
         physics=options.physics,
         outside=options.outside,
         box=tuple(options.box),
+        units=reading.units,
+        assumed=reading.assumed,
     )
 
 
@@ -231,7 +235,10 @@ def _apply(options, tell):
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
-    request = request_of(options, sorted(needed))
+    units = dict(compensator.units)
+    if units.get("output") in SIGNALS and "output" not in compensator.assumed:
+        del units["output"]  # which is asked for again
+    request = request_of(options, sorted(needed), units)
     digests_of(paths)
     tallies: list = []
     with _staged(target.parent) as folder:

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -16,7 +16,7 @@ from ..export.c.dialect import STATUS
 from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
-from ._columns import ask
+from ._columns import ask, declared_units
 from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
 from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
@@ -24,7 +24,10 @@ from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, c
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
-_KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
+_KEYS = (
+    "inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage", "units",
+    "assumed",
+)  # fmt: skip
 # Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
@@ -60,6 +63,11 @@ class GyroCompensator:
         Time constant of "temperature_rate" [s].
     min_coverage : float, default=0.1
         Rows that the training data cover less are flagged.
+    units : dict of str to str, default={}
+        Units of the calibration's files by part, such as {"temperature": "degF"}: for columns of
+        other files that name none.
+    assumed : dict of str to str, default={}
+        Sentences by part on those of these units that neither a name nor an option told.
 
     Examples
     --------
@@ -82,6 +90,8 @@ class GyroCompensator:
     output_unit: str = "deg/s"
     time_constant: float = 60.0
     min_coverage: float = 0.1
+    units: dict[str, str] = field(default_factory=dict)
+    assumed: dict[str, str] = field(default_factory=dict)
 
     def features(self, log: pd.DataFrame) -> pd.DataFrame:
         """The estimator's inputs.
@@ -271,6 +281,11 @@ def _settings(document):
     }
     if not (isinstance(unit, str) and unit.isprintable() and 0 < len(unit) <= _LONGEST_UNIT):
         raise ValueError(f"output_unit: {shown(unit)} is not the name of a unit")
+    for key in ("units", "assumed"):
+        found = document[key]
+        if not (isinstance(found, dict) and all(isinstance(text, str) for text in found.values())):
+            raise ValueError(f"{key} is {shown(found)}; it must be an object of texts")
+    declared_units(document["units"])
     try:
         model = parse_json(json.dumps(document["model"]))
     except ValueError as error:

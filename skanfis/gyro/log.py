@@ -8,7 +8,7 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from ._checks import LABELS, RowChecks, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
+from ._units import settle_by_all
 from .errors import LogError, shortened
 
 _ROWS = 200_000  # of a piece, which is all that is held beside the log itself
@@ -95,7 +96,8 @@ class Reading:
     """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
     Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
-    many. ``files`` and ``rows`` tell the file of each row, and its position there.
+    many. ``files`` and ``rows`` tell the file of each row, and its position there. ``assumed`` has
+    sentences on units, by part, that neither names nor options tell.
     """
 
     log: pd.DataFrame
@@ -105,6 +107,7 @@ class Reading:
     notes: list
     n_rows: int
     digests: tuple
+    assumed: dict
 
     @property
     def units(self):
@@ -147,6 +150,16 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     table, parts = pd.concat(thinned.pieces), files[0].layout.places
     code, runs = table["run"].to_numpy(), finder.runs
     log = table[[part for part in parts if part not in LABELS]].reset_index(drop=True)
+    layout = files[0].layout
+    assumed = {part: text for part, (_, text) in layout.assumed.items()}
+    if assumed and request.assumed is None:
+        found, texts = settle_by_all(log, layout.units, layout.assumed)
+        if any(layout.units[part] != unit for part, unit in found.items()):
+            # All rows tell otherwise than the first ones.
+            retold = replace(request, units=request.units | found)
+            reading = read(paths, retold, tell=tell, most_rows=most_rows)
+            return replace(reading, assumed=assumed | texts)
+        assumed |= texts
     names = _names_of_runs(runs, paths, "run" in parts or finder.note)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
@@ -155,7 +168,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     notes = [note for file in files for note in file.notes]
     notes = list(dict.fromkeys([*notes, *filter(None, [finder.note, thinned.note])]))
     file, row = runs["file"].to_numpy()[code], table.index.to_numpy()
-    return Reading(log, file, row, files, notes, thinned.n_rows, digests)
+    return Reading(log, file, row, files, notes, thinned.n_rows, digests, assumed)
 
 
 class LogFile:

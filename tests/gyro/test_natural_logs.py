@@ -77,6 +77,7 @@ def test_a_log_of_one_kind_is_read_as_it_was_meant(tmp_path, truth, kind):
     told = "; ".join(reading.notes)
     for said in (f"temperature = {names[1]!r}", "split into 5 runs", "--columns"):
         assert said in told
+    assert not set(reading.assumed) & {"time", "temperature"}
 
 
 def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
@@ -210,7 +211,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     assert (some.n_rows, len(some.log)) == (300, 75)
     same(some, expected, PARTS)
     assert some.log["run"].astype(int).tolist() == expected["run"].astype(int).tolist()
-    assert some.notes == ["of 300 rows 75 are used, one in 4 of each run"]
+    assert some.notes[1:] == ["of 300 rows 75 are used, one in 4 of each run"]
     assert some.name_row(7).endswith(f"line {expected.index[7] + 2}")
     # A row that would not be held is checked all the same.
     table.loc[290, "time"] = 0.0
@@ -228,7 +229,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     ],
 )
 def test_runs_are_told_by_the_time(tmp_path, times, runs):
-    table = pd.DataFrame({"time": times, "temperature": 20.0, "output": 1.0})
+    table = pd.DataFrame({"time": times, "temperature": 20.0, "output_dps": 1.0})
     table.to_csv(tmp_path / "log.csv", index=False)
     log = found(tmp_path / "log.csv").log
     assert ("run" in log) == (runs is not None)
