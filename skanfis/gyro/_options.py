@@ -15,6 +15,7 @@ from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
 from ._guess import Request, checked_request
+from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
 from .errors import UsageError, shortened
@@ -100,6 +101,8 @@ def make_parser():
     add("--apply", told, metavar="MODEL")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
+    told = "what is recommended (default), or another: the rules of the model, or what is simpler"
+    add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")

@@ -8,25 +8,30 @@ import os
 import shlex
 import sys
 import tempfile
+import textwrap
 import time
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from ..export import export_c
-from ..export.c.dialect import STATUS
+from ..export.c.dialect import STATUS, comment
 from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
+from ._frozen import FrozenPolynomial
 from ._headline import errors_and_verdict, proven_bounds
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._split import choose_split
 from .c_code import export_c_physics
+from .c_polynomial import export_c_polynomial
 from .compensator import INPUTS, GyroCompensator, features
+from .compose import FrozenRules
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page
 from .log import LogFile, RunFinder, digests_of, find_logs, read
@@ -165,6 +170,7 @@ def _recipe(options, reading, at_rest):
         inputs=inputs,
         output_unit=unit if unit in SIGNALS else "deg/s",
         scale_factor=options.scale_factor or 1.0,
+        write=options.write,
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
@@ -200,14 +206,31 @@ def _write(calibration, options, files, folder):
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export = export_c_physics if calibration.recipe.physics else export_c
-        export(
-            compensator.estimator,
-            folder / "compensator",
-            std=options.c,
-            min_coverage=compensator.min_coverage,
-            saturate=proven_bounds(calibration).found if options.saturate else None,
-        )
+        found = proven_bounds(calibration).found if options.saturate else None
+        _write_c(compensator, folder, options.c, found)
+
+
+def _write_c(compensator, folder, std, saturate):
+    """What is written as C, with the units that were assumed in its header."""
+    estimator, path = compensator.estimator, folder / "compensator"
+    export: Any = export_c
+    if saturate is not None:
+        ends = np.stack([saturate.lower, saturate.upper], axis=1)
+        # A constant's limits are the same: a hair is between them.
+        saturate = ends + [-1e-12, 1e-12] * (1.0 + np.abs(ends))
+    if hasattr(estimator, "residual_"):
+        export = export_c_physics
+    elif isinstance(estimator, FrozenPolynomial):
+        export = export_c_polynomial
+    elif isinstance(estimator, FrozenRules):
+        estimator = estimator.model
+    export(estimator, path, std=std, min_coverage=compensator.min_coverage, saturate=saturate)
+    if compensator.assumed:
+        header = path.with_suffix(".h")
+        texts = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
+        lines = [f" * {comment(line)}" for text in texts for line in textwrap.wrap(text, 60)]
+        first, rest = header.read_text(encoding="ascii").split("\n", 1)
+        header.write_text("\n".join([first, *lines, rest]), encoding="ascii", newline="\n")
 
 
 def _summary(calibration, folder, notes):

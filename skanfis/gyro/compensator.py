@@ -17,6 +17,7 @@ from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask, declared_units
+from ._frozen import FrozenPolynomial
 from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
 from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
@@ -32,6 +33,7 @@ _KEYS = (
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
+_OF_POLYNOMIAL, _MOST_TERMS = ("center", "scale", "powers", "coefficients"), 256
 _PARAMETERS = ("max_phase", "out_of_bounds")
 # As of a model alone: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
@@ -191,13 +193,17 @@ class GyroCompensator:
         Raises
         ------
         ValueError, TypeError
-            If the estimator is neither an ANFIS behind scalers nor a :class:`ResidualRegressor` of
-            the arcsine law and such, or a number is beyond what :meth:`read_json` takes.
+            If the estimator is neither an ANFIS behind scalers, nor a :class:`ResidualRegressor` of
+            the arcsine law and such, nor one of the simple compensations that the command writes;
+            or a number is beyond what :meth:`read_json` takes.
         OSError
             If the file cannot be written.
         """
-        found, law = found_by_search(self.estimator), None
-        if isinstance(found, ResidualRegressor):
+        found, law, polynomial = found_by_search(self.estimator), None, None
+        if isinstance(found, FrozenPolynomial):
+            rules = found.rule
+            polynomial = {key: getattr(found, key).tolist() for key in _OF_POLYNOMIAL}
+        elif isinstance(found, ResidualRegressor):
             fitted, rules = law_and_rules(found)
             law = _law_document(fitted, self.inputs)
         else:
@@ -207,6 +213,7 @@ class GyroCompensator:
             "version": _VERSION,
             **{key: getattr(self, key) for key in _KEYS},
             "law": law,
+            "polynomial": polynomial,
             "columns": [self.inputs[j] for j in rules.positions],
             "model": json.loads(export_json(rules.model)),
         }
@@ -267,7 +274,7 @@ def _settings(document):
         raise ValueError(f'its "format" is not "{_FORMAT}"')
     if document.get("version") != _VERSION:
         raise ValueError(f"its version is {document.get('version')!r}, this reads {_VERSION}")
-    if set(document) != {"format", "version", "law", "columns", "model", *_KEYS}:
+    if set(document) != {"format", "version", "law", "polynomial", "columns", "model", *_KEYS}:
         raise ValueError(f"its keys are {', '.join(document)}")
     inputs, columns, unit = (document[key] for key in ("inputs", "columns", "output_unit"))
     if not _are_of(inputs, INPUTS):
@@ -297,6 +304,8 @@ def _settings(document):
     estimator = FrozenRules(model, np.array([inputs.index(name) for name in columns]))
     if document["law"] is not None:
         estimator = joined(_read_law(document["law"], inputs), estimator)
+    if document["polynomial"] is not None:
+        estimator = _read_polynomial(document["polynomial"], estimator)
     settings = {key: document[key] for key in _KEYS} | numbers
     return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
 
@@ -348,17 +357,42 @@ def _read_law(document, inputs):
     return law
 
 
+def _read_polynomial(document, rule):
+    """The polynomial that a file's content describes; ValueError where it is none."""
+    if not isinstance(document, dict) or set(document) != set(_OF_POLYNOMIAL):
+        raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
+    if not isinstance(rule, FrozenRules) or rule.model.n_rules != 1 or rule.model.order:
+        raise ValueError("a polynomial goes with a single rule of order 0, and no law")
+    n, lists = rule.model.n_inputs, dict(document)
+    for key in ("center", "scale", "coefficients"):
+        size = n if key != "coefficients" else len(document["powers"])
+        lists[key] = _list_of_numbers(document[key], key, size, size, "polynomial")
+    for j, value in enumerate(document["scale"]):
+        _divisor(value, f"polynomial.scale[{j}]")
+    powers = document["powers"]
+    if not (
+        1 <= len(powers) <= _MOST_TERMS
+        and all(isinstance(row, list) and len(row) == n for row in powers)
+        and all(type(k) is int and 0 <= k <= HIGHEST_DEGREE for row in powers for k in row)
+    ):
+        raise ValueError(
+            f"polynomial.powers must be 1 to {_MOST_TERMS} lists of {n} numbers, 0 to "
+            f"{HIGHEST_DEGREE}"
+        )
+    return FrozenPolynomial(rule, **lists | {"powers": np.array(powers)})
+
+
 def _divisor(value, where):
     """A number of either sign that something is divided by."""
     size = number(abs(number(value, where)), f"{where}, in size", SMALLEST_NUMBER)
     return size if value > 0 else -size
 
 
-def _list_of_numbers(values, key, fewest, most):
+def _list_of_numbers(values, key, fewest, most, where="law"):
     if not isinstance(values, list) or not fewest <= len(values) <= most:
         count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-        raise ValueError(f"law.{key}: {shown(values)} must be a list of {count} number(s)")
-    return np.array([number(value, f"law.{key}[{k}]") for k, value in enumerate(values)])
+        raise ValueError(f"{where}.{key}: {shown(values)} must be a list of {count} number(s)")
+    return np.array([number(value, f"{where}.{key}[{k}]") for k, value in enumerate(values)])
 
 
 def _are_of(names, known):
