@@ -100,7 +100,7 @@ def held_out_groups(calibration):
     if kind == "level":
         kind = "rate level"
     n_all = np.unique(calibration.split.labels.astype(str)).size
-    of_all = "" if n_all == n_groups else f" of the {n_all}"
+    of_all = "" if n_all == n_groups else f" (of {n_all})"
     return f"{n_groups}{of_all} held-out {kind}{'s' if n_groups > 1 or of_all else ''}"
 
 

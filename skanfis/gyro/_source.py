@@ -4,6 +4,7 @@ import codecs
 import contextlib
 import csv
 import re
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -14,7 +15,8 @@ from .errors import LogError
 # What loggers write where there is no value, beside what pandas knows.
 NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 
-_LONGEST_FIELD = 2**31 - 1  # the largest limit that the module csv takes on every system
+# Longer is no log, but would take minutes to be found to be none.
+_LONGEST_LINE, _MOST_COLUMNS = 2**22, 10_000
 _HEAD_BYTES = 2**16
 # Lines above the header that a logger may write, and a few rows.
 _HEAD_RECORDS = 60
@@ -39,10 +41,13 @@ _EPOCH = pd.Timestamp(0, tz="UTC")
 _DAY = 86_400.0  # s
 
 
-def open_source(path):
-    """The table in a file; LogError where there is none."""
+def open_source(path, *, head_only=False):
+    """The table in a file; LogError where there is none, as far as its head tells if asked so."""
     is_parquet = str(path).lower().endswith((".parquet", ".pq"))
-    return _ParquetSource(path) if is_parquet else _TextSource(path)
+    source = _ParquetSource(path) if is_parquet else _TextSource(path)
+    if not is_parquet and not head_only:
+        source.check_lengths()
+    return source
 
 
 class _TextSource:
@@ -63,7 +68,6 @@ class _TextSource:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
         self.decimal = self._find_decimal(head)
-        self._check_lengths()
 
     def _find_separator(self):
         """The first sign that is on all lines, those of a preamble aside; else a comma."""
@@ -86,7 +90,10 @@ class _TextSource:
     def _place_header(self, head):
         """Find the header: the last line before the first of numbers."""
         rows = [values for _, values in head]
-        first = next((k for k, values in enumerate(rows) if _is_data(values)), 1)
+        first = next((k for k, values in enumerate(rows) if _is_data(values)), None)
+        if first is None and len(rows) == _HEAD_RECORDS:
+            raise LogError(f"{self.path}: has no row of numbers in its first {len(rows)} lines.")
+        first = 1 if first is None else first
         if first == 0:
             raise LogError(
                 f"{self.path}, line {head[0][0]}: has numbers where the names of the columns are "
@@ -100,7 +107,7 @@ class _TextSource:
         if place:
             self.notes.append(f"the header is line {head[place][0]}")
 
-    def _check_lengths(self):
+    def check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut without a word."""
         n_columns = len(self.header)
         for line, values in islice(self._records(), self._n_above, None):
@@ -115,21 +122,38 @@ class _TextSource:
 
         LogError where the file is no such table.
         """
-        limit = csv.field_size_limit(_LONGEST_FIELD)
+        limit = csv.field_size_limit(_LONGEST_LINE)
         line = 1
         try:
             with open(self.path, encoding=self._encoding, newline="") as file:
-                reader = csv.reader(file, delimiter=self._separator, skipinitialspace=True)
+                lines = self._lines(file)
+                reader = csv.reader(lines, delimiter=self._separator, skipinitialspace=True)
                 for values in reader:
+                    if len(values) > _MOST_COLUMNS:
+                        raise LogError(
+                            f"{self.path}, line {line}: has {len(values):,} columns; a log has "
+                            f"{_MOST_COLUMNS:,} at most."
+                        )
                     if len(values) > 1 or "".join(values).strip():
                         yield line, values
                     line = reader.line_num + 1
+        except LogError:
+            raise
         except UnicodeError as error:
             raise _no_text(self.path) from error
         except (csv.Error, ValueError) as error:
             raise LogError(f"{self.path}, line {line}: is no table: {error}.") from error
         finally:
             csv.field_size_limit(limit)
+
+    def _lines(self, file):
+        for number, line in enumerate(iter(partial(file.readline, _LONGEST_LINE), ""), 1):
+            if len(line) == _LONGEST_LINE:
+                raise LogError(
+                    f"{self.path}, line {number}: is longer than {_LONGEST_LINE:,} signs; that is "
+                    "no log."
+                )
+            yield line
 
     def place_of(self, row):
         """In words, on which line of the file, from 1, a row starts."""

@@ -6,6 +6,8 @@ It writes files all together or not at all. ``--apply`` compensates logs piece b
 import contextlib
 import os
 import shlex
+import shutil
+import signal
 import sys
 import tempfile
 import textwrap
@@ -14,6 +16,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import joblib
 import numpy as np
 import pandas as pd
 
@@ -27,6 +30,7 @@ from ._formulas import rules_text
 from ._frozen import FrozenPolynomial
 from ._headline import errors_and_verdict, proven_bounds
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
+from ._source import open_source
 from ._split import choose_split
 from .c_code import export_c_physics
 from .c_polynomial import export_c_polynomial
@@ -43,6 +47,8 @@ _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 1_000_000  # that are held
+_PICKLES = (".joblib", ".pkl", ".pickle")
+_STAGED, _DAY = ".skanfis-", 86_400.0  # of folders that hold files until all are written
 
 
 def main(arguments=None):
@@ -52,6 +58,10 @@ def main(arguments=None):
     options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _progress(options.quiet)
     try:
+        if arguments is None:
+            # Also where the package has set it aside, see skanfis/__init__.py.
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.default_int_handler)
         (_apply if options.apply else _calibrate)(options, tell)
         return DONE
     except UsageError as error:
@@ -97,7 +107,10 @@ def _where_from_and_to(options):
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
     names = (*_FILES, *(_C_FILES if options.c else ()))
-    _refuse_existing([folder / name for name in names], options.force)
+    _refuse_existing([folder / name for name in names], options.force, paths)
+    with contextlib.suppress(OSError):
+        # What is no log at all is refused before libraries load.
+        open_source(paths[0], head_only=True)
     check_installed()
     return folder, paths
 
@@ -250,11 +263,8 @@ def _apply(options, tell):
     if len(paths) > 1 and options.output is None:
         raise UsageError("--apply to several logs needs --output.")
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
-    _refuse_existing([target], options.force)
-    try:
-        compensator = GyroCompensator.read_json(options.apply)
-    except ValueError as error:
-        raise UsageError(str(error)) from error
+    _refuse_existing([target], options.force, [*paths, options.apply])
+    compensator = _compensator_of(options)
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
@@ -279,6 +289,25 @@ def _apply(options, tell):
         tell(f"writing {target}")
     _say(_summary_of_rates(target, tallies))
     tell("done")
+
+
+def _compensator_of(options):
+    """The compensator that the options name; of a .joblib it is said what reading it means."""
+    path = options.apply
+    if not path.endswith(_PICKLES):
+        if options.trust:
+            raise UsageError(f"--trust is for a model of {', '.join(_PICKLES)}; JSON needs none.")
+        try:
+            return GyroCompensator.read_json(path)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+    _write_to(sys.stderr, f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
+    if not options.trust:
+        raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
+    found = joblib.load(path)
+    if not isinstance(found, GyroCompensator):
+        raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
+    return found
 
 
 def _compensated(file, compensator, stem, tell):
@@ -388,12 +417,37 @@ def _write_to(stream, text):
     stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
 
 
-def _refuse_existing(paths, force):
+def _refuse_existing(paths, force, read=()):
+    """Refuse to replace files, and with ``force`` those that are ``read``."""
     for path in paths:
+        if any(path.resolve() == Path(other).resolve() for other in read):
+            raise ExistsError(
+                f"{path} is what is read; --force does not replace it: choose another --output."
+            )
         if path.is_dir():
             raise ExistsError(f"{path} is a folder: choose another --output.")
         if path.exists() and not force:
             raise ExistsError(f"{path} exists already: choose another --output, or --force.")
+
+
+def _clean(folder):
+    """Remove what runs that were killed have left."""
+    for path in folder.glob(f"{_STAGED}*-*"):
+        owner = path.name.removeprefix(_STAGED).partition("-")[0]
+        with contextlib.suppress(OSError):
+            is_old = time.time() - path.stat().st_mtime > _DAY
+            if is_old or (os.name == "posix" and owner.isdigit() and not _runs(int(owner))):
+                shutil.rmtree(path)
+
+
+def _runs(process):
+    try:
+        os.kill(process, 0)  # asks, and sends nothing
+    except ProcessLookupError:
+        return False
+    except OSError:
+        pass
+    return True
 
 
 @contextlib.contextmanager
@@ -405,7 +459,8 @@ def _staged(folder):
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".skanfis-", dir=folder) as name:
+        _clean(folder)
+        with tempfile.TemporaryDirectory(prefix=f"{_STAGED}{os.getpid()}-", dir=folder) as name:
             yield Path(name)
             for path in sorted(Path(name).iterdir()):
                 os.replace(path, folder / path.name)

@@ -396,6 +396,7 @@ def digests_of(paths):
     """
     found: dict = {}
     for path in paths:
+        open_source(path, head_only=True)  # what is no log is refused before all of it is read
         with open(path, "rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").hexdigest()
             size = opened.tell()
