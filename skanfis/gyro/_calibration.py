@@ -99,12 +99,13 @@ class Calibration:
     """A compensator, and what was found out about it.
 
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
-    the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated rate and the held-out compensated one of every row,
-    ``inside`` whether the row was in the bounds of the model that had not seen it. ``choice`` is of
-    the model's structure, ``fold_choices`` of those held out, each from its fold's training rows;
-    None where it was given. ``simpler`` are compensations without rules, judged with the model by
-    ``verdict`` on the rows in range. ``warnings`` are those of the fit; ``glitches`` sentences on
-    rows that no other supports. ``n_rows`` is how many rows there were, of which ``log`` has some.
+    the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
+    rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
+    of the model that had not seen it. ``choice`` is of the model's structure, ``fold_choices`` of
+    those held out, each from its fold's training rows; None where it was given. ``simpler`` are
+    compensations without rules, judged with the model by ``verdict`` on the rows in range.
+    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
     recipe: Recipe

@@ -113,8 +113,8 @@ def flagged_text(calibration):
     for train, test in calibration.split.folds:
         low, high = X[train].min(axis=0), X[train].max(axis=0)
         beyond += np.count_nonzero((X[test] < low) | (X[test] > high), axis=0)
-    names = calibration.X.columns[np.argsort(-beyond, kind="stable")]
-    counts = ", ".join(f"{name} in {int(n):,}" for name, n in zip(names, -np.sort(-beyond)) if n)
+    most = pd.Series(beyond, calibration.X.columns).sort_values(ascending=False, kind="stable")
+    counts = ", ".join(f"{name} in {int(n):,}" for name, n in most.items() if n)
     why = f" (beyond the other groups' range: {counts})" if counts else ""
     share = n_flagged / n_rows
     advice = "They are the ends of the range, which no other group reaches."

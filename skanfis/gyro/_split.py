@@ -274,7 +274,8 @@ def _labels(log, part, groups):
         ends = log["temperature"].groupby(groups).agg(["first", "last"]).to_numpy()
         number = [f"{leg}" for leg in np.unique(legs) + 1]
         if part == "piece":
-            number = [f"{leg}.{k + 1}" for leg, k in sorted({*zip(legs + 1, _pieces(legs))})]
+            pairs = np.unique(np.column_stack([legs, _pieces(legs)]), axis=0) + 1
+            number = [f"{leg}.{piece}" for leg, piece in pairs]
         names = [f"{no}: {a:.0f} to {b:.0f} °C" for no, (a, b) in zip(number, ends, strict=True)]
     return np.array(names, dtype=object)[groups]
 

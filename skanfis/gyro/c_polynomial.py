@@ -111,7 +111,7 @@ def export_c_polynomial(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
             part.text(),
-            "\n/* Of the polynomial: sum of coefficients times powers of (x - center) / scale. */\n",
+            "\n/* Of the polynomial: coefficients times powers of (x - center) / scale. */\n",
             *(f"{dialect.table(key, values)}\n" for key, values in tables.items()),
             dialect.table("powers", polynomial.powers.astype(int), "unsigned char"),
             dialect.write(rejection(silent, std)),

@@ -50,7 +50,7 @@ def test_it_gives_what_the_model_gives_and_knows_the_rows(case):
 
 
 def test_the_file_of_it_gives_the_same(case, log, tmp_path):
-    X, _, predicts, estimator = case
+    _, _, predicts, estimator = case
     compensator = GyroCompensator(estimator, INPUTS, predicts=predicts)
     compensator.write_json(tmp_path / "it.json")
     again = GyroCompensator.read_json(tmp_path / "it.json")
