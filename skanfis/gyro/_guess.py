@@ -46,6 +46,7 @@ _OF_NO_PART = (
     "sequence index trend delta diff acc accel accelerometer mag pressure humidity supply vdd "
     "current heater bias corrected compensated filtered direction"
 )
+_LABVIEW = {"X_Value": ("time", "s")}  # its name for the time
 _LABELS = {
     "run": {"run", "cycle", "session", "powerup"},
     "device": {"device", "serial", "sn", "unit"},
@@ -168,7 +169,7 @@ class _Column:
 
     def __init__(self, place, name, values, decimal):
         self.place = place
-        meant, rest = None, name.strip()
+        meant, rest = _LABVIEW.get(name.strip()), name.strip()
         bracketed = _BRACKETED.search(rest)
         if bracketed and (found := unit_in(bracketed[1] or bracketed[2] or "")):
             meant, rest = found, rest[: bracketed.start()]
@@ -292,8 +293,8 @@ def _no_column(part, name, header):
     # Columns that are called as another part are that.
     free = [other for other in header if other.strip().casefold() not in PARTS]
     close = [part] if part in header else difflib.get_close_matches(name, free, n=1, cutoff=0.4)
-    advice = f"{part}={close[0]}" if close else f"{part}=NAME"
+    advice = f"{part}={close[0]}" if close else f"{part}={free[0] if free else 'NAME'}"
     return (
         f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "
-        f"(--columns {advice}; columns= in Python)."
+        f"(such as --columns {advice}; columns= in Python)."
     )

@@ -206,25 +206,31 @@ class LogFile:
         labels = [places[part] for part in LABELS if part in places]
         lacking = pd.Series(0, index=list(places))
         n_left_out, first = 0, 0
-        for piece in self.source.pieces(list(places.values()), _ROWS, labels):
-            self.n_rows += len(piece)
+        for table in self.source.pieces(list(places.values()), _ROWS, labels):
+            self.n_rows += len(table)
+            piece = table  # of which an error tells the rows
             try:
-                piece = self._converted(piece)
+                piece = self._in_order(self._converted(table), table)
                 missing = piece.isna()
                 bad = missing.any(axis=1)
                 if bad.any():
                     lacking += missing.sum()
                     first = first if n_left_out else int(bad.idxmax())
                     n_left_out += int(bad.sum())
-                    piece = piece[~bad].copy()
-                if piece.empty:
+                # A gap in one column is none in the clock.
+                known = ~missing[[part for part in ("time", *LABELS) if part in piece]].any(axis=1)
+                piece, bad = piece[known].copy(), bad[known]
+                if bad.all():
                     continue
                 piece["run"] = finder.codes(piece, number)
+                piece = piece[~bad]
                 if checks is not None:
                     checks.add(piece)
             except LogError as error:
                 raise self.located(error, piece.index) from error
             yield piece
+        if self._clock is not None:
+            self.notes += self._clock.notes
         if not n_left_out:
             return
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
@@ -234,6 +240,25 @@ class LogFile:
             raise LogError(f"{said}: too many to go on without them.")
         place = self.source.place_of(first)
         self.notes.append(f"{said}; they are left out, the first of them {place}")
+
+    def _in_order(self, piece, table):
+        """A piece whose rows do not occur twice, and that begins with the first row."""
+        if not self._allow_missing or "time" not in piece:
+            return piece
+        twice = piece.duplicated() & piece["time"].notna()
+        # Runs of one value all through are alike, and two runs.
+        if twice.any() and not piece[twice].drop(columns="time").duplicated()[1:].all():
+            times = table[self.layout.places["time"]][twice]
+            self.notes.append(
+                f"{self.path}: {twice.sum():,} rows occur twice, from time {times.iloc[0]} to "
+                f"{times.iloc[-1]}; the second time they are left out"
+            )
+            piece = piece[~twice]
+        steps = np.diff(piece["time"].dropna())
+        if len(table) < _ROWS and steps.size and (steps < 0.0).all():
+            self.notes.append(f"{self.path}: the last row comes first; rows are turned round")
+            piece = piece[::-1]
+        return piece
 
     def _converted(self, table):
         piece = pd.DataFrame(index=table.index)
