@@ -40,6 +40,7 @@ _SCORES = {
     for part, table in _WORDS.items()
 }
 _STRANGER = -0.5  # any other word
+_FOLLOWS = 0.9  # correlation of the axis that the table turns
 _SIGNAL, _UNIT = 3.0, 0.25  # a unit of a raw signal, for the output; any unit
 _OF_NO_PART = (
     "residual fit fitted error err std sigma var variance status flag valid crc checksum seq "
@@ -160,6 +161,7 @@ def _guess(source, request, layout, first):
     if called_rate is not None and called_rate not in layout.places.values():
         layout.places.setdefault("rate", called_rate)
     of_first = request.assumed if first is None else first.units
+    _settle_axis(columns, layout)
     _settle_units(columns, layout, of_first)
     layout.notes += _sentences(layout)
 
@@ -168,7 +170,7 @@ class _Column:
     """A column's name, read (its words, unit, what that is a unit of), and its first values."""
 
     def __init__(self, place, name, values, decimal):
-        self.place = place
+        self.place, self.name = place, name
         meant, rest = _LABVIEW.get(name.strip()), name.strip()
         bracketed = _BRACKETED.search(rest)
         if bracketed and (found := unit_in(bracketed[1] or bracketed[2] or "")):
@@ -198,9 +200,8 @@ class _Column:
             return False
         if part == "time":
             steps = np.diff(self.numbers)
-            return self.is_time or (
-                self.numbers.size > 0 and np.sum(steps < 0.0) <= 0.1 * steps.size
-            )
+            against = min(np.sum(steps < 0.0), np.sum(steps > 0.0))  # the last may come first
+            return self.is_time or (self.numbers.size > 0 and against <= 0.1 * steps.size)
         # A flag or a trend takes a few whole values.
         is_flag = part == "temperature" and np.isin(self.numbers, (-1.0, 0.0, 1.0)).all()
         return self.numbers.size > 0 and not is_flag
@@ -235,6 +236,22 @@ def _by_unit(part, columns, layout):
     found = [column for column in _free(part, columns, layout) if column.quantity]
     if part != "rate" and len(found) == 1:
         layout.places[part] = found[0].place
+
+
+def _settle_axis(columns, layout):
+    """Of outputs whose names say as much, that of the axis which the table turns."""
+    others = [column for column in columns if column.name in layout.others.get("output", [])]
+    if not others or "rate" not in layout.places:
+        return
+    rate = columns[layout.places["rate"]].aligned
+    own = [columns[layout.places["output"]], *others]
+    if not rate.size or any(not column.aligned.size for column in own):
+        return
+    table = pd.DataFrame({column.place: column.aligned for column in own})
+    follows = table.corrwith(pd.Series(rate)).abs() > _FOLLOWS
+    if follows.sum() == 1:
+        layout.places["output"] = int(follows.idxmax())
+        layout.others.pop("output")
 
 
 def _settle_units(columns, layout, of_first):

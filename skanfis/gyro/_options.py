@@ -96,6 +96,7 @@ def make_parser():
     add("--operator", "who made the calibration", default="")
     told = "of the specification, as in residual_rms=0.01deg/s (at most), reduction_factor=10"
     add("--limits", f"{told} (at least)", type=parse_limit, metavar="FIGURE=VALUE", **several)
+    add("--pdf", "also write it as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")

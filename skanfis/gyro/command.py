@@ -37,7 +37,7 @@ from .c_polynomial import export_c_polynomial
 from .compensator import INPUTS, GyroCompensator, features
 from .compose import FrozenRules
 from .errors import ExistsError, LogError, UsageError
-from .html_report import check_installed, report_page
+from .html_report import check_installed, report_page, write_pdf
 from .log import LogFile, RunFinder, digests_of, find_logs, read
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
@@ -106,12 +106,12 @@ def _where_from_and_to(options):
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = (*_FILES, *(_C_FILES if options.c else ()))
+    names = (*_FILES, *(_C_FILES if options.c else ()), *(["report.pdf"] if options.pdf else []))
     _refuse_existing([folder / name for name in names], options.force, paths)
     with contextlib.suppress(OSError):
         # What is no log at all is refused before libraries load.
         open_source(paths[0], head_only=True)
-    check_installed()
+    check_installed(options.pdf)
     return folder, paths
 
 
@@ -216,6 +216,8 @@ def _write(calibration, options, files, folder):
     page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
+    if options.pdf:
+        write_pdf(page, folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:

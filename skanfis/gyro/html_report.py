@@ -106,8 +106,28 @@ def report_page(calibration, title, options=None):
     )
 
 
-def check_installed():
+def write_pdf(page, path):
+    """The page on paper."""
+    _weasyprint().HTML(string=page).write_pdf(path)
+
+
+def _weasyprint():
+    try:
+        import weasyprint
+    except (ImportError, OSError) as error:
+        # OSError: of Pango, which draws its text.
+        reason = printable(str(error)).partition("\n")[0]
+        raise ImportError(
+            f"--pdf needs weasyprint: pip install 'skanfis[pdf]' ({reason}); or print report.html "
+            "from a browser"
+        ) from error
+    return weasyprint
+
+
+def check_installed(pdf=False):
     """ImportError where the report could not be made: at the end that would be found out late."""
+    if pdf:
+        _weasyprint()
     for name in ("matplotlib", "jinja2"):
         try:
             __import__(name)
