@@ -10,7 +10,8 @@ interval is a little too narrow.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +21,7 @@ from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
 from ._models import Choice, fit_model, some_rows
-from ._simpler import Simpler, simpler_compensations
+from ._simpler import NAMES, Simpler, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, features
 from .errors import LogError
@@ -39,16 +40,20 @@ _ROUNDING = 1e-9
 class Recipe:
     """What a calibration is asked to do.
 
-    ``terms`` is "search" or numbers, one per input.
+    ``terms`` is "search" or numbers, one per input. ``units`` are those of the files by part, and
+    ``assumed`` has sentences on those that were neither named nor told.
     """
 
     inputs: tuple[str, ...]
     output_unit: str = "deg/s"
     scale_factor: float = 1.0  # of a raw signal at rest, which does not tell it
+    write: str = "recommended"  # or "rules", or one of NAMES in _simpler
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
+    units: dict[str, str] = field(default_factory=dict)
+    assumed: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -93,16 +98,20 @@ class Verdict:
 class Calibration:
     """A compensator, and what was found out about it.
 
-    ``before`` and ``after`` are the indicated rate and the held-out compensated one of every row,
-    ``inside`` whether the row was in the bounds of the model that had not seen it. ``choice`` is of
-    the model's structure, ``fold_choices`` of those held out, each from its fold's training rows;
-    None where it was given. ``simpler`` are compensations without rules, judged with the model by
-    ``verdict`` on the rows in range. ``warnings`` are those of the fit; ``glitches`` sentences on
-    rows that no other supports. ``n_rows`` is how many rows there were, of which ``log`` has some.
+    ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
+    the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
+    rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
+    of the model that had not seen it. ``choice`` is of the model's structure, ``fold_choices`` of
+    those held out, each from its fold's training rows; None where it was given. ``simpler`` are
+    compensations without rules, judged with the model by ``verdict`` on the rows in range.
+    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
     recipe: Recipe
     compensator: GyroCompensator
+    written: str
+    model: Any
     split: Split
     log: pd.DataFrame
     X: pd.DataFrame
@@ -122,7 +131,12 @@ class Calibration:
     @property
     def rules(self):
         """The pipeline of the rules: beside the arcsine law, what adds to it."""
-        return getattr(self.compensator.estimator, "residual_", self.compensator.estimator)
+        return getattr(self.model, "residual_", self.model)
+
+    @property
+    def writes_model(self):
+        """Whether law and rules are what is written."""
+        return self.written == self.verdict.model
 
     @property
     def is_thinned(self):
@@ -186,7 +200,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     )
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
-    simpler = list(simpler_compensations(X, rate, before, folds, rows))
+    simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
     tell(f"fitting to {rows.size:,} rows")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -197,37 +211,46 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         tell(f"terms {','.join(map(str, choice.terms))}")
     if recipe.physics:
         tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
-    compensator = GyroCompensator(
-        estimator,
-        recipe.inputs,
-        predicts="rate" if recipe.physics else "error",
-        scale_factor=factor,
-        output_unit=recipe.output_unit,
-        time_constant=_TIME_CONSTANT,
-    )
-    after = compensator.compensate(before, predicted)
+    after = predicted if recipe.physics else before - predicted
     # The same rows for all: those that the model answered in range.
     judged = inside & np.isfinite(after)
     rates = {each.name: each.after for each in simpler if each.after is not None} | {_MODEL: after}
     errors = {name: (compensated - rate)[judged] for name, compensated in rates.items()}
+    verdict = judge(errors, split.labels[judged], is_one_cycle=split.kind == "piece")
+    written = _to_write(recipe, verdict, simpler)
+    predicts = "rate" if recipe.physics else "error"
+    model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
+    chosen = next(each for each in [*simpler, model] if each.name == written)
+    compensator = GyroCompensator(
+        chosen.estimator,
+        recipe.inputs,
+        predicts=chosen.predicts,
+        scale_factor=factor,
+        output_unit=recipe.output_unit,
+        time_constant=_TIME_CONSTANT,
+        units={part: recipe.units[part] for part in recipe.units if part in log},
+        assumed=recipe.assumed,
+    )
     return Calibration(
         recipe=recipe,
         compensator=compensator,
+        written=written,
+        model=estimator,
         split=split,
         log=log,
         X=X,
         before=before,
-        after=after,
-        inside=inside,
+        after=chosen.after,
+        inside=judged,
         choice=choice,
         fold_choices=choices if recipe.physics or isinstance(recipe.terms, str) else None,
         simpler=simpler,
-        verdict=judge(errors, split.labels[judged]),
+        verdict=verdict,
         n_fit_rows=rows.size,
         warnings=sorted({str(warning.message) for warning in caught}),
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
-        fold_models=fold_models,
+        fold_models=chosen.fold_models,
     )
 
 
@@ -256,10 +279,22 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
     return predicted, inside, folds, choices, models
 
 
-def judge(errors, groups):
+def _to_write(recipe, verdict, simpler):
+    """Name of what is written: what is recommended, or asked for."""
+    if recipe.write == "recommended":
+        return verdict.recommended
+    name = NAMES.get(recipe.write, verdict.model)
+    if name not in verdict.rms:
+        reasons = [each.missing for each in simpler if each.name == name] or ["no such on this log"]
+        raise LogError(f"--write {recipe.write}: {reasons[0]}.")
+    return name
+
+
+def judge(errors, groups, is_one_cycle=False):
     """Judge compensations by their errors on the same rows, and what was held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
+    One thermal cycle shows of no more than a constant that it repeats.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -275,6 +310,8 @@ def judge(errors, groups):
         for place, name in enumerate(names)
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
+    if is_one_cycle and recommended != names[0]:
+        recommended = "constant"
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
     return Verdict(of_all, gains, counts.size, recommended)
 

@@ -15,6 +15,7 @@ from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
 from ._guess import Request, checked_request
+from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
 from .errors import UsageError, shortened
@@ -107,11 +108,16 @@ def make_parser():
     add("--operator", "who made the calibration", default="")
     told = "of the specification, as in residual_rms=0.01deg/s (at most), reduction_factor=10"
     add("--limits", f"{told} (at least)", type=parse_limit, metavar="FIGURE=VALUE", **several)
+    add("--pdf", "also write it as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
+    told = "with --apply of a .joblib, which runs the code in it: its maker is trusted"
+    add("--trust", told, action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
+    told = "what is recommended (default), or another: the rules of the model, or what is simpler"
+    add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
@@ -127,11 +133,14 @@ def make_parser():
     return parser
 
 
-def request_of(options, require):
-    """What the options ask of a reading; UsageError where they name an unknown part or unit."""
+def request_of(options, require, assumed=None):
+    """What the options ask of a reading; UsageError where they name an unknown part or unit.
+
+    ``assumed`` are units of columns that name none; None leaves them to the values.
+    """
     columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
     try:
-        return checked_request(Request(columns, units, tuple(require), guess=True))
+        return checked_request(Request(columns, units, tuple(require), True, assumed))
     except ValueError as error:
         raise UsageError(str(error)) from error
 

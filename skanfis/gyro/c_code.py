@@ -31,6 +31,8 @@ from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c.templates import FINITE_INPUT, rejection
 from ..export.folding import found_by_search
 from ..policies import SILENT
+from ._frozen import FrozenPolynomial
+from .c_polynomial import export_c_polynomial
 from .compose import FrozenRules, ResidualRegressor, law_and_rules
 from .physics import past_phase
 
@@ -213,18 +215,29 @@ def export_c_physics(
 
 def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
     """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
+    if saturate is not None:
+        ends = np.stack([saturate.lower, saturate.upper], axis=1)
+        # A constant's limits are the same: a hair is between them.
+        saturate = ends + [-1e-12, 1e-12] * (1.0 + np.abs(ends))
     found, units = found_by_search(compensator.estimator), units_of(compensator)
     if is_rate := isinstance(found, ResidualRegressor):
         use = "y[0] is the compensated rate: take it in the place of the raw rate."
     else:
-        found = FrozenRules.of(found, len(compensator.inputs)).model
-        units[found.output_names[0]] = "deg/s"
+        is_polynomial = isinstance(found, FrozenPolynomial)
+        if not is_polynomial:
+            found = FrozenRules.of(found, len(compensator.inputs)).model
+        model = found.rule.model if is_polynomial else found
+        units[model.output_names[0]] = "deg/s"
         use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
     notes = [
         f"{use} {raw_rate_of(compensator)}",
         *(note for name, note in _NOTES.items() if name in compensator.inputs),
+        *(f"Unit assumed: {text}" for text in compensator.assumed.values()),
     ]
-    return (export_c_physics if is_rate else export_c)(
+    export: Any = export_c_physics if is_rate else export_c
+    if isinstance(found, FrozenPolynomial):
+        export = export_c_polynomial
+    return export(
         found,
         path,
         std=std,

@@ -6,12 +6,15 @@ It writes files all together or not at all. ``--apply`` compensates logs piece b
 import contextlib
 import os
 import shlex
+import shutil
+import signal
 import sys
 import tempfile
 import time
 from datetime import datetime
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pandas as pd
 
@@ -23,11 +26,12 @@ from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
 from ._options import PROGRAM, ReportOptions, check_once, check_targets, make_parser, request_of
+from ._source import open_source
 from ._split import choose_split
 from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
-from .html_report import check_installed, report_page
+from .html_report import check_installed, report_page, write_pdf
 from .log import LogFile, RunFinder, digests_of, find_logs, read
 from .targets.write import FILES, write_targets
 
@@ -39,6 +43,8 @@ _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 1_000_000  # that are held
+_PICKLES = (".joblib", ".pkl", ".pickle")
+_STAGED, _DAY = ".skanfis-", 86_400.0  # of folders that hold files until all are written
 
 
 def main(arguments=None):
@@ -48,6 +54,10 @@ def main(arguments=None):
     options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _progress(options.quiet)
     try:
+        if arguments is None:
+            # Also where the package has set it aside, see skanfis/__init__.py.
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.default_int_handler)
         return (_apply if options.apply else _calibrate)(options, tell)
     except UsageError as error:
         parser.error(printable(error))  # exits
@@ -98,10 +108,13 @@ def _where_from_and_to(options):
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = [*_FILES, *(_C_FILES if options.c else ())]
+    names = [*_FILES, *(_C_FILES if options.c else ()), *(["report.pdf"] if options.pdf else [])]
     names += [name for target in options.target for name in FILES[target]]
-    _refuse_existing([folder / name for name in names], options.force)
-    check_installed()
+    _refuse_existing([folder / name for name in names], options.force, paths)
+    with contextlib.suppress(OSError):
+        # What is no log at all is refused before libraries load.
+        open_source(paths[0], head_only=True)
+    check_installed(options.pdf)
     return folder, paths
 
 
@@ -111,6 +124,8 @@ def _read(options, paths, tell):
     if {"time", "temperature_rate"} & set(options.inputs or ()):
         required.append("time")
     reading = read(paths, request_of(options, required), tell=tell, most_rows=_MOST_ROWS)
+    if reading.assumed:
+        reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     for note in reading.notes:
         tell(f"note: {note}")
     numbers = {"row": reading.n_rows}
@@ -171,10 +186,13 @@ def _recipe(options, reading, at_rest):
         inputs=inputs,
         output_unit=unit if unit in SIGNALS else "deg/s",
         scale_factor=options.scale_factor or 1.0,
+        write=options.write,
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
         box=tuple(options.box),
+        units=reading.units,
+        assumed=reading.assumed,
     )
 
 
@@ -201,6 +219,8 @@ def _write(calibration, options, files, folder):
     page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
+    if options.pdf:
+        write_pdf(page, folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
@@ -229,15 +249,15 @@ def _apply(options, tell):
     if len(paths) > 1 and options.output is None:
         raise UsageError("--apply to several logs needs --output.")
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
-    _refuse_existing([target], options.force)
-    try:
-        compensator = GyroCompensator.read_json(options.apply)
-    except ValueError as error:
-        raise UsageError(str(error)) from error
+    _refuse_existing([target], options.force, [*paths, options.apply])
+    compensator = _compensator_of(options)
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
-    request = request_of(options, sorted(needed))
+    units = dict(compensator.units)
+    if units.get("output") in SIGNALS and "output" not in compensator.assumed:
+        del units["output"]  # which is asked for again
+    request = request_of(options, sorted(needed), units)
     digests_of(paths)
     tallies: list = []
     with _staged(target.parent) as folder:
@@ -256,6 +276,25 @@ def _apply(options, tell):
     _say(_summary_of_rates(target, tallies))
     tell("done")
     return DONE
+
+
+def _compensator_of(options):
+    """The compensator that the options name; of a .joblib it is said what reading it means."""
+    path = options.apply
+    if not path.endswith(_PICKLES):
+        if options.trust:
+            raise UsageError(f"--trust is for a model of {', '.join(_PICKLES)}; JSON needs none.")
+        try:
+            return GyroCompensator.read_json(path)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+    _write_to(sys.stderr, f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
+    if not options.trust:
+        raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
+    found = joblib.load(path)
+    if not isinstance(found, GyroCompensator):
+        raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
+    return found
 
 
 def _compensated(file, compensator, stem, tell):
@@ -365,12 +404,37 @@ def _write_to(stream, text):
     stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
 
 
-def _refuse_existing(paths, force):
+def _refuse_existing(paths, force, read=()):
+    """Refuse to replace files, and with ``force`` those that are ``read``."""
     for path in paths:
+        if any(path.resolve() == Path(other).resolve() for other in read):
+            raise ExistsError(
+                f"{path} is what is read; --force does not replace it: choose another --output."
+            )
         if path.is_dir():
             raise ExistsError(f"{path} is a folder: choose another --output.")
         if path.exists() and not force:
             raise ExistsError(f"{path} exists already: choose another --output, or --force.")
+
+
+def _clean(folder):
+    """Remove what runs that were killed have left."""
+    for path in folder.glob(f"{_STAGED}*-*"):
+        owner = path.name.removeprefix(_STAGED).partition("-")[0]
+        with contextlib.suppress(OSError):
+            is_old = time.time() - path.stat().st_mtime > _DAY
+            if is_old or (os.name == "posix" and owner.isdigit() and not _runs(int(owner))):
+                shutil.rmtree(path)
+
+
+def _runs(process):
+    try:
+        os.kill(process, 0)  # asks, and sends nothing
+    except ProcessLookupError:
+        return False
+    except OSError:
+        pass
+    return True
 
 
 @contextlib.contextmanager
@@ -382,7 +446,8 @@ def _staged(folder):
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".skanfis-", dir=folder) as name:
+        _clean(folder)
+        with tempfile.TemporaryDirectory(prefix=f"{_STAGED}{os.getpid()}-", dir=folder) as name:
             yield Path(name)
             for path in sorted(Path(name).iterdir()):
                 os.replace(path, folder / path.name)
