@@ -126,7 +126,7 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
             ("temperature", "output"),
             {"terms": (1, 1), "physics": True},
             "table",
-            "without --physics",
+            "needs output, which this target",
         ),
         (
             ("temperature",),
