@@ -49,10 +49,9 @@ def _write(calibration, options, name, folder):
         raise RefusedError(f"the model does not take the {missing[0]}; --target table will do.")
     error = ErrorModel(compensator, compensator.estimator, axes, X)
     if lacking := [each for each in error.uses if each not in axes]:
-        less = ", without --physics" if compensator.predicts == "rate" and len(axes) == 1 else ""
         raise RefusedError(
             f"the model needs {' and '.join(lacking)}, which this target cannot say. Calibrate "
-            f"again with --inputs {' '.join(axes)}{less}."
+            f"again with --inputs {' '.join(axes)}."
         )
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if name in TABLES:
