@@ -1,7 +1,6 @@
 """Exported C, compiled and run, answers what ``predict`` answers."""
 
 import re
-import shutil
 import subprocess
 from fractions import Fraction
 
@@ -15,7 +14,7 @@ from sklearn.preprocessing import RobustScaler
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
 from skanfis.export.c.builder import in_digits
-from skanfis.export.c.dialect import STATUS, literals
+from skanfis.export.c.dialect import STATUS
 from skanfis.export.c.self_test import size_of_sum
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian
@@ -26,6 +25,7 @@ from skanfis.policies import OUT_OF_BOUNDS
 from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
+from .counting import most_operations, needs_cpp
 from .every_model import CASES, FEWEST, full_scale, rows, surface
 
 MIN_COVERAGE = 0.3
@@ -255,7 +255,7 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 
 
 @pytest.mark.theory
-@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+@needs_cpp
 @pytest.mark.parametrize("dtype", ["float", "double"])
 def test_files_are_cpp_too(dtype, tmp_path):
     for i, case in enumerate(CASES[::17]):
@@ -267,71 +267,17 @@ def test_files_are_cpp_too(dtype, tmp_path):
     subprocess.run(["g++", *flags, "-c", "all.cpp", "-o", "all.o"], cwd=tmp_path, check=True)
 
 
-# A number that counts what is done with it: exponentials, logarithms, roots, products, quotients.
-COUNTED = """
-#include <cmath>
-#include <cstdio>
-static long done[5];
-struct Counted {
-    double v;
-    Counted(double u = 0.0) : v(u) {}
-    explicit operator int() const { return (int)v; }
-    Counted operator-() const { return Counted(-v); }
-};
-static Counted operator+(Counted a, Counted b) { return Counted(a.v + b.v); }
-static Counted operator-(Counted a, Counted b) { return Counted(a.v - b.v); }
-static Counted operator*(Counted a, Counted b) { ++done[3]; return Counted(a.v * b.v); }
-static Counted operator/(Counted a, Counted b) { ++done[4]; return Counted(a.v / b.v); }
-static Counted &operator+=(Counted &a, Counted b) { return a = a + b; }
-static Counted &operator-=(Counted &a, Counted b) { return a = a - b; }
-static Counted &operator*=(Counted &a, Counted b) { return a = a * b; }
-static Counted &operator/=(Counted &a, Counted b) { return a = a / b; }
-static bool operator<(Counted a, Counted b) { return a.v < b.v; }
-static bool operator>(Counted a, Counted b) { return a.v > b.v; }
-static bool operator<=(Counted a, Counted b) { return a.v <= b.v; }
-static bool operator>=(Counted a, Counted b) { return a.v >= b.v; }
-static Counted exp(Counted a) { ++done[0]; return Counted(std::exp(a.v)); }
-static Counted log(Counted a) { ++done[1]; return Counted(std::log(a.v)); }
-static Counted sqrt(Counted a) { ++done[2]; return Counted(std::sqrt(a.v)); }
-"""
-COUNTING = """
-static const double rows_$name[$n][$d] = $rows;
-static void count_$name() {
-    long most[5] = {0};
-    for (int r = 0; r < $n; ++r) {
-        Counted x[$d], y[9];
-        for (int i = 0; i < $d; ++i) x[i] = rows_$name[r][i];
-        for (int k = 0; k < 5; ++k) done[k] = 0;
-        $name_predict(x, y);
-        for (int k = 0; k < 5; ++k) if (done[k] > most[k]) most[k] = done[k];
-    }
-    for (int k = 0; k < 5; ++k) std::printf("%ld ", most[k]);
-}
-"""
-
-
 @pytest.mark.theory
-@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+@needs_cpp
 def test_no_row_takes_more_than_the_header_says(tmp_path):
-    said, text, calls = [], COUNTED, ""
-    for i, case in enumerate(CASES[::7]):
-        code = export_c(case.model, name=f"m{i}", min_coverage=MIN_COVERAGE)
-        found = re.search(r"Whatever the inputs: at most (.*?)\.", code.header.replace("\n *", ""))
-        said.append([int(number) for number in re.findall(r"\d+", found[1])])
-        text += re.sub(r"\bdouble\b", "Counted", code.header + code.source.partition("\n")[2])
-        X = rows(float, 400)
-        words = {"name": code.name, "n": len(X), "d": X.shape[1], "rows": literals(X)}
-        text += re.sub(r"\$(name|n|d|rows)", lambda word: str(words[word[1]]), COUNTING)  # noqa: B023
-        calls += f"count_{code.name}();"
-    (tmp_path / "count.cpp").write_text(f"{text}int main() {{ {calls} }}\n", encoding="ascii")
-    subprocess.run(
-        ["g++", "-std=c++11", "-O0", "count.cpp", "-o", "count"], cwd=tmp_path, check=True
-    )
-    done = run(["./count"], tmp_path).stdout
-    taken = np.reshape([int(number) for number in done.split()], (-1, 5))
+    codes = [
+        export_c(case.model, name=f"m{i}", min_coverage=MIN_COVERAGE)
+        for i, case in enumerate(CASES[::7])
+    ]
+    taken, said = most_operations(codes, rows(float, 400), tmp_path)
     assert (taken <= said).all()
     # And it is no idle number: some row of most models comes near.
-    assert np.median(taken[:, 3] / np.array(said)[:, 3]) > 0.8
+    assert np.median(taken[:, 3] / said[:, 3]) > 0.8
 
 
 def test_grid_takes_an_exponential_per_term():

@@ -10,6 +10,7 @@ from skanfis.gyro.targets.piecewise import difference
 from skanfis.gyro.targets.tables import TABLES, TYPES, Table
 
 from ...export.c_compiler import SANITIZE, STRICT, gcc, needs_compiler, run
+from ...export.counting import most_operations, needs_cpp
 from .models import ENDS, error_of, error_over_temperature
 
 UNITS = {"temperature": "degC", "output": "counts"}
@@ -140,6 +141,15 @@ def test_no_answer_to_what_is_not_finite(tmp_path):
     y, status = evaluated(table.code([], UNITS), X, tmp_path)
     np.testing.assert_array_equal(status, [10, 10, 10, 0])
     assert np.all(y[:3] == 0.0)
+
+
+@needs_cpp
+@pytest.mark.parametrize("type_name", ["float", "q15"])
+@pytest.mark.parametrize("kind", TABLES)
+def test_no_row_takes_more_than_the_header_says(kind, type_name, tmp_path):
+    code = made(kind, type_name)[1].code([], UNITS)
+    rows = np.random.default_rng(7).uniform(-30.0, 70.0, (50, len(TABLES[kind][1])))
+    np.testing.assert_array_equal(*most_operations([code], rows, tmp_path))
 
 
 def test_the_header_says_what_goes_in_and_comes_out():
