@@ -28,7 +28,7 @@ from .errors import LogError
 from .metrics import rms, scale_factor
 
 _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
-_MOST_FIT_ROWS = 100_000
+_MOST_FIT_ROWS = 10_000
 # Of a verdict: the name of the model in it, and what a gain must be above to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95

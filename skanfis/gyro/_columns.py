@@ -34,6 +34,7 @@ _TABLE = {
             "°/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg_per_hr deg/hour",
         ),
         "rad/s": (180.0 / math.pi, "rad_s rads radps rad/sec rad_sec rad_per_s"),
+        "mdeg/s": (1e-3, "mdps mdeg_s mdegps"),
         "mrad/s": (0.18 / math.pi, "mrad_s mradps"),
         "rpm": (6.0, ""),
     },

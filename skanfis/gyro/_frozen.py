@@ -113,32 +113,17 @@ class FrozenPolynomial:
         return self.rule.coverage(X)
 
     def bounds(self, box=None):
-        """Limits of what it gives in a box (n_inputs, 2), by interval arithmetic, and its box."""
+        """Limits of what it gives in a box (n_inputs, 2), and the box.
+
+        Beside the constant no term, its tangent included, is larger than |c| (|z| + |dz|)^powers.
+        """
         model = self.rule.model
         own = np.stack([model.minimum, model.maximum], axis=1)
         box = own if box is None else np.asarray(box, dtype=float)
-        near = np.clip(box, own[:, :1], own[:, 1:])
-        ends = (near - self.center[:, None]) / self.scale[:, None]
-        limits = self._interval(ends, self.powers, self.coefficients)
-        if model.out_of_bounds == "linear":
-            reach = np.abs(np.vstack([model.way_out(side[None]) for side in box.T])).max(axis=0)
-            for j, step in enumerate(reach / self.scale):
-                lower = self.powers - (np.arange(len(ends)) == j) * (self.powers > 0)
-                slope = self._interval(ends, lower, self.coefficients * self.powers[:, j])
-                limits += step * np.abs(slope).max() * np.array([-1.0, 1.0])
-        return limits, box
-
-    @staticmethod
-    def _interval(ends, powers, coefficients):
-        low, high = coefficients, coefficients
-        for j, (a, b) in enumerate(ends):
-            k = powers[:, j]
-            found = np.stack([a**k, b**k])
-            # An even power of what holds zero is least there.
-            least = np.where((a < 0.0 < b) & (k > 0) & (k % 2 == 0), 0.0, found.min(axis=0))
-            most = found.max(axis=0)
-            products = np.stack([low * least, low * most, high * least, high * most])
-            low, high = products.min(axis=0), products.max(axis=0)
-        # Wider by more than what rounding can be.
-        slack = 1e-12 * np.abs(np.stack([low, high])).max(axis=0).sum()
-        return np.array([low.sum() - slack, high.sum() + slack])
+        near = np.clip(box.T, model.minimum, model.maximum)
+        reach = np.abs(model.way_out(box.T)).max(axis=0) * (model.out_of_bounds == "linear")
+        sizes = (np.abs(near - self.center).max(axis=0) + reach) / self.scale
+        varies = self.powers.any(axis=1)
+        most = np.prod(sizes**self.powers, axis=1) @ (np.abs(self.coefficients) * varies)
+        middle, rounding = self.coefficients @ ~varies, 1.0 + 1e-12
+        return np.array([middle - rounding * most, middle + rounding * most]), box

@@ -14,21 +14,24 @@ from ._units import assumed_text, settle_units
 from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
-_RATE = "rate omega angular velocity speed"
+_RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
     "gyro gyroscope fog output out signal raw counts count adc measured meas indicated sensor imu "
     "dut uut kreisel"
 )
-_TRUTH = "true truth table turntable drehtisch ref reference stage commanded command cmd encoder"
+_TRUTH = (
+    "true truth table turntable drehtisch ref reference stage commanded command cmd encoder soll "
+    "consigne"
+)
 # How much a word in a column's name speaks for a part. A chamber's thermometer is no gyro's.
 _WORDS = {
     "time": {
-        5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime 时间",
+        5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime temps 时间",
         4.0: "clock elapsed",
         3.0: "t sec secs seconds epoch utc tow ms millis us",
     },
     "temperature": {
-        5.0: "temp temperature temperatur tmp therm thermometer thermistor ntc rtd celsius 温度",
+        5.0: "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度",
         3.0: "t",
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
@@ -131,7 +134,9 @@ def settle(source, request, first=None):
         _guess(source, request, layout, first)
     for part in request.require:
         if part not in layout.places:
-            raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
+            taken = layout.places.values() if request.guess else ()
+            told = _no_column(part, names[part], source.header, taken)
+            raise LogError(f"{source.path}: {told}")
     if len(set(layout.places.values())) < len(layout.places):
         raise LogError(f"{source.path}: two parts cannot be the same column of the file.")
     layout.places = {part: layout.places[part] for part in PARTS if part in layout.places}
@@ -305,10 +310,11 @@ def _place(source, name, taken):
     return found[0] if found else None
 
 
-def _no_column(part, name, header):
+def _no_column(part, name, header, taken=()):
     found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
     # Columns that are called as another part are that.
-    free = [other for other in header if other.strip().casefold() not in PARTS]
+    left = [other for place, other in enumerate(header) if place not in taken]
+    free = [other for other in left if other.strip().casefold() not in PARTS]
     close = [part] if part in header else difflib.get_close_matches(name, free, n=1, cutoff=0.4)
     advice = f"{part}={close[0]}" if close else f"{part}={free[0] if free else 'NAME'}"
     return (

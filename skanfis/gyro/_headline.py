@@ -276,11 +276,20 @@ def _proven_polynomial(calibration):
     rows = rows[((rows >= box[:, 0]) & (rows <= box[:, 1])).all(axis=1)]
     rows = np.vstack([rows, polynomial.center])
     values = polynomial.predict(rows)
-    least, most = rows[[values.argmin()]], rows[[values.argmax()]]
-    ends = np.array([[values.min()], [values.max()]])
+    low, high = values.argmin(), values.argmax()
     found = Bounds(
-        limits[:1], limits[1:], *ends, least, most, box, 1, False, tuple(names), ("error",)
+        lower=limits[:1],
+        upper=limits[1:],
+        lowest=values[[low]],
+        highest=values[[high]],
+        at_lowest=rows[[low]],
+        at_highest=rows[[high]],
+        box=box,
+        n_boxes=1,
+        converged=False,
+        input_names=tuple(names),
+        output_names=("error",),
     )
-    side = int(np.argmax(np.abs(ends)))
-    attained = float(np.abs(ends).max()), (least, most)[side][0]
+    largest = int(np.abs(values).argmax())
+    attained = float(abs(values[largest])), rows[largest]
     return Proven(found, float(np.abs(limits).max()), attained, None)

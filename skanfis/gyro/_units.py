@@ -34,7 +34,7 @@ def settle_units(values, units, *, is_all=True):
     UsageError, with the options to copy, where more than one reading is plausible; unless these are
     not all values, which may tell it.
     """
-    readings = [{}]
+    readings: list[dict] = [{}]
     for find in (_of_temperature, _of_time, _of_rates):
         found = find(values, units)
         readings = [known | more for known in readings for more in found]

@@ -42,7 +42,7 @@ INTERRUPTED = 130  # as a shell says of Ctrl-C
 _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _ON_BOARD = ["time", "temperature", "output", "run"]
-_MOST_ROWS = 1_000_000  # that are held
+_MOST_ROWS = 200_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
 _STAGED, _DAY = ".skanfis-", 86_400.0  # of folders that hold files until all are written
 

@@ -53,7 +53,8 @@ def read_log(
         they differ from it; blanks around names, and capitals, do not matter.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
-        and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be in counts, V or mV.
+        and "output" (deg/s, deg/h, rad/s, mdeg/s, mrad/s, rpm); "output" may also be in counts, V
+        or mV.
     require : sequence of str, default=("temperature", "output", "rate")
         Parts without which the log is refused.
 

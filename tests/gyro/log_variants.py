@@ -149,7 +149,7 @@ def _add_axes(frame, header, rng, story):
 
 
 def _rows(frame, rows, rng, story):
-    """Values that are missing, rows that are lost, occur twice, or come from the last to the first."""
+    """Values that are missing, rows that are lost, occur twice, or begin with the last."""
     kind = str(rng.choice(["", "", "", "cells", "lost", "twice", "reversed"]))
     frame = frame.astype(object)
     if kind == "cells":

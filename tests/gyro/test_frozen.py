@@ -94,13 +94,14 @@ def test_bounds_of_a_polynomial_hold_and_are_exact_for_one_input(log):
         inside = np.clip(rows, *used.T)
         values = estimator.predict(inside)
         assert low <= values.min() < values.max() <= high
-    # Of z^3 + 2 z^2 on [-1, 2]: each term on its own.
+    # Of z^3 + 2 z^2 on [-1, 2]: exact at the far end.
     rule = single_rule(X[["temperature"]], "clip")
     low, high = rule.model.minimum[0], rule.model.maximum[0]
     third = (high - low) / 3.0
     one = FrozenPolynomial(rule, np.array([low + third]), np.array([third]),
                            np.array([[3], [2]]), np.array([1.0, 2.0]))  # fmt: skip
-    np.testing.assert_allclose(one.bounds()[0], [-1.0, 16.0], atol=1e-9)
+    np.testing.assert_allclose(one.bounds()[0], [-16.0, 16.0], atol=1e-9)
+    assert one.predict([[high]])[0] == pytest.approx(16.0)
 
 
 @pytest.mark.parametrize(

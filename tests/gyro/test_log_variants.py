@@ -35,7 +35,7 @@ def rate_error(log):
 
 
 def outcome(case, logs, folder):
-    """"read", "refused", "asked" for an option, or "wrong"."""
+    """ "read", "refused", "asked" for an option, or "wrong"."""
     path = folder / f"log{case.number}{case.suffix}"
     path.write_bytes(case.content)
     clean = logs[case.source]

@@ -314,8 +314,14 @@ def test_units_in_a_line_of_their_own_below_numbers(tmp_path, truth):
 
 @pytest.mark.parametrize("how", ["variables", "struct", "7.3"])
 def test_a_file_of_matlab(tmp_path, truth, how):
-    names = {"t_ms": 1000 * truth["clock"], "temp_c": truth["temperature"], "fs": 10.0,
-             "gyro_dps": truth["output"], "rate_dps": truth["rate"], "other": np.arange(7.0)}
+    names = {
+        "t_ms": 1000 * truth["clock"],
+        "temp_c": truth["temperature"],
+        "fs": 10.0,
+        "gyro_dps": truth["output"],
+        "rate_dps": truth["rate"],
+        "other": np.arange(7.0),
+    }
     values = {name: np.asarray(column)[:, None] if name != "fs" else column
               for name, column in names.items()}  # fmt: skip
     path = tmp_path / "log.mat"
@@ -365,7 +371,7 @@ def test_a_damaged_file_is_refused(tmp_path, name):
     if name == "log.xlsx":
         pytest.importorskip("openpyxl")
     (tmp_path / name).write_bytes(b"MATLAB 5.0 and no more" * 20)
-    with pytest.raises(LogError, match="is no .* file that can be read"):
+    with pytest.raises(LogError, match=r"is no .* file that can be read"):
         found(tmp_path / name)
 
 
