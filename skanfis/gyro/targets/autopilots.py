@@ -1,9 +1,8 @@
 """Parameters of autopilots: one cubic over the temperature, of one axis of one gyro.
 
-PX4 (TemperatureCompensation::calc_thermal_offsets_3D) subtracts X0 + X1 d + X2 d^2 + X3 d^3 with
-d = T - TREF; ArduPilot (AP_InertialSensor_TCal::correct_gyro) subtracts P(T) - P(T_cal), with
-P = (GYR1 d + GYR2 d^2 + GYR3 d^3) 1e-6 and d = T - 35. Both are in rad/s and single precision, and
-hold the temperature, and ArduPilot also T_cal, between TMIN and TMAX.
+PX4, in TemperatureCompensation::calc_thermal_offsets_3D: X0 + X1 d + X2 d^2 + X3 d^3, d = T - TREF.
+ArduPilot, in AP_InertialSensor_TCal: (GYR1 d + GYR2 d^2 + GYR3 d^3) 1e-6, d = T - 35. Both are in
+rad/s and single precision; NOTES tell the rest.
 """
 
 import textwrap

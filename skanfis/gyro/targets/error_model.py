@@ -142,7 +142,10 @@ class _Polynomial:
 
 
 class _Law:
-    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
+    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond.
+
+    Of a law without a lag of the thermometer, which a simple target could not say.
+    """
 
     def __init__(self, law):
         self._law, self.columns = law, list(law.columns_)
@@ -150,28 +153,20 @@ class _Law:
 
     def ranges(self, low, high):
         law = self._law
-        lag = np.array([[1.0], [law.thermometer_lag_]])[: len(low) - 1]
-        warmer = product((lag, lag), (low[1:], high[1:]))
-        d = [end.sum(axis=0, keepdims=True) - law.reference_temperature_ for end in warmer]
-        of_temperature = [
+        d = [end[1:2] - law.reference_temperature_ for end in (low, high)]
+        (a, a_slope), (k, k_slope), (b, b_slope) = (
             polynomial_ranges(np.arange(each.size)[:, None], each, *d)
             for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
-        ]
-        (a, (a_slope,)), (k, (k_slope,)), (b, (b_slope,)) = [
-            (value, np.swapaxes(slopes, 0, 1)) for value, slopes in of_temperature
-        ]
+        )
         over_a, over_k = _inverse(a), _inverse(k)
         sine = product((low[0] - law.offset_, high[0] - law.offset_), over_a)
         sine = np.where(size(sine) <= np.sin(law.max_phase), sine, np.nan)
         steep = product(product(over_a, over_k), [1 / np.sqrt(1 - s) for s in square(sine)])
         phase = np.arcsin(sine)
-        bend = product(product(sine, a_slope), steep)
-        turn = product(phase, product(k_slope, square(over_k)))
-        by_temperature = -(np.array(bend) + turn + b_slope)[::-1]
-        slopes = np.array(steep)[:, None]
-        if len(lag):
-            along = product((lag, lag), by_temperature[:, None])
-            slopes = np.concatenate([slopes, along], axis=1)
+        bend = np.array(product(product(sine, a_slope[:, 0]), steep))
+        turn = np.array(product(phase, product(k_slope[:, 0], square(over_k))))
+        slopes = np.zeros((2, *low.shape))
+        slopes[:, 0], slopes[:, 1] = steep, -(bend + turn + b_slope[:, 0])[::-1]
         return product(phase, over_k) - b[::-1], slopes
 
 

@@ -185,14 +185,12 @@ class Table:
             "An input beyond its range is held at the end of it.",
         ]
         if bits:
-            for k, (name, scale) in enumerate(zip(self.names, self.scale, strict=True)):
-                lines.append(
-                    f"Fixed point: x[{k}] is {name} / {_shown(scale)}, rounded by the caller, held "
-                    f"between {-2 * one} and {2 * one - 1}."
-                )
+            pairs = enumerate(zip(self.names, self.scale, strict=True))
+            inputs = ", ".join(f"x[{k}] is {name} / {_shown(scale)}" for k, (name, scale) in pairs)
             lines.append(
-                f"The error is y[0] * {_shown(self.unit)} deg/s. No sum or product overflows, and "
-                f"y[0] stays below {2 * one} in size: nothing else is saturated."
+                f"Fixed point: {inputs}, rounded by the caller, who saturates it to {-2 * one} and "
+                f"{2 * one - 1}. The error is y[0] * {_shown(self.unit)} deg/s. No sum or product "
+                "overflows: nothing else is saturated."
             )
         else:
             lines.append("A row that is not finite gets no output.")

@@ -45,14 +45,13 @@ def write_targets(calibration, options, folder):
 def _write(calibration, options, name, folder):
     axes = TABLES[name][1] if name in TABLES else ("temperature",)
     compensator, X = calibration.compensator, calibration.X
+    again = f"Calibrate again with --inputs {' '.join(axes)}, or ask for another target."
     if missing := [axis for axis in axes if axis not in X]:
-        raise RefusedError(f"the model does not take the {missing[0]}; --target table will do.")
+        raise RefusedError(f"the model does not take the {missing[0]}. {again}")
     error = ErrorModel(compensator, compensator.estimator, axes, X)
     if lacking := [each for each in error.uses if each not in axes]:
-        raise RefusedError(
-            f"the model needs {' and '.join(lacking)}, which this target cannot say. Calibrate "
-            f"again with --inputs {' '.join(axes)}."
-        )
+        needs = " and ".join(lacking)
+        raise RefusedError(f"the model needs {needs}, which this target cannot say. {again}")
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if name in TABLES:
         type_name = options.target_type or next(iter(TYPES))

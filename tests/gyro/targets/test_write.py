@@ -132,7 +132,7 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
             ("temperature",),
             {"terms": (2,)},
             "rate-table",
-            "does not take the output; --target table",
+            "does not take the output. Calibrate again with --inputs",
         ),
     ],
 )
