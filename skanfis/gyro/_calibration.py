@@ -185,13 +185,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
-    glitches = [
-        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
-        "and calibrate again."
-        for row, reason in find_glitches(log, before - rate)
-    ]
-    for sentence in glitches:
-        tell(f"warning: {sentence}")
+    glitches = _glitches(log, before - rate, name_row, tell)
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     predicted, inside, folds, choices = _held_out(X, target, groups, split, recipe, tell, rng)
@@ -204,19 +198,17 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         # Of rows that trial fits have not seen; the final one is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    if choice.terms is not None:
-        tell(f"terms {','.join(map(str, choice.terms))}")
-    if recipe.physics:
-        tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
-    after = predicted if recipe.physics else before - predicted
+    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
+    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
+    model = Simpler(_MODEL, predicts, after, estimator=estimator)
     # The same rows for all: those that the model answered in range.
     judged = inside & np.isfinite(after)
-    rates = {each.name: each.after for each in simpler if each.after is not None} | {_MODEL: after}
-    errors = {name: (compensated - rate)[judged] for name, compensated in rates.items()}
+    every = [each for each in [*simpler, model] if each.after is not None]
+    errors = {each.name: (each.after - rate)[judged] for each in every}
     verdict = judge(errors, split.labels[judged], is_one_cycle=split.kind == "piece")
     written = _to_write(recipe, verdict, simpler)
-    model = Simpler(_MODEL, "rate" if recipe.physics else "error", after, estimator=estimator)
-    chosen = next(each for each in [*simpler, model] if each.name == written)
+    chosen = next(each for each in every if each.name == written)
     compensator = GyroCompensator(
         chosen.estimator,
         recipe.inputs,
@@ -271,6 +263,18 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             "overlap in temperature, rate and time."
         )
     return predicted, inside, folds, choices
+
+
+def _glitches(log, error, name_row, tell):
+    """Sentences on rows that no other supports, told as well."""
+    found = [
+        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
+        "and calibrate again."
+        for row, reason in find_glitches(log, error)
+    ]
+    for sentence in found:
+        tell(f"warning: {sentence}")
+    return found
 
 
 def _to_write(recipe, verdict, simpler):
