@@ -82,6 +82,7 @@ class Verdict:
     gains: dict[str, Gain]
     n_groups: int
     recommended: str
+    is_one_cycle: bool = False  # and cannot tell whether it repeats
 
     @property
     def model(self):
@@ -206,7 +207,8 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
-    verdict = judge(errors, split.labels[judged], is_one_cycle=split.kind == "piece")
+    is_one_cycle = split.kind == "piece" and not np.ptp(rate)
+    verdict = judge(errors, split.labels[judged], is_one_cycle)
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
     compensator = GyroCompensator(
@@ -292,7 +294,7 @@ def judge(errors, groups, is_one_cycle=False):
     """Judge compensations by their errors on the same rows, and what was held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
-    One thermal cycle shows of no more than a constant that it repeats.
+    One thermal cycle at rest shows of no more than a constant that it repeats.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -308,10 +310,10 @@ def judge(errors, groups, is_one_cycle=False):
         for place, name in enumerate(names)
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
-    if is_one_cycle and recommended != names[0]:
-        recommended = "constant"
+    if is_one_cycle:
+        recommended = min(names[:2], key=of_all.get)
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
-    return Verdict(of_all, gains, counts.size, recommended)
+    return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
 
 
 def _gain(logs):
