@@ -45,7 +45,16 @@ LAYERS = {
     "intervals": SKLEARN,
     "dask": [*SKLEARN, "pandas", "dask"],
     "datasets": [*SKLEARN, "pandas"],
-    "gyro": [*PLOTTING, "allantools", "h5py", "jinja2", "joblib", "openpyxl", "pyarrow", "weasyprint"],
+    "gyro": [
+        *PLOTTING,
+        "allantools",
+        "h5py",
+        "jinja2",
+        "joblib",
+        "openpyxl",
+        "pyarrow",
+        "weasyprint",
+    ],
 }
 # The version, which what is exported carries.
 ALSO = {"export": [PUBLIC]}

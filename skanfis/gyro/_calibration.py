@@ -82,6 +82,7 @@ class Verdict:
     gains: dict[str, Gain]
     n_groups: int
     recommended: str
+    is_one_cycle: bool = False  # and cannot tell whether it repeats
 
     @property
     def model(self):
@@ -186,13 +187,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
-    glitches = [
-        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
-        "and calibrate again."
-        for row, reason in find_glitches(log, before - rate)
-    ]
-    for sentence in glitches:
-        tell(f"warning: {sentence}")
+    glitches = _glitches(log, before - rate, name_row, tell)
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     predicted, inside, folds, choices, fold_models = _held_out(
@@ -207,20 +202,18 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         # Of rows that trial fits have not seen; the final one is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    if choice.terms is not None:
-        tell(f"terms {','.join(map(str, choice.terms))}")
-    if recipe.physics:
-        tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
-    after = predicted if recipe.physics else before - predicted
+    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
+    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
+    model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # The same rows for all: those that the model answered in range.
     judged = inside & np.isfinite(after)
-    rates = {each.name: each.after for each in simpler if each.after is not None} | {_MODEL: after}
-    errors = {name: (compensated - rate)[judged] for name, compensated in rates.items()}
-    verdict = judge(errors, split.labels[judged], is_one_cycle=split.kind == "piece")
+    every = [each for each in [*simpler, model] if each.after is not None]
+    errors = {each.name: (each.after - rate)[judged] for each in every}
+    is_one_cycle = split.kind == "piece" and not np.ptp(rate)
+    verdict = judge(errors, split.labels[judged], is_one_cycle)
     written = _to_write(recipe, verdict, simpler)
-    predicts = "rate" if recipe.physics else "error"
-    model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
-    chosen = next(each for each in [*simpler, model] if each.name == written)
+    chosen = next(each for each in every if each.name == written)
     compensator = GyroCompensator(
         chosen.estimator,
         recipe.inputs,
@@ -279,6 +272,18 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
     return predicted, inside, folds, choices, models
 
 
+def _glitches(log, error, name_row, tell):
+    """Sentences on rows that no other supports, told as well."""
+    found = [
+        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
+        "and calibrate again."
+        for row, reason in find_glitches(log, error)
+    ]
+    for sentence in found:
+        tell(f"warning: {sentence}")
+    return found
+
+
 def _to_write(recipe, verdict, simpler):
     """Name of what is written: what is recommended, or asked for."""
     if recipe.write == "recommended":
@@ -294,7 +299,7 @@ def judge(errors, groups, is_one_cycle=False):
     """Judge compensations by their errors on the same rows, and what was held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
-    One thermal cycle shows of no more than a constant that it repeats.
+    One thermal cycle at rest shows of no more than a constant that it repeats.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -310,10 +315,10 @@ def judge(errors, groups, is_one_cycle=False):
         for place, name in enumerate(names)
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
-    if is_one_cycle and recommended != names[0]:
-        recommended = "constant"
+    if is_one_cycle:
+        recommended = min(names[:2], key=of_all.get)
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
-    return Verdict(of_all, gains, counts.size, recommended)
+    return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
 
 
 def _gain(logs):

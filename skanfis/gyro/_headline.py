@@ -63,7 +63,7 @@ def headline(calibration, unit):
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
-    if _cannot_tell(calibration):
+    if verdict.is_one_cycle:
         title = f"One cycle cannot tell whether this repeats; until then {ARTICLES[name]} is safe"
     what = {
         NOTHING: "Without any compensation the error is",
@@ -73,7 +73,7 @@ def headline(calibration, unit):
         "Nothing more elaborate that was tried is better by more than the scatter over the "
         f"{groups} can explain (95 %)."
     )
-    if _cannot_tell(calibration):
+    if verdict.is_one_cycle:
         why = (
             "Whatever follows the temperature was learnt and judged on the same cycle: record two "
             "more, then calibrate again from all."
@@ -87,11 +87,6 @@ def headline(calibration, unit):
         f"{what} {left[name]} RMS on the held-out rows in range; the fuzzy rules leave "
         f"{left[verdict.model]} on the same rows. {why}"
     )
-
-
-def _cannot_tell(calibration):
-    """Whether the log has a single thermal cycle, and pieces of it were held out."""
-    return calibration.split.kind == "piece"
 
 
 def held_out_groups(calibration):

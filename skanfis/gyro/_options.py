@@ -112,8 +112,7 @@ def make_parser():
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
-    told = "with --apply of a .joblib, which runs the code in it: its maker is trusted"
-    add("--trust", told, action="store_true")
+    add("--trust", "of a .joblib, which runs the code in it: trust its maker", action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
     told = "what is recommended (default), or another: the rules of the model, or what is simpler"

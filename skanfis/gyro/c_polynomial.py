@@ -4,9 +4,9 @@ The rule is written by ``skanfis.export`` as a static function of the same file,
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
-from scipy.stats import qmc
 
 from ..export.c import CCode
 from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
@@ -18,7 +18,7 @@ from ..export.c.dialect import (
     remark,
     write_files,
 )
-from ..export.c.self_test import ROWS, TOLERANCE, self_test
+from ..export.c.self_test import TOLERANCE, known_answers, self_test
 from ..export.c.templates import FINITE_INPUT, rejection
 from ..policies import SILENT
 
@@ -170,29 +170,21 @@ def export_c_polynomial(
 
 
 def _known_answers(polynomial, part, kind, limits):
-    """Rows, outputs, status and tolerance; half of the rows lie up to half a width beyond."""
-    model = part.model
-    points = qmc.Halton(model.n_inputs, scramble=False).random(ROWS)
-    reach = np.where(np.arange(len(points)) % 2, 1.0, 2.0)[:, None]
-    X = model.minimum + (model.maximum - model.minimum) * (0.5 + reach * (points - 0.5))
-    X = X.astype(kind).astype(float)
-    answering = replace(model, out_of_bounds="clip") if model.out_of_bounds in SILENT else model
-    same = replace(polynomial, rule=replace(polynomial.rule, model=answering))
-    outside, coverage = ~model.in_bounds(X), model.coverage(X)
-    silent = outside & (model.out_of_bounds in SILENT)
-    status = STATUS["OUT_OF_RANGE"] * outside | STATUS["NO_OUTPUT"] * silent
-    if part.min_coverage is not None:
-        status |= STATUS["UNCOVERED"] * (~silent & (coverage < part.min_coverage))
-        sure = np.abs(coverage - part.min_coverage) > 1e-3 * part.min_coverage
-        X, status, silent = X[sure], status[sure], silent[sure]
-    y = same.predict(X)
-    if limits is not None:
-        y = np.clip(y, *limits.astype(float))
+    """Rows, outputs, status and tolerance: rows and status of the rule alone."""
+    model = polynomial.rule.model
+    numbers = SimpleNamespace(
+        model=part.model, dtype=kind, low=part.low, high=part.high, reference=model.reference
+    )
+    X, _, status, _ = known_answers(numbers, part.min_coverage)
+    policy = "clip" if model.out_of_bounds in SILENT else model.out_of_bounds
+    rule = replace(polynomial.rule, model=part.model.with_out_of_bounds(policy))
+    y = replace(polynomial, rule=rule).predict(X)
+    y = y if limits is None else np.clip(y, *limits.astype(float))
+    y[status & STATUS["NO_OUTPUT"] != 0] = 0.0
     # What is summed, at most; rounding of an input far from zero moves it too.
-    ends = np.stack([model.minimum, model.maximum], axis=1)
-    largest = np.abs(ends - polynomial.center[:, None]).max(axis=1) / polynomial.scale
-    sizes = np.prod((2.0 + largest) ** polynomial.powers, axis=1) * np.abs(polynomial.coefficients)
-    far = 1.0 + (np.abs(ends).max(axis=1) / polynomial.scale).max()
-    tolerance = np.array([TOLERANCE[kind] * far * sizes.sum()])
-    y = np.where(silent, 0.0, y)[:, None]
-    return X.astype(kind), y.astype(kind), status, tolerance.astype(kind)
+    ends = np.stack([model.minimum, model.maximum])
+    widest = 2.0 + np.abs(ends - polynomial.center).max(axis=0) / polynomial.scale
+    size = np.prod(widest**polynomial.powers, axis=1) @ np.abs(polynomial.coefficients)
+    far = 1.0 + (np.abs(ends) / polynomial.scale).max()
+    tolerance = np.array([TOLERANCE[kind] * far * size])
+    return X, y[:, None].astype(kind), status, tolerance.astype(kind)

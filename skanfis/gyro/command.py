@@ -5,6 +5,7 @@ It writes files all together or not at all. ``--apply`` compensates logs piece b
 
 import contextlib
 import os
+import platform
 import shlex
 import shutil
 import signal
@@ -44,7 +45,7 @@ _C_FILES = ("compensator.h", "compensator.c")
 _ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 200_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
-_STAGED, _DAY = ".skanfis-", 86_400.0  # of folders that hold files until all are written
+_STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
 
 
 def main(arguments=None):
@@ -314,7 +315,8 @@ def _compensated(file, compensator, stem, tell):
             labels = labels.map(lambda number: stem if number in "1" else f"{stem} / {number}")
         log["run"] = labels.to_numpy()[log["run"]]
         yield log if any(labels) else log.drop(columns="run"), compensated
-    for note in [*file.notes, *filter(None, [finder.note])]:
+    assumed = [f"units as in the calibration: {text}" for _, text in file.layout.assumed.values()]
+    for note in [*file.notes, *assumed, *filter(None, [finder.note])]:
         tell(f"note: {note}")
     tell(f"{file.n_rows:,} rows")
 
@@ -418,23 +420,16 @@ def _refuse_existing(paths, force, read=()):
 
 
 def _clean(folder):
-    """Remove what runs that were killed have left."""
+    """Remove what runs on this machine that were killed have left."""
     for path in folder.glob(f"{_STAGED}*-*"):
         owner = path.name.removeprefix(_STAGED).partition("-")[0]
-        with contextlib.suppress(OSError):
-            is_old = time.time() - path.stat().st_mtime > _DAY
-            if is_old or (os.name == "posix" and owner.isdigit() and not _runs(int(owner))):
-                shutil.rmtree(path)
-
-
-def _runs(process):
-    try:
-        os.kill(process, 0)  # asks, and sends nothing
-    except ProcessLookupError:
-        return False
-    except OSError:
-        pass
-    return True
+        try:
+            if os.name == "posix":
+                os.kill(int(owner), 0)  # asks, and sends nothing
+        except (ProcessLookupError, ValueError, OverflowError):
+            shutil.rmtree(path, ignore_errors=True)
+        except OSError:
+            pass  # it runs, by another user
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """What the command never does: replace what it reads, run a file unasked, hang, leave things."""
 
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -88,16 +89,21 @@ def test_what_is_no_log_is_refused_at_once(tmp_path, text, message):
     assert time.perf_counter() - begin < 1.0
 
 
+@pytest.mark.skipif(os.name != "posix", reason="processes of another kind")
 def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
     process = subprocess.Popen([sys.executable, "-c", ""])
     process.wait()
-    left, alive = tmp_path / f".skanfis-{process.pid}-x", tmp_path / f".skanfis-{os.getpid()}-y"
-    for folder in (left, alive):
+    names = (f"{process.pid}-x", f"{os.getpid()}-y")
+    left, alive = (tmp_path / f".skanfis-{platform.node()}-{name}" for name in names)
+    other = tmp_path / f".skanfis-another-machine-{process.pid}-z"
+    for folder in (left, alive, other):
         folder.mkdir()
         (folder / "part.csv").write_text("")
     with _staged(tmp_path) as folder:
         (folder / "done.csv").write_text("")
-    assert sorted(path.name for path in tmp_path.iterdir()) == [alive.name, "done.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [alive.name, other.name, "done.csv"]
+    )
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
