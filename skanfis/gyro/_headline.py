@@ -20,10 +20,12 @@ import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
-from ..bounds import bounds, gradient_bounds
+from ..bounds import Bounds, bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
-from ._simpler import LAW_AND_LINE, NOTHING, options_for
+from ._frozen import FrozenPolynomial
+from ._simpler import LAW_AND_LINE, NOTHING
+from .compose import FrozenRules
 from .displays import figures
 from .metrics import rms
 
@@ -37,6 +39,7 @@ ARTICLES = {
 }
 _MOST_ROWS = 100_000  # evenly chosen, for the rules, the noise and the model
 _CONFIDENCE = 0.95  # of every interval in the report
+_MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
 
 
@@ -60,6 +63,8 @@ def headline(calibration, unit):
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
+    if verdict.is_one_cycle:
+        title = f"One cycle cannot tell whether this repeats; until then {ARTICLES[name]} is safe"
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
@@ -68,7 +73,12 @@ def headline(calibration, unit):
         "Nothing more elaborate that was tried is better by more than the scatter over the "
         f"{groups} can explain (95 %)."
     )
-    if verdict.n_groups == 1:
+    if verdict.is_one_cycle:
+        why = (
+            "Whatever follows the temperature was learnt and judged on the same cycle: record two "
+            "more, then calibrate again from all."
+        )
+    elif verdict.n_groups == 1:
         why = (
             "Only one held-out group has rows in range: how far errors scatter is not known, and "
             "nothing can be shown to be better. Log more groups that overlap."
@@ -84,7 +94,31 @@ def held_out_groups(calibration):
     kind, n_groups = calibration.split.kind.split("+")[0], calibration.verdict.n_groups
     if kind == "level":
         kind = "rate level"
-    return f"{n_groups} held-out {kind}{'s' if n_groups > 1 else ''}"
+    n_all = np.unique(calibration.split.labels.astype(str)).size
+    of_all = "" if n_all == n_groups else f" (of {n_all})"
+    return f"{n_groups}{of_all} held-out {kind}{'s' if n_groups > 1 or of_all else ''}"
+
+
+def flagged_text(calibration):
+    """How many held-out rows were flagged, for which inputs, and what that means."""
+    n_rows, n_flagged = calibration.inside.size, np.count_nonzero(~calibration.inside)
+    if not n_flagged:
+        return f"None of the {n_rows:,} held-out rows was flagged."
+    X, beyond = calibration.X.to_numpy(), np.zeros(calibration.X.shape[1])
+    for train, test in calibration.split.folds:
+        low, high = X[train].min(axis=0), X[train].max(axis=0)
+        beyond += np.count_nonzero((X[test] < low) | (X[test] > high), axis=0)
+    most = pd.Series(beyond, calibration.X.columns).sort_values(ascending=False, kind="stable")
+    counts = ", ".join(f"{name} in {int(n):,}" for name, n in most.items() if n)
+    why = f" (beyond the other groups' range: {counts})" if counts else ""
+    share = n_flagged / n_rows
+    advice = "They are the ends of the range, which no other group reaches."
+    if share > _MANY_FLAGGED:
+        advice = (
+            "That is much: the figures say nothing of these rows. Log groups that overlap more, "
+            "above all at both ends of the range."
+        )
+    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{why}. {advice}"
 
 
 def errors_and_verdict(calibration):
@@ -104,11 +138,14 @@ def errors_and_verdict(calibration):
             f"{rms(after[outside]):.4g} after, on {outside.sum():,} held-out rows, all of them "
             "flagged"
         )
+    lines.append(f"flagged        {flagged_text(calibration)}")
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason}")
-    if wanted := options_for(calibration.verdict.recommended, len(calibration.recipe.inputs)):
-        lines.append(f"instead        {wanted} writes the files of it; the report has its formula")
-    if findings := readability_of(calibration).findings:
+    what = ARTICLES.get(calibration.written, "the fuzzy rules")
+    asked = calibration.recipe.write != "recommended"
+    others = "as --write asks" if asked else "as recommended; --write names another"
+    lines.append(f"written is     {what}, {others}")
+    if calibration.writes_model and (findings := readability_of(calibration).findings):
         lines.append(f"rules          not fit to be read one by one. {findings[0]}")
     return lines
 
@@ -116,7 +153,7 @@ def errors_and_verdict(calibration):
 def readability_of(calibration):
     """Whether the rules can be read: against what the law leaves of the rate, or the error."""
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
-    X, estimator = calibration.X.iloc[places], calibration.compensator.estimator
+    X, estimator = calibration.X.iloc[places], calibration.model
     if not calibration.recipe.physics:
         return readability(estimator, X, (calibration.before - calibration.rate)[places])
     left = calibration.rate[places] - estimator.base_.predict(X)
@@ -149,13 +186,14 @@ def budget_of(calibration):
     residual = calibration.compensator.compensate(before, estimator.predict(X)) - rate
     answered = np.isfinite(residual)
     groups, in_range = calibration.split.labels.astype(str), calibration.in_range
-    noise = noise_within(residual[answered], groups[rows][answered], rules.noise_std_)
+    of_fit = rules.noise_std_ if calibration.writes_model else None
+    noise = noise_within(residual[answered], groups[rows][answered], of_fit)
     errors = (calibration.after - calibration.rate)[in_range]
     model = np.nan
-    if rules.noise_std_ is not None:
+    if of_fit is not None:
         deviation = calibration.rules.predict(X[answered], return_std=True)[1]
         # Of the difference of two squares rounding may leave less than nothing.
-        beyond = np.maximum(deviation**2 - rules.noise_std_**2, 0.0)
+        beyond = np.maximum(deviation**2 - of_fit**2, 0.0)
         model = float(np.sqrt(np.mean(beyond)))
     scatter, low, high = scatter_between(errors, groups[in_range])
     return Budget(noise, scatter, low, high, model)
@@ -204,15 +242,49 @@ class Proven(NamedTuple):
 
 def proven_bounds(calibration):
     """Bounds over the box of the recipe, other inputs in the range of the calibration."""
-    recipe, own = calibration.recipe, 1.0 / calibration.compensator.scale_factor
-    box = {name: (low, high) for name, low, high in recipe.box} or None
-    found = bounds(calibration.rules, box, max_boxes=_MOST_BOXES)
+    recipe, compensator = calibration.recipe, calibration.compensator
+    own, box = 1.0 / compensator.scale_factor, {name: ends for name, *ends in recipe.box} or None
+    if isinstance(compensator.estimator, FrozenPolynomial):
+        return _proven_polynomial(calibration)
+    rules = getattr(compensator.estimator, "residual_", compensator.estimator)
+    rules = rules.model if isinstance(rules, FrozenRules) else rules
+    found = bounds(rules, box, max_boxes=_MOST_BOXES)
     sizes = [float(abs(found.lowest[0])), float(abs(found.highest[0]))]
     side = int(np.argmax(sizes))
     attained = sizes[side], (found.at_lowest[0], found.at_highest[0])[side]
     rises = None
-    if not recipe.physics and "output" in recipe.inputs:
+    if compensator.predicts == "error" and "output" in recipe.inputs:
         # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-        slope = gradient_bounds(calibration.rules, "output", box, max_boxes=_MOST_BOXES)
+        slope = gradient_bounds(rules, "output", box, max_boxes=_MOST_BOXES)
         rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
     return Proven(found, float(found.magnitude[0]), attained, rises)
+
+
+def _proven_polynomial(calibration):
+    """Bounds of a polynomial; what was met is that on the rows of the calibration."""
+    polynomial, names = calibration.compensator.estimator, calibration.recipe.inputs
+    box = np.stack([calibration.X.min(), calibration.X.max()], axis=1)
+    for name, *ends in calibration.recipe.box:
+        box[names.index(name)] = ends
+    limits, box = polynomial.bounds(box)
+    rows = calibration.X.to_numpy()
+    rows = rows[((rows >= box[:, 0]) & (rows <= box[:, 1])).all(axis=1)]
+    rows = np.vstack([rows, polynomial.center])
+    values = polynomial.predict(rows)
+    low, high = values.argmin(), values.argmax()
+    found = Bounds(
+        lower=limits[:1],
+        upper=limits[1:],
+        lowest=values[[low]],
+        highest=values[[high]],
+        at_lowest=rows[[low]],
+        at_highest=rows[[high]],
+        box=box,
+        n_boxes=1,
+        converged=False,
+        input_names=tuple(names),
+        output_names=("error",),
+    )
+    largest = int(np.abs(values).argmax())
+    attained = float(abs(values[largest])), rows[largest]
+    return Proven(found, float(np.abs(limits).max()), attained, None)

@@ -15,10 +15,14 @@ from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
 from ._guess import Request, checked_request
+from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
+from .targets.autopilots import AXES, INSTANCES
+from .targets.tables import TABLES, TYPES
+from .targets.write import FILES
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
@@ -26,6 +30,14 @@ _FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.
 _SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
 _AT_LEAST = ("reduction_factor",)  # of this more is better
+
+# Of what is said of a target, which it is for.
+_TARGETS_OF = {
+    "target_type": tuple(TABLES),
+    "axis": tuple(INSTANCES),
+    "instance": tuple(INSTANCES),
+    "device_id": ("px4",),
+}
 
 _WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
@@ -45,6 +57,7 @@ examples:
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
+  5  a target was refused; all else is written
 """
 
 
@@ -95,26 +108,56 @@ def make_parser():
     add("--operator", "who made the calibration", default="")
     told = "of the specification, as in residual_rms=0.01deg/s (at most), reduction_factor=10"
     add("--limits", f"{told} (at least)", type=parse_limit, metavar="FIGURE=VALUE", **several)
+    add("--pdf", "also write it as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
+    add("--trust", "of a .joblib, which runs the code in it: trust its maker", action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
+    told = "what is recommended (default), or another: the rules of the model, or what is simpler"
+    add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
+    told = "also write a simple target, where it is good enough: C tables, parameters of autopilots"
+    add("--target", told, choices=tuple(FILES), **several)
+    add("--target-type", "of the numbers of C tables (float)", choices=tuple(TYPES))
+    add("--axis", "of the autopilot's gyro that this one is", choices=AXES)
+    told = "number of that gyro: 0 to 3 for PX4 (default 0), 1 to 3 for ArduPilot (default 1)"
+    add("--instance", told, type=int)
+    add("--device-id", "of that gyro in PX4, for TC_Gn_ID", type=int)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
 
 
-def request_of(options, require):
-    """What the options ask of a reading; UsageError where they name an unknown part or unit."""
+def request_of(options, require, assumed=None):
+    """What the options ask of a reading; UsageError where they name an unknown part or unit.
+
+    ``assumed`` are units of columns that name none; None leaves them to the values.
+    """
     columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
     try:
-        return checked_request(Request(columns, units, tuple(require), guess=True))
+        return checked_request(Request(columns, units, tuple(require), True, assumed))
     except ValueError as error:
         raise UsageError(str(error)) from error
+
+
+def check_targets(options):
+    """UsageError where what the options ask of simple targets makes no sense."""
+    check_once("--target", options.target)
+    for name in options.target:
+        numbers = INSTANCES.get(name)
+        if numbers and options.axis is None:
+            raise UsageError(f"--target {name} needs the axis of its gyro: --axis x, y or z.")
+        if numbers and options.instance not in (None, *numbers):
+            told = f"{numbers[0]} to {numbers[-1]}"
+            raise UsageError(f"--instance {options.instance}: gyros of {name} are {told}.")
+    for option, names in _TARGETS_OF.items():
+        if getattr(options, option) is not None and not {*names} & {*options.target}:
+            told = f"--{option.replace('_', '-')} is of --target {' or '.join(names)}."
+            raise UsageError(told)
 
 
 def _pairs(texts, option):

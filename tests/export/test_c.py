@@ -1,7 +1,6 @@
 """Exported C, compiled and run, answers what ``predict`` answers."""
 
 import re
-import shutil
 import subprocess
 from fractions import Fraction
 
@@ -14,6 +13,7 @@ from sklearn.preprocessing import RobustScaler
 
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
+from skanfis.export.c.builder import in_digits
 from skanfis.export.c.dialect import STATUS
 from skanfis.export.c.self_test import size_of_sum
 from skanfis.learning import VariableProjection
@@ -25,6 +25,7 @@ from skanfis.policies import OUT_OF_BOUNDS
 from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
+from .counting import most_operations, needs_cpp
 from .every_model import CASES, FEWEST, full_scale, rows, surface
 
 MIN_COVERAGE = 0.3
@@ -254,7 +255,7 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 
 
 @pytest.mark.theory
-@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+@needs_cpp
 @pytest.mark.parametrize("dtype", ["float", "double"])
 def test_files_are_cpp_too(dtype, tmp_path):
     for i, case in enumerate(CASES[::17]):
@@ -264,6 +265,19 @@ def test_files_are_cpp_too(dtype, tmp_path):
     )
     flags = ["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     subprocess.run(["g++", *flags, "-c", "all.cpp", "-o", "all.o"], cwd=tmp_path, check=True)
+
+
+@pytest.mark.theory
+@needs_cpp
+def test_no_row_takes_more_than_the_header_says(tmp_path):
+    codes = [
+        export_c(case.model, name=f"m{i}", min_coverage=MIN_COVERAGE)
+        for i, case in enumerate(CASES[::7])
+    ]
+    taken, said = most_operations(codes, rows(float, 400), tmp_path)
+    assert (taken <= said).all()
+    # And it is no idle number: some row of most models comes near.
+    assert np.median(taken[:, 3] / said[:, 3]) > 0.8
 
 
 def test_grid_takes_an_exponential_per_term():
@@ -276,10 +290,30 @@ def test_grid_takes_an_exponential_per_term():
     # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value.
     assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3)
     assert cost.divisions == 2
-    # Per rule three entries of a factor, two squares, and five more.
+    # Per rule three entries of a factor, two squares, and five more; strengths once more.
     known = 1 + np.count_nonzero(model.model_.support.share)
-    assert cost.coverage_multiply_adds == known * (3 + 2 + 5)
+    assert cost.coverage_multiply_adds == known * (3 + 2 + 5) + 36
     assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
+
+
+def test_ranges_have_digits_that_mean_something():
+    assert in_digits(-1.4e-14, 60.0123456) == ["0", "60.0123"]
+    assert in_digits(-0.0, 2e-5) == ["0", "2e-05"]
+    assert in_digits(1.7e9, 1.7e9 + 12.3456789) == ["1700000000", "1700000012.35"]
+    assert in_digits(20.5, 20.5) == ["20.5", "20.5"]
+    assert in_digits(-np.inf, 1.0) == ["-inf", "1"]
+
+
+def test_units_and_notes_stand_in_the_header():
+    X, y = surface()
+    notes = ["A star * multiplies; */ and /* and \\ end nothing."]
+    units = {"x1": "degC", "y": "deg/s */"}
+    header = export_c(quick(n_mfs=1).fit(X, y), name="m", units=units, notes=notes).header
+    comment = header.partition("#ifndef")[0]
+    assert comment.count("*/") == 1
+    assert "A star * multiplies; <U+002A>/ and /<U+002A> and <U+005C> end nothing." in comment
+    assert "[1] x1 [degC]: " in comment
+    assert "[0] y [deg/s <U+002A>/]: " in comment
 
 
 @pytest.mark.theory

@@ -24,7 +24,7 @@ def calibrated(error, gain=1.0, noise=NOISE, scatter=SCATTER, **options):
     output = gain * rate + error(temperature) + off
     columns = {"run": run, "temperature": temperature, "rate": rate, "output": output}
     log = pd.DataFrame(columns)
-    recipe = Recipe(("temperature", "output"), terms=(1, 1), **options)
+    recipe = Recipe(("temperature", "output"), write="rules", terms=(1, 1), **options)
     return calibrate(log, choose_split(log, "run"), recipe, lambda text: None)
 
 

@@ -1,0 +1,218 @@
+"""Tables and piecewise cubics in C, in floating or fixed point, in the place of an error."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from ...export.c.builder import header_of, input_lines
+from ...export.c.dialect import STATUS, Dialect, kept_lines, remark
+from ...export.c.self_test import ROWS, self_test
+from ...export.c.templates import FINITE_INPUT, rejection
+from .piecewise import Piecewise, spread
+
+# Of every type what C calls it, what it computes in, and the bits of a number behind its sign.
+TYPES = {
+    "float": ("float", "float", 0),
+    "double": ("double", "double", 0),
+    "q31": ("int_least32_t", "int_least64_t", 31),
+    "q15": ("int_least16_t", "int_least32_t", 15),
+}
+# What it says of a cell, and of which inputs.
+TABLES = {
+    "table": ("line", ("temperature",)),
+    "cubic": ("cubic", ("temperature",)),
+    "rate-table": ("plane", ("temperature", "output")),
+}
+_MARGIN = 1.001  # of a fixed-point scale, for what is rounded
+
+_CODE = """
+table |/* The value between two. */
+table |static $wide $name_between($wide a, $wide b, $wide part)
+table |{
+table |    return a + (b - a) * part$per_one;
+table |}
+table |
+      |int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+      |{
+      |    $wide part[$NAME_N_INPUTS], value;
+      |    int i, at[$NAME_N_INPUTS], status = $NAME_IN_RANGE;
+      |
+real  |$finite_input
+fixed |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+      |        value = x[i];
+      |        if (value < $name_low[i]) {
+      |            value = $name_low[i];
+      |            status = $NAME_OUT_OF_RANGE;
+      |        }
+      |        if (value > $name_high[i]) {
+      |            value = $name_high[i];
+      |            status = $NAME_OUT_OF_RANGE;
+      |        }
+      |        value -= $name_low[i];
+real  |        value *= $name_per_unit[i];
+real  |        at[i] = (int)value;
+fixed |        at[i] = (int)(value / $name_step[i]);
+      |        if (at[i] > $name_last[i]) {
+      |            at[i] = $name_last[i];
+      |        }
+real  |        part[i] = value - ($real)at[i];
+fixed |        part[i] = (value - at[i] * $name_step[i]) * $one / $name_step[i];
+      |    }
+line  |    i = at[0];
+line  |    value = $name_between($name_values[i], $name_values[i + 1], part[0]);
+plane |    for (i = 0; i < 2; ++i) {
+plane |        const $real *row = $name_values[at[0] + i];
+plane |        const $wide next = $name_between(row[at[1]], row[at[1] + 1], part[1]);
+plane |        value = (i == 0) ? next : $name_between(value, next, part[0]);
+plane |    }
+cubic |    value = $name_values[at[0]][3];
+cubic |    for (i = 2; i >= 0; --i) {
+cubic |        value = value * part[0]$per_one + $name_values[at[0]][i];
+cubic |    }
+      |    y[0] = ($real)value;
+      |    return status;
+      |}
+"""
+
+
+def name_of(kind):
+    """What files and identifiers of a kind of table start with."""
+    return f"gyro_{kind.replace('-', '_')}"
+
+
+class Table:
+    """A table or piecewise cubic of an ErrorModel, with the numbers as C holds them.
+
+    ``piecewise`` is what it computes. By axis, ``low``, ``high`` and ``step`` are numbers of C that
+    stand for so many ``scale``, and ``counts`` the cells; a value stands for so many ``unit``.
+    """
+
+    def __init__(self, error, kind, type_name, n_cells):
+        self.shape, self.names = TABLES[kind]
+        real, self.wide, self.bits = TYPES[type_name]
+        self.dialect = Dialect(name_of(kind), real, "c99")
+        self._place(error.ends[:, 0], error.ends[:, 1], n_cells)
+        degree = 3 if self.shape == "cubic" else 1
+        axes = zip(self.low, self.high, self.step, self.counts, self.scale, strict=True)
+        at = [
+            np.minimum(low + np.arange(degree * n + 1) * step / degree, high) * scale
+            for low, high, step, n, scale in axes
+        ]
+        points = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1)
+        values = error(points.reshape(-1, len(at))).reshape(points.shape[:-1])
+        largest = np.abs(values).max()
+        if degree == 3:
+            places = 3 * np.arange(values.size // 3)[:, None] + np.arange(4)
+            thirds = np.vander(np.arange(4) / 3.0, increasing=True)
+            values = np.linalg.solve(thirds, values[places].T).T
+            largest = np.abs(values).sum(axis=1).max()
+        self.unit = float(self._scale_of(_MARGIN * largest))
+        values = np.rint(values / self.unit) if self.bits else values
+        self.values = values.astype(self.dialect.dtype)
+        self.piecewise = self._piecewise(self.values * self.unit)
+
+    def _scale_of(self, largest):
+        """What 1 stands for where a number may be so large: in fixed point a power of two."""
+        if not self.bits:
+            return np.ones_like(largest)
+        return 2.0 ** (np.ceil(np.log2(np.where(largest > 0.0, largest, 1.0))) - self.bits)
+
+    def _place(self, low, high, n_cells):
+        self.scale = self._scale_of(np.maximum(np.abs(low), np.abs(high)))
+        if self.bits:
+            self.low = np.ceil(low / self.scale).astype(np.int64)
+            self.high = np.floor(high / self.scale).astype(np.int64).clip(max=2**self.bits - 1)
+            self.step = -((self.low - self.high) // n_cells)
+            self.counts = -((self.low - self.high) // self.step)
+            return
+        self.low, self.high = (end.astype(self.dialect.dtype).astype(float) for end in (low, high))
+        per_unit = (n_cells / (self.high - self.low)).astype(self.dialect.dtype)
+        self.step, self.counts = 1.0 / per_unit.astype(float), np.full(low.size, n_cells)
+
+    def _piecewise(self, values):
+        if self.shape == "plane":
+            powers = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+            down, along = np.diff(values, axis=0), np.diff(values)
+            coefficients = np.stack([values[:-1, :-1], down[:, :-1], along[:-1], np.diff(down)])
+        else:
+            coefficients = values.T if values.ndim > 1 else np.stack([values[:-1], np.diff(values)])
+            powers = np.arange(len(coefficients))[:, None]
+        origins, width = [], self.step * self.scale
+        for low, each, n in zip(self.low * self.scale, width, self.counts, strict=True):
+            origins.append(low + each * np.arange(n))
+        edges = [np.append(*ends) for ends in zip(origins, self.high * self.scale, strict=True)]
+        sizes = np.abs(coefficients)
+        steepest, most = np.tensordot(powers.sum(axis=1), sizes, 1).max(), sizes.sum(axis=0).max()
+        if self.bits:
+            # The input is rounded; its place in a cell has a bit less; three products are cut off.
+            slack = (0.5 / self.step.min() + 2.0 ** (1 - self.bits)) * steepest + 3.0 * self.unit
+        else:
+            eps = np.finfo(self.dialect.dtype).eps
+            slack = eps * (8.0 * self.counts.max() * steepest + 24.0 * most)
+        return Piecewise(edges, origins, width, powers, coefficients, float(slack))
+
+    def code(self, notes, units):
+        """The C files; ``notes`` and ``units`` are as of :func:`skanfis.export.export_c`."""
+        dialect, bits, one = self.dialect, self.bits, 2 ** (self.bits - 1)
+        tables = {"low": self.low, "high": self.high, "values": self.values}
+        head, kinds = f'#include "{dialect.name}.h"\n', {"last": "int", "step": self.wide}
+        if not bits:
+            tables["per_unit"] = 1.0 / self.step
+            head += f"\n#include <float.h>\n\n{dialect.write(rejection('raise', 'c99')).lstrip()}"
+        n_bytes = sum(each.size for each in tables.values()) * dialect.dtype.itemsize
+        tables = {name: each.astype(dialect.dtype) for name, each in tables.items()}
+        tables |= {"last": self.counts - 1} | ({"step": self.step} if bits else {})
+        facts = {self.shape, "fixed" if bits else "real", self.shape != "cubic" and "table"}
+        code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
+        words = {"wide": self.wide, "one": one, "per_one": f" / {one}" if bits else ""}
+        source = [
+            head,
+            *(dialect.table(name, each, kinds.get(name)) for name, each in tables.items()),
+            dialect.write(code, **words),
+            self_test(self._answers(), dialect),
+        ]
+        n_products, d = {"line": 1, "cubic": 3, "plane": 3}[self.shape], self.low.size
+        lines = [
+            *map(remark, notes),
+            f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",
+            f"Whatever the inputs: at most {n_products + (2 * d if bits else d)} multiplications, "
+            f"{n_products + 2 * d if bits else 0} divisions. Memory: {n_bytes} bytes of tables.",
+            "",
+            *input_lines(self.names, self.low * self.scale, self.high * self.scale, units),
+            "Outputs y:",
+            "  [0] error [deg/s]",
+            "",
+            "An input beyond its range is held at the end of it.",
+        ]
+        if bits:
+            pairs = enumerate(zip(self.names, self.scale, strict=True))
+            inputs = ", ".join(f"x[{k}] is {name} / {_shown(scale)}" for k, (name, scale) in pairs)
+            lines.append(
+                f"Fixed point: {inputs}, rounded by the caller, who saturates it to {-2 * one} and "
+                f"{2 * one - 1}. The error is y[0] * {_shown(self.unit)} deg/s. No sum or product "
+                "overflows: nothing else is saturated."
+            )
+        else:
+            lines.append("A row that is not finite gets no output.")
+        include = "#include <stdint.h>" if bits else ""
+        header = header_of("The error of a gyro", lines, dialect, d, 1, include)
+        return SimpleNamespace(name=dialect.name, header=header, source="\n".join(source))
+
+    def _answers(self):
+        """Rows, some of them beyond the range, with their values, status and tolerance."""
+        beyond = 0.1 * (self.high - self.low)
+        points = spread(np.stack([self.low - beyond, self.high + beyond], axis=1))
+        X = points[:: len(points) // ROWS][:ROWS]
+        X = np.rint(X).clip(-(2**self.bits), 2**self.bits - 1) if self.bits else X
+        y, slack = self.piecewise(X * self.scale) / self.unit, self.piecewise.slack / self.unit
+        if self.bits:
+            y, slack = np.rint(y), np.ceil(slack) + 1.0
+        status = STATUS["OUT_OF_RANGE"] * ((self.low > X) | (self.high < X)).any(axis=1)
+        answers = X, y[:, None], np.array([slack])
+        X, y, tolerance = (each.astype(self.dialect.dtype) for each in answers)
+        return X, y, status, tolerance
+
+
+def _shown(power):
+    """A power of two."""
+    return f"2^{int(np.log2(power))} ({power:.6g})"
