@@ -207,8 +207,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
-    is_one_cycle = split.kind == "piece" and not np.ptp(rate)
-    verdict = judge(errors, split.labels[judged], is_one_cycle)
+    verdict = judge(errors, split.labels[judged], split.kind == "piece" and not np.ptp(rate))
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
     compensator = GyroCompensator(

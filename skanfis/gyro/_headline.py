@@ -64,7 +64,8 @@ def headline(calibration, unit):
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
     if verdict.is_one_cycle:
-        title = f"One cycle cannot tell whether this repeats; until then {ARTICLES[name]} is safe"
+        safe = "leave the gyro as it is" if name == NOTHING else "a constant is safe"
+        title = f"One cycle cannot tell whether this repeats; until then {safe}"
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
