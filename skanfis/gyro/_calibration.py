@@ -127,6 +127,7 @@ class Calibration:
     warnings: list
     glitches: list
     n_rows: int
+    fold_models: list  # of what is written, those that had not seen the test rows of each fold
 
     @property
     def rules(self):
@@ -189,20 +190,14 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     glitches = _glitches(log, before - rate, name_row, tell)
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
-    predicted, inside, folds, choices = _held_out(X, target, groups, split, recipe, tell, rng)
+    found = _held_out(X, target, groups, split, recipe, tell, rng)
+    predicted, inside, folds, choices, fold_models = found
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
-    tell(f"fitting to {rows.size:,} rows")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        # Of rows that trial fits have not seen; the final one is asked of none.
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
-        estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
-    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    estimator, choice, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
-    model = Simpler(_MODEL, predicts, after, estimator=estimator)
+    model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # The same rows for all: those that the model answered in range.
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
@@ -236,16 +231,17 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         simpler=simpler,
         verdict=verdict,
         n_fit_rows=rows.size,
-        warnings=sorted({str(warning.message) for warning in caught}),
+        warnings=messages,
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
+        fold_models=chosen.fold_models,
     )
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it, which are in range, folds, and choices."""
+    """Predictions of every row by a model new to it, which are in range, folds, choices, models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    folds, choices = [], []
+    folds, choices, models = [], [], []
     for number, (train, test) in enumerate(split.folds, 1):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
         rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
@@ -257,13 +253,27 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
         choices.append(choice)
+        models.append(model)
     if not (inside & np.isfinite(predicted)).any():
         raise LogError(
             f"the compensator could not be checked: every row lies outside the range of the rows "
             f"that the model had seen while its group was held out ({split.kind}). Log groups that "
             "overlap in temperature, rate and time."
         )
-    return predicted, inside, folds, choices
+    return predicted, inside, folds, choices, models
+
+
+def _fit(X, target, groups, recipe, tell):
+    """The model of all rows, its choice, and what warnings said."""
+    tell(f"fitting to {len(X):,} rows")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        # Of rows that trial fits have not seen; the final one is asked of none.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
+        estimator, choice = fit_model(X, target, groups, recipe)
+    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
+    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    return estimator, choice, sorted({str(warning.message) for warning in caught})
 
 
 def _glitches(log, error, name_row, tell):

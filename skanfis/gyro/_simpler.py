@@ -1,7 +1,7 @@
 """Compensations that are simpler than rules, held out on the same rows: rules must beat them."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -30,8 +30,8 @@ class Simpler:
     """A simple compensation.
 
     ``after`` is the compensated rate of every row by a model that had not seen its group, ``model``
-    the one fitted to all rows, and ``estimator`` that as it is written. They are None where the log
-    does not allow it, and ``missing`` says why.
+    the one fitted to all rows, and ``estimator`` that as it is written; ``fold_models`` are those
+    of the folds. They are None where the log does not allow it, and ``missing`` says why.
     """
 
     name: str
@@ -40,6 +40,7 @@ class Simpler:
     model: Any = None
     estimator: Any = None
     missing: str = ""
+    fold_models: list = field(default_factory=list)
 
 
 def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
@@ -55,10 +56,12 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
         rules = [single_rule(X.iloc[train], policy) for train, _ in fits]
         for name, fit, predicts in _kinds(list(X), policy):
             target, predicted = rate if predicts == "rate" else before - rate, np.full(len(X), 0.0)
+            made = []
             try:
                 for (train, test), rule in zip(fits, rules, strict=True):
                     model = fit(X.iloc[train], target[train])
                     estimator = frozen(model, X, policy, rule)
+                    made.append(estimator)
                     if test is not None:
                         predicted[test] = estimator.predict(X.iloc[test])
                         is_lost = rule.in_bounds(X.iloc[test]) & ~np.isfinite(predicted[test])
@@ -70,7 +73,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
                 yield Simpler(name, predicts, missing=str(error))
                 continue
             after = predicted if predicts == "rate" else before - predicted
-            yield Simpler(name, predicts, after, model, estimator)
+            yield Simpler(name, predicts, after, model, estimator, fold_models=made[:-1])
 
 
 def _kinds(inputs, policy="linear"):
