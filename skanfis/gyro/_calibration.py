@@ -320,7 +320,7 @@ def judge(errors, groups, is_one_cycle=False):
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
     if is_one_cycle:
-        recommended = min(names[:2], key=of_all.get)
+        recommended = min(names[:2], key=lambda name: of_all[name])
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
     return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
 

@@ -273,19 +273,8 @@ def _proven_polynomial(calibration):
     rows = np.vstack([rows, polynomial.center])
     values = polynomial.predict(rows)
     low, high = values.argmin(), values.argmax()
-    found = Bounds(
-        lower=limits[:1],
-        upper=limits[1:],
-        lowest=values[[low]],
-        highest=values[[high]],
-        at_lowest=rows[[low]],
-        at_highest=rows[[high]],
-        box=box,
-        n_boxes=1,
-        converged=False,
-        input_names=tuple(names),
-        output_names=("error",),
-    )
+    met = (values[[low]], values[[high]], rows[[low]], rows[[high]])
+    found = Bounds(limits[:1], limits[1:], *met, box, 1, False, tuple(names), ("error",))
     largest = int(np.abs(values).argmax())
     attained = float(abs(values[largest])), rows[largest]
     return Proven(found, float(np.abs(limits).max()), attained, None)

@@ -87,7 +87,8 @@ def report_page(calibration, title, options=None):
     target = "rate" if calibration.compensator.predicts == "rate" else "rate error"
     cautions = calibration.cautions(results.symbol, RATE_UNITS[results.unit])
     cautions = [f"Warning: {sentence}" for sentence in cautions]
-    cautions += [f"Unit assumed: {sentence}." for sentence in recipe.assumed.values()]
+    if recipe.assumed:
+        cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
     sections = [_check, _merit, _pictures, _sure, _instead, _rules, _use, _log]
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
