@@ -10,7 +10,7 @@ if ("-m", "skanfis.gyro") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
 ):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-from .regressor import ANFISRegressor  # noqa: E402
+from .regressor import ANFISRegressor
 
 __all__ = ["ANFISRegressor", "__version__"]
 
