@@ -87,9 +87,21 @@ _LIMITS = """    if (sum < $least) {
 
 
 def export_c_polynomial(
-    polynomial, path=None, *, name=None, dtype="double", std="c99", min_coverage=0.1, saturate=None
+    polynomial,
+    path=None,
+    *,
+    name=None,
+    dtype="double",
+    std="c99",
+    min_coverage=0.1,
+    saturate=None,
+    units=None,
+    notes=(),
 ):
-    """The C code of a FrozenPolynomial; arguments as of :func:`skanfis.export.export_c`."""
+    """The C code of a FrozenPolynomial; arguments as of :func:`skanfis.export.export_c`.
+
+    ``units`` of the inputs by name, and ``notes``, sentences, are for the header.
+    """
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     dialect = Dialect(name, dtype, std)
@@ -128,12 +140,15 @@ def export_c_polynomial(
         + polynomial.powers.size,
         stack_bytes=part.cost.stack_bytes + (2 * n_inputs + 1) * kind.itemsize,
     )
+    of = units or {}
+    names = [f"{name} [{of[name]}]" if name in of else name for name in model.input_names]
     lines = [
+        *notes,
         f"A polynomial of degree {polynomial.powers.sum(axis=1).max()} with {n_terms} terms; "
         f"{std.upper()}, {dtype}.",
         *cost_lines(price),
         "",
-        *input_lines(model.input_names, part.low, part.high),
+        *input_lines(names, part.low, part.high),
         "",
         policy_line(model, "Outside this range"),
         "A row that is not finite gets no output either way.",
