@@ -5,11 +5,12 @@ import signal
 import sys
 
 # Ctrl-C while the command is still importing ends it, without a traceback; then it takes over.
-_words = sys.orig_argv
-if "skanfis.gyro" in _words[1:4] or os.path.basename(sys.argv[0]) == "skanfis-gyro":
+if ("-m", "skanfis.gyro") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or any(
+    os.path.basename(word).removesuffix(".exe") == "skanfis-gyro" for word in sys.orig_argv[:2]
+):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-from .regressor import ANFISRegressor  # noqa: E402
+from .regressor import ANFISRegressor
 
 __all__ = ["ANFISRegressor", "__version__"]
 

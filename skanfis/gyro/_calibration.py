@@ -127,7 +127,7 @@ class Calibration:
     warnings: list
     glitches: list
     n_rows: int
-    fold_models: list  # those that had not seen the test rows of each fold
+    fold_models: list  # of what is written, those that had not seen the test rows of each fold
 
     @property
     def rules(self):
@@ -190,28 +190,19 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     glitches = _glitches(log, before - rate, name_row, tell)
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
-    predicted, inside, folds, choices, fold_models = _held_out(
-        X, target, groups, split, recipe, tell, rng
-    )
+    found = _held_out(X, target, groups, split, recipe, tell, rng)
+    predicted, inside, folds, choices, fold_models = found
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
-    tell(f"fitting to {rows.size:,} rows")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        # Of rows that trial fits have not seen; the final one is asked of none.
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
-        estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
-    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    estimator, choice, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
     model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # The same rows for all: those that the model answered in range.
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
-    is_one_cycle = split.kind == "piece" and not np.ptp(rate)
-    verdict = judge(errors, split.labels[judged], is_one_cycle)
+    verdict = judge(errors, split.labels[judged], split.kind == "piece" and not np.ptp(rate))
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
     compensator = GyroCompensator(
@@ -240,7 +231,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         simpler=simpler,
         verdict=verdict,
         n_fit_rows=rows.size,
-        warnings=sorted({str(warning.message) for warning in caught}),
+        warnings=messages,
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
         fold_models=chosen.fold_models,
@@ -270,6 +261,19 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             "overlap in temperature, rate and time."
         )
     return predicted, inside, folds, choices, models
+
+
+def _fit(X, target, groups, recipe, tell):
+    """The model of all rows, its choice, and what warnings said."""
+    tell(f"fitting to {len(X):,} rows")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        # Of rows that trial fits have not seen; the final one is asked of none.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
+        estimator, choice = fit_model(X, target, groups, recipe)
+    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
+    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    return estimator, choice, sorted({str(warning.message) for warning in caught})
 
 
 def _glitches(log, error, name_row, tell):
@@ -316,7 +320,7 @@ def judge(errors, groups, is_one_cycle=False):
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
     if is_one_cycle:
-        recommended = min(names[:2], key=of_all.get)
+        recommended = min(names[:2], key=lambda name: of_all[name])
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
     return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
 

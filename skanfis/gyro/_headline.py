@@ -64,7 +64,8 @@ def headline(calibration, unit):
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
     if verdict.is_one_cycle:
-        title = f"One cycle cannot tell whether this repeats; until then {ARTICLES[name]} is safe"
+        safe = "leave the gyro as it is" if name == NOTHING else "a constant is safe"
+        title = f"One cycle cannot tell whether this repeats; until then {safe}"
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
@@ -272,19 +273,8 @@ def _proven_polynomial(calibration):
     rows = np.vstack([rows, polynomial.center])
     values = polynomial.predict(rows)
     low, high = values.argmin(), values.argmax()
-    found = Bounds(
-        lower=limits[:1],
-        upper=limits[1:],
-        lowest=values[[low]],
-        highest=values[[high]],
-        at_lowest=rows[[low]],
-        at_highest=rows[[high]],
-        box=box,
-        n_boxes=1,
-        converged=False,
-        input_names=tuple(names),
-        output_names=("error",),
-    )
+    met = (values[[low]], values[[high]], rows[[low]], rows[[high]])
+    found = Bounds(limits[:1], limits[1:], *met, box, 1, False, tuple(names), ("error",))
     largest = int(np.abs(values).argmax())
     attained = float(abs(values[largest])), rows[largest]
     return Proven(found, float(np.abs(limits).max()), attained, None)

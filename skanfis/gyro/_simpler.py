@@ -1,7 +1,7 @@
 """Compensations that are simpler than rules, held out on the same rows: rules must beat them."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -30,9 +30,8 @@ class Simpler:
     """A simple compensation.
 
     ``after`` is the compensated rate of every row by a model that had not seen its group, ``model``
-    the one fitted to all rows, and ``estimator`` that as it is written; ``fold_models`` had not
-    seen the test rows of each fold. They are None where the log does not allow it, and ``missing``
-    says why.
+    the one fitted to all rows, and ``estimator`` that as it is written; ``fold_models`` are those
+    of the folds. They are None where the log does not allow it, and ``missing`` says why.
     """
 
     name: str
@@ -40,8 +39,8 @@ class Simpler:
     after: np.ndarray | None = None
     model: Any = None
     estimator: Any = None
-    fold_models: list | None = None
     missing: str = ""
+    fold_models: list = field(default_factory=list)
 
 
 def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
@@ -57,13 +56,13 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
         rules = [single_rule(X.iloc[train], policy) for train, _ in fits]
         for name, fit, predicts in _kinds(list(X), policy):
             target, predicted = rate if predicts == "rate" else before - rate, np.full(len(X), 0.0)
-            fold_models = []
+            made = []
             try:
                 for (train, test), rule in zip(fits, rules, strict=True):
                     model = fit(X.iloc[train], target[train])
                     estimator = frozen(model, X, policy, rule)
+                    made.append(estimator)
                     if test is not None:
-                        fold_models.append(estimator)
                         predicted[test] = estimator.predict(X.iloc[test])
                         is_lost = rule.in_bounds(X.iloc[test]) & ~np.isfinite(predicted[test])
                         if is_lost.any():
@@ -74,7 +73,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
                 yield Simpler(name, predicts, missing=str(error))
                 continue
             after = predicted if predicts == "rate" else before - predicted
-            yield Simpler(name, predicts, after, model, estimator, fold_models)
+            yield Simpler(name, predicts, after, model, estimator, fold_models=made[:-1])
 
 
 def _kinds(inputs, policy="linear"):

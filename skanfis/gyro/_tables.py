@@ -99,7 +99,10 @@ def excel_source(path, header_place):
     notes = [f"of {len(sheets)} sheets {name!r} is read"] if len(sheets) > 1 else []
     rows = [["" if pd.isna(cell) else str(cell) for cell in row]
             for row in sheet.head(_HEAD_ROWS).to_numpy(dtype=object)]  # fmt: skip
-    place, first, header = header_place(rows)
+    try:
+        place, first, header = header_place(rows)
+    except LogError as error:
+        raise LogError(f"{path}: {error}") from error
     table = sheet.iloc[first:].reset_index(drop=True).infer_objects()
     table.columns = header
     if place:

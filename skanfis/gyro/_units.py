@@ -34,6 +34,7 @@ def settle_units(values, units, *, is_all=True):
     UsageError, with the options to copy, where more than one reading is plausible; unless these are
     not all values, which may tell it.
     """
+    values = {part: column for part, column in values.items() if np.isfinite(column).any()}
     readings: list[dict] = [{}]
     for find in (_of_temperature, _of_time, _of_rates):
         found = find(values, units)
@@ -89,11 +90,9 @@ def _question(values, readings):
 
 
 def _of_temperature(values, units):
-    found = values.get("temperature", np.empty(0))
-    found = found[np.isfinite(found)]
-    if "temperature" in units or found.size == 0:
+    if "temperature" in units or "temperature" not in values:
         return [{}]
-    low, high = np.quantile(found, [0.001, 0.999])  # without glitches
+    low, high = np.nanquantile(values["temperature"], [0.001, 0.999])  # without glitches
     if low > _COLDEST_IN_KELVIN:
         ways = ["K"]
     elif high > _HOTTEST:
@@ -104,17 +103,17 @@ def _of_temperature(values, units):
 
 
 def _of_time(values, units):
-    time = values.get("time", np.empty(0))
-    known = np.isfinite(time)
-    if "time" in units or not known.any():
+    if "time" in units or "time" not in values:
         return [{}]
-    if time[known].min() > _EPOCHS[-1][0]:
-        return [{"time": next(unit for least, unit in _EPOCHS if time[known].min() > least)}]
-    time, heat = time[known], values.get("temperature", np.zeros(known.size))[known]
-    if np.median(np.diff(time)) < 0.0:  # the last row comes first
+    known = np.isfinite(values["time"])
+    time = values["time"][known]
+    heat = values.get("temperature", np.zeros(known.size))[known]
+    if time.min() > _EPOCHS[-1][0]:
+        return [{"time": next(unit for least, unit in _EPOCHS if time.min() > least)}]
+    if time.size > 1 and np.median(np.diff(time)) < 0.0:  # the last row comes first
         time, heat = time[::-1], heat[::-1]
     steps = np.diff(time)
-    if not (steps > 0.0).any():
+    if not (steps > 0.0).any() or not np.isfinite(heat).any():
         return [{"time": "s"}]
     # Of the first run, if the clock tells one from another.
     ends = np.flatnonzero(steps < 0.0)
@@ -150,13 +149,13 @@ def _of_rates(values, units):
     own, true = units.get("output"), units.get("rate")
     if (own or not output.size) and (true or not rate.size):
         return [{}]
-    turns = rate.size > 0 and np.nanmin(rate) < np.nanmax(rate)
+    known = np.isfinite(output) & np.isfinite(rate) if output.size and rate.size else []
+    turns = np.any(known) and np.ptp(rate[known]) > 0.0
     rates = [true] if true else _of_rate(rate)
     if not output.size or own in SIGNALS or not turns:
         outputs = [own] if own or not output.size else _of_rest(output)
         pairs = [(each, other) for each in outputs for other in rates]
     else:
-        known = np.isfinite(output) & np.isfinite(rate)
         slope = abs(np.polyfit(rate[known], output[known], 1)[0])
         outputs = [own] if own else units_of("rate") if true else _RATES
         ways = list(units_of("rate")) if own and not true else rates

@@ -105,7 +105,10 @@ def export_c_polynomial(
     units=None,
     notes=(),
 ):
-    """The C code of a FrozenPolynomial; arguments as of :func:`skanfis.export.export_c`."""
+    """The C code of a FrozenPolynomial; arguments as of :func:`skanfis.export.export_c`.
+
+    ``units`` of the inputs by name, and ``notes``, sentences, are for the header.
+    """
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     dialect = Dialect(name, dtype, std)

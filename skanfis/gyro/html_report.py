@@ -87,7 +87,8 @@ def report_page(calibration, title, options=None):
     target = "rate" if calibration.compensator.predicts == "rate" else "rate error"
     cautions = calibration.cautions(results.symbol, RATE_UNITS[results.unit])
     cautions = [f"Warning: {sentence}" for sentence in cautions]
-    cautions += [f"Unit assumed: {sentence}." for sentence in recipe.assumed.values()]
+    if recipe.assumed:
+        cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
     sections = [_check, _merit, _pictures, _sure, _instead, _rules, _use, _log]
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
@@ -225,10 +226,7 @@ def _check(results):
     beyond = ~calibration.inside & np.isfinite(calibration.after)
     if beyond.any():
         error = results.shown(rms((calibration.after - results.rate)[beyond]))
-        texts.append(
-            f"{beyond.mean():.1%} of the held-out rows are out of range; on them the RMS error "
-            f"after compensation is {error} {results.symbol}."
-        )
+        texts.append(f"On rows out of range the RMS error after is {error} {results.symbol}.")
     if calibration.is_thinned:
         texts.append(
             f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, evenly "

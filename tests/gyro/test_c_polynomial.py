@@ -59,7 +59,10 @@ def test_it_is_held_and_rows_that_are_not_finite_get_no_output(tmp_path):
     log = make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)
     X = log[["temperature", "output"]]
     estimator = frozen(make_polynomial(3).fit(X, log["output"] - log["rate"]), X, "clip")
-    code = export_c_polynomial(estimator, name="gyro", saturate=[[-0.01, 0.02]])
+    said = {"units": {"temperature": "degC"}, "notes": ["Subtract y[0]."]}
+    code = export_c_polynomial(estimator, name="gyro", saturate=[[-0.01, 0.02]], **said)
+    assert " * Subtract y[0].\n" in code.header
+    assert "[0] temperature [degC]: " in code.header
     rows = np.vstack([X.to_numpy(), [[np.nan, 0.0], [20.0, np.inf]]])
     [(y, status)] = evaluate_all([code], rows, tmp_path, "c99", [1], [])
     np.testing.assert_allclose(y[:-2, 0], np.clip(estimator.predict(X), -0.01, 0.02), atol=1e-12)

@@ -171,7 +171,7 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
     assert "Unit assumed: 'output' has no unit, taken as deg/s" in header
     assert "[0] temperature" in header
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.index("Unit assumed: &#39;output&#39; has no unit") < page.index("<section>")
+    assert page.index("&#39;output&#39; has no unit, taken as deg/s") < page.index("<section>")
     assert compensator.units["output"] == "deg/s"
     # That of the report's first table is the error of what is written.
     text = (out / "rules.txt").read_text(encoding="utf-8")

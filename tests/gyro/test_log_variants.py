@@ -17,7 +17,7 @@ from skanfis.gyro.log import read
 
 from .log_variants import clean_logs, variant
 
-N_VARIANTS = int(os.environ.get("LOG_VARIANTS", "80"))
+N_VARIANTS = int(os.environ.get("LOG_VARIANTS", "40"))
 FEWEST_READ = 0.98
 
 

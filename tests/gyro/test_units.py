@@ -6,7 +6,7 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro._guess import Request
-from skanfis.gyro.errors import UsageError
+from skanfis.gyro.errors import LogError, UsageError
 from skanfis.gyro.log import read
 
 PARTS = ("temperature", "output", "rate")
@@ -133,3 +133,11 @@ def test_the_rate_of_the_earth_is_known(tmp_path):
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
     found = read([tmp_path / "log.csv"], Request(require=PARTS, guess=True))
     assert found.units["rate"] == "deg/h"
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_row_or_two_and_columns_without_numbers_tell_nothing(tmp_path, rows):
+    table = {"time": [1.0, 2.0], "temp": ["", ""], "gyro": [1.0, ""], "rate": [2.0, 3.0]}
+    pd.DataFrame(table)[:rows].to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises((LogError, UsageError)):
+        read([tmp_path / "log.csv"], Request(require=("output",), guess=True))
