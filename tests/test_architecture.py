@@ -33,6 +33,7 @@ LAYERS = {
     "support": NUMERIC,
     "posterior": NUMERIC,
     "model": NUMERIC,
+    "reading_cost": NUMERIC,
     "learning": SKLEARN,
     "cluster": SKLEARN,
     "search": SKLEARN,
