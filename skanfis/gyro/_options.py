@@ -20,9 +20,6 @@ from ._split import KINDS
 from .compensator import INPUTS
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
-from .targets.autopilots import AXES, INSTANCES
-from .targets.tables import TABLES, TYPES
-from .targets.write import FILES
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
@@ -31,13 +28,9 @@ _SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
 _AT_LEAST = ("reduction_factor",)  # of this more is better
 
-# Of what is said of a target, which it is for.
-_TARGETS_OF = {
-    "target_type": tuple(TABLES),
-    "axis": tuple(INSTANCES),
-    "instance": tuple(INSTANCES),
-    "device_id": ("px4",),
-}
+_TARGET = re.compile(
+    r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
+)
 
 _WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
@@ -120,13 +113,14 @@ def make_parser():
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
-    told = "also write a simple target, where it is good enough: C tables, parameters of autopilots"
-    add("--target", told, choices=tuple(FILES), **several)
-    add("--target-type", "of the numbers of C tables (float)", choices=tuple(TYPES))
-    add("--axis", "of the autopilot's gyro that this one is", choices=AXES)
-    told = "number of that gyro: 0 to 3 for PX4 (default 0), 1 to 3 for ArduPilot (default 1)"
-    add("--instance", told, type=int)
-    add("--device-id", "of that gyro in PX4, for TC_Gn_ID", type=int)
+    told = (
+        "also write a simple target, where it is good enough: in C table[:TYPE] over temperature, "
+    )
+    told += (
+        "rate-table[:TYPE] over the output too (float, double, q31, q15); parameters of one AXIS "
+    )
+    told += "of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
+    add("--target", told, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
@@ -144,22 +138,6 @@ def request_of(options, require, assumed=None):
         raise UsageError(str(error)) from error
 
 
-def check_targets(options):
-    """UsageError where what the options ask of simple targets makes no sense."""
-    check_once("--target", options.target)
-    for name in options.target:
-        numbers = INSTANCES.get(name)
-        if numbers and options.axis is None:
-            raise UsageError(f"--target {name} needs the axis of its gyro: --axis x, y or z.")
-        if numbers and options.instance not in (None, *numbers):
-            told = f"{numbers[0]} to {numbers[-1]}"
-            raise UsageError(f"--instance {options.instance}: gyros of {name} are {told}.")
-    for option, names in _TARGETS_OF.items():
-        if getattr(options, option) is not None and not {*names} & {*options.target}:
-            told = f"--{option.replace('_', '-')} is of --target {' or '.join(names)}."
-            raise UsageError(told)
-
-
 def _pairs(texts, option):
     """Options of the form PART=NAME as a dict."""
     pairs = [text.partition("=") for text in texts]
@@ -175,6 +153,16 @@ def check_once(option, names):
     for name in names:
         if names.count(name) > 1:
             raise UsageError(f"{option}: {name} is given twice.")
+
+
+def _target(text):
+    if not _TARGET.fullmatch(text):
+        raise ArgumentTypeError(
+            f"{shortened(text)} must be table:TYPE or rate-table:TYPE (float, double, q31, q15), "
+            "px4:AXIS:INSTANCE:DEVICE_ID (x, y or z; 0 to 3) or ardupilot:AXIS:INSTANCE (1 to 3); "
+            "all but the axis may be left out"
+        )
+    return text
 
 
 def _scale_factor(text):

@@ -37,6 +37,7 @@ from .compose import FrozenRules, ResidualRegressor, law_and_rules
 from .physics import past_phase
 
 _SUFFIX = "_r"
+SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
 
 # Of inputs of a compensator: units, and how they are made.
 _UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
@@ -228,7 +229,7 @@ def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
             found = FrozenRules.of(found, len(compensator.inputs)).model
         model = found.rule.model if is_polynomial else found
         units[model.output_names[0]] = "deg/s"
-        use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
+        use = SUBTRACT
     notes = [
         f"{use} {raw_rate_of(compensator)}",
         *(note for name, note in _NOTES.items() if name in compensator.inputs),

@@ -26,7 +26,7 @@ from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
-from ._options import PROGRAM, ReportOptions, check_once, check_targets, make_parser, request_of
+from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source
 from ._split import choose_split
 from .c_code import export_c_compensator
@@ -86,7 +86,7 @@ def _calibrate(options, tell):
         )
         tell("drawing the report")
         _write(calibration, options, reading.digests, written)
-        targets = list(write_targets(calibration, options, written))
+        targets = list(write_targets(calibration, options.target, written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
@@ -102,7 +102,8 @@ def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
     check_once("--box", [name for name, *_ in options.box])
-    check_targets(options)
+    targets = [text.partition(":")[0] for text in options.target]
+    check_once("--target", targets)
     if options.saturate and not options.c:
         raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
@@ -110,7 +111,7 @@ def _where_from_and_to(options):
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
     names = [*_FILES, *(_C_FILES if options.c else ()), *(["report.pdf"] if options.pdf else [])]
-    names += [name for target in options.target for name in FILES[target]]
+    names += [name for target in targets for name in FILES[target]]
     _refuse_existing([folder / name for name in names], options.force, paths)
     with contextlib.suppress(OSError):
         # What is no log at all is refused before libraries load.

@@ -217,10 +217,10 @@ def test_physics_and_policy(tmp_path, log, capsys):
 def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
     arguments = [path, *SMALL, "--quiet", "--output", str(out), "--target", "rate-table"]
-    assert main([*arguments, "--target", "px4", "--axis", "x", "--target-type", "q15"]) == 5
+    assert main([*arguments, "--target", "px4:x"]) == 5
     told = capsys.readouterr().out
     assert "target         rate-table: it differs from the model by " in told
-    assert "REFUSED        px4: the model needs output, which this target cannot say" in told
+    assert "REFUSED        px4:x: the model needs output, which this target cannot say" in told
     found = sorted(path.name for path in out.iterdir())
     assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
     assert main([*arguments, "--force"]) == 0
@@ -284,11 +284,9 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--box", "humidity=0:1"], "--box: 'humidity' is no input; these are time, temperature"),
         (["--box", "time=85:-40"], "must be INPUT=LOW:HIGH, two numbers"),
         (["--box", "time=0:inf"], "must be INPUT=LOW:HIGH, two numbers"),
-        (["--target", "px4"], "--target px4 needs the axis of its gyro: --axis x, y or z"),
-        (["--target", "ardupilot", "--axis", "x", "--instance", "0"], "ardupilot are 1 to 3"),
-        (["--target", "table", "table"], "--target: table is given twice"),
-        (["--target", "table", "--axis", "x"], "--axis is of --target px4 or ardupilot"),
-        (["--target-type", "q15"], "--target-type is of --target table or cubic or rate-table"),
+        (["--target", "px4"], "'px4' must be table:TYPE or rate-table:TYPE (float, double, q31"),
+        (["--target", "ardupilot:x:0"], "or ardupilot:AXIS:INSTANCE (1 to 3)"),
+        (["--target", "table", "table:q15"], "--target: table is given twice"),
         (["--limits", "bias=5"], "bias takes deg/s or deg/h; found ''"),
     ],
 )

@@ -13,21 +13,15 @@ from scipy.optimize import linprog
 
 from .piecewise import Piecewise
 
-INSTANCES = {"px4": range(4), "ardupilot": range(1, 4)}
-AXES = ("x", "y", "z")
 _ARDUPILOT_REFERENCE, _ARDUPILOT_SCALE = 35.0, 1e6
 NOTES = {
-    "px4": (
-        "PX4: a cubic about TREF that is subtracted from the rate of one axis [rad/s]. The "
-        "temperature is that of the IMU's own sensor, held between TMIN and TMAX. The axes of a "
-        "gyro share ID, TREF, TMIN and TMAX: calibrate all from the same log. Calibrate the gyro's "
-        "offsets (CAL_GYROn_XOFF ...) anew with this: both are subtracted.",
-    ),
-    "ardupilot": (
-        "ArduPilot: P(T) - P(T_cal) is subtracted from the rate of one axis [rad/s], with a cubic "
-        "P about 35 degC. The temperature is that of the IMU's own sensor; T and T_cal are held "
-        "between TMIN and TMAX. The offset and T_cal (INS_GYRn_CALTEMP) are measured at boot.",
-    ),
+    "px4": "PX4: a cubic about TREF that is subtracted from the rate of one axis [rad/s]. The "
+    "temperature is that of the IMU's own sensor, held between TMIN and TMAX. The axes of a "
+    "gyro share ID, TREF, TMIN and TMAX: calibrate all from the same log. Calibrate the gyro's "
+    "offsets (CAL_GYROn_XOFF ...) anew with this: both are subtracted.",
+    "ardupilot": "ArduPilot: P(T) - P(T_cal) is subtracted from the rate of one axis [rad/s], with "
+    "a cubic P about 35 degC. The temperature is that of the IMU's own sensor; both are held "
+    "between TMIN and TMAX. The offset and T_cal (INS_GYRn_CALTEMP) are measured at boot.",
 }
 _N_POINTS = 400
 # Roundings of an evaluation in single precision, in units of the last place of all terms.
@@ -69,8 +63,9 @@ class Cubic:
             [edges], origin, [1.0], np.arange(4)[:, None], values[:, None], slack
         )
 
-    def text(self, notes, axis, instance, device_id=None):
+    def text(self, notes, axis, instance=None, device_id=None):
         """The parameter file of one axis ("x", "y" or "z") of a gyro; ``notes`` are comments."""
+        instance = instance or ("0" if self.autopilot == "px4" else "1")
         lines = [f"# {line}" for note in notes for line in textwrap.wrap(note, 96)]
         if self.autopilot == "ardupilot":
             imu = f"INS_TCAL{instance}_"
@@ -85,7 +80,7 @@ class Cubic:
             whole[f"{gyro}ID"] = device_id
         found = {f"{gyro}TREF": self.reference, f"{gyro}TMIN": self.low, f"{gyro}TMAX": self.high}
         for k, each in enumerate(self.coefficients):
-            found[f"{gyro}X{k}_{AXES.index(axis)}"] = each
+            found[f"{gyro}X{k}_{'xyz'.index(axis)}"] = each
         # Vehicle, component, name, value, and the type: 6 is a whole number, 9 a float.
         lines += [f"1\t1\t{name}\t{value}\t6" for name, value in whole.items()]
         lines += [f"1\t1\t{name}\t{_text(value)}\t9" for name, value in found.items()]

@@ -1,18 +1,16 @@
 """A polynomial on every cell of a grid, and how far an error can be from it at most.
 
-The difference is certain: branch and bound over boxes of one cell each, by the mean value theorem.
+The difference is certain: over boxes of one cell each, by the mean value theorem.
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
-from ...bounds.search import largest
 from .error_model import ErrorModel, polynomial_ranges
 
-# Boxes to look at for each side; how near to the largest difference is near enough, and nothing.
-_MOST_BOXES, _TOLERANCE, _NOTHING = 100_000, 0.02, 1e-7
+# Boxes to look at, and how small; how near to the largest difference is near enough, and nothing.
+_MOST_BOXES, _MOST_CUTS, _TOLERANCE, _NOTHING = 100_000, 30, 0.02, 1e-7
 _N_POINTS = 4096
 
 
@@ -63,45 +61,41 @@ def spread(ends):
 
 
 def difference(error: ErrorModel, target: Piecewise):
-    """What the error minus the target lies between where the target is not held: certainly."""
+    """What the error minus the target lies between where the target is not held: certainly.
+
+    Boxes in which it may be larger than anything met are cut in halves, as long as that helps.
+    """
     points = spread(target.ends)
     errors = error(points)
     sampled = errors - target(points)
-    tolerance = _TOLERANCE * np.ptp(sampled) + _NOTHING * np.abs(errors).max()
-    ends = []
-    for sign in (-1, 1):
-        top = int(np.argmax(sign * sampled))
-        evaluate = partial(_upper_bounds, error, target, sign)
-        start, cuts = (points[top], sign * sampled[top]), _cuts(target.edges)
-        low, high = target.ends.T
-        found = largest(evaluate, low, high, tolerance, _MOST_BOXES, cuts, start)
-        ends.append(sign * (found.bound + target.slack))
-    return ends
-
-
-def _upper_bounds(error, target, sign, low, high):
-    """Of sign (error - target) over boxes, as ``bounds.search.largest`` asks for them."""
-    middle = low + 0.5 * (high - low)
-    value = sign * (error.ranges(middle, middle)[0] - target.ranges(middle, middle)[0])[::sign]
-    (_, own), (_, its) = error.ranges(low, high), target.ranges(low, high)
-    gain = np.abs([own[0] - its[1], own[1] - its[0]]).max(axis=0) * (high - low)
-    bound = value[1] + 0.5 * gain.sum(axis=0) * (1.0 + 1e-9)
-    # Of boxes of many cells nothing is known but that they must be cut.
-    n_more = np.array(
-        [
-            np.searchsorted(edges, above) - np.searchsorted(edges, below, side="right")
-            for edges, below, above in zip(target.edges, low, high, strict=True)
-        ]
+    enough = _TOLERANCE * np.ptp(sampled) + _NOTHING * np.abs(errors).max()
+    least, most = sampled.min(), sampled.max()
+    low, high = (
+        np.stack(np.meshgrid(*ends, indexing="ij")).reshape(len(ends), -1)
+        for ends in ([each[:-1] for each in target.edges], [each[1:] for each in target.edges])
     )
-    is_known = (n_more <= 0).all(axis=0) & np.isfinite(bound)
-    gain = np.where(is_known, gain, n_more)
-    return np.where(is_known, bound, np.inf), middle, np.where(is_known, value[0], -np.inf), gain
+    ends = np.array([least, most])
+    for _ in range(_MOST_CUTS):
+        below, above = _limits(error, target, low, high)
+        is_open = ~((below >= least - enough) & (above <= most + enough))
+        if not 0 < 2 ** len(low) * is_open.sum() <= _MOST_BOXES:
+            break
+        ends = np.array(
+            [below[~is_open].min(initial=ends[0]), above[~is_open].max(initial=ends[1])]
+        )
+        low, high = low[:, is_open], high[:, is_open]
+        for axis in range(len(low)):
+            middle = 0.5 * (low[axis] + high[axis])
+            low, high = np.tile(low, 2), np.tile(high, 2)
+            high[axis, : middle.size] = low[axis, middle.size :] = middle
+    return [min(ends[0], below.min()) - target.slack, max(ends[1], above.max()) + target.slack]
 
 
-def _cuts(edges):
-    """Inner edges by axis: of those in a box the last is cut at, here that next to the middle."""
-    found = np.full((len(edges), max(each.size for each in edges) - 2), np.nan)
-    for row, inner in zip(found, (each[1:-1] for each in edges), strict=True):
-        places = np.arange(1, inner.size + 1)
-        row[: inner.size] = inner[np.argsort(places & -places, kind="stable")]
-    return found
+def _limits(error, target, low, high):
+    """What the difference lies between in every box, by its middle and its slopes."""
+    middle = 0.5 * (low + high)
+    value = error.ranges(middle, middle)[0] - target.ranges(middle, middle)[0][::-1]
+    (_, own), (_, its) = error.ranges(low, high), target.ranges(low, high)
+    steepest = np.abs([own[0] - its[1], own[1] - its[0]]).max(axis=0)
+    reach = 0.5 * (steepest * (high - low)).sum(axis=0) * (1.0 + 1e-9)
+    return value[0] - reach, value[1] + reach

@@ -1,5 +1,6 @@
-"""Tables and piecewise cubics in C, in floating or fixed point, in the place of an error."""
+"""Tables in C, in floating or fixed point, in the place of an error."""
 
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,21 +18,18 @@ TYPES = {
     "q31": ("int_least32_t", "int_least64_t", 31),
     "q15": ("int_least16_t", "int_least32_t", 15),
 }
-# What it says of a cell, and of which inputs.
-TABLES = {
-    "table": ("line", ("temperature",)),
-    "cubic": ("cubic", ("temperature",)),
-    "rate-table": ("plane", ("temperature", "output")),
-}
+# Their inputs, and cells of each.
+TABLES = {"table": ("temperature",), "rate-table": ("temperature", "output")}
+N_CELLS = {1: 64, 2: 24}
 _MARGIN = 1.001  # of a fixed-point scale, for what is rounded
 
 _CODE = """
-table |/* The value between two. */
-table |static $wide $name_between($wide a, $wide b, $wide part)
-table |{
-table |    return a + (b - a) * part$per_one;
-table |}
-table |
+      |/* The value between two. */
+      |static $wide $name_between($wide a, $wide b, $wide part)
+      |{
+      |    return a + (b - a) * part$per_one;
+      |}
+      |
       |int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
       |{
       |    $wide part[$NAME_N_INPUTS], value;
@@ -65,10 +63,6 @@ plane |        const $real *row = $name_values[at[0] + i];
 plane |        const $wide next = $name_between(row[at[1]], row[at[1] + 1], part[1]);
 plane |        value = (i == 0) ? next : $name_between(value, next, part[0]);
 plane |    }
-cubic |    value = $name_values[at[0]][3];
-cubic |    for (i = 2; i >= 0; --i) {
-cubic |        value = value * part[0]$per_one + $name_values[at[0]][i];
-cubic |    }
       |    y[0] = ($real)value;
       |    return status;
       |}
@@ -81,32 +75,26 @@ def name_of(kind):
 
 
 class Table:
-    """A table or piecewise cubic of an ErrorModel, with the numbers as C holds them.
+    """A table of an ErrorModel, with the numbers as C holds them.
 
     ``piecewise`` is what it computes. By axis, ``low``, ``high`` and ``step`` are numbers of C that
     stand for so many ``scale``, and ``counts`` the cells; a value stands for so many ``unit``.
     """
 
-    def __init__(self, error, kind, type_name, n_cells):
-        self.shape, self.names = TABLES[kind]
+    def __init__(self, error, kind, type_name, n_cells=None):
+        self.names = TABLES[kind]
+        n_cells = n_cells or N_CELLS[len(self.names)]
         real, self.wide, self.bits = TYPES[type_name]
         self.dialect = Dialect(name_of(kind), real, "c99")
         self._place(error.ends[:, 0], error.ends[:, 1], n_cells)
-        degree = 3 if self.shape == "cubic" else 1
         axes = zip(self.low, self.high, self.step, self.counts, self.scale, strict=True)
         at = [
-            np.minimum(low + np.arange(degree * n + 1) * step / degree, high) * scale
+            np.minimum(low + np.arange(n + 1) * step, high) * scale
             for low, high, step, n, scale in axes
         ]
         points = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1)
         values = error(points.reshape(-1, len(at))).reshape(points.shape[:-1])
-        largest = np.abs(values).max()
-        if degree == 3:
-            places = 3 * np.arange(values.size // 3)[:, None] + np.arange(4)
-            thirds = np.vander(np.arange(4) / 3.0, increasing=True)
-            values = np.linalg.solve(thirds, values[places].T).T
-            largest = np.abs(values).sum(axis=1).max()
-        self.unit = float(self._scale_of(_MARGIN * largest))
+        self.unit = float(self._scale_of(_MARGIN * np.abs(values).max()))
         values = np.rint(values / self.unit) if self.bits else values
         self.values = values.astype(self.dialect.dtype)
         self.piecewise = self._piecewise(self.values * self.unit)
@@ -130,17 +118,18 @@ class Table:
         self.step, self.counts = 1.0 / per_unit.astype(float), np.full(low.size, n_cells)
 
     def _piecewise(self, values):
-        if self.shape == "plane":
-            powers = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
-            down, along = np.diff(values, axis=0), np.diff(values)
-            coefficients = np.stack([values[:-1, :-1], down[:, :-1], along[:-1], np.diff(down)])
-        else:
-            coefficients = values.T if values.ndim > 1 else np.stack([values[:-1], np.diff(values)])
-            powers = np.arange(len(coefficients))[:, None]
+        powers = np.array(list(product((0, 1), repeat=values.ndim)))
+        coefficients = []
+        for power in powers:
+            found = values
+            for axis, k in enumerate(power):
+                found = np.diff(found, axis=axis) if k else np.delete(found, -1, axis)
+            coefficients.append(found)
         origins, width = [], self.step * self.scale
         for low, each, n in zip(self.low * self.scale, width, self.counts, strict=True):
             origins.append(low + each * np.arange(n))
         edges = [np.append(*ends) for ends in zip(origins, self.high * self.scale, strict=True)]
+        coefficients = np.array(coefficients)
         sizes = np.abs(coefficients)
         steepest, most = np.tensordot(powers.sum(axis=1), sizes, 1).max(), sizes.sum(axis=0).max()
         if self.bits:
@@ -162,7 +151,8 @@ class Table:
         n_bytes = sum(each.size for each in tables.values()) * dialect.dtype.itemsize
         tables = {name: each.astype(dialect.dtype) for name, each in tables.items()}
         tables |= {"last": self.counts - 1} | ({"step": self.step} if bits else {})
-        facts = {self.shape, "fixed" if bits else "real", self.shape != "cubic" and "table"}
+        d = self.low.size
+        facts = {"plane" if d > 1 else "line", "fixed" if bits else "real"}
         code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
         words = {"wide": self.wide, "one": one, "per_one": f" / {one}" if bits else ""}
         source = [
@@ -171,7 +161,7 @@ class Table:
             dialect.write(code, **words),
             self_test(self._answers(), dialect),
         ]
-        n_products, d = {"line": 1, "cubic": 3, "plane": 3}[self.shape], self.low.size
+        n_products = 2**d - 1
         lines = [
             *map(remark, notes),
             f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",

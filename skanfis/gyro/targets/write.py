@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from ..c_code import raw_rate_of, units_of
+from ..c_code import SUBTRACT, raw_rate_of, units_of
 from ..metrics import rms
-from .autopilots import INSTANCES, NOTES, Cubic
+from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel
-from .piecewise import difference, spread
-from .tables import TABLES, TYPES, Table, name_of
+from .piecewise import difference
+from .tables import TABLES, Table, name_of
 
 FILES = {
     **{kind: (f"{name_of(kind)}.h", f"{name_of(kind)}.c") for kind in TABLES},
@@ -20,8 +20,6 @@ FILES = {
 }
 # A target is let through whose error on rows held out is at most so many times the model's.
 _MOST_TIMES = 1.5
-# A table grows until its difference is such a part of the model's error, while that gains enough.
-_PART, _GAIN, _FEWEST_CELLS, _MOST_CELLS = 0.1, 0.8, 4, {1: 128, 2: 32}
 _N_CALIBRATION_TEMPERATURES = 200
 _THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
 
@@ -30,21 +28,22 @@ class RefusedError(Exception):
     """Why a target is not written."""
 
 
-def write_targets(calibration, options, folder):
-    """Write what the options of the command ask for; yields names, sentences, and if it was done.
-
-    Of the options it reads ``target``, ``target_type``, ``axis``, ``instance`` and ``device_id``.
-    """
-    for name in options.target:
+def write_targets(calibration, texts, folder):
+    """Write targets such as "px4:x:0"; yields these, a sentence, and whether it was done."""
+    for text in texts:
         try:
-            yield name, _write(calibration, options, name, folder), True
+            yield text, _write(calibration, text, folder), True
         except RefusedError as reason:
-            yield name, str(reason), False
+            yield text, str(reason), False
 
 
-def _write(calibration, options, name, folder):
-    axes = TABLES[name][1] if name in TABLES else ("temperature",)
-    compensator, X = calibration.compensator, calibration.X
+def _write(calibration, text, folder):
+    name, *details = text.split(":")
+    axes, compensator, X = (
+        TABLES.get(name, ("temperature",)),
+        calibration.compensator,
+        calibration.X,
+    )
     again = f"Calibrate again with --inputs {' '.join(axes)}, or ask for another target."
     if missing := [axis for axis in axes if axis not in X]:
         raise RefusedError(f"the model does not take the {missing[0]}. {again}")
@@ -52,18 +51,16 @@ def _write(calibration, options, name, folder):
     if lacking := [each for each in error.uses if each not in axes]:
         needs = " and ".join(lacking)
         raise RefusedError(f"the model needs {needs}, which this target cannot say. {again}")
-    model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
+    make: Any = partial(Cubic, autopilot=name)
     if name in TABLES:
-        type_name = options.target_type or next(iter(TYPES))
-        n_cells = _n_cells(error, name, type_name, _PART * model_rms)
-        make: Any = partial(Table, kind=name, type_name=type_name, n_cells=n_cells)
-    else:
-        make = partial(Cubic, autopilot=name)
+        make = partial(Table, kind=name, type_name=(details or ["float"])[0])
     made = make(error)
     low, high = difference(error, made.piecewise)
     # ArduPilot: of the difference at T less that at T_cal.
-    largest = high - low if name == "ardupilot" else max(-low, high)
-    left = _held_out_rms(calibration, axes, make, name == "ardupilot")
+    is_relative = name == "ardupilot"
+    largest = high - low if is_relative else max(-low, high)
+    model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
+    left = _held_out_rms(calibration, axes, make, is_relative)
     if not np.isfinite(largest):
         raise RefusedError("no bound of its difference from the model could be proven.")
     if left > _MOST_TIMES * model_rms:
@@ -71,26 +68,19 @@ def _write(calibration, options, name, folder):
             f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
             f"than {_MOST_TIMES:g} times as much is not written."
         )
-    of = "model(T) - model(T_cal), for the worst T_cal," if name == "ardupilot" else "the model"
+    of = "model(T) - model(T_cal), for the worst T_cal," if is_relative else "the model"
     worth = (
         f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
-    _write_files(made, calibration.compensator, options, name, worth, folder)
+    notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
+    if name in TABLES:
+        use = f"{SUBTRACT} {raw_rate_of(compensator)}"
+        write_files(made.code([use, *notes], units_of(compensator)), folder / name_of(name))
+    else:
+        written = made.text([NOTES[name], *notes], *details)
+        (folder / FILES[name][0]).write_text(written, encoding="ascii", newline="\n")
     return worth
-
-
-def _n_cells(error, kind, type_name, goal):
-    """Cells of an axis that a table needs."""
-    n_cells, before = _FEWEST_CELLS, np.inf
-    points, most = spread(error.ends), _MOST_CELLS[len(error.ends)]
-    errors = error(points)
-    while True:
-        made = Table(error, kind, type_name, n_cells).piecewise
-        largest = np.abs(errors - made(points)).max()
-        if largest <= goal or n_cells >= most or largest > _GAIN * before:
-            return n_cells
-        n_cells, before = 2 * n_cells, largest
 
 
 def _held_out_rms(calibration, axes, make, is_relative):
@@ -110,16 +100,3 @@ def _held_out_rms(calibration, axes, make, is_relative):
         shift = made(at) - error(at) if is_relative else np.zeros(1)
         squares = squares + (left**2).sum() + 2.0 * shift * left.sum() + left.size * shift**2
     return float(np.sqrt(np.max(squares) / calibration.in_range.sum()))
-
-
-def _write_files(made, compensator, options, name, worth, folder):
-    about = f"In the place of the model in compensator.json: {worth}."
-    if name in TABLES:
-        use = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
-        notes = [f"{use} {raw_rate_of(compensator)}", about, _THERMOMETER]
-        write_files(made.code(notes, units_of(compensator)), folder / name_of(name))
-        return
-    instance = INSTANCES[name][0] if options.instance is None else options.instance
-    notes = [*NOTES[name], about, _THERMOMETER]
-    text = made.text(notes, options.axis, instance, options.device_id)
-    (folder / FILES[name][0]).write_text(text, encoding="ascii", newline="\n")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skanfis.gyro.targets.autopilots import AXES, Cubic
+from skanfis.gyro.targets.autopilots import Cubic
 from skanfis.gyro.targets.piecewise import difference
 
 from .models import ENDS, error_over_temperature
@@ -73,7 +73,7 @@ def ardupilot_correction(found, temperature, cal_temp, imu, axis):
 def test_px4_is_within_the_certain_difference(kind):
     error = error_over_temperature(kind)
     cubic = Cubic(error, "px4")
-    found = parameters(cubic.text(["A note."], "z", 2, 3407914))
+    found = parameters(cubic.text(["A note."], "z", "2", "3407914"))
     assert {"TC_G_ENABLE": "1", "TC_G2_ID": "3407914"}.items() <= found.items()
     off = error(TEMPERATURES[:, None].astype(float)) - np.rad2deg(
         px4_offset(found, TEMPERATURES, 2, 2).astype(float)
@@ -93,7 +93,7 @@ def test_px4_is_within_the_certain_difference(kind):
 def test_ardupilot_is_within_the_certain_difference_for_any_calibration_temperature():
     error = error_over_temperature()
     cubic = Cubic(error, "ardupilot")
-    found = parameters(cubic.text(["A note."], "y", 3))
+    found = parameters(cubic.text(["A note."], "y", "3"))
     assert len(found) == 6
     low, high = difference(error, cubic.piecewise)
     model = error(TEMPERATURES[::20, None].astype(float))
@@ -117,10 +117,9 @@ def test_the_nearest_cubic_of_a_fourth_power_by_chebyshev(autopilot):
 def test_a_range_is_no_wider_for_two_digits_and_no_parameter_has_an_exponent():
     error = Within(error_over_temperature(), np.array([(-19.996, 59.994)]))
     for autopilot in ("px4", "ardupilot"):
-        text = Cubic(error, autopilot).text([], "x", 1)
+        text = Cubic(error, autopilot).text([], "x", "1")
         found = parameters(text)
         name = "TC_G1_" if autopilot == "px4" else "INS_TCAL1_"
         assert (found[f"{name}TMIN"], found[f"{name}TMAX"]) == ("-19.99", "59.99")
         assert not any("e" in value for value in found.values())
         assert ("# 1\t1\tTC_G1_ID\t?\t6: missing" in text) == (autopilot == "px4")
-    assert AXES == ("x", "y", "z")

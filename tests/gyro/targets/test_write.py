@@ -1,7 +1,6 @@
 """What a target is worth on rows held out, by hand; and when there is none."""
 
 import re
-from argparse import Namespace
 
 import numpy as np
 import pandas as pd
@@ -42,10 +41,9 @@ def calibrated(error, inputs=("temperature",), **options):
     return calibrate(log, split, Recipe(tuple(inputs), **options), lambda text: None)
 
 
-def written(calibration, folder, *names, **options):
-    given = {"target_type": "float", "axis": "x", "instance": None, "device_id": None} | options
-    found = write_targets(calibration, Namespace(target=names, **given), folder)
-    return {name: (told, done) for name, told, done in found}
+def written(calibration, folder, *texts):
+    found = write_targets(calibration, texts, folder)
+    return {text.partition(":")[0]: (told, done) for text, told, done in found}
 
 
 def numbers_of(told):
@@ -59,7 +57,7 @@ def calibration():
 
 
 def test_errors_on_rows_held_out_by_hand(calibration, tmp_path):
-    told = written(calibration, tmp_path, "table", "px4", "ardupilot")
+    told = written(calibration, tmp_path, "table", "px4:x", "ardupilot:x")
     assert all(done for _, done in told.values())
     code = (tmp_path / "gyro_table.c").read_text()
     n_cells = int(re.search(r"gyro_table_values\[(\d+)\]", code)[1]) - 1
@@ -94,10 +92,10 @@ def test_errors_on_rows_held_out_by_hand(calibration, tmp_path):
 
 
 def test_files_say_what_they_are_worth(calibration, tmp_path):
-    told = written(calibration, tmp_path, "cubic", "px4", "ardupilot", device_id=7, instance=2)
+    told = written(calibration, tmp_path, "table", "px4:x:2:7", "ardupilot:x:2")
     px4, ardupilot = (tmp_path / name for name in ("px4.params", "ardupilot.parm"))
-    header = (tmp_path / "gyro_cubic.h").read_text().replace("\n * ", " ")
-    assert told["cubic"][0] in header
+    header = (tmp_path / "gyro_table.h").read_text().replace("\n * ", " ")
+    assert told["table"][0] in header
     assert "subtract y[0] from the raw rate" in header
     assert told["px4"][0] in px4.read_text().replace("\n# ", " ")
     assert "1\t1\tTC_G2_ID\t7\t6\n" in px4.read_text()
@@ -109,7 +107,7 @@ def test_files_say_what_they_are_worth(calibration, tmp_path):
 
 def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
     calibration = calibrated(a_step, terms=(5,))
-    told = written(calibration, tmp_path, "px4", "table")
+    told = written(calibration, tmp_path, "px4:x", "table")
     assert not told["px4"][1]
     assert "more than 1.5 times as much is not written" in told["px4"][0]
     _, of_target, of_model = [0.0, *numbers_of(told["px4"][0])[:2]]
@@ -121,7 +119,7 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("inputs", "options", "target", "message"),
     [
-        (BOTH, {"terms": (2, 1)}, "px4", "needs output, which this target"),
+        (BOTH, {"terms": (2, 1)}, "px4:x", "needs output, which this target"),
         (
             ("temperature", "output"),
             {"terms": (1, 1), "physics": True},
@@ -139,7 +137,7 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
 @pytest.mark.usefixtures("law_of_degree_one")
 def test_what_a_target_cannot_say_is_refused_by_name(inputs, options, target, message, tmp_path):
     calibration = calibrated(smooth, inputs, **options)
-    told, done = written(calibration, tmp_path, target)[target]
+    told, done = written(calibration, tmp_path, target)[target.partition(":")[0]]
     assert not done
     assert message in told
     assert not list(tmp_path.iterdir())
@@ -150,6 +148,5 @@ def test_what_a_target_cannot_say_is_refused_by_name(inputs, options, target, me
 @pytest.mark.parametrize("type_name", ["float", "q15"])
 def test_where_there_is_no_rate_outside_a_table_ends_with_the_range(type_name, tmp_path):
     calibration = calibrated(smooth, terms=(2,), outside="nan")
-    told = written(calibration, tmp_path, "table", "cubic", target_type=type_name)
-    told |= written(calibration, tmp_path, "px4")
+    told = written(calibration, tmp_path, f"table:{type_name}", "px4:x")
     assert all(done for _, done in told.values()), told
