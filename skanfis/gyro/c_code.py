@@ -380,7 +380,6 @@ def _cost(whole):
         of_rules,
         multiply_adds=of_rules.multiply_adds + sum(sizes) - len(sizes) + 1,
         divisions=of_rules.divisions + 2,
-        beyond_multiply_adds=of_rules.beyond_multiply_adds + (whole.law.out_of_bounds == "linear"),
         table_bytes=of_rules.table_bytes + table_bytes,
         stack_bytes=of_rules.stack_bytes + itemsize * (n_rules_inputs + 1),
     )

@@ -143,9 +143,6 @@ def export_c_polynomial(
         part.cost,
         multiply_adds=part.cost.multiply_adds + int(polynomial.powers.sum()) + n_terms,
         divisions=part.cost.divisions + 2 * n_inputs,
-        # Of every power a product that lacks one factor, times the way and the exponent.
-        beyond_multiply_adds=part.cost.beyond_multiply_adds
-        + int(((powers > 0) * (powers.sum(axis=1, keepdims=True) + 1)).sum()),
         table_bytes=part.cost.table_bytes
         + sum(values.nbytes for values in tables.values())
         + polynomial.powers.size,

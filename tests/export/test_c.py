@@ -1,6 +1,7 @@
 """Exported C, compiled and run, answers what ``predict`` answers."""
 
 import re
+import shutil
 import subprocess
 from fractions import Fraction
 
@@ -25,7 +26,6 @@ from skanfis.policies import OUT_OF_BOUNDS
 from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
-from .counting import most_operations, needs_cpp
 from .every_model import CASES, FEWEST, full_scale, rows, surface
 
 MIN_COVERAGE = 0.3
@@ -255,7 +255,7 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 
 
 @pytest.mark.theory
-@needs_cpp
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
 @pytest.mark.parametrize("dtype", ["float", "double"])
 def test_files_are_cpp_too(dtype, tmp_path):
     for i, case in enumerate(CASES[::17]):
@@ -265,19 +265,6 @@ def test_files_are_cpp_too(dtype, tmp_path):
     )
     flags = ["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     subprocess.run(["g++", *flags, "-c", "all.cpp", "-o", "all.o"], cwd=tmp_path, check=True)
-
-
-@pytest.mark.theory
-@needs_cpp
-def test_no_row_takes_more_than_the_header_says(tmp_path):
-    codes = [
-        export_c(case.model, name=f"m{i}", min_coverage=MIN_COVERAGE)
-        for i, case in enumerate(CASES[::7])
-    ]
-    taken, said = most_operations(codes, rows(float, 400), tmp_path)
-    assert (taken <= said).all()
-    # And it is no idle number: some row of most models comes near.
-    assert np.median(taken[:, 3] / said[:, 3]) > 0.8
 
 
 def test_grid_takes_an_exponential_per_term():
@@ -290,9 +277,9 @@ def test_grid_takes_an_exponential_per_term():
     # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value.
     assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3)
     assert cost.divisions == 2
-    # Per rule three entries of a factor, two squares, and five more; strengths once more.
+    # Per rule three entries of a factor, two squares, and five more.
     known = 1 + np.count_nonzero(model.model_.support.share)
-    assert cost.coverage_multiply_adds == known * (3 + 2 + 5) + 36
+    assert cost.coverage_multiply_adds == known * (3 + 2 + 5)
     assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
 
 

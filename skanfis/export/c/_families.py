@@ -193,16 +193,16 @@ _BY_NAME = {
 # By the class, since another class may go by the same name.
 BODIES = {MEMBERSHIPS[name]: in_c for name, in_c in _BY_NAME.items()}
 
-# Exponentials, logarithms, multiplications and divisions that a value, and a slope, take at most.
+# Exponentials, logarithms and multiplications that a value takes at most.
 COSTS = {
-    "gaussian": ((0, 0, 2, 0), (0, 0, 3, 0)),
-    "bell": ((1, 2, 3, 0), (1, 1, 6, 2)),
-    "triangular": ((1, 1, 6, 0), (1, 0, 7, 1)),
-    "trapezoidal": ((1, 1, 6, 0), (1, 0, 8, 1)),
-    "two_sided_gaussian": ((0, 0, 3, 0), (0, 0, 2, 0)),
-    "pi_shaped": ((1, 1, 8, 0), (1, 0, 12, 1)),
-    "s_shaped": ((1, 1, 7, 0), (1, 0, 11, 1)),
-    "z_shaped": ((1, 1, 7, 0), (1, 0, 11, 1)),
-    "sigmoid_difference": ((2, 2, 2, 0), (2, 0, 4, 2)),
-    "sigmoid_product": ((2, 2, 2, 0), (2, 0, 4, 2)),
+    "gaussian": (0, 0, 2),
+    "bell": (1, 2, 3),
+    "triangular": (1, 1, 5),
+    "trapezoidal": (1, 1, 5),
+    "two_sided_gaussian": (0, 0, 3),
+    "pi_shaped": (1, 1, 7),
+    "s_shaped": (1, 1, 6),
+    "z_shaped": (1, 1, 6),
+    "sigmoid_difference": (2, 2, 2),
+    "sigmoid_product": (2, 2, 2),
 }

@@ -36,8 +36,6 @@ class CCost:
     coverage_exponentials, coverage_square_roots, coverage_multiply_adds : int
         What the coverage takes besides, at most. Where the strongest rule alone covers the row, it
         is one quadratic form. Zero with ``min_coverage=None``.
-    beyond_exponentials, beyond_logarithms, beyond_multiply_adds, beyond_divisions : int
-        What a row out of range takes besides, at most.
 
     Examples
     --------
@@ -58,10 +56,6 @@ class CCost:
     coverage_exponentials: int = 0
     coverage_square_roots: int = 0
     coverage_multiply_adds: int = 0
-    beyond_exponentials: int = 0
-    beyond_logarithms: int = 0
-    beyond_multiply_adds: int = 0
-    beyond_divisions: int = 0
 
 
 class Source:
@@ -112,8 +106,7 @@ class Source:
         of_terms = [
             len(terms.constants) * np.array(COSTS[terms.family.name]) for terms in numbers.terms
         ]
-        value, slope = sum(of_terms, np.zeros((2, 4), dtype=int)).tolist()
-        exponentials, logarithms, multiply_adds, _ = value
+        exponentials, logarithms, multiply_adds = map(int, sum(of_terms, np.zeros(3)))
         n_shares = self.n_terms if self.is_grid else self.model.n_rules
         # Of a grid, products of shares: after two inputs, after three, ...
         products = int(np.cumprod(numbers.counts or (), dtype=int)[1:].sum())
@@ -134,23 +127,8 @@ class Source:
             coverage_exponentials=int(asked),
             coverage_square_roots=int(asked),
             # The factor's triangle, its square, share and strength.
-            coverage_multiply_adds=asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5)
-            + bool(asked) * products,
-            **self._cost_beyond(slope, products + n_shares),
+            coverage_multiply_adds=asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5),
         )
-
-    def _cost_beyond(self, slope, n_products):
-        """Of a row out of range, from what slopes of terms and what strengths take."""
-        n_inputs, n_outputs = self.model.n_inputs, self.model.n_outputs
-        fades, linear = ("fades" in self.facts), ("linear" in self.facts)
-        rules = self.model.n_rules * n_outputs * (2 + 2 * self.n_slopes)
-        along = slope[2] + self.n_terms + n_products + rules + n_inputs + n_outputs
-        return {
-            "beyond_exponentials": fades + linear * slope[0],
-            "beyond_logarithms": linear * slope[1],
-            "beyond_multiply_adds": fades * (2 * n_inputs + 2) + linear * along,
-            "beyond_divisions": linear * (slope[3] + n_inputs),
-        }
 
     def text(self, include):
         """All of it; ``include`` is the name of the header."""

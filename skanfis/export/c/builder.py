@@ -96,15 +96,6 @@ def cost_lines(cost, besides=""):
             f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
             "multiply-adds more; where the strongest rule covers the row, a small part of them."
         )
-    parts = ("", "coverage_", "beyond_")
-    exponentials, logarithms, roots, multiply_adds, divisions = (
-        sum(getattr(cost, f"{part}{name}", 0) for part in parts)
-        for name in ("exponentials", "logarithms", "square_roots", "multiply_adds", "divisions")
-    )
-    yield (
-        f"Whatever the inputs: at most {besides}{exponentials} exponentials, {logarithms} "
-        f"logarithms, {roots} square roots, {multiply_adds} multiply-adds, {divisions} divisions."
-    )
     yield f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack."
 
 
